@@ -1,0 +1,1 @@
+"""Control laws, and the allocation of torque to coil currents."""

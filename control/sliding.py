@@ -1,0 +1,9 @@
+"""The sliding surface ``s = lambda e + edot`` (30); linear, although the paper calls it terminal."""
+
+from spheretwin.models.compiled import compiled
+
+
+@compiled
+def sliding_surface(error: float, error_rate: float, slope: float) -> float:
+    """Distance from the surface on one axis, rad/s: zero where the error decays at rate `slope`."""
+    return slope * error + error_rate

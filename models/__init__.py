@@ -1,0 +1,1 @@
+"""What the actuator is, and what it says: geometry, dynamics, magnetics, signals."""

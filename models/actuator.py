@@ -1,0 +1,259 @@
+"""The actuator as data: read once from the MJCF and the torque curve, then frozen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models import torque_curve
+from spheretwin.models.errors import InputError
+from spheretwin.models.torque_curve import TorqueCurve
+
+FOLDER = Path(__file__).resolve().parent
+MJCF_PATH = FOLDER / "actuator.xml"
+SCENE_PATH = FOLDER / "scene.xml"
+TORQUE_CURVE_PATH = FOLDER / "torque_curve.csv"
+
+HINGES = ("alpha", "beta", "gamma")
+
+# Axes of one group are exact opposites in the MJCF; rotations built from degrees keep 1e-15.
+COLLINEAR_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Magnet:
+    """One cylindrical pole magnet, magnetised along its axis."""
+
+    remanence_T: float
+    radius_m: float
+    length_m: float
+    distance_m: float
+    """From the joint centre to the magnet's centre."""
+
+
+@dataclass(frozen=True)
+class Coil:
+    """One air-core coil of rectangular winding section."""
+
+    inner_radius_m: float
+    outer_radius_m: float
+    length_m: float
+    distance_m: float
+    """From the joint centre to the coil's centre."""
+    turns: float
+
+
+@dataclass(frozen=True)
+class Group:
+    """Two collinear coils in series, and the amplifier that drives them."""
+
+    resistance_ohm: float
+    inductance_H: float
+    current_limit_A: float
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """Geometry, inertia, magnets and coils of the actuator.
+
+    Attributes
+    ----------
+    inertia : (3,) array, kg·m²
+        Principal inertias of the rotor about the joint centre.
+    pole_axes : (16, 3) array
+        Unit vectors, rotor frame, pointing outward.
+    pole_polarity : (16,) array
+        +1 where the north pole points outward, -1 where the south pole does.
+    coil_axes : (36, 3) array
+        Unit vectors, stator frame, pointing outward.
+    groups : (18, 2) int array
+        The two coils of each group, as indices into the coils.
+    hinge_range_rad : (3, 2) array, rad
+        Least and greatest angle of each hinge; infinite where the hinge turns freely.
+    shaft_tip_m, payload_mount_m : (3,) array, m
+        In the rotor frame.
+    magnet, coil, group
+        Data shared by all of a kind.
+    torque_curve
+        Torque of one coil on one pole per ampere.
+    """
+
+    inertia: NDArray[np.float64]
+    pole_axes: NDArray[np.float64]
+    pole_polarity: NDArray[np.float64]
+    coil_axes: NDArray[np.float64]
+    groups: NDArray[np.int64]
+    hinge_range_rad: NDArray[np.float64]
+    shaft_tip_m: NDArray[np.float64]
+    payload_mount_m: NDArray[np.float64]
+    magnet: Magnet
+    coil: Coil
+    group: Group
+    torque_curve: TorqueCurve
+
+    @property
+    def group_axes(self) -> NDArray[np.float64]:
+        """(18, 3) array: axis of the first coil of each group, stator frame."""
+        return self.coil_axes[self.groups[:, 0]]
+
+
+def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
+    """Read the actuator from its MJCF and its torque curve.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file; the shipped one unless given.
+    curve : Path
+        Torque curve as CSV; the shipped one unless given.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, or the model lacks a part of the actuator.
+    """
+    return from_model(read_spec(mjcf).compile(), torque_curve.read(curve))
+
+
+def read_spec(path: Path) -> mujoco.MjSpec:
+    """Read an MJCF file without what is only drawn: its geoms and meshes.
+
+    Raises
+    ------
+    InputError
+        The file is missing or broken; the engine's complaint on one line.
+    """
+    if not path.is_file():
+        raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        for drawn in [*spec.geoms, *spec.meshes]:
+            spec.delete(drawn)
+        spec.compile()
+    except ValueError as error:
+        raise InputError(f"model {path}: expected valid MJCF, {one_line(error)}") from None
+    return spec
+
+
+def compile_mjcf(path: Path) -> mujoco.MjModel:
+    return read_spec(path).compile()
+
+
+def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
+    """Read the actuator out of a compiled model."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    poles = _sites(model, "pole_")
+    coils = _sites(model, "coil_")
+    R_SR = data.body(_body(model, "rotor")).xmat.reshape(3, 3)
+    coil_axes = _frozen(_outward_axes(data, coils))
+    return Actuator(
+        inertia=_frozen(model.body_inertia[_body(model, "rotor")]),
+        pole_axes=_frozen(_outward_axes(data, poles) @ R_SR),
+        pole_polarity=_frozen(_polarity(model, poles)),
+        coil_axes=coil_axes,
+        groups=_frozen(_collinear_pairs(model, coils, coil_axes)),
+        hinge_range_rad=_frozen(_hinge_range(model)),
+        shaft_tip_m=_frozen(model.site_pos[_site(model, "shaft_tip")]),
+        payload_mount_m=_frozen(model.body_pos[_body(model, "payload")]),
+        magnet=Magnet(
+            remanence_T=_number(model, "magnet_remanence_T"),
+            radius_m=_shared(model.site_size[poles, 0], "radius of the poles"),
+            length_m=2 * _shared(model.site_size[poles, 1], "length of the poles"),
+            distance_m=_shared(np.linalg.norm(data.site_xpos[poles], axis=1), "distance of the poles"),
+        ),
+        coil=Coil(
+            inner_radius_m=_number(model, "coil_inner_radius_m"),
+            outer_radius_m=_shared(model.site_size[coils, 0], "radius of the coils"),
+            length_m=2 * _shared(model.site_size[coils, 1], "length of the coils"),
+            distance_m=_shared(np.linalg.norm(data.site_xpos[coils], axis=1), "distance of the coils"),
+            turns=_number(model, "coil_turns"),
+        ),
+        group=Group(
+            resistance_ohm=_number(model, "group_resistance_ohm"),
+            inductance_H=_number(model, "group_inductance_H"),
+            current_limit_A=_number(model, "group_current_limit_A"),
+        ),
+        torque_curve=curve,
+    )
+
+
+def one_line(error: Exception) -> str:
+    """An error's message without its line breaks."""
+    return " ".join(str(error).split())
+
+
+def _frozen(values: NDArray) -> NDArray:
+    copy = np.array(values)
+    copy.flags.writeable = False
+    return copy
+
+
+def _named(model: mujoco.MjModel, kind: mujoco.mjtObj, label: str, name: str) -> int:
+    index = mujoco.mj_name2id(model, kind, name)
+    if index < 0:
+        raise InputError(f'model: expected a {label} named "{name}", received none')
+    return index
+
+
+def _body(model: mujoco.MjModel, name: str) -> int:
+    return _named(model, mujoco.mjtObj.mjOBJ_BODY, "body", name)
+
+
+def _site(model: mujoco.MjModel, name: str) -> int:
+    return _named(model, mujoco.mjtObj.mjOBJ_SITE, "site", name)
+
+
+def _number(model: mujoco.MjModel, name: str) -> float:
+    _named(model, mujoco.mjtObj.mjOBJ_NUMERIC, "custom numeric", name)
+    value = float(model.numeric(name).data[0])
+    if not value > 0:
+        raise InputError(f"model: expected {name} above zero, received {value:g}")
+    return value
+
+
+def _sites(model: mujoco.MjModel, prefix: str) -> list[int]:
+    found = [i for i in range(model.nsite) if model.site(i).name.startswith(prefix)]
+    if not found:
+        raise InputError(f'model: expected sites named "{prefix}…", received none')
+    return found
+
+
+def _outward_axes(data: mujoco.MjData, sites: list[int]) -> NDArray[np.float64]:
+    return data.site_xmat[sites].reshape(-1, 3, 3)[:, :, 2]
+
+
+def _polarity(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
+    polarity = model.site_user[poles, 0] if model.nuser_site else np.zeros(len(poles))
+    for pole, value in zip(poles, polarity, strict=True):
+        if value not in (-1.0, 1.0):
+            name = model.site(pole).name
+            raise InputError(f"model: expected polarity 1 or -1 as user value of {name}, received {value:g}")
+    return polarity
+
+
+def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Coils whose axes are exact opposites form one group in series."""
+    opposite = axes @ axes.T < -1 + COLLINEAR_TOLERANCE
+    for index, count in enumerate(opposite.sum(axis=1)):
+        if count != 1:
+            name = model.site(coils[index]).name
+            raise InputError(f"model: expected one coil opposite {name}, received {count}")
+    partner = np.argmax(opposite, axis=1)
+    return np.array([[i, j] for i, j in enumerate(partner) if i < j])
+
+
+def _hinge_range(model: mujoco.MjModel) -> NDArray[np.float64]:
+    joints = [_named(model, mujoco.mjtObj.mjOBJ_JOINT, "joint", name) for name in HINGES]
+    limited = model.jnt_limited[joints].astype(bool)[:, None]
+    return np.where(limited, model.jnt_range[joints], [-np.inf, np.inf])
+
+
+def _shared(values: NDArray[np.float64], what: str) -> float:
+    if np.ptp(values) > COLLINEAR_TOLERANCE:
+        raise InputError(f"model: expected one {what}, received {values.min():g} to {values.max():g} m")
+    return float(values[0])

@@ -1,0 +1,13 @@
+"""The errors this package raises: one root, so that a caller can catch them all."""
+
+
+class SpheretwinError(Exception):
+    """Root of every error raised on purpose; its message is one line."""
+
+
+class InputError(SpheretwinError):
+    """What the user gave (a scenario, a flag, a file, a law) cannot be used as it is."""
+
+
+class EngineError(SpheretwinError):
+    """The physics engine reported a fault that no input explains."""

@@ -1,0 +1,115 @@
+"""Orientation and angular rates of the rotor on its three serial revolutes.
+
+The pose is ``q = [alpha, beta, gamma]``: intrinsic rotations about x, y, z. Frame S is the stator,
+frame R the rotor; ``R_SR`` maps rotor-frame vectors into the stator frame.
+"""
+
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.compiled import compiled
+
+
+@compiled
+def rotation(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrix ``R_SR = Rx(alpha) Ry(beta) Rz(gamma)``.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose.
+
+    Returns
+    -------
+    (3, 3) array
+        Maps rotor-frame vectors into the stator frame.
+
+    Notes
+    -----
+    Paper section 2.1; its entry (3, 1) is misprinted and corrected here.
+    """
+    ca, sa = cos(q[0]), sin(q[0])
+    cb, sb = cos(q[1]), sin(q[1])
+    cg, sg = cos(q[2]), sin(q[2])
+    R_SR = np.empty((3, 3))
+    R_SR[0, 0], R_SR[0, 1], R_SR[0, 2] = cb * cg, -cb * sg, sb
+    R_SR[1, 0], R_SR[1, 1] = ca * sg + sa * sb * cg, ca * cg - sa * sb * sg
+    R_SR[1, 2] = -sa * cb
+    R_SR[2, 0], R_SR[2, 1] = sa * sg - ca * sb * cg, sa * cg + ca * sb * sg
+    R_SR[2, 2] = ca * cb
+    return R_SR
+
+
+@compiled
+def rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rate Jacobian E: stator-frame angular velocity ``w_SR_S = E(q) qdot``.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose.
+
+    Returns
+    -------
+    (3, 3) array
+        E; its columns are the three hinge axes in the stator frame. Singular at beta = +-90 degrees.
+    """
+    ca, sa = cos(q[0]), sin(q[0])
+    cb, sb = cos(q[1]), sin(q[1])
+    E = np.zeros((3, 3))
+    E[0, 0], E[0, 2] = 1.0, sb
+    E[1, 1], E[1, 2] = ca, -sa * cb
+    E[2, 1], E[2, 2] = sa, ca * cb
+    return E
+
+
+@compiled
+def rotor_rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rate Jacobian B: rotor-frame angular velocity ``w_SR_R = B(q) qdot``.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose.
+
+    Returns
+    -------
+    (3, 3) array
+        B, equal to ``R_SR.T @ E``.
+    """
+    cb, sb = cos(q[1]), sin(q[1])
+    cg, sg = cos(q[2]), sin(q[2])
+    B = np.zeros((3, 3))
+    B[0, 0], B[0, 1] = cb * cg, sg
+    B[1, 0], B[1, 1] = -cb * sg, cg
+    B[2, 0], B[2, 2] = sb, 1.0
+    return B
+
+
+@compiled
+def cartesian_torque(
+    q: NDArray[np.float64], torque_q: NDArray[np.float64], torque_S: NDArray[np.float64]
+) -> None:
+    """Cartesian torque that has a given effect on the hinges: ``torque_S = E^-T torque_q``.
+
+    The paper equates the two; they differ wherever the rotor is tilted, because virtual power gives
+    ``torque_q = E^T torque_S``.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose, away from beta = +-90 degrees.
+    torque_q : (3,) array, N·m
+        Generalised torque on (alpha, beta, gamma).
+    torque_S : (3,) array, N·m
+        Result, in the stator frame.
+    """
+    ca, sa = cos(q[0]), sin(q[0])
+    cb, sb = cos(q[1]), sin(q[1])
+    # Along the gamma hinge's direction within the plane normal to the alpha hinge.
+    in_plane = (torque_q[2] - sb * torque_q[0]) / cb
+    torque_S[0] = torque_q[0]
+    torque_S[1] = ca * torque_q[1] - sa * in_plane
+    torque_S[2] = sa * torque_q[1] + ca * in_plane

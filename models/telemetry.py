@@ -1,0 +1,169 @@
+"""What a run says: named signals with units, and the table of a run, one row a control tick."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import accumulate
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.errors import InputError
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One column of telemetry."""
+
+    name: str
+    unit: str
+    size: int
+    meaning: str
+    labels: tuple[str, ...] = ()
+    """A short name for each entry of a vector."""
+
+
+ANGLES = ("α", "β", "γ")
+AXES = ("x", "y", "z")
+GROUPS = tuple(f"group {j}" for j in range(18))
+
+SIGNALS = (
+    Signal("t_s", "s", 1, "time of the control tick"),
+    Signal("q_rad", "rad", 3, "hinge angles", ANGLES),
+    Signal("qdot_rad_s", "rad/s", 3, "hinge rates", ANGLES),
+    Signal("q_ref_rad", "rad", 3, "desired hinge angles", ANGLES),
+    Signal("qdot_ref_rad_s", "rad/s", 3, "desired hinge rates", ANGLES),
+    Signal("error_rad", "rad", 3, "tracking error q - q_ref (28)", ANGLES),
+    Signal("torque_command_Nm", "N·m", 3, "generalised torque asked for by the law", ANGLES),
+    Signal("torque_Nm", "N·m", 3, "torque of the coils on the rotor, stator frame", AXES),
+    Signal("disturbance_Nm", "N·m", 3, "generalised load and random torque, opposing motion (55)", ANGLES),
+    Signal("current_command_A", "A", 18, "group currents asked of the amplifiers", GROUPS),
+    Signal("current_A", "A", 18, "group currents, mean over the physics step that begins now", GROUPS),
+    Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
+    Signal("sliding_s", "rad/s", 3, "sliding variable s = λe + ė (30)", ANGLES),
+)
+
+
+def offsets(signals: tuple[Signal, ...]) -> dict[str, int]:
+    """First column of each signal in a flat row."""
+    ends = accumulate((signal.size for signal in signals), initial=0)
+    return dict(zip((signal.name for signal in signals), ends, strict=False))
+
+
+def width(signals: tuple[Signal, ...]) -> int:
+    """Numbers in one flat row."""
+    return sum(signal.size for signal in signals)
+
+
+class Table:
+    """A run's telemetry: ``table["q_rad"]`` is an (n, 3) array, ``table["t_s"]`` an (n,) array.
+
+    Parameters
+    ----------
+    signals : tuple of Signal
+        The columns, in order.
+    values : (n, width) array
+        One flat row a tick; not copied.
+    """
+
+    def __init__(self, signals: tuple[Signal, ...], values: NDArray[np.float64]) -> None:
+        if values.ndim != 2 or values.shape[1] != width(signals):
+            raise InputError(
+                f"telemetry: expected rows of {width(signals)} numbers, received shape {values.shape}"
+            )
+        self.signals = signals
+        self.values = values
+        self._offsets = offsets(signals)
+        self._by_name = {signal.name: signal for signal in signals}
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        if name not in self._by_name:
+            raise InputError(f"telemetry: expected one of {', '.join(self._by_name)}, received {name}")
+        first = self._offsets[name]
+        size = self._by_name[name].size
+        return self.values[:, first] if size == 1 else self.values[:, first : first + size]
+
+    def rows(self, first: int, last: int) -> Table:
+        """Table of the rows from `first` up to, not including, `last` (a view)."""
+        return Table(self.signals, self.values[first:last])
+
+    def write_parquet(self, path: Path, metadata: Mapping[str, str]) -> None:
+        """Write all columns, their units, and `metadata`, whole or not at all.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written there.
+        """
+        import pyarrow.parquet  # slow to import, and most runs write no file
+
+        try:
+            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+            os.close(handle)
+        except OSError as error:
+            raise InputError(f"telemetry: expected a writable path, {error}") from None
+        try:
+            pyarrow.parquet.write_table(self._arrow(metadata), temporary)
+            os.chmod(temporary, 0o666 & ~_umask())  # mkstemp's files are private
+            os.replace(temporary, path)
+        except BaseException:
+            os.unlink(temporary)
+            raise
+
+    def _arrow(self, metadata: Mapping[str, str]):  # type: ignore[no-untyped-def]  # pyarrow has no types
+        import pyarrow as pa
+
+        fields, columns = [], []
+        for signal in self.signals:
+            flat = pa.array(np.ascontiguousarray(self[signal.name]).ravel())
+            column = flat if signal.size == 1 else pa.FixedSizeListArray.from_arrays(flat, signal.size)
+            described = {"unit": signal.unit, "meaning": signal.meaning, "labels": ",".join(signal.labels)}
+            fields.append(pa.field(signal.name, column.type, nullable=False, metadata=described))
+            columns.append(column)
+        return pa.table(columns, schema=pa.schema(fields, metadata=dict(metadata)))
+
+
+def read_parquet(path: Path) -> tuple[Table, dict[str, str]]:
+    """Read a table back, with the metadata of its file.
+
+    Raises
+    ------
+    InputError
+        The file is missing, or is no telemetry of this package.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    try:
+        arrow = pyarrow.parquet.read_table(path)
+        signals = tuple(_signal(field) for field in arrow.schema)
+    except (OSError, pa.ArrowException, KeyError) as error:
+        raise InputError(f"telemetry {path}: expected a Parquet file of a run, {error}") from None
+    parts = [_flat(arrow[signal.name], signal.size) for signal in signals]
+    metadata = {key.decode(): value.decode() for key, value in (arrow.schema.metadata or {}).items()}
+    return Table(signals, np.concatenate(parts, axis=1)), metadata
+
+
+def _signal(field) -> Signal:  # type: ignore[no-untyped-def]
+    described = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+    size = getattr(field.type, "list_size", 1)
+    labels = tuple(filter(None, described["labels"].split(",")))
+    return Signal(field.name, described["unit"], size, described["meaning"], labels)
+
+
+def _flat(column, size: int) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    chunk = column.combine_chunks()
+    return np.asarray(chunk.flatten() if size > 1 else chunk, dtype=np.float64).reshape(-1, size)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

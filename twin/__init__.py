@@ -1,0 +1,1 @@
+"""The closed loop, and everything on the far side of the controller."""

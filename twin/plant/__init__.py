@@ -1,0 +1,1 @@
+"""The plant: engine, drive, disturbance."""

@@ -1,0 +1,53 @@
+"""The current drive: each group follows its command through the lag of its inductance."""
+
+from math import exp
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.compiled import compiled
+
+
+class Drive(NamedTuple):
+    """First-order lag, solved exactly over one physics step with the command held."""
+
+    decay: float
+    """Share of the distance to the command that is left after a step."""
+    mean_share: float
+    """Share of that distance that is left on average over the step."""
+    current_limit_A: float
+
+
+def drive(time_constant_s: float, step_s: float, current_limit_A: float) -> Drive:
+    """Drive for a time constant L/R (s; 0 for ideal amplifiers), a physics step (s) and a limit (A)."""
+    if time_constant_s == 0:
+        return Drive(0.0, 0.0, current_limit_A)
+    decay = exp(-step_s / time_constant_s)
+    return Drive(decay, (1 - decay) * time_constant_s / step_s, current_limit_A)
+
+
+@compiled
+def advance(
+    drive: Drive,
+    command: NDArray[np.float64],
+    current: NDArray[np.float64],
+    mean: NDArray[np.float64],
+) -> None:
+    """Advance the currents by one physics step.
+
+    Parameters
+    ----------
+    drive : Drive
+        Lag of the groups.
+    command : (18,) array, A
+        Held over the step.
+    current : (18,) array, A
+        At the start of the step; on return, at its end.
+    mean : (18,) array, A
+        Mean over the step, which is what acts on the rotor.
+    """
+    for j in range(command.shape[0]):
+        distance = current[j] - command[j]
+        mean[j] = command[j] + drive.mean_share * distance
+        current[j] = command[j] + drive.decay * distance
