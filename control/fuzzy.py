@@ -20,48 +20,24 @@ CONSEQUENTS = 3 * RULES
 
 
 @compiled
-def memberships(x: float, degree: NDArray[np.float64]) -> None:
-    """Degrees of membership of `x` in the five sets, normalised to sum 1, written into `degree` (5,).
+def memberships(x: float) -> tuple[float, float, float, float, float]:
+    """Degrees of membership of `x` in the five sets, normalised to sum 1.
 
     The nearest set's exponent is taken off before the exponential (which divides numerator and
     denominator alike), so at least one degree is 1 before normalising: nothing underflows at any x.
     """
-    exponent = -SHAPE / (4.0 * WIDTH**2)
-    nearest = exponent * (x - CENTRES[0]) ** 2
-    for k in range(1, SETS):
-        nearest = max(nearest, exponent * (x - CENTRES[k]) ** 2)
-    total = 0.0
-    for k in range(SETS):
-        degree[k] = exp(exponent * (x - CENTRES[k]) ** 2 - nearest)
-        total += degree[k]
-    for k in range(SETS):
-        degree[k] /= total
+    a, b, c, d, e = exponent(x, 0), exponent(x, 1), exponent(x, 2), exponent(x, 3), exponent(x, 4)
+    nearest = max(a, b, c, d, e)
+    a, b, c = exp(a - nearest), exp(b - nearest), exp(c - nearest)
+    d, e = exp(d - nearest), exp(e - nearest)
+    share = 1.0 / (a + b + c + d + e)
+    return a * share, b * share, c * share, d * share, e * share
 
 
 @compiled
-def basis(rate: float, angle: float) -> NDArray[np.float64]:
-    """Normalised firing strengths psi of the 25 rules (34).
-
-    Because the product of two normalised sets of degrees sums to 1, the inputs are normalised apart.
-
-    Parameters
-    ----------
-    rate : float, rad/s
-    angle : float, rad
-
-    Returns
-    -------
-    (25,) array
-        Non-negative, with sum 1; rule ``5 i + j`` joins set i of the rate and set j of the angle.
-    """
-    of_rate, of_angle = np.empty(SETS), np.empty(SETS)
-    memberships(rate, of_rate)
-    memberships(angle, of_angle)
-    psi = np.empty(RULES)
-    for i in range(SETS):
-        for j in range(SETS):
-            psi[SETS * i + j] = of_rate[i] * of_angle[j]
-    return psi
+def exponent(x: float, k: int) -> float:
+    """Logarithm of the membership of `x` in set `k` (57)."""
+    return -SHAPE * ((x - CENTRES[k]) / (2.0 * WIDTH)) ** 2
 
 
 @compiled
@@ -82,13 +58,35 @@ def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: 
     float
         The approximator's output before the adaptation.
     """
-    psi = basis(rate, angle)
+    of_rate, of_angle = memberships(rate), memberships(angle)
     output = 0.0
-    for k in range(RULES):
-        output += psi[k] * (
-            consequents[k] + consequents[RULES + k] * rate + consequents[2 * RULES + k] * angle
-        )
-        consequents[k] += drive * psi[k]
-        consequents[RULES + k] += drive * psi[k] * rate
-        consequents[2 * RULES + k] += drive * psi[k] * angle
+    for i in range(SETS):
+        for j in range(SETS):
+            k = SETS * i + j
+            psi = of_rate[i] * of_angle[j]
+            output += psi * (
+                consequents[k] + consequents[RULES + k] * rate + consequents[2 * RULES + k] * angle
+            )
+            step = drive * psi
+            consequents[k] += step
+            consequents[RULES + k] += step * rate
+            consequents[2 * RULES + k] += step * angle
     return output
+
+
+def basis(rate: float, angle: float) -> NDArray[np.float64]:
+    """Normalised firing strengths psi of the 25 rules (34).
+
+    The product of two sets of degrees that each sum to 1 sums to 1, so the inputs are normalised apart.
+
+    Parameters
+    ----------
+    rate : float, rad/s
+    angle : float, rad
+
+    Returns
+    -------
+    (25,) array
+        Non-negative, with sum 1; rule ``5 i + j`` joins set i of the rate and set j of the angle.
+    """
+    return np.outer(memberships(rate), memberships(angle)).ravel()

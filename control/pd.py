@@ -1,7 +1,6 @@
 """Proportional-derivative law, the paper's baseline: ``v = -lambda e - K edot``."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.gains import INERTIA, REACHING_GAIN, SURFACE_SLOPE, Gains
 from spheretwin.control.law import Law

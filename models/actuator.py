@@ -160,19 +160,8 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
         hinge_range_rad=_frozen(_hinge_range(model)),
         shaft_tip_m=_frozen(model.site_pos[_site(model, "shaft_tip")]),
         payload_mount_m=_frozen(model.body_pos[_body(model, "payload")]),
-        magnet=Magnet(
-            remanence_T=_number(model, "magnet_remanence_T"),
-            radius_m=_shared(model.site_size[poles, 0], "radius of the poles"),
-            length_m=2 * _shared(model.site_size[poles, 1], "length of the poles"),
-            distance_m=_shared(np.linalg.norm(data.site_xpos[poles], axis=1), "distance of the poles"),
-        ),
-        coil=Coil(
-            inner_radius_m=_number(model, "coil_inner_radius_m"),
-            outer_radius_m=_shared(model.site_size[coils, 0], "radius of the coils"),
-            length_m=2 * _shared(model.site_size[coils, 1], "length of the coils"),
-            distance_m=_shared(np.linalg.norm(data.site_xpos[coils], axis=1), "distance of the coils"),
-            turns=_number(model, "coil_turns"),
-        ),
+        magnet=_magnet(model, poles),
+        coil=_coil(model, coils),
         group=Group(
             resistance_ohm=_number(model, "group_resistance_ohm"),
             inductance_H=_number(model, "group_inductance_H"),
@@ -180,6 +169,18 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
         ),
         torque_curve=curve,
     )
+
+
+def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
+    """Read what the torque curve is computed from, before there is a curve.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or the model lacks poles or coils.
+    """
+    model = read_spec(mjcf).compile()
+    return _magnet(model, _sites(model, "pole_")), _coil(model, _sites(model, "coil_"))
 
 
 def one_line(error: Exception) -> str:
@@ -245,6 +246,25 @@ def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.f
             raise InputError(f"model: expected one coil opposite {name}, received {count}")
     partner = np.argmax(opposite, axis=1)
     return np.array([[i, j] for i, j in enumerate(partner) if i < j])
+
+
+def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
+    return Magnet(
+        remanence_T=_number(model, "magnet_remanence_T"),
+        radius_m=_shared(model.site_size[poles, 0], "radius of the poles"),
+        length_m=2 * _shared(model.site_size[poles, 1], "length of the poles"),
+        distance_m=_shared(np.linalg.norm(model.site_pos[poles], axis=1), "distance of the poles"),
+    )
+
+
+def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
+    return Coil(
+        inner_radius_m=_number(model, "coil_inner_radius_m"),
+        outer_radius_m=_shared(model.site_size[coils, 0], "radius of the coils"),
+        length_m=2 * _shared(model.site_size[coils, 1], "length of the coils"),
+        distance_m=_shared(np.linalg.norm(model.site_pos[coils], axis=1), "distance of the coils"),
+        turns=_number(model, "coil_turns"),
+    )
 
 
 def _hinge_range(model: mujoco.MjModel) -> NDArray[np.float64]:

@@ -5,15 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.compiled import compiled
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.torque_curve import TorqueCurve
 
-# Intervals of the look-up over |cos phi| from 0 to 1; with 1024 the worst error is about 1e-7 of the
-# curve's peak, and the part in use (below 30 degrees) fills a seventh of a first-level cache.
-INTERVALS = 1024
+# Intervals of the look-up over cos phi from -1 to 1.
+INTERVALS = 2048
 
 
 class TorqueModel(NamedTuple):
@@ -28,7 +26,7 @@ class TorqueModel(NamedTuple):
     line_axes: NDArray[np.float64]  # (n_lines, 3), rotor frame
     line_weights: NDArray[np.float64]  # (n_lines,)
     group_axes: NDArray[np.float64]  # (3, 18), stator frame
-    table: NDArray[np.float64]  # (INTERVALS, 4), cubic coefficients of h, N·m/A
+    table: NDArray[np.float64]  # (INTERVALS + 1, 4), cubic coefficients of h, N·m/A
 
 
 def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
@@ -64,19 +62,22 @@ def torque_model(actuator: Actuator) -> TorqueModel:
 
 
 def lookup_table(curve: TorqueCurve, intervals: int = INTERVALS) -> NDArray[np.float64]:
-    """Cubics for ``h(c) = g(c) - g(-c)`` on equal intervals of c from 0 to 1.
+    """Cubics for ``h(c) = g(c) - g(-c)`` on equal intervals of c from -1 to 1.
 
-    Each cubic meets h at four Chebyshev points of its interval.
+    Each cubic meets h at four Chebyshev points of its interval. The last row repeats the end of the one
+    before it: the cosine of a pole straight in front of a coil may round past 1.
 
     Returns
     -------
-    (intervals, 4) array, N·m/A
+    (intervals + 1, 4) array, N·m/A
         Coefficients of 1, t, t², t³ with t from 0 to 1 within an interval.
     """
     t = 0.5 - 0.5 * np.cos((2 * np.arange(4) + 1) * np.pi / 8)  # (4,)
-    c = (np.arange(intervals)[:, None] + t) / intervals  # (intervals, 4)
+    c = 2 * (np.arange(intervals)[:, None] + t) / intervals - 1  # (intervals, 4)
     h = curve.over_sine(c) - curve.over_sine(-c)
-    return np.ascontiguousarray(np.linalg.solve(np.vander(t, increasing=True), h.T).T)
+    table = np.linalg.solve(np.vander(t, increasing=True), h.T).T
+    beyond = [[table[-1].sum(), 0.0, 0.0, 0.0]]
+    return np.ascontiguousarray(np.concatenate([table, beyond]))
 
 
 @compiled
@@ -90,7 +91,7 @@ def fill_torque_matrix(q: NDArray[np.float64], model: TorqueModel, G: NDArray[np
     """
     R_SR = rotation(q)
     axes, table = model.group_axes, model.table
-    intervals, groups = table.shape[0], axes.shape[1]
+    half, groups = 0.5 * (table.shape[0] - 1), axes.shape[1]
     G[:] = 0.0
     for line in range(model.line_axes.shape[0]):
         r, weight = model.line_axes[line], model.line_weights[line]
@@ -99,14 +100,13 @@ def fill_torque_matrix(q: NDArray[np.float64], model: TorqueModel, G: NDArray[np
         z = R_SR[2, 0] * r[0] + R_SR[2, 1] * r[1] + R_SR[2, 2] * r[2]
         for j in range(groups):
             cosine = x * axes[0, j] + y * axes[1, j] + z * axes[2, j]
-            place = abs(cosine) * intervals
-            i = min(np.int32(place), np.int32(intervals - 1))
+            place = (cosine + 1.0) * half
+            i = np.int32(place)
             t = place - i
             h = table[i, 0] + t * (table[i, 1] + t * (table[i, 2] + t * table[i, 3]))
-            pull = weight * (h if cosine >= 0 else -h)
-            G[0, j] += pull * x
-            G[1, j] += pull * y
-            G[2, j] += pull * z
+            G[0, j] += weight * h * x
+            G[1, j] += weight * h * y
+            G[2, j] += weight * h * z
     for j in range(groups):
         x, y, z = G[0, j], G[1, j], G[2, j]
         G[0, j] = y * axes[2, j] - z * axes[1, j]

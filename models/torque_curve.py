@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
 from spheretwin.models.errors import InputError
 
 if TYPE_CHECKING:

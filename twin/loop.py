@@ -10,10 +10,10 @@ from spheretwin.control.allocation import allocate
 from spheretwin.control.sliding import sliding_surface
 from spheretwin.models.compiled import compiled
 from spheretwin.models.kinematics import cartesian_torque
-from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix
+from spheretwin.models.magnetics import fill_torque_matrix
 from spheretwin.models.telemetry import SIGNALS, offsets, width
-from spheretwin.twin.plant.drive import Drive, advance
-from spheretwin.twin.plant.engine import Engine, step
+from spheretwin.twin.plant.drive import advance
+from spheretwin.twin.plant.engine import step
 
 COMPLETED, LEFT_WORKSPACE, DIVERGED = 0, 1, 2
 

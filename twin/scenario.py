@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from spheretwin.control.gains import Gains, NonNegative, Positive
-from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
 from spheretwin.models.errors import InputError
 from spheretwin.twin.plant.disturbance import Disturbance
 from spheretwin.twin.trajectory import Trajectory, Triple
@@ -51,8 +50,8 @@ class Plant(_Section):
     initial_rad: Triple | None = Field(
         None, description="pose at rest at the start, rad; the trajectory's first unless given"
     )
-    mjcf: str = Field(str(MJCF_PATH), description="model file")
-    torque_curve: str = Field(str(TORQUE_CURVE_PATH), description="torque curve f_t as CSV")
+    mjcf: str | None = Field(None, description="model file; the shipped one unless given")
+    torque_curve: str | None = Field(None, description="torque curve as CSV; the shipped one unless given")
 
 
 class DriveSection(_Section):
@@ -139,6 +138,8 @@ def explain(error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         valid = ", ".join(_names_at(path[:-1]))
         return f"expected one of {valid} in {_dotted(path[:-1]) or 'the scenario'}, received {path[-1]}"
+    if first["type"] == "missing":
+        return f"{_dotted(path)}: expected a value, received none"
     expected = first["msg"].removeprefix("Input should be ")
     return f"{_dotted(path)}: expected {expected}, received {first['input']!r}"
 

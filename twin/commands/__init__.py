@@ -1,0 +1,1 @@
+"""The verbs of the `spheretwin` command, one a file."""
