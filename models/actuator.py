@@ -139,10 +139,6 @@ def read_spec(path: Path) -> mujoco.MjSpec:
     return spec
 
 
-def compile_mjcf(path: Path) -> mujoco.MjModel:
-    return read_spec(path).compile()
-
-
 def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
     """Read the actuator out of a compiled model."""
     data = mujoco.MjData(model)

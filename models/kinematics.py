@@ -8,6 +8,7 @@ from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
+
 from spheretwin.models.compiled import compiled
 
 

@@ -6,6 +6,7 @@ the joint centre, so that ``G = 0``. ``inertia`` holds the principal inertias (J
 
 import numpy as np
 from numpy.typing import NDArray
+
 from spheretwin.models.compiled import compiled
 
 

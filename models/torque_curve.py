@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
 from spheretwin.models.errors import InputError
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     for phi, torque in zip(curve.phi_rad, curve.torque_Nm_per_A, strict=True):
-        writer.writerow([f"{np.degrees(phi):.6g}", f"{torque:.12e}"])
+        writer.writerow([f"{np.degrees(phi):.6g}", f"{torque:.12f}"])
     return text.getvalue()
 
 
@@ -119,7 +120,8 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
     if np.any(np.diff(angles) <= 0):
         row = int(np.argmax(np.diff(angles) <= 0))
         raise InputError(
-            f"torque curve {path}: expected rising angles, received {angles[row]:g} then {angles[row + 1]:g} degrees"
+            f"torque curve {path}: expected rising angles,"
+            f" received {angles[row]:g} then {angles[row + 1]:g} degrees"
         )
     if angles[0] != 0.0 or angles[-1] != 180.0:
         raise InputError(

@@ -196,7 +196,7 @@ def _names_at(path: list[str]) -> list[str]:
 
 
 def _shapes() -> tuple[type[BaseModel], ...]:
-    union, *_ = Trajectory.__args__  # type: ignore[attr-defined]
+    union, *_ = Trajectory.__args__
     return union.__args__
 
 

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from spheretwin.control import laws
 from spheretwin.control.law import SIGNATURE, Law
 from spheretwin.models import actuator as actuators
-from spheretwin.models.actuator import Actuator
+from spheretwin.models.actuator import Group
 from spheretwin.models.compiled import compiled_callback
 from spheretwin.models.magnetics import torque_model
 from spheretwin.models.telemetry import SIGNALS, Signal, Table, width
 from spheretwin.twin import loop as loops
 from spheretwin.twin.loop import Inputs, Memory, Settings
-from spheretwin.twin.plant.drive import drive
+from spheretwin.twin.plant.drive import Drive, drive
 from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.scenario import Scenario
+from spheretwin.twin.scenario import DriveSection, Scenario
 
 STATUS = {
     loops.COMPLETED: "completed",
@@ -85,9 +85,9 @@ class Simulation:
         plant, period = scenario.plant, scenario.controller.period_s
         mjcf = Path(plant.mjcf or actuators.MJCF_PATH)
         self.actuator = actuators.load(mjcf, Path(plant.torque_curve or actuators.TORQUE_CURVE_PATH))
-        self.scenario = _resolved(scenario, self.actuator)
+        self.scenario, self._drive = _resolved(scenario, self.actuator.group)
         self.law = law or laws.build(scenario.controller, self.actuator, period)
-        t = period * np.arange(scenario.ticks)
+        t = period * np.arange(scenario.ticks, dtype=np.float64)
         self._inputs = Inputs(
             t,
             np.ascontiguousarray(scenario.trajectory.sample(t)),
@@ -148,8 +148,6 @@ class Simulation:
         initial = self.scenario.plant.initial_rad
         pose = self._inputs.reference[0, 0] if initial is None else np.array(initial)
         engine = self._rotor.start(pose, np.zeros(3))
-        settings = self.scenario.drive
-        lag = drive(settings.time_constant_s, self.scenario.plant.step_s, settings.current_limit_A)
         memory = Memory(np.zeros(len(self.actuator.groups)), self.law.state.copy())
         log = np.zeros((self.scenario.ticks, width(self.signals)))
         run_loop, step = _matching(self.law)
@@ -166,7 +164,7 @@ class Simulation:
                 self._settings,
                 engine,
                 magnetics,
-                lag,
+                self._drive,
                 log,
             )
 
@@ -195,17 +193,17 @@ def _matching(law: Law) -> tuple[Callable[..., tuple[int, int]], Callable[..., A
     return loops.loop.py_func, law.step
 
 
-def _resolved(scenario: Scenario, actuator: Actuator) -> Scenario:
-    """Scenario whose open values are filled in from the model."""
-    group, given = actuator.group, scenario.drive
-    time_constant, limit = given.time_constant_s, given.current_limit_A
-    filled = {
-        "time_constant_s": group.inductance_H / group.resistance_ohm
-        if time_constant is None
-        else time_constant,
-        "current_limit_A": group.current_limit_A if limit is None else limit,
-    }
-    return scenario.model_copy(update={"drive": given.model_copy(update=filled)})
+def _resolved(scenario: Scenario, group: Group) -> tuple[Scenario, Drive]:
+    """Scenario whose open values are filled in from the model, and the drive they make."""
+    given = scenario.drive
+    time_constant_s, limit_A = given.time_constant_s, given.current_limit_A
+    if time_constant_s is None:
+        time_constant_s = group.inductance_H / group.resistance_ohm
+    if limit_A is None:
+        limit_A = group.current_limit_A
+    filled = DriveSection(time_constant_s=time_constant_s, current_limit_A=limit_A)
+    lag = drive(time_constant_s, scenario.plant.step_s, limit_A)
+    return scenario.model_copy(update={"drive": filled}), lag
 
 
 def _sleep_until(moment: float) -> None:

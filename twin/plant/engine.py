@@ -64,7 +64,9 @@ class Rotor:
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         rotor = self.model.body("rotor").id
         self.model.body_inertia[rotor] *= 1 + modelling_error
-        self.model.body_mass[self.model.body("payload").id] = payload_kg
+        payload = self.model.body("payload").id
+        self.model.body_mass[payload] = payload_kg
+        self.model.body_ipos[payload] = 0.0  # the compiler leaves it elsewhere for a body without mass
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
         self._rotor = rotor

@@ -1,0 +1,93 @@
+"""The compiled laws against slow copies of the paper's equations, written for this test."""
+
+import numpy as np
+import pytest
+
+from spheretwin.control import laws
+from spheretwin.control.gains import Gains
+from spheretwin.control.law import SIGNATURE
+from spheretwin.models.compiled import compiled_callback
+
+PERIOD = 1e-3
+CENTRES = np.array([-3, -1.5, 0, 1.5, 3])
+
+
+class SlowLaw:
+    """Equations (28)-(43), one axis at a time, as matrices and sums."""
+
+    def __init__(self, gains, inertia):
+        self.gains = gains
+        self.factor = inertia if gains.level == "acceleration" else np.ones(3)
+        self.theta = np.zeros((3, 75))
+        self.xi, self.zeta = np.zeros(3), np.zeros(3)
+
+    def torque(self, reference, measurement):
+        g = self.gains
+        e, e_rate = measurement[0] - reference[0], measurement[1] - reference[1]
+        if g.law == "pd":
+            return self.factor * (-g.surface_slope * e - g.reaching_gain * e_rate)
+        s = g.surface_slope * e + e_rate
+        bound = 1 + np.abs(s) + s**2
+        v = np.empty(3)
+        for i in range(3):
+            rate, angle = measurement[1, i], measurement[0, i]
+            gaussians = np.exp(-0.5 * ((np.array([rate, angle])[:, None] - CENTRES) / 2) ** 2)
+            products = np.outer(gaussians[0], gaussians[1]).ravel()
+            psi = products / products.sum()
+            regressor = np.concatenate([psi, psi * rate, psi * angle])
+            v[i] = self.theta[i] @ regressor - g.reaching_gain * s[i]
+            self.theta[i] -= g.fuzzy_rate * s[i] * regressor * PERIOD
+        if g.law == "afsm":
+            v -= np.sign(s) * (self.xi + self.zeta * bound)
+            self.xi += g.switching_rate * np.abs(s) * PERIOD
+            self.zeta += g.bound_rate * np.abs(s) * bound * PERIOD
+        return self.factor * v
+
+
+@pytest.mark.parametrize("level", ["acceleration", "torque"])
+@pytest.mark.parametrize("name", ["pd", "adaptive_fuzzy", "afsm"])
+def test_law_follows_the_paper(actuator, name, level):
+    gains = Gains(law=name, level=level)
+    law, slow = laws.build(gains, actuator, PERIOD), SlowLaw(gains, actuator.inertia)
+    compiled = compiled_callback(SIGNATURE, law.step)
+    generator = np.random.default_rng(0)
+    state, torque = law.state.copy(), np.empty(3)
+    for tick in range(500):
+        reference = generator.normal(size=(3, 3))
+        measurement = reference[:2] + 0.3 * generator.normal(size=(2, 3))
+        compiled(PERIOD * tick, reference, measurement, law.parameters, state, torque)
+        # 500 Euler steps of up to 75 sums: accumulated rounding.
+        np.testing.assert_allclose(torque, slow.torque(reference, measurement), rtol=1e-9, atol=1e-12)
+
+
+def test_estimates_are_logged_as_they_are(actuator):
+    law = laws.build(Gains(law="afsm"), actuator, PERIOD)
+    state, torque = law.state.copy(), np.empty(3)
+    measurement = np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
+    law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, state, torque)
+    s = 50 * measurement[0]
+    names = [signal.name for signal in law.signals]
+    assert names == ["fuzzy_torque_Nm", "switching_torque_Nm", "switching_gain", "bound_gain"]
+    np.testing.assert_allclose(state[6:9], 10 * np.abs(s) * PERIOD)
+    np.testing.assert_allclose(state[9:12], 10 * np.abs(s) * (1 + np.abs(s) + s**2) * PERIOD)
+
+
+def test_without_its_rates_afsm_is_the_adaptive_fuzzy_law(actuator):
+    still = laws.build(Gains(law="afsm", switching_rate=0.0, bound_rate=0.0), actuator, PERIOD)
+    fuzzy = laws.build(Gains(law="adaptive_fuzzy"), actuator, PERIOD)
+    states = [still.state.copy(), fuzzy.state.copy()]
+    generator = np.random.default_rng(1)
+    for _ in range(20):
+        measurement, torques = generator.normal(size=(2, 3)), np.empty((2, 3))
+        for law, state, torque in zip((still, fuzzy), states, torques, strict=True):
+            law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, state, torque)
+        np.testing.assert_array_equal(torques[0], torques[1])
+
+
+def test_no_error_asks_for_no_switching(actuator):
+    # sgn(0) = 0: on the surface the law must not push to either side.
+    law = laws.build(Gains(law="afsm"), actuator, PERIOD)
+    state, torque = law.state.copy(), np.empty(3)
+    state[6:12] = 5.0  # grown estimates
+    law.step(0.0, np.zeros((3, 3)), np.zeros((2, 3)), law.parameters, state, torque)
+    np.testing.assert_array_equal(torque, np.zeros(3))
