@@ -30,7 +30,7 @@ format: setup
 setup: .venv/installed
 
 .venv/installed: uv.lock pyproject.toml $(TOOLS)/uv
-	$(UV) sync --quiet --frozen --python $(PYTHON) --all-extras --group dev
+	$(UV) sync --quiet --frozen --compile-bytecode --python $(PYTHON) --all-extras --group dev
 	@touch $@
 
 # Type checkers and import-linter do not see folders that are mapped by an editable install.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import mujoco
@@ -116,7 +117,7 @@ def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
     InputError
         A file cannot be read, or the model lacks a part of the actuator.
     """
-    return from_model(read_spec(mjcf).compile(), torque_curve.read(curve))
+    return _load(mjcf, curve, _state(mjcf), _state(curve))
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
@@ -182,6 +183,21 @@ def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
 def one_line(error: Exception) -> str:
     """An error's message without its line breaks."""
     return " ".join(str(error).split())
+
+
+@lru_cache(maxsize=8)
+def _load(mjcf: Path, curve: Path, *_: object) -> Actuator:
+    """Read an actuator once: the further arguments change when a file does."""
+    return from_model(read_spec(mjcf).compile(), torque_curve.read(curve))
+
+
+def _state(path: Path) -> tuple[int, int] | None:
+    """What changes when a file is written; None where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
 
 
 def _frozen(values: NDArray) -> NDArray:

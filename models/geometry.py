@@ -47,7 +47,7 @@ HOOP_GROOVE_DEPTH_M = 2.5 * MM
 COIL_FLANGE_M = 1.2 * MM
 COIL_CHAMFER_M = 0.3 * MM
 COIL_RECESS_M = 0.35 * MM
-COIL_RIDGES = 11
+COIL_RIDGES = 7
 COIL_RIDGE_DEPTH_M = 0.35 * MM
 
 # Passive joint: fork of the stator, outer ring, inner ring, bearing; each turns freely in the next.
@@ -109,7 +109,7 @@ NECK_RADIUS_M = 3.0 * MM
 
 SECTIONS = 60
 SMALL_SECTIONS = 40
-COIL_SECTIONS = 36
+COIL_SECTIONS = 24
 PIN_SECTIONS = 24
 HOLE_SECTIONS = 24
 ARC_STEP_DEG = 6.0

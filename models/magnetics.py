@@ -1,6 +1,6 @@
 """Torque matrix: from 18 group currents to the torque on the rotor (12)-(15)."""
 
-from functools import cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -54,9 +54,9 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
     return G
 
 
-@cache
+@lru_cache(maxsize=8)
 def torque_model(actuator: Actuator) -> TorqueModel:
-    """Compile-ready form of an actuator's magnetics (kept: one for each actuator)."""
+    """Compile-ready form of an actuator's magnetics, kept for the actuators used last."""
     axes, weights = _pole_lines(actuator)
     return TorqueModel(
         line_axes=axes,
@@ -118,7 +118,7 @@ def fill_torque_matrix(q: NDArray[np.float64], model: TorqueModel, G: NDArray[np
         for j in range(groups):
             cosine = x * axes[0, j] + y * axes[1, j] + z * axes[2, j]
             row = place(cosine)
-            i = np.int32(row)
+            i = np.uint32(row)  # unsigned, so that no check for an index below 0 is compiled in
             t = row - i
             h = table[i, 0] + t * (table[i, 1] + t * (table[i, 2] + t * table[i, 3]))
             G[0, j] += weight * h * x

@@ -117,9 +117,9 @@ def loop(  # type: ignore[no-untyped-def]
                 for i in range(3):
                     engine.torque_q[i] = -disturbance[i] - settings.modelling_torque[i]
             step(engine)
-        for i in range(3):
-            if not abs(engine.qdot[i]) < FASTEST_RATE:  # also where it is not a number
-                return tick + 1, DIVERGED
+            for i in range(3):
+                if not abs(engine.qdot[i]) < FASTEST_RATE:  # also where it is not a number
+                    return tick + 1, DIVERGED
         for i in range(3):
             if not settings.hinge_range[i, 0] <= engine.q[i] <= settings.hinge_range[i, 1]:
                 return tick + 1, LEFT_WORKSPACE

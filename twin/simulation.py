@@ -32,7 +32,8 @@ STATUS = {
 }
 INTERRUPTED = "interrupted"
 
-CHUNK_TICKS = 500
+# Long enough to make the calls between chunks cheap, short enough for a progress bar.
+CHUNK_TICKS = 1000
 LIVE_CHUNK_S = 0.02
 
 
@@ -41,6 +42,9 @@ class Sink(Protocol):
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk."""
+
+    def finish(self, status: str) -> None:
+        """Take note of how the run ended."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +146,8 @@ class Simulation:
             if live:
                 _sleep_until(started + done * self.scenario.controller.period_s)
         status = STATUS[code] if code or done == n else INTERRUPTED
+        for sink in sinks:
+            sink.finish(status)
         return Run(self.scenario, status, Table(self.signals, log[:done]), wall)
 
     def _start(self) -> tuple[Callable[[int, int], tuple[int, int]], NDArray[np.float64]]:

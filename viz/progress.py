@@ -16,6 +16,7 @@ class Progress:
 
     def __init__(self, name: str, ticks: int) -> None:
         console = Console(stderr=True)
+        self._name = name
         self._bars = Bars(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -40,3 +41,7 @@ class Progress:
         """Count the rows of one chunk."""
         if len(rows):
             self._bars.update(self._task, advance=len(rows), simulated_s=rows["t_s"][-1])
+
+    def finish(self, status: str) -> None:
+        """Show how the run ended."""
+        self._bars.update(self._task, description=f"{self._name}: {status}")

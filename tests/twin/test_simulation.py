@@ -178,7 +178,12 @@ def test_sinks_are_handed_every_row_once():
         def write(self, rows):
             seen.append(rows.values.copy())
 
+        def finish(self, status):
+            endings.append(status)
+
+    endings = []
     finished = simulate(scenarios.load("hold"), sinks=[Collector()])
+    assert endings == ["completed"]
     np.testing.assert_array_equal(np.concatenate(seen), finished.telemetry.values)
 
 

@@ -1,0 +1,174 @@
+"""Speed as ratios, each measured within one run: ``python tests/benchmarks/ratios.py [--json]``.
+
+Machines differ and are shared, so only ratios have bounds. Both sides of a ratio are measured in turn,
+several times, and the fastest of each counts: whatever else the machine does only ever adds time.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import plain
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.compiled import compiled
+from spheretwin.models.magnetics import fill_torque_matrix, torque_model
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.simulation import Simulation
+from spheretwin.viz.recording import Recorder
+
+SCENARIO = "nutation"
+PLAIN_TICKS = 500
+
+
+def fastest(measures: dict[str, Callable[[], float]], rounds: int) -> dict[str, float]:
+    """Least time of each measure over several rounds in turn, s; a first round warms up."""
+    taken = {name: [] for name in measures}
+    for turn in range(rounds + 1):
+        for name, measure in measures.items():
+            seconds = measure()
+            if turn:
+                taken[name].append(seconds)
+    return {name: min(seconds) for name, seconds in taken.items()}
+
+
+def seconds_of(work: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+def loop_seconds() -> float:
+    """Loop time of one physics step, s."""
+    run = Simulation(scenarios.load(SCENARIO)).run()
+    return run.wall_s / (len(run.telemetry) * run.scenario.substeps)
+
+
+def bare_seconds() -> float:
+    """Time of one `mj_step` on the same model, spinning as the nutation does, s."""
+    rotor = _rotor()
+    steps = 10_000
+    return seconds_of(lambda: mujoco.mj_step(rotor.model, rotor.data, nstep=steps)) / steps
+
+
+def plain_seconds() -> float:
+    """Time of one physics step of the plain loop, s."""
+    scenario = scenarios.load(SCENARIO)
+    actuator, rotor = actuators.load(), _rotor()
+    t = scenario.controller.period_s * np.arange(PLAIN_TICKS)
+    reference = scenario.trajectory.sample(t)
+    disturbance = scenario.disturbance.sample(t, np.random.default_rng(0))
+    rotor.start(reference[0, 0], np.zeros(3))
+    work = seconds_of(
+        lambda: plain.run(rotor.model, rotor.data, actuator, scenario, reference, disturbance, PLAIN_TICKS)
+    )
+    return work / (PLAIN_TICKS * scenario.substeps)
+
+
+def torque_matrix_seconds() -> float:
+    """Time of one torque matrix, s."""
+    model, calls = torque_model(actuators.load()), 100_000
+    q, G = np.array([0.1, 0.2, 0.3]), np.empty((3, 18))
+    _repeat(1, q, model, G)
+    return seconds_of(lambda: _repeat(calls, q, model, G)) / calls
+
+
+@compiled
+def _repeat(calls, q, model, G):
+    for _ in range(calls):
+        q[2] += 1e-3
+        fill_torque_matrix(q, model, G)
+
+
+def run_seconds(record: bool) -> Callable[[], float]:
+    """Time of one run within this process, with or without a recording, s."""
+
+    def work() -> None:
+        simulation = Simulation(scenarios.load(SCENARIO))
+        if not record:
+            simulation.run()
+            return
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "run.rrd"
+            scenario = simulation.scenario.model_dump(mode="json")
+            with Recorder(simulation.actuator, simulation.signals, scenario, path=path) as recorder:
+                simulation.run([recorder])
+
+    return lambda: seconds_of(work)
+
+
+def process_seconds(*command: str) -> Callable[[], float]:
+    """Time of a whole process, s."""
+    return lambda: seconds_of(lambda: subprocess.run(command, check=True, capture_output=True))
+
+
+def _rotor() -> Rotor:
+    plant = scenarios.load(SCENARIO).plant
+    rotor = Rotor(
+        actuators.MJCF_PATH, plant.step_s, plant.integrator, plant.modelling_error, plant.payload_kg
+    )
+    rotor.start(np.zeros(3), np.array([0.2 * np.pi, 0.2, 2 * np.pi]))
+    return rotor
+
+
+def ratios() -> list[dict[str, object]]:
+    """Measure everything; rows with name, value, bound (None: reported only) and the two sides in s."""
+    command = [str(Path(sys.executable).with_name("spheretwin")), "simulate", SCENARIO]
+    imports = [sys.executable, "-c", "import mujoco, numba, rerun"]
+    inner = fastest({"loop": loop_seconds, "bare": bare_seconds, "G_t": torque_matrix_seconds}, rounds=9)
+    outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
+    runs = fastest({"recorded": run_seconds(True), "silent": run_seconds(False)}, rounds=7)
+    with tempfile.TemporaryDirectory() as folder:
+        processes = fastest(
+            {
+                "recorded": process_seconds(*command, "--record", f"{folder}/run.rrd"),
+                "silent": process_seconds(*command),
+                "imports": process_seconds(*imports),
+            },
+            rounds=5,
+        )
+    return [
+        _row("closed loop over bare mj_step, a physics step", inner["loop"], inner["bare"], at_most=1.5),
+        _row("plain Python loop over ours, a physics step", outer["plain"], outer["loop"], at_least=15),
+        _row("command with --record over without", processes["recorded"], processes["silent"], at_most=1.3),
+        _row("run with a recorder over without, in one process", runs["recorded"], runs["silent"]),
+        _row(
+            "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2
+        ),
+        _row("one torque matrix over bare mj_step", inner["G_t"], inner["bare"]),
+    ]
+
+
+def _row(name, numerator_s, denominator_s, at_most=None, at_least=None):
+    value = numerator_s / denominator_s
+    ok = (at_most is None or value <= at_most) and (at_least is None or value >= at_least)
+    sides = {"numerator_s": numerator_s, "denominator_s": denominator_s}
+    return {"name": name, "value": value, "at_most": at_most, "at_least": at_least, "ok": ok, **sides}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    rows = ratios() if (options := parser.parse_args()) else []
+    if options.json:
+        print(json.dumps({"ratios": rows}))
+    else:
+        for row in rows:
+            bound = f"<= {row['at_most']}" if row["at_most"] else f">= {row['at_least']}"
+            bound = bound if row["at_most"] or row["at_least"] else "reported"
+            verdict = "" if row["ok"] else "  MISSED"
+            sides = f"{1e6 * row['numerator_s']:.4g} / {1e6 * row['denominator_s']:.4g} µs"
+            print(f"{row['value']:8.2f}  {bound:>8}  {row['name']} ({sides}){verdict}")
+    return 0 if all(row["ok"] for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,51 @@
+"""Colours: one for each axis, one for each coil group, and a scale for signed currents."""
+
+import colorsys
+
+import numpy as np
+from numpy.typing import NDArray
+
+Colour = tuple[int, int, int]
+
+AXIS_COLOURS: tuple[Colour, ...] = ((235, 87, 87), (76, 190, 120), (86, 140, 245))
+"""α or x, β or y, γ or z."""
+
+DESIRED_COLOURS: tuple[Colour, ...] = ((150, 78, 78), (62, 112, 80), (70, 96, 150))
+"""The same axes, muted: what was asked for."""
+
+BACKGROUND: Colour = (20, 22, 26)
+TRACE: Colour = (255, 190, 60)
+DESIRED_TRACE: Colour = (130, 136, 146)
+
+_NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)
+
+
+def group_colours(count: int) -> list[Colour]:
+    """Evenly spaced hues."""
+    return [_rgb(j / count) for j in range(count)]
+
+
+def current_colours(current: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:
+    """Colour of signed currents: blue for negative, copper when idle, red for positive.
+
+    Parameters
+    ----------
+    current : (...) array, A
+        Any shape.
+    limit : float, A
+        Current of the full colour.
+
+    Returns
+    -------
+    (..., 3) uint8 array
+        Red, green, blue.
+    """
+    # The root shows small currents, which are most of them.
+    share = np.sqrt(np.clip(np.abs(current) / limit, 0, 1))[..., None]
+    full = np.where(current[..., None] < 0, _NEGATIVE, _POSITIVE)
+    return np.round((1 - share) * np.array(_IDLE) + share * full).astype(np.uint8)
+
+
+def _rgb(hue: float) -> Colour:
+    red, green, blue = colorsys.hsv_to_rgb(hue, 0.6, 0.95)
+    return round(255 * red), round(255 * green), round(255 * blue)

@@ -1,0 +1,217 @@
+"""A run as a Rerun recording: written to a file, watched live, or both."""
+
+from __future__ import annotations
+
+import json
+import os
+import uuid
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.errors import InputError
+from spheretwin.models.telemetry import SIGNALS, Signal, Table
+from spheretwin.viz import blueprint, palette, scene
+from spheretwin.viz.events import Events
+from spheretwin.viz.live import Viewer
+
+APPLICATION = "spheretwin"
+
+Index = list[rr.TimeColumn]
+
+# What only the eye needs: poses, coil colours, traces.
+FRAME_RATE_Hz = 60.0
+
+_COMMON = {signal.name for signal in SIGNALS}
+
+
+class Recorder:
+    """Takes a run's telemetry chunk by chunk and streams it to Rerun.
+
+    Every signal is recorded at the rate of the control ticks, bit for bit; poses, coil colours and traces
+    at 60 Hz. The file appears under its name when the recording closes; until then it ends in ``.part``.
+
+    All work is done by one thread beside the simulation, which leaves the interpreter free while its
+    compiled loop runs; what goes wrong there is raised by the next call.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Drawn, and source of the current limit.
+    signals : tuple of Signal
+        Columns of the telemetry.
+    scenario : dict
+        Resolved scenario, for the text panel and the axes.
+    path : Path, optional
+        Recording to write.
+    live : bool
+        Serve a viewer on 127.0.0.1.
+    """
+
+    def __init__(
+        self,
+        actuator: Actuator,
+        signals: tuple[Signal, ...],
+        scenario: dict[str, Any],
+        *,
+        path: Path | None = None,
+        live: bool = False,
+    ) -> None:
+        rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
+        self._actuator = actuator
+        self._limit_A = scenario["drive"]["current_limit_A"]
+        self._path = path
+        self._part = path and path.with_name(path.name + ".part")
+        self._events = Events()
+        self._next_frame = 0
+        self._last_tips: dict[str, NDArray[np.float64]] = {}
+        self._recording = rr.RecordingStream(APPLICATION, recording_id=_identity(scenario))
+        self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
+        self.viewer = Viewer() if live else None
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
+        self._pending: deque[Future[None]] = deque()
+        if self._part:
+            _touch(self._part)
+        self._submit(self._connect, signals, scenario)
+
+    def _connect(self, signals: tuple[Signal, ...], scenario: dict[str, Any]) -> None:
+        """Open the sinks, log all that stays the same, then let a viewer in."""
+        own = tuple(signal for signal in signals if signal.name not in _COMMON)
+        sinks: list[Any] = []
+        if self._part:
+            sinks.append(rr.FileSink(self._part))
+        if self.viewer:
+            sinks.append(self.viewer.sink)
+        layout = blueprint.layout(scenario["duration"], self._limit_A, own)
+        self._recording.set_sinks(*sinks, default_blueprint=layout)
+        self._recording.send_recording_name(f"{scenario['name']}, {scenario['controller']['law']}")
+        mjcf = Path(scenario["plant"]["mjcf"] or MJCF_PATH)
+        scene.log_static(self._recording, self._actuator, mjcf, scenario["plant"]["payload_kg"])
+        blueprint.log_styles(self._recording, signals)
+        text = rr.TextDocument(_as_markdown(scenario), media_type=rr.MediaType.MARKDOWN)
+        self._recording.log(blueprint.SCENARIO, text, static=True)
+        if self.viewer:
+            self.viewer.start()
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def write(self, rows: Table) -> None:
+        """Record the rows of one chunk, which must not change any more."""
+        if len(rows):
+            self._submit(self._write, rows)
+
+    def finish(self, status: str) -> None:
+        """Record how the run ended."""
+        self._submit(lambda: self._log([self._events.end(status)]))
+
+    def close(self) -> None:
+        """Complete the file and give it its name; end the live viewer."""
+        try:
+            self._submit(self._recording.flush)
+            while self._pending:
+                self._pending.popleft().result()
+        finally:
+            self._worker.shutdown()
+            self._recording.disconnect()
+            if self._part and self._path and self._part.exists():
+                os.replace(self._part, self._path)
+            if self.viewer:
+                self.viewer.close()
+
+    def _submit(self, work: Callable[..., None], *arguments: Any) -> None:
+        while self._pending and self._pending[0].done():
+            self._pending.popleft().result()
+        self._pending.append(self._worker.submit(work, *arguments))
+
+    def _write(self, rows: Table) -> None:
+        index = _time_index(rows["t_s"])
+        for signal in rows.signals:
+            if signal.name != "t_s":
+                values = rr.Scalars.columns(scalars=rows[signal.name])
+                self._recording.send_columns(blueprint.entity(signal.name), index, values)
+        self._write_frames(rows)
+        self._log(self._events.of(rows))
+
+    def _write_frames(self, rows: Table) -> None:
+        """Poses, coil colours and traces of the ticks that fall on a frame."""
+        t = rows["t_s"]
+        frame = np.floor(t * FRAME_RATE_Hz + 1e-6).astype(np.int64)
+        new = frame >= np.concatenate([[self._next_frame], frame[:-1] + 1])
+        if not np.any(new):
+            return
+        self._next_frame = int(frame[-1]) + 1
+        index, q = _time_index(t[new]), rows["q_rad"][new]
+        for body, quaternion in scene.body_quaternions(q).items():
+            # Translation too in every row: a row that has only one of the two resets the other.
+            pose = rr.Transform3D.columns(translation=np.zeros((len(q), 3)), quaternion=quaternion)
+            self._recording.send_columns(f"{scene.WORLD}/{body}", index, pose)
+        self._recording.send_columns(scene.COILS, index, self._coil_colours(rows["current_A"][new]))
+        self._send_trace(scene.TIP, index, q)
+        self._send_trace(scene.TIP_DESIRED, index, rows["q_ref_rad"][new])
+
+    def _coil_colours(self, current_A: NDArray[np.float64]) -> rr.ComponentColumnList:
+        colours = palette.current_colours(current_A, self._limit_A)  # (n, 18, 3)
+        coils = np.empty((len(current_A), len(self._actuator.coil_axes), 3), dtype=np.uint8)
+        for side in range(2):  # both coils of a group carry its current
+            coils[:, self._actuator.groups[:, side]] = colours
+        return rr.Mesh3D.columns(albedo_texture_buffer=coils.reshape(len(coils), -1))
+
+    def _send_trace(self, entity: str, index: Index, q: NDArray[np.float64]) -> None:
+        """One short segment a frame; the view shows those of the last seconds."""
+        tips = scene.shaft_tip(q, self._actuator)
+        before = np.concatenate([self._last_tips.get(entity, tips[:1]), tips[:-1]])
+        self._last_tips[entity] = tips[-1:]
+        segments = np.stack([before, tips], axis=1)  # (n, 2, 3)
+        self._recording.send_columns(entity, index, rr.LineStrips3D.columns(strips=segments))
+
+    def _log(self, events: list[tuple[float, str, str]]) -> None:
+        if events:
+            t_s, level, text = zip(*events, strict=True)
+            lines = rr.TextLog.columns(text=list(text), level=list(level))
+            self._recording.send_columns(blueprint.EVENTS, _time_index(np.array(t_s)), lines)
+
+
+def _touch(path: Path) -> None:
+    try:
+        path.touch()
+    except OSError as error:
+        raise InputError(f"output: expected a writable path, {error}") from None
+
+
+def _time_index(t_s: NDArray[np.float64]) -> Index:
+    """Times in whole nanoseconds: Rerun would cut the fraction of seconds off, a nanosecond too early."""
+    nanoseconds = np.round(t_s * 1e9).astype("timedelta64[ns]")
+    return [rr.TimeColumn(blueprint.TIMELINE, duration=nanoseconds)]
+
+
+def _identity(scenario: dict[str, Any]) -> str:
+    """Identity of a recording: the same for the same resolved scenario."""
+    text = json.dumps(scenario, sort_keys=True)
+    return str(uuid.uuid5(uuid.NAMESPACE_OID, text))
+
+
+def _as_markdown(scenario: dict[str, Any]) -> str:
+    """Resolved scenario as a table for each section."""
+    lines = [f"# {scenario['name']}", "", scenario["description"], ""]
+    top = {key: value for key, value in scenario.items() if not isinstance(value, dict)}
+    sections = {key: value for key, value in scenario.items() if isinstance(value, dict)}
+    for title, fields in {"run": top, **sections}.items():
+        shown = {key: value for key, value in fields.items() if key not in ("name", "description")}
+        lines += [f"## {title}", "", "| field | value |", "|---|---|"]
+        lines += [f"| {key} | {'' if value is None else value} |" for key, value in shown.items()]
+        lines.append("")
+    return "\n".join(lines)
