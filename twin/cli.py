@@ -51,3 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     simulate.add_to(verbs)
     magnetics.add_to(verbs)
     return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -91,7 +91,7 @@ def loop(  # type: ignore[no-untyped-def]
     measurement = np.empty((2, 3))
     torque_q, torque_S = np.empty(3), np.empty(3)
     command, current = np.empty(groups), np.empty(groups)
-    G = np.empty((3, groups))
+    G, scratch = np.empty((3, groups)), np.empty((2, groups))
     for tick in range(first, last):
         reference, disturbance, row = inputs.reference[tick], inputs.disturbance[tick], log[tick]
         measurement[0], measurement[1] = engine.q, engine.qdot
@@ -99,11 +99,11 @@ def loop(  # type: ignore[no-untyped-def]
         if not isfinite(torque_q[0] + torque_q[1] + torque_q[2]):
             return tick, DIVERGED
         cartesian_torque(engine.q, torque_q, torque_S)
-        fill_torque_matrix(engine.q, magnetics, G)
+        fill_torque_matrix(engine.q, magnetics, G, scratch)
         row[SCALE] = allocate(G, torque_S, drive.current_limit_A, command)
         for substep in range(settings.substeps):
             if substep > 0:
-                fill_torque_matrix(engine.q, magnetics, G)
+                fill_torque_matrix(engine.q, magnetics, G, scratch)
             advance(drive, command, memory.current, current)
             rotor_torque(G, current, engine.torque_S)
             if substep == 0:

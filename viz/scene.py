@@ -71,7 +71,7 @@ def _meshes(mjcf: Path, _: int) -> dict[str, rr.Mesh3D]:
     mujoco.mj_kinematics(model, data)
     coils: list[Drawn] = []
     others: dict[tuple[str, tuple[float, ...]], list[tuple[str, Drawn]]] = defaultdict(list)
-    for i in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH):
+    for i in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).tolist():
         drawn, geom = _in_body_frame(model, data, i), model.geom(i)
         if geom.name.startswith("coil_"):
             coils.append(drawn)

@@ -6,9 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from spheretwin.models import compiled
+from spheretwin.models import cache, compiled
 
 SOURCE = Path(compiled.__file__).parent
 
@@ -19,7 +20,8 @@ def package(tmp_path):
     models = tmp_path / "spheretwin" / "models"
     models.mkdir(parents=True)
     (models / "__init__.py").write_text("")
-    shutil.copy(SOURCE / "compiled.py", models)
+    for name in ("cache.py", "compiled.py"):
+        shutil.copy(SOURCE / name, models)
     (models / "callee.py").write_text(
         "from spheretwin.models.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"
     )
@@ -73,3 +75,22 @@ def test_read_only_home_still_compiles():
         "print(rotation(np.zeros(3))[0, 0])"
     )
     assert float(python(code, **{**environment, "HOME": "/proc"})) == 1.0
+
+
+def test_kept_array_is_computed_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "_root", lambda: tmp_path)
+    made = []
+
+    def compute():
+        made.append(1)
+        return np.arange(3.0)
+
+    for _ in range(2):
+        np.testing.assert_array_equal(cache.kept_array(b"key", compute), [0, 1, 2])
+    assert len(made) == 1
+    cache.kept_array(b"other key", compute)
+    assert len(made) == 2
+    next(tmp_path.rglob("*.npy")).write_bytes(b"damaged")
+    cache.kept_array(b"key", compute)
+    cache.kept_array(b"other key", compute)
+    assert len(made) == 3

@@ -89,6 +89,8 @@ def _simulate(scenario: Scenario, options: argparse.Namespace) -> Run:
                 live=options.live,
             )
             sinks.append(stack.enter_context(recorder))
+            if recorder.viewer:
+                print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
         stop_requested = stack.enter_context(_interruptible())
         return simulation.run(sinks, live=options.live, stop_requested=stop_requested)
 

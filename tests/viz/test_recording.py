@@ -1,0 +1,194 @@
+"""Recordings read back: the telemetry bit for bit, poses, colours, texts and events."""
+
+import json
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+from scipy.spatial.transform import Rotation
+
+from spheretwin.models.errors import InputError
+from spheretwin.models.kinematics import rotation
+from spheretwin.models.telemetry import SIGNALS, Table, width
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.simulation import Simulation
+from spheretwin.viz import blueprint, palette, scene
+from spheretwin.viz.recording import Recorder
+
+
+def recorded(path, name="nutation", **changes):
+    simulation = Simulation(scenarios.load(name, {"duration": 2.3, **changes}))
+    resolved = simulation.scenario.model_dump(mode="json")
+    with Recorder(simulation.actuator, simulation.signals, resolved, path=path) as recorder:
+        return simulation, simulation.run([recorder])
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recording") / "run.rrd"
+    simulation, finished = recorded(path)
+    return path, simulation, finished
+
+
+def rows_of(path, entity, component):
+    """Times in ns and values of one component, in order."""
+    times, values = [], []
+    chunks = (
+        RrdReader(path)
+        .stream()
+        .filter(content=f"/{entity}", components=component, has_timeline=blueprint.TIMELINE)
+    )
+    for chunk in chunks:
+        batch = chunk.to_record_batch()
+        column = batch.column(component)
+        while pa.types.is_nested(column.type):
+            column = column.flatten()
+        times.append(np.asarray(batch.column(blueprint.TIMELINE).cast(pa.int64())))
+        values.append(np.asarray(column).reshape(len(batch), -1))
+    times, values = np.concatenate(times), np.concatenate(values)
+    order = np.argsort(times, kind="stable")
+    return times[order], values[order]
+
+
+def test_every_signal_is_recorded_bit_for_bit(run):
+    path, _, finished = run
+    table = finished.telemetry
+    ticks_ns = np.arange(len(table)) * 1_000_000
+    for signal in table.signals:
+        if signal.name != "t_s":
+            times, values = rows_of(path, blueprint.entity(signal.name), "Scalars:scalars")
+            np.testing.assert_array_equal(times, ticks_ns)
+            assert values.tobytes() == np.ascontiguousarray(table[signal.name]).tobytes()
+
+
+def test_rotor_turns_as_the_telemetry_says(run):
+    path, _, finished = run
+    times, quaternions = rows_of(path, f"{scene.WORLD}/rotor", "Transform3D:quaternion")
+    q = finished.telemetry["q_rad"][times // 1_000_000]
+    for quaternion, pose in zip(quaternions, q, strict=True):
+        # Rerun keeps poses in single precision.
+        np.testing.assert_allclose(Rotation.from_quat(quaternion).as_matrix(), rotation(pose), atol=1e-6)
+
+
+def test_frames_come_at_sixty_hertz(run):
+    path, _, finished = run
+    times, _ = rows_of(path, f"{scene.WORLD}/rotor", "Transform3D:quaternion")
+    assert len(times) == pytest.approx(60 * finished.telemetry["t_s"][-1], abs=2)
+    assert np.diff(times).max() <= 18_000_000
+
+
+def test_both_coils_of_a_group_show_its_current(run):
+    path, simulation, finished = run
+    times, pixels = rows_of(path, scene.COILS, "Mesh3D:albedo_texture_buffer")
+    colours = pixels.reshape(len(times), 36, 3)
+    current = finished.telemetry["current_A"][times // 1_000_000]
+    expected = palette.current_colours(current, simulation.scenario.drive.current_limit_A)
+    for side in range(2):
+        np.testing.assert_array_equal(colours[:, simulation.actuator.groups[:, side]], expected)
+
+
+def test_trace_follows_the_shaft_tip(run, actuator):
+    path, _, finished = run
+    times, strips = rows_of(path, scene.TIP, "LineStrips3D:strips")
+    q = finished.telemetry["q_rad"][times // 1_000_000]
+    tips = np.array([rotation(pose) @ actuator.shaft_tip_m for pose in q])
+    np.testing.assert_allclose(strips[:, 3:], tips, atol=1e-7)
+    np.testing.assert_allclose(strips[1:, :3], tips[:-1], atol=1e-7)
+
+
+def static_text(path, entity, component):
+    for chunk in RrdReader(path).stream().filter(content=f"/{entity}", is_static=True):
+        batch = chunk.to_record_batch()
+        if component in batch.schema.names:
+            return batch.column(component).to_pylist()[0]
+    raise AssertionError(f"no {component} at {entity}")
+
+
+def test_resolved_scenario_is_in_the_recording(run):
+    path, *_ = run
+    text = static_text(path, blueprint.SCENARIO, "TextDocument:text")[0]
+    assert "| modelling_error | 0.2 |" in text
+    assert "| current_limit_A | 8.0 |" in text
+
+
+def test_series_have_names_with_units(run):
+    path, *_ = run
+    names = static_text(path, blueprint.entity("error_rad"), "SeriesLines:names")
+    assert names == ["error α [rad]", "error β [rad]", "error γ [rad]"]
+
+
+def texts(path):
+    lines = []
+    for chunk in RrdReader(path).stream().filter(content=f"/{blueprint.EVENTS}"):
+        lines += [row[0] for row in chunk.to_record_batch().column("TextLog:text").to_pylist()]
+    return lines
+
+
+def test_events_tell_of_saturation_and_the_end(run):
+    path, *_ = run
+    lines = texts(path)
+    assert any("current limit reached" in line for line in lines)
+    assert lines[-1] == "the run is complete"
+
+
+def test_leaving_the_workspace_is_an_event(tmp_path):
+    path = tmp_path / "run.rrd"
+    _, finished = recorded(path, "sinusoid", **{"controller.law": "pd", "disturbance.load": 5.0})
+    assert finished.status == "left_workspace"
+    assert "end of its range" in texts(path)[-1]
+
+
+def test_recording_carries_its_blueprint_and_name(run):
+    path, *_ = run
+    reader = RrdReader(path)
+    assert len(reader.blueprints()) == 1
+    assert reader.recordings()[0].application_id == "spheretwin"
+
+
+def test_payload_is_drawn_where_it_is_mounted(tmp_path):
+    path = tmp_path / "tilt.rrd"
+    recorded(path, "tilt", duration=0.1)
+    centre = static_text(path, f"{scene.WORLD}/rotor/payload", "Cylinders3D:centers")
+    # A cylinder's centre is stored as the translation of its instance in some releases.
+    np.testing.assert_allclose(np.ravel(centre[0]), [0, 0, 0.10], atol=1e-7)
+
+
+def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
+    path = tmp_path / "run.rrd"
+    simulation = Simulation(scenarios.load("hold", {"duration": 0.1}))
+    resolved = simulation.scenario.model_dump(mode="json")
+
+    def interrupted():
+        with Recorder(simulation.actuator, simulation.signals, resolved, path=path) as recorder:
+            simulation.run([recorder])
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    times, _ = rows_of(path, blueprint.entity("q_rad"), "Scalars:scalars")
+    assert len(times) == 100
+
+
+def test_unwritable_path_is_bad_input(tmp_path, actuator):
+    resolved = json.loads(scenarios.load("hold").model_dump_json())
+    resolved["drive"]["current_limit_A"] = 8.0
+    with pytest.raises(InputError, match="writable"):
+        Recorder(actuator, SIGNALS, resolved, path=tmp_path / "missing" / "run.rrd")
+
+
+def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
+    simulation = Simulation(scenarios.load("hold", {"duration": 0.1}))
+    resolved = simulation.scenario.model_dump(mode="json")
+    recorder = Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd")
+    backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
+    backwards.values[:, 0] = np.nan
+    recorder.write(backwards)
+    with pytest.raises(Exception):  # noqa: B017, PT011  # whatever Rerun or NumPy makes of it
+        recorder.close()
+
+
+def test_strict_mode_is_on(run):
+    # Without it Rerun turns a mistake into a warning and drops the data.
+    assert rr.strict_mode()

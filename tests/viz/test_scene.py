@@ -1,0 +1,46 @@
+"""Poses of the drawn bodies against the kinematics; meshes as the model file places them."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.kinematics import rotation
+from spheretwin.viz import palette, scene
+
+poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
+
+
+@given(poses)
+def test_bodies_turn_hinge_by_hinge(q):
+    quaternions = scene.body_quaternions(q)
+    alone = {"outer_ring": [1, 0, 0], "inner_ring": [1, 1, 0], "rotor": [1, 1, 1]}
+    for body, hinges in alone.items():
+        matrix = Rotation.from_quat(quaternions[body][0]).as_matrix()
+        np.testing.assert_allclose(matrix, rotation(q[0] * hinges), atol=1e-14)
+
+
+@given(q=poses)
+def test_shaft_tip_is_the_model_s(actuator, q):
+    expected = rotation(q[0]) @ actuator.shaft_tip_m
+    np.testing.assert_allclose(scene.shaft_tip(q, actuator)[0], expected, atol=1e-15)
+
+
+def test_meshes_stand_where_the_model_puts_them(actuator):
+    meshes = scene._meshes(actuators.MJCF_PATH, 0)
+    coils = np.array(meshes[scene.COILS].vertex_positions.as_arrow_array().to_pylist())
+    centres = coils.reshape(36, -1, 3).mean(axis=1)
+    directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
+    # Each coil's vertices are symmetric about its axis, to the rounding of the mesh files.
+    np.testing.assert_allclose(directions, actuator.coil_axes, atol=1e-4)
+    assert f"{scene.WORLD}/rotor/ball" in meshes
+    poles = [name for name in meshes if name.endswith("/pole")]
+    assert len(poles) == len(set(poles))
+
+
+def test_current_colours_tell_sign_and_size():
+    idle, small, full, negative = palette.current_colours(np.array([0.0, 2.0, 8.0, -8.0]), 8.0).astype(int)
+    assert full[0] > small[0] > idle[0]
+    assert negative[2] > full[2]
+    np.testing.assert_array_equal(palette.current_colours(np.array([100.0]), 8.0)[0], full)
