@@ -26,7 +26,7 @@ class Progress:
             console=console,
             disable=not console.is_terminal,
         )
-        self._task = self._bars.add_task(name, total=ticks, simulated_s=0.0)
+        self._task = self._bars.add_task(f"{name}: getting ready", total=ticks, simulated_s=0.0)
 
     def __enter__(self) -> Progress:
         self._bars.start()
@@ -40,7 +40,8 @@ class Progress:
     def write(self, rows: Table) -> None:
         """Count the rows of one chunk."""
         if len(rows):
-            self._bars.update(self._task, advance=len(rows), simulated_s=rows["t_s"][-1])
+            simulated_s = rows["t_s"][-1]
+            self._bars.update(self._task, advance=len(rows), simulated_s=simulated_s, description=self._name)
 
     def finish(self, status: str) -> None:
         """Show how the run ended."""

@@ -52,9 +52,10 @@ def print_files(record: Path | None, telemetry: Path | None) -> None:
 
 def print_fields(scenario: str, rows: Sequence[tuple[str, str, str]]) -> None:
     """Print every field of a scenario with its value and meaning."""
-    table = Table(title=f"fields of {scenario}", title_justify="left")
-    for heading in ("flag", "value", "meaning"):
-        table.add_column(heading, overflow="fold")
+    table = Table(title=f"fields of {scenario}", title_justify="left", box=None, header_style="bold")
+    table.add_column("flag", no_wrap=True)
+    table.add_column("value", overflow="fold", max_width=24)
+    table.add_column("meaning", overflow="fold")
     for row in rows:
         table.add_row(*map(escape, row))
     Console().print(table)

@@ -7,6 +7,7 @@ import contextlib
 import json
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -92,7 +93,12 @@ def _simulate(scenario: Scenario, options: argparse.Namespace) -> Run:
             if recorder.viewer:
                 print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
         stop_requested = stack.enter_context(_interruptible())
-        return simulation.run(sinks, live=options.live, stop_requested=stop_requested)
+        finished = simulation.run(sinks, live=options.live, stop_requested=stop_requested)
+        if options.live and sys.stderr.isatty():
+            print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
+            while not stop_requested():
+                time.sleep(0.1)
+        return finished
 
 
 @contextlib.contextmanager
