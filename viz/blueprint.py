@@ -33,7 +33,7 @@ def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> No
         recording.log(entity(signal.name), style, static=True)
 
 
-def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...]) -> rrb.Blueprint:
+def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], live: bool) -> rrb.Blueprint:
     """Blueprint of a run's recording.
 
     Parameters
@@ -44,6 +44,8 @@ def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...]) -
         Range of the current axis.
     own : tuple of Signal
         Signals of the law itself, each in a tab.
+    live : bool
+        Follow the run instead of playing from its start.
     """
     boundary = rrb.TimeRangeBoundary
     whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=duration_s))
@@ -87,7 +89,12 @@ def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...]) -
             rrb.Vertical(plots, texts, row_shares=[3, 1]),
             column_shares=[4, 5],
         ),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            play_state="following" if live else "playing",
+            loop_mode="off" if live else "all",
+        ),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         auto_views=False,

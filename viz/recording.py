@@ -93,7 +93,7 @@ class Recorder:
             sinks.append(rr.FileSink(self._part))
         if self.viewer:
             sinks.append(self.viewer.sink)
-        layout = blueprint.layout(scenario["duration"], self._limit_A, own)
+        layout = blueprint.layout(scenario["duration"], self._limit_A, own, live=self.viewer is not None)
         self._recording.set_sinks(*sinks, default_blueprint=layout)
         self._recording.send_recording_name(f"{scenario['name']}, {scenario['controller']['law']}")
         mjcf = Path(scenario["plant"]["mjcf"] or MJCF_PATH)
