@@ -7,16 +7,16 @@ at their centre, z outward).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from manifold3d import CrossSection, FillRule, Manifold, OpType
-from numpy.typing import NDArray
+from manifold3d import Manifold
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.mesh_files import to_mesh, to_obj
+from spheretwin.models.solids import along, around, both, cylinder, revolve, section, union
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -114,11 +114,6 @@ PIN_SECTIONS = 24
 HOLE_SECTIONS = 24
 ARC_STEP_DEG = 6.0
 
-# Faces that meet at less than this angle are shaded as one smooth surface.
-CREASE_DEG = 30.0
-VERTEX_DECIMALS = 7
-NORMAL_DECIMALS = 3
-
 Points = list[tuple[float, float]]
 
 
@@ -172,64 +167,6 @@ def write(folder: Path, actuator: Actuator) -> list[Path]:
     return written
 
 
-def to_mesh(solid: Manifold) -> Trimesh:
-    """Mesh of a solid in an order that depends on its shape alone."""
-    from trimesh import Trimesh  # slow to import
-
-    raw = solid.as_original().simplify(10.0**-VERTEX_DECIMALS * 5).to_mesh64()
-    corners = np.round(raw.vert_properties[:, :3], VERTEX_DECIMALS) + 0.0  # no negative zero
-    vertices, index = np.unique(corners, axis=0, return_inverse=True)
-    faces = index.ravel()[raw.tri_verts.astype(np.int64)]
-    # The least vertex first keeps the winding; a face that lost a corner to rounding goes.
-    first = np.argmin(faces, axis=1)
-    faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
-    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
-    faces = faces[np.lexsort(faces.T[::-1])]
-    return Trimesh(vertices, faces, process=False)
-
-
-def to_obj(mesh: Trimesh) -> str:
-    """Text of an OBJ file: vertices in metres, and normals that are split along sharp edges.
-
-    Without normals of its own a mesh gets one normal per vertex from MuJoCo, and every edge looks worn.
-    """
-    corner_normals = np.round(crease_normals(mesh).reshape(-1, 3), NORMAL_DECIMALS) + 0.0
-    normals, normal_of_corner = np.unique(corner_normals, axis=0, return_inverse=True)
-    normal_of_corner = normal_of_corner.reshape(-1, 3)
-    lines = [
-        f"v {x:.{VERTEX_DECIMALS}f} {y:.{VERTEX_DECIMALS}f} {z:.{VERTEX_DECIMALS}f}"
-        for x, y, z in mesh.vertices
-    ]
-    lines += [
-        f"vn {x:.{NORMAL_DECIMALS}f} {y:.{NORMAL_DECIMALS}f} {z:.{NORMAL_DECIMALS}f}" for x, y, z in normals
-    ]
-    for vertices, corners in zip(mesh.faces + 1, normal_of_corner + 1, strict=True):
-        lines.append("f " + " ".join(f"{v}//{n}" for v, n in zip(vertices, corners, strict=True)))
-    return "\n".join(lines) + "\n"
-
-
-def crease_normals(mesh: Trimesh) -> NDArray[np.float64]:
-    """Normal at each corner of each face: the mean over the vertex's faces that are nearly coplanar.
-
-    Returns
-    -------
-    (faces, 3, 3) array
-        Unit normals, weighted by the angle a face spans at the vertex.
-    """
-    from scipy.sparse import coo_array, csr_array  # slow to import
-
-    vertex = mesh.faces.ravel()
-    corner = np.arange(len(vertex))
-    normal = np.repeat(mesh.face_normals, 3, axis=0)  # (corners, 3)
-    at_vertex = csr_array((np.ones(len(vertex)), (vertex, corner)))
-    pairs = (at_vertex.T @ at_vertex).tocoo()  # corners that share a vertex
-    a, b = pairs.coords
-    smooth = np.einsum("ij,ij->i", normal[a], normal[b]) > np.cos(np.radians(CREASE_DEG))
-    weight = np.where(smooth, mesh.face_angles.ravel()[b], 0.0)
-    total = coo_array((weight, (a, b)), shape=pairs.shape) @ normal
-    return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(-1, 3, 3)
-
-
 def ball_radius(actuator: Actuator) -> float:
     """Radius of the ball, m: the poles' outer faces lie on it."""
     return actuator.magnet.distance_m + actuator.magnet.length_m / 2
@@ -248,7 +185,7 @@ def pole(actuator: Actuator) -> Manifold:
         (radius, face[0][1] - POLE_CHAMFER_M),
         *face,
     ]
-    return _revolve(outline, SMALL_SECTIONS)
+    return revolve(outline, SMALL_SECTIONS)
 
 
 def coil(actuator: Actuator) -> Manifold:
@@ -277,7 +214,7 @@ def coil(actuator: Actuator) -> Manifold:
         (bore + c, half),
         (bore, half - c),
     ]
-    return _revolve(outline, COIL_SECTIONS)
+    return revolve(outline, COIL_SECTIONS)
 
 
 def ball(actuator: Actuator) -> Manifold:
@@ -285,7 +222,7 @@ def ball(actuator: Actuator) -> Manifold:
     radius = ball_radius(actuator)
     shell = _shell(radius - BALL_WALL_M, radius, -60.0, 60.0)
     band = shell.trim_by_plane([0, 0, 1], -BALL_CUT_HEIGHT_M).trim_by_plane([0, 0, -1], -BALL_CUT_HEIGHT_M)
-    hole = _cylinder(actuator.magnet.radius_m + POLE_CLEARANCE_M, 0.5 * radius, 1.5 * radius, SMALL_SECTIONS)
+    hole = cylinder(actuator.magnet.radius_m + POLE_CLEARANCE_M, 0.5 * radius, 1.5 * radius, SMALL_SECTIONS)
     return band - along(hole, actuator.pole_axes)
 
 
@@ -296,7 +233,7 @@ def hoop(actuator: Actuator) -> Manifold:
     band = band.trim_by_plane([0, 0, 1], -HOOP_HALF_HEIGHT_M).trim_by_plane([0, 0, -1], -HOOP_HALF_HEIGHT_M)
     band -= _tube(groove, 2 * groove, -HOOP_GROOVE_HALF_WIDTH_M, HOOP_GROOVE_HALF_WIDTH_M)
     inner_face = actuator.magnet.distance_m - actuator.magnet.length_m / 2
-    seat = _cylinder(actuator.magnet.radius_m + POLE_CLEARANCE_M, inner_face, 2 * inner_face, SMALL_SECTIONS)
+    seat = cylinder(actuator.magnet.radius_m + POLE_CLEARANCE_M, inner_face, 2 * inner_face, SMALL_SECTIONS)
     return band - along(seat, actuator.pole_axes)
 
 
@@ -305,8 +242,8 @@ def outer_ring() -> Manifold:
     ring = _ring(OUTER_RING_INNER_RADIUS_M, OUTER_RING_OUTER_RADIUS_M, OUTER_RING_HALF_HEIGHT_M)
     middle = (OUTER_RING_INNER_RADIUS_M + OUTER_RING_OUTER_RADIUS_M) / 2
     pin = _pin(PIVOT_RADIUS_M, middle, FORK_OUTER_RADIUS_M + RING_CHAMFER_M)
-    bore = _cylinder(PIVOT_RADIUS_M + RUNNING_CLEARANCE_M, 0.0, 2 * OUTER_RING_OUTER_RADIUS_M, PIN_SECTIONS)
-    return ring + along(pin, _both("x")) - along(bore, _both("y"))
+    bore = cylinder(PIVOT_RADIUS_M + RUNNING_CLEARANCE_M, 0.0, 2 * OUTER_RING_OUTER_RADIUS_M, PIN_SECTIONS)
+    return ring + along(pin, both("x")) - along(bore, both("y"))
 
 
 def inner_ring() -> Manifold:
@@ -318,10 +255,10 @@ def inner_ring() -> Manifold:
     )
     reach = INNER_RING_INNER_RADIUS_M + RING_CHAMFER_M
     spoke = Manifold.cube([2 * reach, 2 * SPOKE_HALF_WIDTH_M, 2 * SPOKE_HALF_HEIGHT_M], True)
-    spokes = (spoke.rotate([0, 0, 45]) + spoke.rotate([0, 0, -45])) - _cylinder(
+    spokes = (spoke.rotate([0, 0, 45]) + spoke.rotate([0, 0, -45])) - cylinder(
         BEARING_INNER_RADIUS_M + RING_CHAMFER_M, -reach, reach, SMALL_SECTIONS
     )
-    return ring + housing + spokes + along(pin, _both("y"))
+    return ring + housing + spokes + along(pin, both("y"))
 
 
 def shaft(actuator: Actuator) -> Manifold:
@@ -352,30 +289,12 @@ def shaft(actuator: Actuator) -> Manifold:
         (SHAFT_RADIUS_M - 2 * c, tip),
         (0.0, tip),
     ]
-    return _revolve(outline, SMALL_SECTIONS) + _spider(actuator)
+    return revolve(outline, SMALL_SECTIONS) + _spider(actuator)
 
 
 def stator(actuator: Actuator) -> Manifold:
     """Shell around the coils, cut open; base, and the fork that carries the outer ring."""
     return _housing(actuator) + _base(actuator) + _fork()
-
-
-def along(solid: Manifold, axes: NDArray[np.float64], distance: float = 0.0) -> Manifold:
-    """Copies of a solid, its z turned to each of some unit vectors.
-
-    Parameters
-    ----------
-    solid : Manifold
-        In its own frame.
-    axes : (n, 3) array
-        Unit vectors.
-    distance : float, m
-        Of the copies' origins from the centre, outward along the axes.
-    """
-    polar = np.degrees(np.arccos(np.clip(axes[:, 2], -1.0, 1.0)))
-    azimuth = np.degrees(np.arctan2(axes[:, 1], axes[:, 0]))
-    placed = solid.translate([0.0, 0.0, distance])
-    return _union(placed.rotate([0.0, p, a]) for p, a in zip(polar, azimuth, strict=True))
 
 
 def _spider(actuator: Actuator) -> Manifold:
@@ -385,9 +304,9 @@ def _spider(actuator: Actuator) -> Manifold:
     # The rim's upper edge stays inside the ball's sphere.
     rim = float(np.sqrt(ball_radius(actuator) ** 2 - high**2)) - RING_CHAMFER_M
     inside = rim - SPIDER_RIM_WIDTH_M
-    ring = _revolve([(inside, low), (rim, low), (rim, high), (inside, high)], SECTIONS)
+    ring = revolve([(inside, low), (rim, low), (rim, high), (inside, high)], SECTIONS)
     root = HUB_RADIUS_M / 2
-    cone = _revolve(
+    cone = revolve(
         [
             (inside + 0.4 * thick, low),
             (inside + 1.2 * thick, high),
@@ -397,16 +316,16 @@ def _spider(actuator: Actuator) -> Manifold:
         SECTIONS,
     )
     arm = Manifold.cube([rim, 2 * SPIDER_ARM_HALF_WIDTH_M, 4 * HUB_HEIGHT_M], True).translate([rim / 2, 0, 0])
-    screw = _cylinder(SCREW_RADIUS_M, low + thick / 2, high + SCREW_HEIGHT_M, PIN_SECTIONS)
+    screw = cylinder(SCREW_RADIUS_M, low + thick / 2, high + SCREW_HEIGHT_M, PIN_SECTIONS)
     screw = screw.translate([rim - SPIDER_RIM_WIDTH_M / 2, 0, 0])
-    return ring + (cone ^ _around(arm, SPIDER_ARMS)) + _around(screw, SCREWS, first_deg=180 / SCREWS)
+    return ring + (cone ^ around(arm, SPIDER_ARMS)) + around(screw, SCREWS, first_deg=180 / SCREWS)
 
 
 def _housing(actuator: Actuator) -> Manifold:
     lowest, highest = shell_latitudes_deg(actuator)
     shell = _shell(SHELL_INNER_RADIUS_M, SHELL_OUTER_RADIUS_M, lowest, highest)
     shell -= _sector() - _holders(actuator)
-    hole = _cylinder(
+    hole = cylinder(
         actuator.coil.outer_radius_m + COIL_CLEARANCE_M,
         SHELL_INNER_RADIUS_M / 2,
         2 * SHELL_OUTER_RADIUS_M,
@@ -437,7 +356,7 @@ def _sector() -> Manifold:
     reach = 2 * SHELL_OUTER_RADIUS_M
     angles = np.radians(np.linspace(CUT_FROM_DEG, CUT_TO_DEG, 5))
     corners = [(0.0, 0.0), *((reach * np.cos(a), reach * np.sin(a)) for a in angles)]
-    return Manifold.extrude(_section(corners), 2 * reach).translate([0, 0, -reach])
+    return Manifold.extrude(section(corners), 2 * reach).translate([0, 0, -reach])
 
 
 def _holders(actuator: Actuator) -> Manifold:
@@ -448,11 +367,11 @@ def _holders(actuator: Actuator) -> Manifold:
         _shell(inner, outer, at - BELT_HALF_WIDTH_DEG, at + BELT_HALF_WIDTH_DEG)
         for at in _latitudes_deg(actuator)
     ]
-    collar = _cylinder(actuator.coil.outer_radius_m + COLLAR_WALL_M, inner, outer, HOLE_SECTIONS)
+    collar = cylinder(actuator.coil.outer_radius_m + COLLAR_WALL_M, inner, outer, HOLE_SECTIONS)
     rim = _shell(
         SHELL_INNER_RADIUS_M / 2, 2 * SHELL_OUTER_RADIUS_M, lowest - 1.0, lowest + SHELL_LOWER_MARGIN_DEG
     )
-    return _union([*belts, along(collar, actuator.coil_axes), rim])
+    return union([*belts, along(collar, actuator.coil_axes), rim])
 
 
 def _base(actuator: Actuator) -> Manifold:
@@ -462,7 +381,7 @@ def _base(actuator: Actuator) -> Manifold:
     outer = SHELL_OUTER_RADIUS_M * np.cos(np.radians(lowest))
     rim = SHELL_OUTER_RADIUS_M * np.sin(np.radians(lowest))
     c = 2 * RING_CHAMFER_M
-    plate = _revolve(
+    plate = revolve(
         [
             (0.0, floor),
             (BASE_RADIUS_M - c, floor),
@@ -475,7 +394,7 @@ def _base(actuator: Actuator) -> Manifold:
     )
     foot = BASE_RADIUS_M - 2 * SKIRT_WALL_M
     lip = RING_CHAMFER_M  # overlap with the shell: solids that meet in an edge alone are not watertight
-    skirt = _revolve(
+    skirt = revolve(
         [
             (outer - lip - SKIRT_WALL_M, rim + 2 * lip),
             (foot - SKIRT_WALL_M, top - lip),
@@ -486,11 +405,11 @@ def _base(actuator: Actuator) -> Manifold:
     )
     middle = (rim + top) / 2
     window = (
-        _cylinder(0.36 * (rim - top), 0.0, 2 * BASE_RADIUS_M, HOLE_SECTIONS)
+        cylinder(0.36 * (rim - top), 0.0, 2 * BASE_RADIUS_M, HOLE_SECTIONS)
         .rotate([0, 90, 0])
         .translate([0, 0, middle])
     )
-    windows = _around(window, SKIRT_WINDOWS)
+    windows = around(window, SKIRT_WINDOWS)
     return plate + (skirt - windows) + _pedestal(actuator, top)
 
 
@@ -507,7 +426,7 @@ def _pedestal(actuator: Actuator, top: float) -> Manifold:
         (4 * NECK_RADIUS_M, top - MM),
         (0.0, top - MM),
     ]
-    return _revolve(outline, SMALL_SECTIONS)
+    return revolve(outline, SMALL_SECTIONS)
 
 
 def _fork() -> Manifold:
@@ -515,15 +434,15 @@ def _fork() -> Manifold:
     hoop = _ring(FORK_INNER_RADIUS_M, FORK_OUTER_RADIUS_M, FORK_HALF_WIDTH_M).rotate([90, 0, 0])
     half = hoop.trim_by_plane([0, 0, -1], 0.0)
     inner, outer = FORK_INNER_RADIUS_M + FORK_EYE_SHIFT_M, FORK_OUTER_RADIUS_M + FORK_EYE_SHIFT_M
-    eye = _cylinder(FORK_EYE_RADIUS_M, inner, outer, SMALL_SECTIONS)
-    bore = _cylinder(PIVOT_RADIUS_M + RUNNING_CLEARANCE_M, 0.0, 2 * FORK_OUTER_RADIUS_M, PIN_SECTIONS)
-    return half + along(eye, _both("x")) - along(bore, _both("x"))
+    eye = cylinder(FORK_EYE_RADIUS_M, inner, outer, SMALL_SECTIONS)
+    bore = cylinder(PIVOT_RADIUS_M + RUNNING_CLEARANCE_M, 0.0, 2 * FORK_OUTER_RADIUS_M, PIN_SECTIONS)
+    return half + along(eye, both("x")) - along(bore, both("x"))
 
 
 def _ring(inner: float, outer: float, half_height: float) -> Manifold:
     """Flat ring about z with chamfered edges."""
     c, h = RING_CHAMFER_M, half_height
-    return _revolve(
+    return revolve(
         [
             (inner, -h + c),
             (inner + c, -h),
@@ -543,45 +462,18 @@ def _shell(inner: float, outer: float, lowest_deg: float, highest_deg: float) ->
     steps = max(1, round((highest_deg - lowest_deg) / ARC_STEP_DEG))
     latitude = np.radians(np.linspace(lowest_deg, highest_deg, steps + 1))
     circle = np.column_stack([np.cos(latitude), np.sin(latitude)])
-    return _revolve([*map(tuple, outer * circle), *map(tuple, inner * circle[::-1])], SECTIONS)
+    return revolve([*map(tuple, outer * circle), *map(tuple, inner * circle[::-1])], SECTIONS)
 
 
 def _tube(inner: float, outer: float, low: float, high: float) -> Manifold:
-    return _revolve([(inner, low), (outer, low), (outer, high), (inner, high)], SECTIONS)
-
-
-def _cylinder(radius: float, low: float, high: float, sections: int) -> Manifold:
-    return Manifold.cylinder(high - low, radius, radius, sections).translate([0, 0, low])
+    return revolve([(inner, low), (outer, low), (outer, high), (inner, high)], SECTIONS)
 
 
 def _pin(radius: float, low: float, high: float) -> Manifold:
     c = RING_CHAMFER_M
-    return _revolve(
+    return revolve(
         [(0.0, low), (radius, low), (radius, high - c), (radius - c, high), (0.0, high)], PIN_SECTIONS
     )
-
-
-def _revolve(outline: Iterable[tuple[float, float]], sections: int) -> Manifold:
-    """Solid of revolution about z of an outline of points (distance from z, height)."""
-    return Manifold.revolve(_section(outline), sections)
-
-
-def _section(outline: Iterable[tuple[float, float]]) -> CrossSection:
-    return CrossSection([np.array(list(outline), dtype=float)], FillRule.NonZero)
-
-
-def _around(solid: Manifold, count: int, first_deg: float = 0.0) -> Manifold:
-    """Copies of a solid, evenly spaced about z."""
-    return _union(solid.rotate([0.0, 0.0, first_deg + 360.0 * i / count]) for i in range(count))
-
-
-def _both(axis: str) -> NDArray[np.float64]:
-    direction = np.eye(3)["xyz".index(axis)]
-    return np.array([direction, -direction])
-
-
-def _union(solids: Iterable[Manifold]) -> Manifold:
-    return Manifold.batch_boolean(list(solids), OpType.Add)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import pytest
 import trimesh
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models import geometry
+from spheretwin.models import geometry, mesh_files
+from spheretwin.models.solids import along
 
 NAMES = ("stator", "outer_ring", "inner_ring", "ball", "hoop", "shaft", "pole", "coil")
 ROTOR = ("ball", "hoop", "shaft", "poles")
@@ -30,8 +31,8 @@ def solids(actuator):
         "ball": geometry.ball(actuator),
         "hoop": geometry.hoop(actuator),
         "shaft": geometry.shaft(actuator),
-        "poles": geometry.along(geometry.pole(actuator), actuator.pole_axes, actuator.magnet.distance_m),
-        "coils": geometry.along(geometry.coil(actuator), actuator.coil_axes, actuator.coil.distance_m),
+        "poles": along(geometry.pole(actuator), actuator.pole_axes, actuator.magnet.distance_m),
+        "coils": along(geometry.coil(actuator), actuator.coil_axes, actuator.coil.distance_m),
     }
 
 
@@ -112,16 +113,16 @@ def test_the_meshes_stay_small(committed):
 @pytest.mark.parametrize("name", NAMES)
 def test_normals_are_unit_vectors_on_the_outer_side(name, made):
     mesh = made[name]
-    normals = geometry.crease_normals(mesh)
+    normals = mesh_files.crease_normals(mesh)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=2), 1.0, atol=1e-9)
     # A corner's normal averages faces within the crease angle of its own.
     cosine = np.einsum("fcj,fj->fc", normals, mesh.face_normals)
-    assert cosine.min() > np.cos(np.radians(geometry.CREASE_DEG))
+    assert cosine.min() > np.cos(np.radians(mesh_files.CREASE_DEG))
 
 
 def test_edges_stay_sharp_and_curves_smooth(made, actuator):
     mesh = made["coil"]
-    normals = geometry.crease_normals(mesh)
+    normals = mesh_files.crease_normals(mesh)
     flange = np.abs(mesh.triangles[:, :, 2]).min(axis=1) > actuator.coil.length_m / 2 - ROUNDING_M
     np.testing.assert_allclose(np.abs(normals[flange][:, :, 2]), 1.0, atol=1e-9)
     rho = np.linalg.norm(mesh.triangles[:, :, :2], axis=2)
