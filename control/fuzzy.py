@@ -24,7 +24,8 @@ def memberships(x: float) -> tuple[float, float, float, float, float]:
     """Degrees of membership of `x` in the five sets, normalised to sum 1.
 
     The nearest set's exponent is taken off before the exponential (which divides numerator and
-    denominator alike), so at least one degree is 1 before normalising: nothing underflows at any x.
+    denominator alike), so at least one degree is 1 before normalising: nothing underflows, wherever the
+    square of `x` is a number (up to 1e150).
     """
     a, b, c, d, e = exponent(x, 0), exponent(x, 1), exponent(x, 2), exponent(x, 3), exponent(x, 4)
     nearest = max(a, b, c, d, e)

@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-NonNegative = Annotated[float, Field(ge=0)]
-Positive = Annotated[float, Field(gt=0)]
+# Gains and times beyond this are slips of the pen; their products would overflow.
+LARGEST = 1e9
+
+NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 
 # Layout of the packed gains.
 PERIOD, SURFACE_SLOPE, REACHING_GAIN, FUZZY_RATE, SWITCHING_RATE, BOUND_RATE = range(6)

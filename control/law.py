@@ -10,7 +10,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from spheretwin.models.telemetry import Signal
+from spheretwin.models.errors import InputError
+from spheretwin.models.telemetry import SIGNALS, Signal, width
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
@@ -32,13 +33,20 @@ class Law:
         (N·m) on (alpha, beta, gamma) into `torque` and returns nothing. `reference` holds the desired
         angle, rate and acceleration as rows (rad, rad/s, rad/s²), `measurement` angle and rate.
         `state` is the law's memory, changed in place. A plain Python function works; one that numba
-        compiles runs at the speed of the shipped laws.
+        compiles runs at the speed of the shipped laws. It must write all three torques at every call:
+        one that is left out, or is no number, ends the run as ``diverged``. So does an exception in
+        compiled code; one in plain Python is raised to the caller.
     parameters : (n,) array
         Numbers handed to every call.
     state : (m,) array
         Memory at the start of a run; the run works on a copy.
     signals : tuple of Signal
         Names of the leading entries of the state, which the loop logs after every call.
+
+    Raises
+    ------
+    InputError
+        The numbers are not one-dimensional arrays, or the signals do not fit the state.
     """
 
     name: str
@@ -46,3 +54,20 @@ class Law:
     parameters: NDArray[np.float64]
     state: NDArray[np.float64]
     signals: tuple[Signal, ...] = ()
+
+    def __post_init__(self) -> None:
+        for field in ("parameters", "state"):
+            numbers = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
+            if np.ndim(getattr(self, field)) != 1:
+                raise InputError(
+                    f"law {self.name}: expected {field} as a one-dimensional array, received {numbers.shape}"
+                )
+            object.__setattr__(self, field, numbers)  # compiled code takes this layout alone
+        if width(self.signals) > len(self.state):
+            raise InputError(
+                f"law {self.name}: expected signals of at most {len(self.state)} numbers, the size of its"
+                f" state, received {width(self.signals)}"
+            )
+        names = [signal.name for signal in (*SIGNALS, *self.signals)]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")

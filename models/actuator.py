@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
 from spheretwin.models.errors import InputError
+from spheretwin.models.mujoco_library import silence_warnings
+from spheretwin.models.telemetry import GROUPS
 from spheretwin.models.torque_curve import TorqueCurve
 
 FOLDER = Path(__file__).resolve().parent
@@ -117,7 +119,9 @@ def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
     InputError
         A file cannot be read, or the model lacks a part of the actuator.
     """
-    return _load(mjcf, curve, _state(mjcf), _state(curve))
+    if (mjcf, curve) == (MJCF_PATH, TORQUE_CURVE_PATH):
+        return _shipped()  # read once: another file, or one that it includes, may change meanwhile
+    return from_model(read_spec(mjcf).compile(), torque_curve.read(curve))
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
@@ -130,6 +134,7 @@ def read_spec(path: Path) -> mujoco.MjSpec:
     """
     if not path.is_file():
         raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
+    silence_warnings()
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         for drawn in [*spec.geoms, *spec.meshes]:
@@ -141,9 +146,17 @@ def read_spec(path: Path) -> mujoco.MjSpec:
 
 
 def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
-    """Read the actuator out of a compiled model."""
+    """Read the actuator out of a compiled model.
+
+    Raises
+    ------
+    InputError
+        The model is not a rotor on three hinges about x, y, z amid paired coils.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
+    _check_joint(model, data)
+    _check_finite(model)
     poles = _sites(model, "pole_")
     coils = _sites(model, "coil_")
     R_SR = data.body(_body(model, "rotor")).xmat.reshape(3, 3)
@@ -180,24 +193,14 @@ def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
     return _magnet(model, _sites(model, "pole_")), _coil(model, _sites(model, "coil_"))
 
 
-def one_line(error: Exception) -> str:
+def one_line(error: BaseException) -> str:
     """An error's message without its line breaks."""
     return " ".join(str(error).split())
 
 
-@lru_cache(maxsize=8)
-def _load(mjcf: Path, curve: Path, *_: object) -> Actuator:
-    """Read an actuator once: the further arguments change when a file does."""
-    return from_model(read_spec(mjcf).compile(), torque_curve.read(curve))
-
-
-def _state(path: Path) -> tuple[int, int] | None:
-    """What changes when a file is written; None where there is none."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_size
+@cache
+def _shipped() -> Actuator:
+    return from_model(read_spec(MJCF_PATH).compile(), torque_curve.read(TORQUE_CURVE_PATH))
 
 
 def _frozen(values: NDArray) -> NDArray:
@@ -224,8 +227,8 @@ def _site(model: mujoco.MjModel, name: str) -> int:
 def _number(model: mujoco.MjModel, name: str) -> float:
     _named(model, mujoco.mjtObj.mjOBJ_NUMERIC, "custom numeric", name)
     value = float(model.numeric(name).data[0])
-    if not value > 0:
-        raise InputError(f"model: expected {name} above zero, received {value:g}")
+    if not 0 < value < np.inf:
+        raise InputError(f"model: expected {name} finite and above zero, received {value:g}")
     return value
 
 
@@ -257,7 +260,10 @@ def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.f
             name = model.site(coils[index]).name
             raise InputError(f"model: expected one coil opposite {name}, received {count}")
     partner = np.argmax(opposite, axis=1)
-    return np.array([[i, j] for i, j in enumerate(partner) if i < j])
+    groups = np.array([[i, j] for i, j in enumerate(partner) if i < j])
+    if len(groups) != len(GROUPS):
+        raise InputError(f"model: expected {len(GROUPS)} groups of two coils, received {len(groups)}")
+    return groups
 
 
 def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
@@ -270,13 +276,52 @@ def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
 
 
 def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
-    return Coil(
+    coil = Coil(
         inner_radius_m=_number(model, "coil_inner_radius_m"),
         outer_radius_m=_shared(model.site_size[coils, 0], "radius of the coils"),
         length_m=2 * _shared(model.site_size[coils, 1], "length of the coils"),
         distance_m=_shared(np.linalg.norm(model.site_pos[coils], axis=1), "distance of the coils"),
         turns=_number(model, "coil_turns"),
     )
+    if coil.inner_radius_m >= coil.outer_radius_m:
+        raise InputError(
+            f"model: expected coil_inner_radius_m below the coils' radius of {coil.outer_radius_m:g} m,"
+            f" received {coil.inner_radius_m:g}"
+        )
+    return coil
+
+
+def _check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """The joint that the kinematics assume: hinges about x, y, z, in this order, through one point."""
+    if model.nv != 3 or model.nq != 3:
+        raise InputError(f"model: expected three degrees of freedom, received {model.nv}")
+    for i, (name, axis) in enumerate(zip(HINGES, "xyz", strict=True)):
+        joint = _named(model, mujoco.mjtObj.mjOBJ_JOINT, "joint", name)
+        is_hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+        along = np.allclose(data.xaxis[joint], np.eye(3)[i], atol=COLLINEAR_TOLERANCE)
+        centred = np.allclose(data.xanchor[joint], 0.0, atol=COLLINEAR_TOLERANCE)
+        if not (joint == i and is_hinge and along and centred):
+            raise InputError(
+                f"model: expected joint {i + 1} to be hinge {name} about {axis} through the origin"
+            )
+    rotor = _body(model, "rotor")
+    upright = abs(model.body_iquat[rotor][0]) > 1 - COLLINEAR_TOLERANCE
+    if not upright or np.any(np.abs(model.body_ipos[rotor]) > COLLINEAR_TOLERANCE):
+        raise InputError(
+            "model: expected the rotor's centre of mass at the origin and its principal axes along its own"
+        )
+    if np.any(np.abs(_hinge_range(model)[1]) >= np.pi / 2):
+        raise InputError("model: expected a range of beta inside -90 to 90 degrees, where the joint locks")
+
+
+def _check_finite(model: mujoco.MjModel) -> None:
+    arrays = {
+        name: getattr(model, name)
+        for name in ("body_mass", "body_inertia", "body_pos", "site_pos", "site_size", "jnt_range")
+    }
+    for name, numbers in {**arrays, "gravity": model.opt.gravity}.items():
+        if not np.all(np.isfinite(numbers)):
+            raise InputError(f"model: expected finite numbers, received NaN or infinity in {name}")
 
 
 def _hinge_range(model: mujoco.MjModel) -> NDArray[np.float64]:

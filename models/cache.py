@@ -1,16 +1,19 @@
 """A folder for what is expensive to make and can always be made again.
 
-Its name is a digest of every source file that can hold compiled code, and of the versions of numba and
-MuJoCo, so that nothing in it can be stale: numba itself keys a cached function by its own file alone, and
-an edited callee in another file would go on returning its old answer.
+Its name is a digest of every source file that can hold compiled code, and of the versions of the
+packages it is made with, so that nothing in it can be stale: numba itself keys a cached function by its
+own file alone, and an edited callee in another file would go on returning its old answer.
 """
 
+import atexit
 import hashlib
 import importlib.metadata
 import importlib.util
 import os
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -40,31 +43,42 @@ def kept_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArra
         return np.load(path)
     except (OSError, ValueError, EOFError):
         array = compute()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-        np.save(file, array)
-    os.replace(file.name, path)
+    with suppress(OSError):  # it can always be made again
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+            np.save(file, array)
+        os.replace(file.name, path)
     return array
 
 
 @cache
 def _root() -> Path:
-    chosen = os.environ.get("SPHERETWIN_CACHE_DIR")
-    if chosen:
-        return Path(chosen)
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "spheretwin"
-    try:
-        home.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=home):
-            return home
-    except OSError:  # a read-only home: compile for this process, in a folder of its own
-        return Path(tempfile.mkdtemp(prefix="spheretwin-"))
+    for folder in _candidates():
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    # Nowhere to keep anything: work for this process, in a folder of its own.
+    folder = Path(tempfile.mkdtemp(prefix="spheretwin-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _candidates() -> Iterator[Path]:
+    if chosen := os.environ.get("SPHERETWIN_CACHE_DIR"):
+        yield Path(chosen)
+    if chosen := os.environ.get("XDG_CACHE_HOME"):
+        yield Path(chosen) / "spheretwin"
+    with suppress(RuntimeError):  # a user without a home
+        yield Path.home() / ".cache" / "spheretwin"
 
 
 @cache
 def _digest() -> str:
     digest = hashlib.sha256()
-    for package in ("numba", "mujoco"):
+    for package in ("numba", "mujoco", "numpy", "scipy"):
         digest.update(importlib.metadata.version(package).encode())
     for source in _sources():
         digest.update(source.name.encode())

@@ -9,7 +9,7 @@ sharp rim, which passes half a millimetre from the winding, or through it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -64,7 +64,11 @@ def sample_angles(step_deg: float = STEP_DEG) -> Array:
 
 
 def compute_curve(
-    magnet: Magnet, coil: Coil, phi_rad: Array | None = None, mesh: Mesh | None = None
+    magnet: Magnet,
+    coil: Coil,
+    phi_rad: Array | None = None,
+    mesh: Mesh | None = None,
+    track: Callable[[range], Iterable[int]] = iter,
 ) -> TorqueCurve:
     """Torque of one ampere in a coil on one pole of polarity +1, about the joint centre.
 
@@ -78,6 +82,8 @@ def compute_curve(
         Angles between the two axes; `sample_angles()` unless given.
     mesh : Mesh
         Quadrature; the default one unless given.
+    track : callable
+        Passes on the numbers of the angles, and may show progress.
 
     Returns
     -------
@@ -106,24 +112,31 @@ def compute_curve(
         )
     phi_rad = sample_angles() if phi_rad is None else np.asarray(phi_rad, dtype=np.float64)
     solenoid = _solenoid_field()
-    torque = np.array([_torque(magnet, coil, phi, mesh or Mesh(), solenoid) for phi in phi_rad])
+    angles = track(range(len(phi_rad)))
+    torque = np.array([_torque(magnet, coil, phi_rad[i], mesh or Mesh(), solenoid) for i in angles])
     torque[(phi_rad == 0.0) | (phi_rad == np.pi)] = 0.0  # by symmetry; the sum leaves 1e-18
     return TorqueCurve(phi_rad, torque)
 
 
-def convergence(curve: TorqueCurve, magnet: Magnet, coil: Coil, mesh: Mesh | None = None) -> Convergence:
+def convergence(
+    curve: TorqueCurve,
+    magnet: Magnet,
+    coil: Coil,
+    mesh: Mesh | None = None,
+    track: Callable[[range], Iterable[int]] = iter,
+) -> Convergence:
     """Compare a curve with one on a doubled mesh, at its peak and at every eighth sample.
 
     Parameters
     ----------
     curve : TorqueCurve
         What `compute_curve` returned for the same magnet, coil and mesh.
-    magnet, coil, mesh
+    magnet, coil, mesh, track
         As in `compute_curve`.
     """
     top = int(np.argmax(np.abs(curve.torque_Nm_per_A)))
     again = np.append(np.arange(0, len(curve.phi_rad), CONVERGENCE_STRIDE), top)
-    finer = compute_curve(magnet, coil, curve.phi_rad[again], (mesh or Mesh()).doubled())
+    finer = compute_curve(magnet, coil, curve.phi_rad[again], (mesh or Mesh()).doubled(), track)
     change = np.abs(finer.torque_Nm_per_A - curve.torque_Nm_per_A[again]) / curve.peak_Nm_per_A
     return Convergence(peak=float(change[-1]), worst=float(np.max(change)))
 

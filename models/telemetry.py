@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import accumulate
@@ -13,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.errors import InputError
+from spheretwin.models.files import whole_file
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ SIGNALS = (
     Signal("error_rad", "rad", 3, "tracking error q - q_ref (28)", ANGLES),
     Signal("torque_command_Nm", "N·m", 3, "generalised torque asked for by the law", ANGLES),
     Signal("torque_Nm", "N·m", 3, "torque of the coils on the rotor, stator frame", AXES),
-    Signal("disturbance_Nm", "N·m", 3, "generalised load and random torque, opposing motion (55)", ANGLES),
+    Signal("disturbance_Nm", "N·m", 3, "generalised load and random torque, subtracted in (1)", ANGLES),
     Signal("current_command_A", "A", 18, "group currents asked of the amplifiers", GROUPS),
     Signal("current_A", "A", 18, "group currents, mean over the physics step that begins now", GROUPS),
     Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
@@ -100,22 +99,14 @@ class Table:
         Raises
         ------
         InputError
-            The file cannot be written there.
+            No file can be made there.
+        SpheretwinError
+            Writing failed; what was there before is untouched.
         """
         import pyarrow.parquet  # slow to import, and most runs write no file
 
-        try:
-            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            os.close(handle)
-        except OSError as error:
-            raise InputError(f"telemetry: expected a writable path, {error}") from None
-        try:
+        with whole_file(path) as temporary:
             pyarrow.parquet.write_table(self._arrow(metadata), temporary)
-            os.chmod(temporary, 0o666 & ~_umask())  # mkstemp's files are private
-            os.replace(temporary, path)
-        except BaseException:
-            os.unlink(temporary)
-            raise
 
     def _arrow(self, metadata: Mapping[str, str]):  # type: ignore[no-untyped-def]  # pyarrow has no types
         import pyarrow as pa
@@ -161,9 +152,3 @@ def _signal(field) -> Signal:  # type: ignore[no-untyped-def]
 def _flat(column, size: int) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
     chunk = column.combine_chunks()
     return np.asarray(chunk.flatten() if size > 1 else chunk, dtype=np.float64).reshape(-1, size)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 COLUMNS = ("phi_deg", "torque_Nm_per_A")
 FEWEST_ROWS = 8
 
+# Symmetry leaves no torque on a pole straight in front of a coil, or behind it. A measured curve may be
+# off by its noise; more would be divided by a vanishing sine.
+LARGEST_END_SHARE = 0.01
+
 
 @dataclass(frozen=True, eq=False)
 class TorqueCurve:
@@ -81,18 +85,22 @@ def read(path: Path) -> TorqueCurve:
         The file cannot be read, lacks a column, or its samples are no curve from 0 to 180 degrees.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"torque curve {path}: expected a readable text file, {error}") from None
-    rows = csv.DictReader(line for line in text.splitlines() if line and not line.startswith("#"))
-    missing = [name for name in COLUMNS if name not in (rows.fieldnames or ())]
-    if missing:
-        found = ", ".join(rows.fieldnames or ()) or "none"
-        raise InputError(f"torque curve {path}: expected the columns {', '.join(COLUMNS)}, received {found}")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    rows = csv.DictReader(lines, skipinitialspace=True)
     try:
-        samples = np.array([[float(row[name]) for name in COLUMNS] for row in rows])
-    except (TypeError, ValueError) as error:
+        found = [name or "" for name in rows.fieldnames or ()]
+        missing = [name for name in COLUMNS if name not in found]
+        samples = np.array([] if missing else [[float(row[name]) for name in COLUMNS] for row in rows])
+    except (TypeError, ValueError, csv.Error) as error:
         raise InputError(f"torque curve {path}: expected numbers only, received {error}") from None
+    if missing:
+        raise InputError(
+            f"torque curve {path}: expected the columns {', '.join(COLUMNS)},"
+            f" received {', '.join(found) or 'none'}"
+        )
     _check(path, samples)
     return TorqueCurve(np.radians(samples[:, 0]), samples[:, 1])
 
@@ -116,7 +124,13 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
         )
     if not np.all(np.isfinite(samples)):
         raise InputError(f"torque curve {path}: expected finite numbers, received NaN or infinity")
-    angles = samples[:, 0]
+    angles, torque = samples.T
+    outside = (angles < 0.0) | (angles > 180.0)
+    if np.any(outside):
+        raise InputError(
+            f"torque curve {path}: expected angles from 0 to 180 degrees,"
+            f" received {angles[np.argmax(outside)]:g}, which is outside"
+        )
     if np.any(np.diff(angles) <= 0):
         row = int(np.argmax(np.diff(angles) <= 0))
         raise InputError(
@@ -127,4 +141,12 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
         raise InputError(
             f"torque curve {path}: expected angles from 0 to 180 degrees,"
             f" received {angles[0]:g} to {angles[-1]:g}"
+        )
+    peak = np.max(np.abs(torque))
+    if peak == 0.0:
+        raise InputError(f"torque curve {path}: expected a torque somewhere, received zeros only")
+    if max(abs(torque[0]), abs(torque[-1])) > LARGEST_END_SHARE * peak:
+        raise InputError(
+            f"torque curve {path}: expected no torque at 0 and 180 degrees, where symmetry leaves none,"
+            f" received {torque[0]:g} and {torque[-1]:g} N·m/A"
         )

@@ -6,32 +6,50 @@ Exit 0: done. 1: a run or a check failed. 2: bad input, told in one line.
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
 from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.twin.commands import magnetics, simulate
+from spheretwin.twin.commands import crosscheck, magnetics, simulate
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters
     try:
         options, rest = _parser().parse_known_args(arguments)
         succeeded = options.run(options, rest)
+        sys.stdout.flush()
     except InputError as error:
-        print(f"spheretwin: {error}", file=sys.stderr)
-        return BAD_INPUT
+        return _refused(f"{error}", BAD_INPUT)
     except SpheretwinError as error:
-        print(f"spheretwin: {error}", file=sys.stderr)
-        return FAILED
+        return _refused(f"{error}", FAILED)
+    except KeyboardInterrupt:
+        return _refused("interrupted", FAILED)
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_stdout()
         return FAILED
+    except OSError as error:
+        _discard_stdout()
+        return _refused(f"output: {error}", FAILED)
     return DONE if succeeded else FAILED
+
+
+def _refused(message: str, code: int) -> int:
+    print(f"spheretwin: {message}", file=sys.stderr)
+    return code
+
+
+def _discard_stdout() -> None:
+    """Keep Python from trying to flush, at its exit, what can no longer be written."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
@@ -49,6 +67,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(metavar="VERB", required=True)
     simulate.add_to(verbs)
+    crosscheck.add_to(verbs)
     magnetics.add_to(verbs)
     return parser
 

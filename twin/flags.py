@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, get_args
 
 from spheretwin.models.errors import InputError
 from spheretwin.twin import scenario as scenarios
@@ -58,12 +58,16 @@ def _grouped(tokens: Sequence[str]) -> list[tuple[str, list[str]]]:
 def _value(name: str, text: str) -> Any:
     if name in _TEXT_FIELDS:
         return text
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text
+    for read in (json.loads, float):
+        try:
+            return read(text)
+        except (ValueError, RecursionError):
+            continue
+    return text
 
 
-_TEXT_FIELDS = {
-    name for name, field in scenarios.fields_of(Scenario).items() if field.annotation in (str, str | None)
-}
+def _is_text(annotation: Any) -> bool:
+    return annotation is str or any(map(_is_text, get_args(annotation)))
+
+
+_TEXT_FIELDS = {name for name, field in scenarios.fields_of(Scenario).items() if _is_text(field.annotation)}

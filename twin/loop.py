@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.allocation import allocate
+from spheretwin.control.bounded_allocation import SCRATCH_ROWS, allocate_bounded
 from spheretwin.control.sliding import sliding_surface
 from spheretwin.models.compiled import compiled
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import fill_torque_matrix
 from spheretwin.models.telemetry import SIGNALS, offsets, width
 from spheretwin.twin.plant.drive import advance
-from spheretwin.twin.plant.engine import step
+from spheretwin.twin.plant.stepping import step
 
 COMPLETED, LEFT_WORKSPACE, DIVERGED = 0, 1, 2
 
@@ -35,7 +36,7 @@ class Inputs(NamedTuple):
 
     t: NDArray[np.float64]  # (n,) s
     reference: NDArray[np.float64]  # (n, 3, 3) angle, rate, acceleration as rows
-    disturbance: NDArray[np.float64]  # (n, 3) N·m, generalised, opposing motion
+    disturbance: NDArray[np.float64]  # (n, 3) N·m, generalised, subtracted in (1)
 
 
 class Settings(NamedTuple):
@@ -45,6 +46,7 @@ class Settings(NamedTuple):
     hinge_range: NDArray[np.float64]  # (3, 2) rad
     modelling_torque: NDArray[np.float64]  # (3,) N·m, unknown to the controller
     surface_slope: float  # 1/s, of the logged sliding variable
+    bounded: bool  # allocate all that the current limit allows, not the scaled least-norm currents
 
 
 class Memory(NamedTuple):
@@ -75,8 +77,8 @@ def loop(  # type: ignore[no-untyped-def]
         Changed in place.
     inputs : Inputs
     settings : Settings
-    engine : Engine
-        Changed in place.
+    engine : Engine or Equations
+        The plant, changed in place.
     magnetics : TorqueModel
     drive : Drive
     log : (ticks, width) array
@@ -88,26 +90,33 @@ def loop(  # type: ignore[no-untyped-def]
         Ticks completed since the start of the run, and `COMPLETED`, `LEFT_WORKSPACE` or `DIVERGED`.
     """
     groups = memory.current.shape[0]
-    measurement = np.empty((2, 3))
+    reference, measurement = np.empty((3, 3)), np.empty((2, 3))
     torque_q, torque_S = np.empty(3), np.empty(3)
     command, current = np.empty(groups), np.empty(groups)
-    G, scratch = np.empty((3, groups)), np.empty((2, groups))
+    G, scratch = np.empty((3, groups)), np.empty((SCRATCH_ROWS, groups))
     for tick in range(first, last):
-        reference, disturbance, row = inputs.reference[tick], inputs.disturbance[tick], log[tick]
+        disturbance, row = inputs.disturbance[tick], log[tick]
+        reference[:] = inputs.reference[tick]
         measurement[0], measurement[1] = engine.q, engine.qdot
+        # Logged before the law is called: it may write into all that it is handed.
+        write_row(row, inputs.t[tick], reference, measurement, disturbance, settings.surface_slope)
+        torque_q[:] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         law(inputs.t[tick], reference, measurement, parameters, memory.law, torque_q)
         if not isfinite(torque_q[0] + torque_q[1] + torque_q[2]):
             return tick, DIVERGED
         cartesian_torque(engine.q, torque_q, torque_S)
         fill_torque_matrix(engine.q, magnetics, G, scratch)
-        row[SCALE] = allocate(G, torque_S, drive.current_limit_A, command)
+        if settings.bounded:
+            scale = allocate_bounded(G, torque_S, drive.current_limit_A, command, scratch)
+        else:
+            scale = allocate(G, torque_S, drive.current_limit_A, command)
+        row[SCALE] = scale
         for substep in range(settings.substeps):
             if substep > 0:
                 fill_torque_matrix(engine.q, magnetics, G, scratch)
             advance(drive, command, memory.current, current)
             rotor_torque(G, current, engine.torque_S)
             if substep == 0:
-                write_row(row, inputs.t[tick], reference, measurement, disturbance, settings.surface_slope)
                 row[TORQUE_COMMAND : TORQUE_COMMAND + 3] = torque_q
                 row[TORQUE : TORQUE + 3] = engine.torque_S
                 row[CURRENT_COMMAND : CURRENT_COMMAND + groups] = command

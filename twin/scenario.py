@@ -18,8 +18,11 @@ from spheretwin.twin.trajectory import Trajectory, Triple
 
 FOLDER = resources.files("spheretwin.twin") / "scenarios"
 
-# Telemetry of a run is held in memory, about 0.6 kB a tick.
-MOST_TICKS = 10_000_000
+# An hour at 1 kHz; the telemetry of a run is held in memory, about 0.6 kB a tick.
+MOST_TICKS = 3_600_000
+
+# A tick must end before its user does: 10,000 physics steps take some 50 ms.
+MOST_SUBSTEPS = 10_000
 
 # Clock times are built from decimal fractions; a period and a step that fit do so to rounding only.
 WHOLE = 1e-9
@@ -32,13 +35,15 @@ class _Section(BaseModel):
 class Controller(Gains):
     """The law, its gains, and how often it runs."""
 
-    period_s: Positive = Field(1e-3, description="control period, s; a whole number of physics steps")
+    period_s: Annotated[float, Field(gt=0, le=10)] = Field(
+        1e-3, description="control period, s; a whole number of physics steps"
+    )
 
 
 class Plant(_Section):
     """The rotor and how its motion is integrated."""
 
-    step_s: Positive = Field(5e-4, description="physics step, s")
+    step_s: Annotated[float, Field(ge=1e-7, le=1)] = Field(5e-4, description="physics step, s")
     integrator: Literal["RK4", "Euler", "implicitfast"] = Field("RK4", description="MuJoCo integrator")
     modelling_error: Annotated[float, Field(gt=-1, le=100)] = Field(
         0.0, description="m: the rotor's inertia is (1 + m) times what the controller assumes"
@@ -50,14 +55,20 @@ class Plant(_Section):
     initial_rad: Triple | None = Field(
         None, description="pose at rest at the start, rad; the trajectory's first unless given"
     )
-    mjcf: str | None = Field(None, description="model file; the shipped one unless given")
-    torque_curve: str | None = Field(None, description="torque curve as CSV; the shipped one unless given")
+    mjcf: Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="model file; the shipped one unless given"
+    )
+    torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="torque curve as CSV; the shipped one unless given"
+    )
 
 
 class DriveSection(_Section):
     """Amplifiers and coils; what is not given comes from the model file."""
 
-    time_constant_s: NonNegative | None = Field(None, description="current lag L/R, s; 0 for none")
+    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
+        None, description="current lag L/R, s; 0 for none"
+    )
     current_limit_A: Positive | None = Field(None, description="largest group current, A")
 
 
@@ -68,6 +79,10 @@ class Scenario(_Section):
     description: str = Field("", description="what it shows")
     duration: Positive = Field(5.0, description="length of the run, s")
     seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the random torque")
+    allocation: Literal["least_norm", "bounded"] = Field(
+        "least_norm",
+        description="currents for a torque: least-norm and scaled at the limit (16), or all the limit allows",
+    )
     trajectory: Trajectory
     controller: Controller = Controller()
     plant: Plant = Plant()
@@ -77,9 +92,9 @@ class Scenario(_Section):
     @model_validator(mode="after")
     def _clocks_fit(self) -> Scenario:
         ratio = self.controller.period_s / self.plant.step_s
-        if round(ratio) < 1 or abs(ratio - round(ratio)) > WHOLE * ratio:
+        if round(ratio) < 1 or round(ratio) > MOST_SUBSTEPS or abs(ratio - round(ratio)) > WHOLE * ratio:
             raise ValueError(
-                "expected controller.period_s a whole multiple of plant.step_s,"
+                f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
                 f" received {self.controller.period_s:g} and {self.plant.step_s:g} s"
             )
         if not 1 <= self.ticks <= MOST_TICKS:
@@ -168,9 +183,19 @@ def _read(source: str) -> dict[str, Any]:
     else:
         raise InputError(f"scenario: expected {', '.join(shipped())} or a .toml file, received {source}")
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        fields = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
         raise InputError(f"scenario {source}: expected valid TOML, {error}") from None
+    return _beside(Path(source), fields)
+
+
+def _beside(source: Path, fields: dict[str, Any]) -> dict[str, Any]:
+    """Take the paths that a scenario file names from where the file is."""
+    plant = fields.get("plant")
+    for name in ("mjcf", "torque_curve"):
+        if isinstance(plant, dict) and isinstance(plant.get(name), str) and plant[name]:
+            plant[name] = str(source.parent / plant[name])
+    return fields
 
 
 def _override(fields: dict[str, Any], dotted: str, value: Any) -> None:

@@ -6,7 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-Triple = tuple[float, float, float]
+# Far beyond any motion of the actuator, and far from where squares of numbers overflow.
+LARGEST = 1e4
+
+Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Triple = tuple[Bounded, Bounded, Bounded]
 Samples = NDArray[np.float64]
 
 
@@ -29,7 +33,7 @@ class Sinusoid(_Trajectory):
 
     shape: Literal["sinusoid"] = Field("sinusoid", description="kind of trajectory")
     amplitude_rad: Triple = Field((0.2, 0.2, 0.2), description="amplitude on each axis, rad")
-    frequency_Hz: Annotated[float, Field(gt=0)] = Field(0.5, description="frequency, Hz")
+    frequency_Hz: Annotated[float, Field(gt=0, le=LARGEST)] = Field(0.5, description="frequency, Hz")
 
     def sample(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
         w = 2 * np.pi * self.frequency_Hz
@@ -42,9 +46,9 @@ class Nutation(_Trajectory):
     """``[a sin(pi t), b t cos(pi t), 2 pi t]``: a gyration that widens while the rotor spins (59)."""
 
     shape: Literal["nutation"] = Field("nutation", description="kind of trajectory")
-    alpha_amplitude_rad: float = Field(0.2, description="amplitude of α, rad")
-    beta_growth_rad_s: float = Field(0.2, description="growth of the amplitude of β, rad/s")
-    spin_rate_rad_s: float = Field(2 * np.pi, description="rate of γ, rad/s")
+    alpha_amplitude_rad: Bounded = Field(0.2, description="amplitude of α, rad")
+    beta_growth_rad_s: Bounded = Field(0.2, description="growth of the amplitude of β, rad/s")
+    spin_rate_rad_s: Bounded = Field(2 * np.pi, description="rate of γ, rad/s")
 
     def sample(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
         pi, a, b = np.pi, self.alpha_amplitude_rad, self.beta_growth_rad_s
@@ -62,8 +66,10 @@ class Tilt(_Trajectory):
     """Rise at a steady rate, hold, fall; the other hinges stay at 0 (60)."""
 
     shape: Literal["tilt"] = Field("tilt", description="kind of trajectory")
-    rate_rad_s: float = Field(np.pi / 30, description="rate of α while rising, rad/s")
-    phase_s: Annotated[float, Field(gt=0)] = Field(2.0, description="length of rise, hold and fall each, s")
+    rate_rad_s: Bounded = Field(np.pi / 30, description="rate of α while rising, rad/s")
+    phase_s: Annotated[float, Field(gt=0, le=LARGEST)] = Field(
+        2.0, description="length of rise, hold and fall each, s"
+    )
 
     def sample(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
         rising, falling = t < self.phase_s, (t >= 2 * self.phase_s) & (t < 3 * self.phase_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import rerun as rr
@@ -33,6 +34,7 @@ def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> No
         recording.log(entity(signal.name), style, static=True)
 
 
+@lru_cache(maxsize=4)
 def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], live: bool) -> rrb.Blueprint:
     """Blueprint of a run's recording.
 

@@ -18,7 +18,7 @@ class Progress:
         console = Console(stderr=True)
         self._name = name
         self._bars = Bars(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             TaskProgressColumn(),
             TextColumn("{task.fields[simulated_s]:.2f} s simulated"),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
-import uuid
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -17,8 +16,9 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import MJCF_PATH, Actuator
-from spheretwin.models.errors import InputError
+from spheretwin.models.actuator import MJCF_PATH, Actuator, one_line
+from spheretwin.models.errors import SpheretwinError
+from spheretwin.models.files import check_writable
 from spheretwin.models.telemetry import SIGNALS, Signal, Table
 from spheretwin.viz import blueprint, palette, scene
 from spheretwin.viz.events import Events
@@ -43,7 +43,7 @@ class Recorder:
     at 60 Hz. The file appears under its name when the recording closes; until then it ends in ``.part``.
 
     All work is done by one thread beside the simulation, which leaves the interpreter free while its
-    compiled loop runs; what goes wrong there is raised by the next call.
+    compiled loop runs; what goes wrong there is raised by `close`, so that the run itself goes on.
 
     Parameters
     ----------
@@ -76,13 +76,13 @@ class Recorder:
         self._events = Events()
         self._next_frame = 0
         self._last_tips: dict[str, NDArray[np.float64]] = {}
-        self._recording = rr.RecordingStream(APPLICATION, recording_id=_identity(scenario))
+        self._recording = rr.RecordingStream(APPLICATION)
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.viewer = Viewer() if live else None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
         self._pending: deque[Future[None]] = deque()
         if self._part:
-            _touch(self._part)
+            check_writable(self._part)
         self._submit(self._connect, signals, scenario)
 
     def _connect(self, signals: tuple[Signal, ...], scenario: dict[str, Any]) -> None:
@@ -122,22 +122,28 @@ class Recorder:
         self._submit(lambda: self._log([self._events.end(status)]))
 
     def close(self) -> None:
-        """Complete the file and give it its name; end the live viewer."""
-        try:
-            self._submit(self._recording.flush)
-            while self._pending:
-                self._pending.popleft().result()
-        finally:
-            self._worker.shutdown()
+        """Complete the file and give it its name; end the live viewer.
+
+        Raises
+        ------
+        SpheretwinError
+            Some of the recording could not be made or written; what there is of it keeps ``.part``.
+        """
+        self._submit(self._recording.flush)
+        self._worker.shutdown()
+        failed = next(filter(None, (work.exception() for work in self._pending)), None)
+        with suppress(Exception):  # a full disk was told by the flush already
             self._recording.disconnect()
-            if self._part and self._path and self._part.exists():
-                os.replace(self._part, self._path)
-            if self.viewer:
-                self.viewer.close()
+        if self.viewer:
+            self.viewer.close()
+        if failed:
+            raise SpheretwinError(f"recording: {self._part or 'live view'}: {one_line(failed)}") from failed
+        if self._part and self._path:
+            os.replace(self._part, self._path)
 
     def _submit(self, work: Callable[..., None], *arguments: Any) -> None:
-        while self._pending and self._pending[0].done():
-            self._pending.popleft().result()
+        while self._pending and self._pending[0].done() and not self._pending[0].exception():
+            self._pending.popleft()
         self._pending.append(self._worker.submit(work, *arguments))
 
     def _write(self, rows: Table) -> None:
@@ -203,23 +209,10 @@ def _strips(segments: NDArray[np.float64]) -> pa.Array:
     return pa.ListArray.from_arrays(pa.array(starts), points, type=kind)
 
 
-def _touch(path: Path) -> None:
-    try:
-        path.touch()
-    except OSError as error:
-        raise InputError(f"output: expected a writable path, {error}") from None
-
-
 def _time_index(t_s: NDArray[np.float64]) -> Index:
     """Times in whole nanoseconds: Rerun would cut the fraction of seconds off, a nanosecond too early."""
     nanoseconds = np.round(t_s * 1e9).astype("timedelta64[ns]")
     return [rr.TimeColumn(blueprint.TIMELINE, duration=nanoseconds)]
-
-
-def _identity(scenario: dict[str, Any]) -> str:
-    """Identity of a recording: the same for the same resolved scenario."""
-    text = json.dumps(scenario, sort_keys=True)
-    return str(uuid.uuid5(uuid.NAMESPACE_OID, text))
 
 
 def _as_markdown(scenario: dict[str, Any]) -> str:

@@ -65,24 +65,28 @@ def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]
 
 @lru_cache(maxsize=2)
 def _meshes(mjcf: Path, _: int) -> dict[str, rr.Mesh3D]:
-    """Meshes by entity, one for each body and colour, and one for all coils; read once while unchanged."""
+    """Meshes by entity, one for each body and colour, and one for all coils; read once while unchanged.
+
+    An entity is named after the first geom that it draws.
+    """
     model = mujoco.MjModel.from_xml_path(str(mjcf))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     coils: list[Drawn] = []
-    others: dict[tuple[str, tuple[float, ...]], list[tuple[str, Drawn]]] = defaultdict(list)
+    others: dict[tuple[str, tuple[float, ...]], list[Drawn]] = defaultdict(list)
+    names: dict[tuple[str, tuple[float, ...]], str] = {}
     for i in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).tolist():
         drawn, geom = _in_body_frame(model, data, i), model.geom(i)
         if geom.name.startswith("coil_"):
             coils.append(drawn)
-        else:
-            key = (model.body(geom.bodyid[0]).name, tuple(geom.rgba.tolist()))
-            others[key].append((model.mesh(geom.dataid[0]).name, drawn))
+            continue
+        key = (model.body(geom.bodyid[0]).name, tuple(geom.rgba.tolist()))
+        others[key].append(drawn)
+        names.setdefault(key, geom.name or f"geom{i}")
     meshes = {COILS: _coil_mesh(coils)} if coils else {}
     for (body, colour), parts in others.items():
-        name = "_".join(dict.fromkeys(name for name, _ in parts))
-        drawn = _joined([part for _, part in parts])
-        meshes[f"{WORLD}/{body}/{name}"] = rr.Mesh3D(
+        drawn = _joined(parts)
+        meshes[f"{WORLD}/{body}/{names[body, colour]}"] = rr.Mesh3D(
             vertex_positions=drawn.positions,
             vertex_normals=drawn.normals,
             triangle_indices=drawn.triangles,

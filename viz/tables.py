@@ -16,7 +16,7 @@ from spheretwin.models.telemetry import ANGLES
 def print_run(scenario: str, law: str, summary: dict[str, Any]) -> None:
     """Print the figures of one run: errors per axis, then currents and speed."""
     console = Console()
-    errors = Table(title=f"{scenario} under {law}: {summary['status']}", title_justify="left")
+    errors = Table(title=escape(f"{scenario} under {law}: {summary['status']}"), title_justify="left")
     errors.add_column("tracking error, rad")
     for axis in ANGLES:
         errors.add_column(axis, justify="right")
@@ -52,7 +52,7 @@ def print_files(record: Path | None, telemetry: Path | None) -> None:
 
 def print_fields(scenario: str, rows: Sequence[tuple[str, str, str]]) -> None:
     """Print every field of a scenario with its value and meaning."""
-    table = Table(title=f"fields of {scenario}", title_justify="left", box=None, header_style="bold")
+    table = Table(title=escape(f"fields of {scenario}"), title_justify="left", box=None, header_style="bold")
     table.add_column("flag", no_wrap=True)
     table.add_column("value", overflow="fold", max_width=24)
     table.add_column("meaning", overflow="fold")

@@ -56,7 +56,8 @@ def run(model, data, actuator, scenario, reference, disturbance, ticks):
     """Run the first control ticks; returns the telemetry rows as a list."""
     law = PlainAfsm(actuator.inertia, scenario.controller.period_s)
     rotor = model.body("rotor").id
-    decay = np.exp(-scenario.plant.step_s * actuator.group.resistance_ohm / actuator.group.inductance_H)
+    steps = scenario.plant.step_s * actuator.group.resistance_ohm / actuator.group.inductance_H
+    decay, mean_share = np.exp(-steps), (1 - np.exp(-steps)) / steps
     current, limit = np.zeros(18), actuator.group.current_limit_A
     unknown = np.array(scenario.plant.modelling_torque_Nm)
     rows = []
@@ -70,11 +71,12 @@ def run(model, data, actuator, scenario, reference, disturbance, ticks):
         for substep in range(scenario.substeps):
             if substep:
                 G = torque_matrix(rotation(data.qpos)[0], actuator)
+            mean = command + mean_share * (current - command)
             current = command + decay * (current - command)
-            torque = G @ current
+            torque = G @ mean
             data.xfrc_applied[rotor, 3:] = torque
             data.qfrc_applied[:] = -disturbance[tick] - unknown
             if substep == 0:
-                rows.append((q, qdot, q - reference[tick][0], torque_q, torque, command, current))
+                rows.append((q, qdot, q - reference[tick][0], torque_q, torque, command, mean))
             mujoco.mj_step(model, data)
     return rows

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from spheretwin.models import telemetry
-from spheretwin.models.errors import InputError
+from spheretwin.models import files
+from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry import SIGNALS, Table, offsets, read_parquet, width
 
 
@@ -55,16 +55,16 @@ def test_parquet_columns_are_what_pandas_and_polars_expect(table, tmp_path):
 
 
 def test_failed_write_leaves_nothing(table, tmp_path, monkeypatch):
-    monkeypatch.setattr(telemetry.os, "replace", _fail)
+    monkeypatch.setattr(files.os, "replace", _fail)
     (old := tmp_path / "run.parquet").write_text("what was there before")
-    with pytest.raises(RuntimeError):
+    with pytest.raises(SpheretwinError, match="disk full"):
         table.write_parquet(old, {})
     assert [path.name for path in tmp_path.iterdir()] == ["run.parquet"]
     assert old.read_text() == "what was there before"
 
 
 def _fail(*_):
-    raise RuntimeError("disk full")
+    raise OSError("disk full")
 
 
 def test_unwritable_place_and_foreign_file_are_bad_input(table, tmp_path):

@@ -240,6 +240,19 @@ HEADER = "phi_deg,torque_Nm_per_A"
         ([HEADER], "expected at least 8 rows, received 0"),
         ([HEADER, *GOOD_ROWS[1:]], "expected angles from 0 to 180 degrees, received 20 to 180"),
         ([HEADER, *GOOD_ROWS[:-1]], "expected angles from 0 to 180 degrees, received 0 to 160"),
+        (
+            [HEADER, *GOOD_ROWS, "190,0"],
+            "expected angles from 0 to 180 degrees, received 190, which is outside",
+        ),
+        (
+            [HEADER, "-20,0", *GOOD_ROWS],
+            "expected angles from 0 to 180 degrees, received -20, which is outside",
+        ),
+        ([HEADER, "0,0", "400,0", *GOOD_ROWS[1:]], "received 400, which is outside"),
+        ([HEADER, *GOOD_ROWS], "expected no torque at 0 and 180 degrees"),
+        ([HEADER, *(f"{phi},0" for phi in range(0, 181, 20))], "expected a torque somewhere"),
+        ([HEADER.replace(",", ";"), *GOOD_ROWS], "expected the columns phi_deg, torque_Nm_per_A"),
+        ([HEADER, *GOOD_ROWS[:4], '"80,0.001'], "expected numbers only"),
     ],
 )
 def test_bad_csv_is_refused_on_one_line(tmp_path, lines, complaint):
@@ -251,6 +264,16 @@ def test_bad_csv_is_refused_on_one_line(tmp_path, lines, complaint):
     assert complaint in message
     assert str(path) in message
     assert "\n" not in message
+
+
+def test_spreadsheet_s_csv_is_read(tmp_path):
+    # A byte-order mark, spaces after the commas, an empty line, a further column, Windows' line ends.
+    path = tmp_path / "curve.csv"
+    rows = [f"{phi}, {np.sin(np.radians(phi)):.6f}, bench" for phi in range(0, 181, 20)]
+    path.write_bytes("\r\n".join(["\ufeff" + HEADER + ",where", *rows[:3], "  ", *rows[3:]]).encode())
+    curve = torque_curve.read(path)
+    assert_allclose(np.degrees(curve.phi_rad), range(0, 181, 20))
+    assert_allclose(curve.torque_Nm_per_A, np.sin(curve.phi_rad), atol=1e-6)
 
 
 def test_missing_csv_is_refused_on_one_line(tmp_path):

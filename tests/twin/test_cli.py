@@ -102,6 +102,17 @@ def test_ctrl_c_keeps_the_run(tmp_path):
     assert recording.exists()
 
 
+def test_termination_keeps_the_run_too(tmp_path):
+    telemetry = tmp_path / "run.parquet"
+    process = started("simulate", "hold", "--live", "--duration", "60", "--telemetry", telemetry)
+    assert "watch" in process.stderr.readline()
+    time.sleep(3)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert len(read_parquet(telemetry)[0]) < 60_000
+
+
 def test_live_serves_on_this_machine_alone():
     process = started("simulate", "hold", "--live", "--duration", "20")
     try:
@@ -160,7 +171,12 @@ def _wait_for(condition, seconds=60):
         (["simulate", "hold", "--record", "missing/run.rrd"], ["writable", "missing"]),
         (["simulate", "hold", "--telemetry", "."], ["file name", "folder"]),
         (["simulate", "hold", "--plant.mjcf", "broken.xml"], ["broken.xml", "MJCF"]),
-        (["simulate", "hold", "--plant.mjcf", "empty.xml"], ["pole_"]),
+        (["simulate", "hold", "--plant.mjcf", "empty.xml"], ["three degrees of freedom", "0"]),
+        (["simulate", "hold", "--plant.initial-rad", "0", "1.6", "0"], ["first pose", "1.6"]),
+        (["simulate", "hold", "--plant.step-s", "1e-12"], ["step_s", "1e-12"]),
+        (["simulate", "hold", "--trajectory.angle-rad", "1e200", "0", "0"], ["angle_rad", "1e+200"]),
+        (["simulate", "hold", "--record", "same", "--telemetry", "./same"], ["own", "twice"]),
+        (["simulate", "hold", "--seed", "9" * 5000], ["seed"]),
         (["simulate", "hold", "--plant.mjcf", "missing.xml"], ["missing.xml"]),
         (["simulate", "hold", "--plant.torque-curve", "broken.csv"], ["phi_deg", "broken.csv"]),
         (["simulate", "hold", "--plant.torque-curve", "nan.csv"], ["finite", "nan.csv"]),

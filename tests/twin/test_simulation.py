@@ -6,6 +6,7 @@ import pytest
 
 from spheretwin.control import laws
 from spheretwin.control.law import Law
+from spheretwin.models.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry import Signal
@@ -100,7 +101,7 @@ def test_same_seed_same_bytes_other_seed_other_bytes():
 
 def test_chunks_change_nothing(monkeypatch):
     whole = run("nutation", duration=0.5)
-    monkeypatch.setattr(simulations, "CHUNK_TICKS", 7)
+    monkeypatch.setattr(simulations, "CHUNK_STEPS", 14)
     assert run("nutation", duration=0.5).telemetry.values.tobytes() == whole.telemetry.values.tobytes()
 
 
@@ -110,12 +111,16 @@ def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
     compiled = run("nutation", **overrides)
     monkeypatch.setattr(simulations, "_matching", lambda law: (loops.loop.py_func, law.step))
     plain = run("nutation", **overrides)
-    # Fused multiply-adds round once where Python rounds twice; before sgn(s) chatters, that is all.
-    rows = np.argmax(np.any(np.diff(np.sign(compiled.telemetry["sliding_s"]), axis=0), axis=1)) or 100
+    # Fused multiply-adds round once where Python rounds twice. Where sgn(s) first flips, a rounding may
+    # decide its tick; up to there the traces differ by rounding alone.
+    flips = np.flatnonzero(np.any(np.diff(np.sign(compiled.telemetry["sliding_s"]), axis=0), axis=1))
+    rows = flips[0] if name == "afsm" and len(flips) else 100
+    assert rows >= 20
     np.testing.assert_allclose(
         plain.telemetry.values[:rows], compiled.telemetry.values[:rows], rtol=1e-9, atol=1e-12
     )
-    assert largest_error(plain) == pytest.approx(largest_error(compiled), rel=1e-3)
+    # A flip a tick apart moves the angle by J^-1 torque T²/2, some 1e-5 rad.
+    np.testing.assert_allclose(largest_error(plain), largest_error(compiled), atol=1e-4)
 
 
 def proportional(t, reference, measurement, parameters, state, torque):
@@ -168,7 +173,7 @@ def test_stop_request_keeps_what_was_computed():
     asked = iter([False, False, True])
     finished = Simulation(scenarios.load("nutation")).run(stop_requested=lambda: next(asked))
     assert finished.status == "interrupted"
-    assert len(finished.telemetry) == 2 * simulations.CHUNK_TICKS
+    assert len(finished.telemetry) == simulations.CHUNK_STEPS
 
 
 def test_sinks_are_handed_every_row_once():
@@ -209,3 +214,75 @@ def test_current_lags_its_command_by_the_time_constant():
     h, T = scenario.plant.step_s, 0.9e-3 / 1.3
     share = 1 - (T / h) * (1 - np.exp(-h / T))
     np.testing.assert_allclose(mean, share * command, rtol=1e-12)
+
+
+def raising(t, reference, measurement, parameters, state, torque):
+    torque[:2] = 0.0
+    if t > 0.02:
+        raise ValueError("lost")
+    torque[2] = 0.0
+
+
+@pytest.mark.parametrize("step", [raising, numba.njit(raising)], ids=["plain", "compiled"])
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # numba's callback cannot raise
+def test_a_law_that_raises_is_never_taken_for_one_that_works(step):
+    law = Law("raising", step, np.zeros(0), np.zeros(0))
+    if step is raising:
+        with pytest.raises(ValueError, match="lost"):
+            simulate(scenarios.load("hold"), law)
+    else:
+        finished = simulate(scenarios.load("hold"), law)
+        assert (finished.status, len(finished.telemetry)) == ("diverged", 21)
+
+
+def silent(t, reference, measurement, parameters, state, torque):
+    pass
+
+
+def scribbling(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+    reference[:] = 7.0
+    measurement[:] = 7.0
+
+
+def test_a_law_that_writes_no_torque_ends_the_run():
+    law = Law("silent", numba.njit(silent), np.zeros(0), np.zeros(0))
+    finished = simulate(scenarios.load("hold"), law)
+    assert (finished.status, len(finished.telemetry)) == ("diverged", 0)
+
+
+def test_a_law_cannot_change_what_is_logged():
+    simulation = Simulation(scenarios.load("hold", {"duration": 0.05}), Law("s", scribbling, [], []))
+    first, again = simulation.run(), simulation.run()
+    np.testing.assert_array_equal(first.telemetry["q_ref_rad"], np.tile([0.2, -0.1, 0.3], (50, 1)))
+    np.testing.assert_array_equal(first.telemetry.values, again.telemetry.values)
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"signals": (Signal("mine", "1", 3, ""),)}, "at most 1 numbers"),
+        ({"signals": (Signal("q_rad", "1", 1, ""),)}, "q_rad"),
+        ({"parameters": np.zeros((2, 2))}, "one-dimensional"),
+    ],
+)
+def test_a_law_whose_parts_do_not_fit_is_bad_input(changes, part):
+    parts = {"parameters": np.zeros(2), "state": np.zeros(1), "signals": ()} | changes
+    with pytest.raises(InputError, match=part):
+        Law("mine", silent, **parts)
+
+
+def test_a_law_of_another_signature_is_bad_input():
+    law = Law("mine", numba.njit(lambda t, torque: None), np.zeros(0), np.zeros(0))
+    with pytest.raises(InputError, match="expected a function that compiles") as caught:
+        simulate(scenarios.load("hold"), law)
+    assert "\n" not in str(caught.value)
+
+
+def test_growing_random_torque_of_bound_zero_is_none():
+    finished = run("hold", disturbance__gamma_envelope="growing", duration=0.1)
+    np.testing.assert_array_equal(finished.telemetry["disturbance_Nm"], 0.05)
+    with pytest.raises(InputError, match="finite disturbance"):
+        run("hold", disturbance__gamma_envelope="growing", disturbance__random_bound_Nm=0.05, duration=300.0)

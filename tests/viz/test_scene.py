@@ -34,9 +34,20 @@ def test_meshes_stand_where_the_model_puts_them(actuator):
     directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
     # Each coil's vertices are symmetric about its axis, to the rounding of the mesh files.
     np.testing.assert_allclose(directions, actuator.coil_axes, atol=1e-4)
-    assert f"{scene.WORLD}/rotor/ball" in meshes
-    poles = [name for name in meshes if name.endswith("/pole")]
-    assert len(poles) == len(set(poles))
+
+
+def test_all_poles_are_drawn_in_the_colour_of_their_polarity(actuator):
+    meshes = scene._meshes(actuators.MJCF_PATH, 0)
+    for polarity, name in ((1, "north"), (-1, "south")):
+        mesh = meshes[f"{scene.WORLD}/rotor/pole_upper_{name}0"]
+        vertices = np.array(mesh.vertex_positions.as_arrow_array().to_pylist())
+        centres = vertices.reshape(8, -1, 3).mean(axis=1)
+        directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
+        axes = actuator.pole_axes[actuator.pole_polarity == polarity]
+        # Each direction is one axis of this polarity, and each axis has its pole.
+        match = directions @ axes.T > 1 - 1e-6
+        np.testing.assert_array_equal(match.sum(axis=0), 1)
+        np.testing.assert_array_equal(match.sum(axis=1), 1)
 
 
 def test_current_colours_tell_sign_and_size():

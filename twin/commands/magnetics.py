@@ -3,66 +3,145 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
+from spheretwin.models.workspace import LARGEST_TILT_DEG
 
-from spheretwin.models import pole_torque, torque_curve
-from spheretwin.models.actuator import MJCF_PATH, read_magnet_and_coil
-from spheretwin.models.errors import InputError
+CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
+
+MOST_POSES = 10_000  # some four hours
+
+# At 90 degrees the shaft's azimuth no longer tells a pose, and the hinges lock.
+STEEPEST_DEG = 85.0
 
 
 def add_to(verbs: Any) -> None:
     """Add the verb to the command's parser."""
     parser = verbs.add_parser("magnetics", help="the magnetic model by itself", allow_abbrev=False)
     parts = parser.add_subparsers(metavar="PART", required=True)
-    curve = parts.add_parser(
+    curve = _part(
+        parts,
         "curve",
-        help="compute the torque curve of a pole and a coil",
-        description="Compute the torque curve f_t(φ) from the geometry of the model file, with magpylib.",
-        allow_abbrev=False,
+        "compute the torque curve of a pole and a coil, or judge your own",
+        "Compute the torque curve f_t(φ) from the geometry of the model file, with magpylib; or compare"
+        " your own finite-element or bench data with it.",
     )
     curve.add_argument("--out", type=Path, metavar="FILE.csv", help="write the curve here, not to stdout")
-    curve.add_argument("--mjcf", type=Path, default=MJCF_PATH, metavar="FILE.xml", help="model file")
-    curve.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
-    curve.set_defaults(run=run_curve)
+    curve.add_argument("--csv", type=Path, metavar="FILE.csv", help=f"judge this {CURVE}")
+    curve.set_defaults(run=_run_curve)
+
+    check = _part(
+        parts,
+        "check",
+        "check the torque matrix against the summed field of all poles on all windings",
+        "Compare G_t(q)·I with the exact field of the 16 magnets on the current of the 36 windings"
+        " (magpylib), in random poses and for random currents.",
+    )
+    _add_curve(check)
+    check.add_argument("--poses", type=_count, default=15, metavar="N", help="number of poses (default: 15)")
+    check.add_argument(
+        "--seed", type=_seed, default=0, metavar="N", help="of poses and currents (default: 0)"
+    )
+    check.set_defaults(run=_run_check)
+
+    capability = _part(
+        parts,
+        "map",
+        "map the torque that is available in every direction over the workspace",
+        "Map, over tilt, its direction and spin: the torque available in every direction at the current"
+        " limit, the torque matrix's smallest singular value and condition number, and the copper loss.",
+    )
+    _add_curve(capability)
+    capability.add_argument("--out", type=Path, metavar="DIR", help="write figures into this folder")
+    capability.add_argument(
+        "--need", type=_positive, metavar="NM", help="fail where less torque (N·m) is available"
+    )
+    capability.add_argument(
+        "--largest-tilt",
+        type=_tilt,
+        default=LARGEST_TILT_DEG,
+        metavar="DEG",
+        help=f"of the shaft, degrees (default: {LARGEST_TILT_DEG:g})",
+    )
+    capability.set_defaults(run=_run_map)
 
 
-def run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Compute the curve, check its convergence, write it."""
-    if rest:
-        raise InputError(f"command line: expected --out, --mjcf or --json, received {' '.join(rest)}")
-    magnet, coil = read_magnet_and_coil(options.mjcf)
-    curve = pole_torque.compute_curve(magnet, coil)
-    measured = pole_torque.convergence(curve, magnet, coil)
-    text = torque_curve.to_csv(curve, pole_torque.provenance(magnet, coil, measured))
-    if options.out:
-        _write(options.out, text)
-    elif not options.json:
-        print(text, end="")
-    figures = {
-        "peak_Nm_per_A": curve.peak_Nm_per_A,
-        "peak_deg": float(np.degrees(curve.phi_rad[np.argmax(curve.torque_Nm_per_A)])),
-        "doubled_mesh_moves_peak": measured.peak,
-        "doubled_mesh_moves_worst_sample": measured.worst,
-    }
-    if options.json:
-        print(json.dumps(figures))
-    else:
-        print(
-            f"peak {figures['peak_Nm_per_A']:.5f} N·m/A at {figures['peak_deg']:.2f}°;"
-            f" a doubled mesh moves it by {measured.peak:.0e} of itself",
-            file=sys.stderr,
-        )
-    return True
+# Each part is imported when it runs: numba and scipy are slow to import.
 
 
-def _write(path: Path, text: str) -> None:
+def _run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    from spheretwin.twin.commands import magnetics_curve
+
+    return magnetics_curve.run(options, rest)
+
+
+def _run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    from spheretwin.twin.commands import magnetics_check
+
+    return magnetics_check.run(options, rest)
+
+
+def _run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    from spheretwin.twin.commands import magnetics_map
+
+    return magnetics_map.run(options, rest)
+
+
+def _part(parts: Any, name: str, summary: str, description: str) -> argparse.ArgumentParser:
+    part: argparse.ArgumentParser = parts.add_parser(
+        name, help=summary, description=description, allow_abbrev=False
+    )
+    part.add_argument("--mjcf", type=Path, default=MJCF_PATH, metavar="FILE.xml", help="model file")
+    part.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
+    return part
+
+
+def _add_curve(part: argparse.ArgumentParser) -> None:
+    part.add_argument(
+        "--csv",
+        type=Path,
+        default=TORQUE_CURVE_PATH,
+        metavar="FILE.csv",
+        help=f"{CURVE} (default: the shipped one)",
+    )
+
+
+def _count(text: str) -> int:
+    if not _digits(text) or not 1 <= int(text) <= MOST_POSES:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to {MOST_POSES}, received {text}")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not _digits(text):
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0 to 10^18, received {text}")
+    return int(text)
+
+
+def _digits(text: str) -> bool:
+    return text.isdecimal() and len(text) <= 18
+
+
+def _positive(text: str) -> float:
+    value = _number(text)
+    if not (0 < value < math.inf):
+        raise argparse.ArgumentTypeError(f"expected a number above 0, received {text}")
+    return value
+
+
+def _tilt(text: str) -> float:
+    value = _number(text)
+    if not 0 <= value <= STEEPEST_DEG:
+        raise argparse.ArgumentTypeError(f"expected degrees from 0 to {STEEPEST_DEG:g}, received {text}")
+    return value
+
+
+def _number(text: str) -> float:
     try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"output: expected a writable path, {error}") from None
+        return float(text)
+    except ValueError:
+        return math.nan

@@ -10,17 +10,20 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spheretwin.models.errors import InputError
+from spheretwin.models.files import check_writable
 from spheretwin.twin import flags, metrics
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario import Scenario
-from spheretwin.twin.simulation import Run, Simulation, Sink
+from spheretwin.twin.simulation import Run, Simulation
 from spheretwin.viz import tables
 from spheretwin.viz.progress import Progress
+
+if TYPE_CHECKING:
+    from spheretwin.viz.recording import Recorder
 
 EXAMPLE = "nutation"
 
@@ -59,62 +62,69 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             f"command line: expected a scenario ({', '.join(scenarios.shipped())}), received none"
         )
     scenario = scenarios.load(options.scenario, flags.overrides(rest))
-    for path in filter(None, (options.record, options.telemetry)):
-        _check_writable(path)
-    finished = _simulate(scenario, options)
-    summary = metrics.summary(finished)
-    if options.telemetry:
-        finished.telemetry.write_parquet(options.telemetry, _metadata(summary))
-    if options.json:
-        print(json.dumps(summary, allow_nan=False))
-    else:
-        tables.print_run(scenario.name, finished.scenario.controller.law, summary)
-        tables.print_files(options.record, options.telemetry)
-    if finished.status != "completed":
-        print(f"spheretwin: {_ending(finished)}", file=sys.stderr)
-    return finished.status == "completed"
-
-
-def _simulate(scenario: Scenario, options: argparse.Namespace) -> Run:
-    simulation = Simulation(scenario)
+    _check_outputs([path for path in (options.record, options.telemetry) if path])
     with contextlib.ExitStack() as stack:
-        sinks: list[Sink] = [stack.enter_context(Progress(scenario.name, simulation.scenario.ticks))]
-        if options.record or options.live:
-            from spheretwin.viz.recording import Recorder  # Rerun is slow to import
-
-            recorder = Recorder(
-                simulation.actuator,
-                simulation.signals,
-                simulation.scenario.model_dump(mode="json"),
-                path=options.record,
-                live=options.live,
-            )
-            sinks.append(stack.enter_context(recorder))
-            if recorder.viewer:
-                print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
         stop_requested = stack.enter_context(_interruptible())
-        finished = simulation.run(sinks, live=options.live, stop_requested=stop_requested)
+        simulation = Simulation(scenario)
+        progress = Progress(scenario.name, simulation.scenario.ticks)
+        recorders = [stack.enter_context(_recorder(simulation, options))] if _records(options) else []
+        with progress:
+            finished = simulation.run(
+                [progress, *recorders], live=options.live, stop_requested=stop_requested
+            )
+        _report(finished, options)
         if options.live and sys.stderr.isatty():
             print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
             while not stop_requested():
                 time.sleep(0.1)
-        return finished
+    return finished.status == "completed"
+
+
+def _records(options: argparse.Namespace) -> bool:
+    return bool(options.record or options.live)
+
+
+def _recorder(simulation: Simulation, options: argparse.Namespace) -> Recorder:
+    from spheretwin.viz.recording import Recorder  # Rerun is slow to import
+
+    scenario = simulation.scenario.model_dump(mode="json")
+    recorder = Recorder(
+        simulation.actuator, simulation.signals, scenario, path=options.record, live=options.live
+    )
+    if recorder.viewer:
+        print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
+    return recorder
+
+
+def _report(finished: Run, options: argparse.Namespace) -> None:
+    """Write the telemetry, print the figures."""
+    summary = metrics.summary(finished)
+    if options.telemetry:
+        finished.telemetry.write_parquet(options.telemetry, _metadata(summary))
+    if options.json:
+        print(json.dumps(summary, allow_nan=False), flush=True)
+    else:
+        tables.print_run(finished.scenario.name, finished.scenario.controller.law, summary)
+        tables.print_files(options.record, options.telemetry)
+    if finished.status != "completed":
+        print(f"spheretwin: {_ending(finished)}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
 def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C end the run at the next chunk, so that nothing computed is lost; a second one is abrupt."""
-    pressed = []
-
-    def press(*_: object) -> None:
-        pressed.append(True)
-        signal.signal(signal.SIGINT, before)
-
-    before = signal.signal(signal.SIGINT, press)
+    """Let Ctrl-C, or the end of the session, end the run at the next chunk: nothing computed is lost."""
+    asked = []
+    before = {number: signal.signal(number, lambda *_: asked.append(True)) for number in _ENDINGS}
     try:
-        yield lambda: bool(pressed)
+        yield lambda: bool(asked)
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+_ENDINGS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
+]
 
 
 def _metadata(summary: dict[str, Any]) -> dict[str, str]:
@@ -126,18 +136,12 @@ def _metadata(summary: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def _check_writable(path: Path) -> None:
-    """Find out before the run, and leave no empty file where the run then fails to start."""
-    if path.is_dir():
-        raise InputError(f"output: expected a file name, received the folder {path}")
-    existed = path.exists()
-    try:
-        with open(path, "ab"):
-            pass
-    except OSError as error:
-        raise InputError(f"output: expected a writable path, {error}") from None
-    if not existed:
-        path.unlink()
+def _check_outputs(paths: Sequence[Path]) -> None:
+    """Find out before the run whether its files can be written."""
+    for path in paths:
+        check_writable(path)
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise InputError(f"output: expected a path of its own for each file, received {paths[0]} twice")
 
 
 def _ending(run: Run) -> str:

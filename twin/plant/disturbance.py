@@ -1,4 +1,4 @@
-"""Load and random torque that oppose the motion: ``tau_d = tau_l + tau_r`` (55), (56)."""
+"""Load and random torque, taken off the control torque: ``tau_d = tau_l + tau_r`` (1), (55), (56)."""
 
 from typing import Annotated, Literal
 
@@ -40,9 +40,11 @@ class Disturbance(BaseModel):
         Returns
         -------
         (n, 3) array, N·m
-            Generalised torque that opposes motion.
+            Generalised torque, subtracted in (1); not finite where the growing envelope overflows.
         """
         r = generator.uniform(-self.random_bound_Nm, self.random_bound_Nm, size=len(t))
         growth = np.pi if self.gamma_envelope == "growing" else -np.pi
-        envelope = np.stack([np.cos(np.pi * t), np.sin(-np.pi * t), np.exp(growth * t)], axis=1)
+        with np.errstate(over="ignore"):
+            third = np.exp(growth * t) if self.random_bound_Nm else np.zeros_like(t)
+        envelope = np.stack([np.cos(np.pi * t), np.sin(-np.pi * t), third], axis=1)
         return self.load * LOAD_UNIT_Nm + r[:, None] * envelope  # (n, 3)

@@ -1,6 +1,6 @@
 """The current drive: each group follows its command through the lag of its inductance."""
 
-from math import exp
+from math import exp, expm1
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +23,8 @@ def drive(time_constant_s: float, step_s: float, current_limit_A: float) -> Driv
     """Drive for a time constant L/R (s; 0 for ideal amplifiers), a physics step (s) and a limit (A)."""
     if time_constant_s == 0:
         return Drive(0.0, 0.0, current_limit_A)
-    decay = exp(-step_s / time_constant_s)
-    return Drive(decay, (1 - decay) * time_constant_s / step_s, current_limit_A)
+    steps = step_s / time_constant_s
+    return Drive(exp(-steps), -expm1(-steps) / steps, current_limit_A)
 
 
 @compiled

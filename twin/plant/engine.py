@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import read_spec
 from spheretwin.models.compiled import compiled
-from spheretwin.models.errors import EngineError
+from spheretwin.models.mujoco_library import library
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -104,16 +104,8 @@ def _idle_stages(model: mujoco.MjModel) -> int:
     return int(idle)
 
 
-def _library() -> ctypes.CDLL:
-    folder = Path(mujoco.__file__).parent
-    for pattern in ("libmujoco.so.*", "libmujoco.*.dylib", "mujoco.dll"):
-        for path in folder.glob(pattern):
-            return ctypes.CDLL(str(path))
-    raise EngineError(f"engine: expected MuJoCo's shared library in {folder}, found none")
-
-
 # A symbol that LLVM resolves by name can be cached; a ctypes function inside compiled code cannot.
-llvmlite.binding.add_symbol("mj_step", ctypes.cast(_library().mj_step, ctypes.c_void_p).value)
+llvmlite.binding.add_symbol("mj_step", ctypes.cast(library().mj_step, ctypes.c_void_p).value)
 _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 
 

@@ -1,0 +1,215 @@
+"""The Lagrangian as a plant: its payload from energies, its steps of order four, one loop for both plants."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from spheretwin.control.law import Law
+from spheretwin.models import actuator as actuators
+from spheretwin.models.compiled import compiled
+from spheretwin.models.errors import InputError
+from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
+from spheretwin.models.lagrangian import (
+    acceleration,
+    coriolis_matrix,
+    coupling_torques,
+    gravity_torque,
+    inertia_matrix,
+)
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.plant import engine, lagrangian, stepping
+from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.plant.lagrangian import LagrangianRotor
+from spheretwin.twin.simulation import Simulation
+
+STEP_S, PAYLOAD_KG = 5e-4, 0.05
+
+
+def states(count, seed=1):
+    generator = np.random.default_rng(seed)
+    for _ in range(count):
+        q = generator.uniform([-1.4, -1.4, -3], [1.4, 1.4, 3])
+        yield q, generator.uniform(-5, 5, 3), generator.uniform(-50, 50, 3)
+
+
+def potential(q, actuator):
+    return PAYLOAD_KG * 9.81 * (rotation(q) @ actuator.payload_mount_m)[2]
+
+
+def kinetic(q, qdot, actuator):
+    """Rotor and point mass apart: the mass by its velocity, not by any inertia."""
+    w_SR_R, w_SR_S = rotor_rate_jacobian(q) @ qdot, rate_jacobian(q) @ qdot
+    velocity = np.cross(w_SR_S, rotation(q) @ actuator.payload_mount_m)
+    return 0.5 * w_SR_R @ (actuator.inertia * w_SR_R) + 0.5 * PAYLOAD_KG * velocity @ velocity
+
+
+def gradient(function, at, h=1e-4):
+    """Central differences of fourth order."""
+    steps = h * np.eye(len(at))
+    near = np.array([function(at + d) - function(at - d) for d in steps])
+    far = np.array([function(at + 2 * d) - function(at - 2 * d) for d in steps])
+    return (8 * near - far) / (12 * h)
+
+
+def torque_by_energies(q, qdot, qddot, actuator):
+    """Lagrange's equation, d/dt dT/dqdot - d(T - V)/dq, by numeric differentiation."""
+
+    def momentum(time):
+        pose, rates = q + time[0] * qdot, qdot + time[0] * qddot
+        return gradient(lambda v: kinetic(pose, v, actuator), rates)
+
+    def lagrangian_of(pose):
+        return kinetic(pose, qdot, actuator) - potential(pose, actuator)
+
+    return gradient(momentum, np.zeros(1))[0] - gradient(lagrangian_of, q)
+
+
+def test_payload_obeys_lagrange_s_equations_of_its_energies(actuator):
+    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+    for q, qdot, qddot in states(20):
+        torque = (
+            inertia_matrix(q, rotor.inertia) @ qddot
+            + coriolis_matrix(q, qdot, rotor.inertia) @ qdot
+            + gravity_torque(q, rotor.weight_moment)
+        )
+        # Rounding of energies near 0.1 J over two nested differences of 1e-4: 1e-17 / 1e-8.
+        np.testing.assert_allclose(torque, torque_by_energies(q, qdot, qddot, actuator), atol=1e-7)
+
+
+def test_gravity_is_the_gradient_of_the_potential(actuator):
+    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+    for q, _, _ in states(20):
+        expected = gradient(lambda pose: potential(pose, actuator), q)
+        np.testing.assert_allclose(gravity_torque(q, rotor.weight_moment), expected, atol=1e-12)
+
+
+def test_acceleration_solves_the_equation_of_motion(actuator):
+    for q, qdot, torque in states(200):
+        qddot = acceleration(q, qdot, torque, actuator.inertia, 0.05)
+        M, C = inertia_matrix(q, actuator.inertia), coriolis_matrix(q, qdot, actuator.inertia)
+        size = np.linalg.norm(M) * np.linalg.norm(qddot) + np.linalg.norm(torque)
+        left_over = M @ qddot + C @ qdot + gravity_torque(q, 0.05) - torque
+        # Backward error of an elimination without growth: rounding alone.
+        assert np.linalg.norm(left_over) < 1e-15 * size
+
+
+def test_coupling_torques_are_the_paper_s():
+    q, qdot, qddot, J = np.array([0.0, np.pi / 6, 0.4]), np.array([1.0, 2.0, 3.0]), np.full(3, 10.0), 2.0
+    inertial, coriolis = coupling_torques(q, qdot, qddot, J)
+    np.testing.assert_allclose(inertial, [10, 0, 10])  # (6), (9)
+    np.testing.assert_allclose(coriolis, np.sqrt(3) * np.array([6, -3, 2]))  # (7), (8), (10)
+
+
+def end_of_steps(actuator, step_s, duration, torque_q, torque_S):
+    plant = LagrangianRotor(actuator, step_s, payload_kg=PAYLOAD_KG).start(START[:3], START[3:])
+    plant.torque_q[:], plant.torque_S[:] = torque_q, torque_S
+    for _ in range(round(duration / step_s)):
+        lagrangian.step(plant)
+    return np.concatenate([plant.q, plant.qdot])
+
+
+START = np.array([0.2, -0.3, 0.5, 3.0, -2.0, 20.0])
+
+
+def test_steps_are_of_order_four(actuator):
+    duration, torque_q, torque_S = 0.08, np.array([0.05, -0.1, 0.02]), np.array([0.1, 0.05, -0.1])
+    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+
+    def flow(_, state):
+        q, qdot = state[:3].copy(), state[3:].copy()
+        torque = torque_q + rate_jacobian(q).T @ torque_S
+        return np.concatenate([qdot, acceleration(q, qdot, torque, rotor.inertia, rotor.weight_moment)])
+
+    exact = solve_ivp(flow, (0, duration), START, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    steps = np.array([8e-3, 4e-3, 2e-3, 1e-3, 5e-4])
+    errors = [np.abs(end_of_steps(actuator, h, duration, torque_q, torque_S) - exact).max() for h in steps]
+    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    assert 3.8 < order < 4.2, errors
+
+
+def test_one_step_is_mujoco_s_under_both_kinds_of_torque(actuator):
+    settings = (STEP_S, "RK4", 0.2, PAYLOAD_KG)
+    ours = LagrangianRotor(actuator, *settings).start(START[:3], START[3:])
+    mujoco_rotor = Rotor(actuators.MJCF_PATH, *settings)
+    theirs = mujoco_rotor.start(START[:3], START[3:])
+    for plant in (ours, theirs):
+        plant.torque_S[:], plant.torque_q[:] = [0.3, -0.2, 0.1], [0.05, 0.1, -0.2]
+        stepping.step(plant)
+    # Rounding, and the gimbal rings: 1e-12 of an acceleration near 200 rad/s² over 0.5 ms.
+    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-15)
+    np.testing.assert_allclose(ours.qdot, theirs.qdot, atol=1e-12)
+
+
+@compiled
+def ten_steps(plant):
+    for _ in range(10):
+        stepping.step(plant)
+
+
+@pytest.mark.parametrize("kind", [engine, lagrangian])
+def test_compiled_code_steps_what_python_steps(actuator, kind):
+    def start():
+        # Kept alive: compiled code holds bare addresses of MuJoCo's own.
+        settings = (STEP_S, "RK4", 0.0, 0.0)
+        rotor = (
+            Rotor(actuators.MJCF_PATH, *settings) if kind is engine else LagrangianRotor(actuator, *settings)
+        )
+        return rotor, rotor.start(START[:3], START[3:])
+
+    (_keep, by_python), (_keep_too, by_compiled) = start(), start()
+    for _ in range(10):
+        stepping.step(by_python)
+    ten_steps(by_compiled)
+    np.testing.assert_array_equal(by_compiled.q, by_python.q)
+    np.testing.assert_array_equal(by_compiled.qdot, by_python.qdot)
+    assert not np.array_equal(by_python.q, START[:3])
+
+
+def test_start_does_not_hold_on_to_its_arguments(actuator):
+    pose = np.zeros(3)
+    plant = LagrangianRotor(actuator, STEP_S).start(pose, np.array([1.0, 0.0, 0.0]))
+    lagrangian.step(plant)
+    np.testing.assert_array_equal(pose, 0)
+
+
+def proportional(t, reference, measurement, parameters, state, torque):
+    for axis in range(3):
+        torque[axis] = -0.5 * (measurement[0, axis] - reference[0, axis]) - 0.05 * measurement[1, axis]
+
+
+def test_a_plain_python_law_runs_on_both_plants():
+    scenario = scenarios.load("hold", {"duration": 0.1, "plant.payload_kg": PAYLOAD_KG})
+    law = Law("mine", proportional, np.zeros(0), np.zeros(0))
+    tables = [Simulation(scenario, law, plant).run().telemetry for plant in ("mujoco", "lagrangian")]
+    # A smooth law: the gimbal rings and rounding, nothing that grows.
+    np.testing.assert_allclose(tables[1]["q_rad"], tables[0]["q_rad"], atol=1e-12)
+
+
+def test_only_runge_kutta_and_a_payload_on_the_axis_are_known(actuator):
+    with pytest.raises(InputError, match="expected the integrator RK4, received Euler"):
+        LagrangianRotor(actuator, STEP_S, "Euler")
+    scenario = scenarios.load("hold", {"plant.integrator": "implicitfast"})
+    with pytest.raises(InputError, match="implicitfast"):
+        Simulation(scenario, plant="lagrangian")
+
+
+SECOND_PROCESS = """
+from spheretwin.twin import loop, scenario
+from spheretwin.twin.simulation import Simulation
+brief = scenario.load("hold", {"duration": 0.01})
+for plant in ("mujoco", "lagrangian"):
+    Simulation(brief, plant=plant).run()
+print(sum(loop.loop.stats.cache_hits.values()), sum(loop.loop.stats.cache_misses.values()))
+"""
+
+
+def test_both_loops_are_kept_between_processes():
+    def hits_and_misses():
+        command = [sys.executable, "-c", SECOND_PROCESS]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+
+    hits_and_misses()
+    assert hits_and_misses() == ["2", "0"]

@@ -1,0 +1,45 @@
+"""What a user should know of a geometry before believing its figures: one line each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.clearance import Overlap, overlaps
+from spheretwin.models.errors import InputError
+
+
+def of_model_file(mjcf: Path) -> list[str]:
+    """Warnings for a model file that may still lack what the torque curve does not need."""
+    try:
+        return of_geometry(actuators.load(mjcf))
+    except InputError:
+        return []
+
+
+def of_geometry(actuator: Actuator) -> list[str]:
+    """Coils that overlap coils and poles that overlap poles: the deepest pair, and how many more."""
+    found = overlaps(actuator)
+    lines = []
+    for part, axes in (("coil", actuator.coil_axes), ("pole", actuator.pole_axes)):
+        pairs = [overlap for overlap in found if overlap.part == part]
+        if pairs:
+            lines.append(_line(pairs, axes))
+    return lines
+
+
+def _line(pairs: list[Overlap], axes: NDArray[np.float64]) -> str:
+    deepest = pairs[0]
+    first, second = (_place(deepest.part, i, axes) for i in (deepest.first, deepest.second))
+    more = f", and {len(pairs) - 1} more pairs" if len(pairs) > 1 else ""
+    return f"{first} and {second} overlap by {1e3 * deepest.depth_m:.2g} mm{more}"
+
+
+def _place(part: str, index: int, axes: NDArray[np.float64]) -> str:
+    x, y, z = axes[index]
+    latitude, azimuth = np.degrees(np.arcsin(np.clip(z, -1.0, 1.0))), np.degrees(np.arctan2(y, x))
+    return f"{part} {index} (latitude {latitude:.0f}°, azimuth {azimuth % 360:.0f}°)"

@@ -1,0 +1,286 @@
+"""Equation of motion (1), state by state: MuJoCo and Pinocchio against the Lagrangian.
+
+Every difference is divided by the size of the terms that make up what is compared, not by what is left of
+them: terms of opposite sign may cancel to almost nothing, and rounding is relative to the terms. For the
+same reason an acceleration is judged by the torque that it leaves over in the equation of motion: solving
+for it multiplies any difference by the condition of M, which is (1 + sin β)/(1 - sin β) and so grows like
+1/cos²β, to 130 at 80 degrees; the torque left over does not depend on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator, one_line
+from spheretwin.models.errors import InputError
+from spheretwin.models.kinematics import rate_jacobian, rotation
+from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
+from spheretwin.twin.crosscheck.check import Check
+from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.plant.lagrangian import LagrangianRotor
+
+Array = NDArray[np.float64]
+
+LARGEST_TILT_rad = np.radians(80)  # the hinges' range
+SEED = 0
+STEP_S = 5e-4  # of no effect here: nothing is stepped
+
+ROTATION_BOUND = 1e-14
+BIAS_BOUND = 1e-13
+DYNAMICS_BOUND = 1e-12
+
+_ROUNDING = "rounding of three turns, each 2e-16 of a unit vector, with a margin of ten"
+_RINGS = (
+    "the engine's two gimbal rings, which the paper does not have, hold 1.1e-15 kg·m² each, the least it"
+    " admits: up to 6e-13 of M (Frobenius norm); the rest is rounding, near 1e-15"
+)
+_NO_RINGS = (
+    "rounding, a few 1e-15, with a margin for other processors; the gimbal rings, isotropic and centred,"
+    " add nothing here"
+)
+
+
+class Case(NamedTuple):
+    """A plant to compare."""
+
+    name: str
+    modelling_error: float
+    payload_kg: float
+
+
+CASES = (
+    Case("nominal", 0.0, 0.0),
+    Case("modelling error 0.2", 0.2, 0.0),
+    Case("payload 0.05 kg", 0.0, 0.05),
+)
+
+
+class States(NamedTuple):
+    """Where the dynamics are compared; one row a state."""
+
+    q: Array  # (n, 3) rad
+    qdot: Array  # (n, 3) rad/s
+    qddot: Array  # (n, 3) rad/s², for inverse dynamics
+    torque_q: Array  # (n, 3) N·m on the hinges, for forward dynamics
+    torque_S: Array  # (n, 3) N·m on the rotor, stator frame, for forward dynamics
+
+
+class Answers(NamedTuple):
+    """What an engine says at these states."""
+
+    R: Array  # (n, 3, 3)
+    M: Array  # (n, 3, 3) kg·m²
+    bias: Array  # (n, 3) N·m, C qdot + G
+    torque: Array  # (n, 3) N·m, inverse dynamics
+    qddot: Array  # (n, 3) rad/s², forward dynamics
+
+
+class Dynamics(NamedTuple):
+    """Checks, and every single difference: by engine, then by quantity."""
+
+    checks: list[Check]
+    differences: dict[str, dict[str, Array]]
+
+
+class _Quantity(NamedTuple):
+    name: str
+    compares: str
+    bound: float
+    why: str
+
+
+QUANTITIES = (
+    _Quantity(
+        "orientation R", "R_SR(q); Frobenius norm of the difference over √3", ROTATION_BOUND, _ROUNDING
+    ),
+    _Quantity(
+        "inertia matrix M", "M(q); Frobenius norm of the difference over that of M", DYNAMICS_BOUND, _RINGS
+    ),
+    _Quantity("bias C q̇ + G", "C q̇ + G; difference over |C||q̇| + |G|", BIAS_BOUND, _NO_RINGS),
+    _Quantity(
+        "inverse dynamics",
+        "M q̈ + C q̇ + G; difference over |M||q̈| + |C||q̇| + |G|",
+        DYNAMICS_BOUND,
+        _RINGS,
+    ),
+    _Quantity(
+        "forward dynamics",
+        "torque that the engine's q̈ leaves over in (1), over the sum of its terms",
+        DYNAMICS_BOUND,
+        _RINGS,
+    ),
+)
+
+
+def compare(mjcf: Path, actuator: Actuator, count: int) -> Dynamics:
+    """Compare both engines with the Lagrangian at random states, for every case.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file that the engines read.
+    actuator : Actuator
+        Its inertia is what the Lagrangian has.
+    count : int
+        States a case.
+    """
+    states = random_states(count)
+    checks: list[Check] = []
+    differences: dict[str, dict[str, Array]] = {}
+    for engine, answers in (("MuJoCo", ask_mujoco), ("Pinocchio", ask_pinocchio)):
+        try:
+            by_case = [_differences(mjcf, actuator, case, states, answers) for case in CASES]
+        except ImportError:
+            checks += [_not_installed(engine, quantity) for quantity in QUANTITIES]
+            continue
+        checks += [_check(engine, quantity, [case[quantity.name] for case in by_case])
+                   for quantity in QUANTITIES]  # fmt: skip
+        differences[engine] = {
+            quantity.name: np.concatenate([case[quantity.name] for case in by_case])
+            for quantity in QUANTITIES
+        }
+    return Dynamics(checks, differences)
+
+
+def random_states(count: int) -> States:
+    """Tilts to 80 degrees, rates to 50 rad/s, and accelerations and torques that weigh as much as they do."""
+    generator = np.random.default_rng(SEED)
+
+    def uniform(*most: float) -> Array:
+        return generator.uniform(-np.array(most), most, size=(count, 3))
+
+    return States(
+        q=uniform(LARGEST_TILT_rad, LARGEST_TILT_rad, np.pi),
+        qdot=uniform(50, 50, 50),
+        qddot=uniform(2500, 2500, 2500),
+        torque_q=uniform(5, 5, 5),
+        torque_S=uniform(5, 5, 5),
+    )
+
+
+def ask_mujoco(mjcf: Path, case: Case, states: States) -> Answers:
+    """Answers of MuJoCo, from its public functions."""
+    rotor = Rotor(mjcf, STEP_S, "RK4", case.modelling_error, case.payload_kg)
+    model, data, body = rotor.model, rotor.data, rotor.model.body("rotor").id
+    answers = _empty(len(states.q))
+    axes = np.eye(3)
+    for i in range(len(states.q)):
+        data.qpos[:], data.qvel[:] = states.q[i], states.qdot[i]
+        data.qfrc_applied[:], data.xfrc_applied[body, 3:] = states.torque_q[i], states.torque_S[i]
+        mujoco.mj_forward(model, data)
+        answers.R[i] = data.xmat[body].reshape(3, 3)
+        answers.bias[i] = data.qfrc_bias
+        answers.qddot[i] = data.qacc
+        for axis in range(3):
+            mujoco.mj_mulM(model, data, answers.M[i, axis], axes[axis])
+        data.qacc[:] = states.qddot[i]
+        mujoco.mj_inverse(model, data)
+        answers.torque[i] = data.qfrc_inverse
+    return answers
+
+
+def ask_pinocchio(mjcf: Path, case: Case, states: States) -> Answers:
+    """Answers of Pinocchio, from the same model file.
+
+    Raises
+    ------
+    ImportError
+        Pinocchio is not installed.
+    InputError
+        It cannot read the model.
+    """
+    import pinocchio  # of the test group: nothing else needs it
+
+    try:
+        model = pinocchio.buildModelFromMJCF(str(mjcf))
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"model {mjcf}: expected MJCF that Pinocchio reads, {one_line(error)}") from None
+    joint = model.getJointId("gamma")
+    model.inertias[joint].inertia = (1 + case.modelling_error) * model.inertias[joint].inertia
+    if case.payload_kg:
+        mount = Rotor(mjcf, STEP_S, "RK4", 0.0, 0.0).model.body("payload").pos
+        point = pinocchio.Inertia(case.payload_kg, mount, np.zeros((3, 3)))
+        model.appendBodyToJoint(joint, point, pinocchio.SE3.Identity())
+    data = model.createData()
+    answers = _empty(len(states.q))
+    for i, (q, qdot) in enumerate(zip(states.q, states.qdot, strict=True)):
+        # A hinge without range is a point on the circle to Pinocchio.
+        pose = q if model.nq == 3 else np.array([q[0], q[1], np.cos(q[2]), np.sin(q[2])])
+        torque = states.torque_q[i] + rate_jacobian(q).T @ states.torque_S[i]
+        answers.torque[i] = pinocchio.rnea(model, data, pose, qdot, states.qddot[i])
+        answers.qddot[i] = pinocchio.aba(model, data, pose, qdot, torque)
+        answers.bias[i] = pinocchio.nonLinearEffects(model, data, pose, qdot)
+        upper = np.triu(pinocchio.crba(model, data, pose))
+        answers.M[i] = upper + np.triu(upper, 1).T
+        pinocchio.forwardKinematics(model, data, pose)
+        answers.R[i] = data.oMi[joint].rotation
+    return answers
+
+
+def _differences(
+    mjcf: Path,
+    actuator: Actuator,
+    case: Case,
+    states: States,
+    ask: Callable[[Path, Case, States], Answers],
+) -> dict[str, Array]:
+    """Relative differences by quantity, one entry a state."""
+    said = ask(mjcf, case, states)
+    rotor = LagrangianRotor(actuator, STEP_S, "RK4", case.modelling_error, case.payload_kg)
+    pairs = list(zip(states.q, states.qdot, strict=True))
+    R = np.array([rotation(q) for q, _ in pairs])
+    E = np.array([rate_jacobian(q) for q, _ in pairs])
+    M = np.array([inertia_matrix(q, rotor.inertia) for q, _ in pairs])
+    C = np.array([coriolis_matrix(q, qdot, rotor.inertia) for q, qdot in pairs])
+    G = np.array([gravity_torque(q, rotor.weight_moment) for q, _ in pairs])
+    bias = _times(C, states.qdot) + G
+    bias_size = _norm(C) * _norm(states.qdot) + _norm(G)
+    torque = states.torque_q + _times(E.transpose(0, 2, 1), states.torque_S)
+    left_over = _times(M, said.qddot) + bias - torque
+    return {
+        "orientation R": _norm(said.R - R) / np.sqrt(3),
+        "inertia matrix M": _norm(said.M - M) / _norm(M),
+        "bias C q̇ + G": _norm(said.bias - bias) / bias_size,
+        "inverse dynamics": _norm(said.torque - _times(M, states.qddot) - bias)
+        / (_norm(M) * _norm(states.qddot) + bias_size),
+        "forward dynamics": _norm(left_over) / (_norm(M) * _norm(said.qddot) + bias_size + _norm(torque)),
+    }
+
+
+def _check(engine: str, quantity: _Quantity, by_case: list[Array]) -> Check:
+    worst = {case.name: float(np.max(values)) for case, values in zip(CASES, by_case, strict=True)}
+    return Check(
+        name=f"{quantity.name}: {engine}",
+        compares=f"{engine} with the Lagrangian, {quantity.compares}",
+        states=sum(len(values) for values in by_case),
+        value=float(np.max(list(worst.values()))),
+        bound=quantity.bound,
+        why=quantity.why,
+        detail=worst,
+    )
+
+
+def _not_installed(engine: str, quantity: _Quantity) -> Check:
+    why = f"{engine} is not installed; it is the extra opinion of the test group"
+    return Check(f"{quantity.name}: {engine}", f"{engine} with the Lagrangian, {quantity.compares}", 0,
+                 None, quantity.bound, why)  # fmt: skip
+
+
+def _empty(count: int) -> Answers:
+    matrices, vectors = np.empty((2, count, 3, 3)), np.empty((3, count, 3))
+    return Answers(matrices[0], matrices[1], *vectors)
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    return np.einsum("nij,nj->ni", matrices, vectors)
+
+
+def _norm(values: Array) -> Array:
+    """Euclidean norm of every vector, Frobenius norm of every matrix."""
+    return np.sqrt(np.sum(values**2, axis=tuple(range(1, values.ndim))))

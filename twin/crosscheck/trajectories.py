@@ -1,0 +1,192 @@
+"""Motion under given torques: the engine's steps against an integrator of a much higher order.
+
+The torques are those of the nutation, but held over pieces of 10 ms, the same in both: MuJoCo keeps an
+applied force over a whole step, so a torque that varied within the steps would measure that hold and not
+the engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.errors import EngineError
+from spheretwin.models.lagrangian import acceleration, coriolis_matrix, inertia_matrix
+from spheretwin.twin.crosscheck.check import Check
+from spheretwin.twin.plant import lagrangian
+from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.plant.lagrangian import LagrangianRotor
+from spheretwin.twin.trajectory import Nutation
+
+Array = NDArray[np.float64]
+
+DURATION_s = 5.0
+HOLD_s = 0.01
+STEP_s = 5e-4  # the default physics step
+STEPS_s = (1e-2, 5e-3, 2.5e-3, 2e-3, 1e-3)  # whole fractions of the hold
+
+BOUND_rad = 1e-8
+ORDERS = {"RK4": 4, "Euler": 1, "implicitfast": 1}
+ORDER_MARGIN = 0.2
+OWN = "our own RK4"
+
+
+class Pieces(NamedTuple):
+    """Torques held one after another, from a given start."""
+
+    start: Array  # (6,) rad and rad/s
+    torque: Array  # (n, 3) N·m on the hinges
+
+
+class Convergence(NamedTuple):
+    """Largest error of a method at each step, and its order by regression."""
+
+    steps_s: Array
+    errors_rad: Array
+    order: float
+
+
+class Trajectories(NamedTuple):
+    """Checks, and what they were taken from."""
+
+    checks: list[Check]
+    t_s: Array  # (n + 1,) ends of the pieces
+    q_rad: Array  # (n + 1, 3) by the engine
+    difference_rad: Array  # (n + 1, 3) engine less reference
+    convergence: dict[str, Convergence]
+
+
+def compare(mjcf: Path, actuator: Actuator) -> Trajectories:
+    """Compare whole motions, and measure orders of convergence.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file that the engine reads.
+    actuator : Actuator
+        Its inertia is what the Lagrangian has.
+    """
+    pieces = nutation_pieces(actuator.inertia)
+    reference = integrate(pieces, actuator.inertia)
+    engine = by_mujoco(mjcf, pieces, "RK4", STEP_s)
+    difference = engine[:, :3] - reference[:, :3]
+    methods: dict[str, Callable[[float], Array]] = {
+        f"MuJoCo {name}": partial(by_mujoco, mjcf, pieces, name) for name in ORDERS
+    }
+    methods[OWN] = partial(by_own_steps, actuator, pieces)
+    measured = {name: convergence(method, reference) for name, method in methods.items()}
+    orders = {f"MuJoCo {name}": order for name, order in ORDERS.items()} | {OWN: 4}
+    return Trajectories(
+        [_trajectory(difference), *(_order(name, measured[name], orders[name]) for name in methods)],
+        HOLD_s * np.arange(len(reference), dtype=np.float64),
+        engine[:, :3],
+        difference,
+        measured,
+    )
+
+
+def nutation_pieces(inertia: Array) -> Pieces:
+    """Torques that follow the nutation (59): those of (1) at the middle of each piece."""
+    nutation, count = Nutation(), round(DURATION_s / HOLD_s)
+    desired = nutation.sample(HOLD_s * (np.arange(count, dtype=np.float64) + 0.5))
+    torque = [
+        inertia_matrix(q, inertia) @ qddot + coriolis_matrix(q, qdot, inertia) @ qdot
+        for q, qdot, qddot in desired
+    ]
+    return Pieces(nutation.sample(np.zeros(1))[0, :2].ravel(), np.array(torque))
+
+
+def integrate(pieces: Pieces, inertia: Array) -> Array:
+    """States at the ends of the pieces by DOP853, of order eight, on the Lagrangian.
+
+    Its tolerance is near rounding, so that its error is far below any bound here.
+
+    Raises
+    ------
+    EngineError
+        The integrator could not hold its tolerance.
+    """
+
+    def flow(_: float, state: Array, torque: Array) -> Array:
+        q, qdot = state[:3].copy(), state[3:].copy()
+        return np.concatenate([qdot, acceleration(q, qdot, torque, inertia, 0.0)])
+
+    states = [pieces.start]
+    for torque in pieces.torque:
+        solved = solve_ivp(
+            flow, (0, HOLD_s), states[-1], method="DOP853", rtol=1e-13, atol=1e-14, args=(torque,)
+        )
+        if not solved.success:
+            raise EngineError(f"reference trajectory: expected DOP853 to converge, {solved.message}")
+        states.append(solved.y[:, -1])
+    return np.array(states)
+
+
+def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Array:
+    """States at the ends of the pieces by MuJoCo."""
+    rotor = Rotor(mjcf, step_s, integrator, 0.0, 0.0)
+    plant = rotor.start(pieces.start[:3], pieces.start[3:])
+    states = [pieces.start]
+    for torque in pieces.torque:
+        plant.torque_q[:] = torque
+        mujoco.mj_step(rotor.model, rotor.data, nstep=round(HOLD_s / step_s))
+        states.append(np.concatenate([plant.q, plant.qdot]))
+    return np.array(states)
+
+
+def by_own_steps(actuator: Actuator, pieces: Pieces, step_s: float) -> Array:
+    """States at the ends of the pieces by the Lagrangian plant."""
+    plant = LagrangianRotor(actuator, step_s).start(pieces.start[:3], pieces.start[3:])
+    states = [pieces.start]
+    for torque in pieces.torque:
+        plant.torque_q[:] = torque
+        for _ in range(round(HOLD_s / step_s)):
+            lagrangian.step(plant)
+        states.append(np.concatenate([plant.q, plant.qdot]))
+    return np.array(states)
+
+
+def convergence(method: Callable[[float], Array], reference: Array) -> Convergence:
+    """Regression of the logarithm of the largest error on that of the step."""
+    errors = np.array([np.max(np.abs((method(step_s) - reference)[:, :3])) for step_s in STEPS_s])
+    order = np.polyfit(np.log(STEPS_s), np.log(errors), 1)[0] if np.all(np.isfinite(errors)) else np.nan
+    return Convergence(np.array(STEPS_s), errors, float(order))
+
+
+def _trajectory(difference: Array) -> Check:
+    return Check(
+        name="trajectory: MuJoCo RK4",
+        compares=f"MuJoCo RK4 at {1e3 * STEP_s:g} ms with DOP853 on the Lagrangian, torques of the nutation"
+        f" held over {1e3 * HOLD_s:g} ms, {DURATION_s:g} s; largest difference of any hinge angle",
+        states=len(difference),
+        value=float(np.max(np.abs(difference))),
+        bound=BOUND_rad,
+        why="truncation of a fourth-order step, (ωh)⁴ωT/120 = 8e-10 for inertia that turns at twice the spin,"
+        " with a margin of ten; an inertia wrong by 2e-8 of itself breaks it",
+        unit="rad",
+    )
+
+
+def _order(name: str, measured: Convergence, order: int) -> Check:
+    return Check(
+        name=f"order of convergence: {name}",
+        compares=f"slope of log error over log step, {len(STEPS_s)} steps from {1e3 * max(STEPS_s):g}"
+        f" to {1e3 * min(STEPS_s):g} ms, against DOP853",
+        states=len(STEPS_s),
+        value=measured.order,
+        bound=order + ORDER_MARGIN,
+        why=f"order {order} in theory; the margin is what the next power of the step adds at these steps",
+        at_least=order - ORDER_MARGIN,
+        detail={
+            f"error at {1e3 * step_s:g} ms, rad": float(error)
+            for step_s, error in zip(measured.steps_s, measured.errors_rad, strict=True)
+        },
+    )
