@@ -96,11 +96,13 @@ def loop(  # type: ignore[no-untyped-def]
     G, scratch = np.empty((3, groups)), np.empty((SCRATCH_ROWS, groups))
     for tick in range(first, last):
         disturbance, row = inputs.disturbance[tick], log[tick]
-        reference[:] = inputs.reference[tick]
-        measurement[0], measurement[1] = engine.q, engine.qdot
+        for i in range(3):
+            measurement[0, i], measurement[1, i] = engine.q[i], engine.qdot[i]
+            for order in range(3):
+                reference[order, i] = inputs.reference[tick, order, i]
+            torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         # Logged before the law is called: it may write into all that it is handed.
         write_row(row, inputs.t[tick], reference, measurement, disturbance, settings.surface_slope)
-        torque_q[:] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         law(inputs.t[tick], reference, measurement, parameters, memory.law, torque_q)
         if not isfinite(torque_q[0] + torque_q[1] + torque_q[2]):
             return tick, DIVERGED
@@ -117,12 +119,11 @@ def loop(  # type: ignore[no-untyped-def]
             advance(drive, command, memory.current, current)
             rotor_torque(G, current, engine.torque_S)
             if substep == 0:
-                row[TORQUE_COMMAND : TORQUE_COMMAND + 3] = torque_q
-                row[TORQUE : TORQUE + 3] = engine.torque_S
-                row[CURRENT_COMMAND : CURRENT_COMMAND + groups] = command
-                row[CURRENT : CURRENT + groups] = current
-                for i in range(row.shape[0] - OF_THE_LAW):
-                    row[OF_THE_LAW + i] = memory.law[i]
+                put(row, TORQUE_COMMAND, torque_q, 3)
+                put(row, TORQUE, engine.torque_S, 3)
+                put(row, CURRENT_COMMAND, command, groups)
+                put(row, CURRENT, current, groups)
+                put(row, OF_THE_LAW, memory.law, row.shape[0] - OF_THE_LAW)
                 for i in range(3):
                     engine.torque_q[i] = -disturbance[i] - settings.modelling_torque[i]
             step(engine)
@@ -143,6 +144,13 @@ def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S:
         for j in range(current.shape[0]):
             total += G[i, j] * current[j]
         torque_S[i] = total
+
+
+@compiled
+def put(row: NDArray[np.float64], first: int, values: NDArray[np.float64], count: int) -> None:
+    """Copy leading values into a row; a slice would be checked for overlap, at twice the time."""
+    for i in range(count):
+        row[first + i] = values[i]
 
 
 @compiled
