@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 # the line, the limit that holds each group (-1, 1, or 0 where it is free), lengths of the columns, and steps.
 SCRATCH_ROWS = 5
 
-# A step takes one group to its limit or back. Of half a million matrices, symmetric and nearly singular ones
-# among them, none took more than 1.9 steps a group, by path or simplex, unless the path had lost its way.
+# A step takes one group to its limit or back. Poses of the actuator took at most 1.4 steps a group, symmetric
+# and nearly singular matrices 1.9, but for one in thousands: there this ends the path's going in circles.
 STEPS_PER_GROUP = 2
 
 # Shares of a vector's length that count as none: as a column's height over the plane of others, as a rate,
@@ -63,7 +63,8 @@ def allocate_bounded(
     """Smallest currents within the limit that give the torque, or else the most torque in its direction.
 
     Never less torque than `spheretwin.control.allocation.allocate` gives, and the same currents where they
-    respect the limit. About 3 µs on a 2024 server core where the limit acts, 0.06 where it does not.
+    respect the limit. On a 2024 server core and with 18 groups, 0.06 µs where they do; about 3 where the
+    limit acts, and 11 at most, where the path has lost its way.
 
     Parameters
     ----------

@@ -140,7 +140,7 @@ def ratios() -> list[dict[str, object]]:
             rounds=5,
         )
     return [
-        _row("closed loop over bare mj_step, a physics step", inner["loop"], inner["bare"], at_most=1.5),
+        _row("closed loop over bare mj_step, a physics step", inner["loop"], inner["bare"], at_most=1.25),
         _row("plain Python loop over ours, a physics step", outer["plain"], outer["loop"], at_least=15),
         _row("run that records over one that does not", runs["recorded"], runs["silent"], at_most=1.3),
         _row("warm command with --record over without", processes["recorded"], processes["silent"]),

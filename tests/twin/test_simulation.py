@@ -286,3 +286,21 @@ def test_growing_random_torque_of_bound_zero_is_none():
     np.testing.assert_array_equal(finished.telemetry["disturbance_Nm"], 0.05)
     with pytest.raises(InputError, match="finite disturbance"):
         run("hold", disturbance__gamma_envelope="growing", disturbance__random_bound_Nm=0.05, duration=300.0)
+
+
+def test_bounded_allocation_completes_what_scaled_currents_cannot(sinusoid, actuator):
+    scaled = sinusoid["pd", 2.0]
+    assert scaled.status == "left_workspace"
+    bounded = run("sinusoid", controller__law="pd", disturbance__load=2.0, allocation="bounded")
+    assert bounded.status == "completed"
+    table = bounded.telemetry
+    assert np.abs(table["current_command_A"]).max() <= 8.0
+    # Up to the first tick at which the least-norm currents met the limit, the runs are the same.
+    first = np.argmax(scaled.telemetry["allocation_scale"] < 1)
+    assert first > 1000
+    np.testing.assert_array_equal(table["q_rad"][:first], scaled.telemetry["q_rad"][:first])
+    for row in range(first - 5, first + 50):
+        q = table["q_rad"][row]
+        torque_q = rate_jacobian(q).T @ torque_matrix(q, actuator) @ table["current_command_A"][row]
+        wanted = table["allocation_scale"][row] * table["torque_command_Nm"][row]
+        np.testing.assert_allclose(torque_q, wanted, atol=1e-11)
