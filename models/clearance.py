@@ -40,6 +40,16 @@ def overlaps(actuator: Actuator) -> list[Overlap]:
     return sorted(found, key=lambda pair: (-round(pair.depth_m / TOUCHING_M), pair.part, pair.first))
 
 
+def air_gap_m(actuator: Actuator) -> float:
+    """Room between the ball and the coils' faces, m; negative where the coils reach into the ball.
+
+    The ball goes through the middle of the poles' outer faces: a pole is ground to it, although its rim
+    stands proud in the magnetic model.
+    """
+    magnet, coil = actuator.magnet, actuator.coil
+    return (coil.distance_m - coil.length_m / 2) - (magnet.distance_m + magnet.length_m / 2)
+
+
 def clearance(axes: NDArray[np.float64], radius_m: float, length_m: float, distance_m: float) -> NDArray:
     """Room between equal cylinders whose axes meet at the centre, m; negative where they overlap.
 

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 COLUMNS = ("phi_deg", "torque_Nm_per_A")
 FEWEST_ROWS = 8
 
+# Angles closer than this are one angle twice; peaks beyond these are slips of the unit.
+CLOSEST_DEG = 1e-6
+LEAST_PEAK, LARGEST_PEAK = 1e-12, 1e6
+
 # Symmetry leaves no torque on a pole straight in front of a coil, or behind it. A measured curve may be
 # off by its noise; more would be divided by a vanishing sine.
 LARGEST_END_SHARE = 0.01
@@ -93,7 +97,8 @@ def read(path: Path) -> TorqueCurve:
     try:
         found = [name or "" for name in rows.fieldnames or ()]
         missing = [name for name in COLUMNS if name not in found]
-        samples = np.array([] if missing else [[float(row[name]) for name in COLUMNS] for row in rows])
+        records = list(rows)
+        samples = np.array([] if missing else [[float(row[name]) for name in COLUMNS] for row in records])
     except (TypeError, ValueError, csv.Error) as error:
         raise InputError(f"torque curve {path}: expected numbers only, received {error}") from None
     if missing:
@@ -101,6 +106,10 @@ def read(path: Path) -> TorqueCurve:
             f"torque curve {path}: expected the columns {', '.join(COLUMNS)},"
             f" received {', '.join(found) or 'none'}"
         )
+    uneven = next((i for i, row in enumerate(records) if None in row or None in row.values()), None)
+    if uneven is not None or len(set(found)) < len(found):
+        where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
+        raise InputError(f"torque curve {path}: expected each column once in every row, received {where}")
     _check(path, samples)
     return TorqueCurve(np.radians(samples[:, 0]), samples[:, 1])
 
@@ -131,8 +140,8 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
             f"torque curve {path}: expected angles from 0 to 180 degrees,"
             f" received {angles[np.argmax(outside)]:g}, which is outside"
         )
-    if np.any(np.diff(angles) <= 0):
-        row = int(np.argmax(np.diff(angles) <= 0))
+    if np.any(np.diff(angles) < CLOSEST_DEG):
+        row = int(np.argmax(np.diff(angles) < CLOSEST_DEG))
         raise InputError(
             f"torque curve {path}: expected rising angles,"
             f" received {angles[row]:g} then {angles[row + 1]:g} degrees"
@@ -143,6 +152,11 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
             f" received {angles[0]:g} to {angles[-1]:g}"
         )
     peak = np.max(np.abs(torque))
+    if not (peak == 0.0 or LEAST_PEAK < peak < LARGEST_PEAK):
+        raise InputError(
+            f"torque curve {path}: expected a peak between {LEAST_PEAK:g} and {LARGEST_PEAK:g} N·m/A,"
+            f" received {peak:g}"
+        )
     if peak == 0.0:
         raise InputError(f"torque curve {path}: expected a torque somewhere, received zeros only")
     if max(abs(torque[0]), abs(torque[-1])) > LARGEST_END_SHARE * peak:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -35,7 +35,7 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
         (f"least-norm torque at {limit_A:g} A, N·m", on_grid.least_norm_Nm, np.min, "viridis"),
         (f"torque by the best currents at {limit_A:g} A, N·m", on_grid.best_Nm, np.min, "viridis"),
         (
-            "smallest singular value σ, N·m/A (copper loss: R/σ²)",
+            "least singular value σ, N·m/A",
             on_grid.singular_value_Nm_per_A,
             np.min,
             "viridis",
@@ -45,31 +45,40 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
     grid = figure.subplots(2, 2, subplot_kw={"projection": "polar"})
     for axes, (title, values, worst, colours) in zip(grid.flat, maps, strict=True):
         _polar(figure, axes, workspace, _over_spin(workspace, values, worst), title, colours)
-    figure.suptitle("Worst direction and worst spin; radius: tilt of the shaft, angle: its azimuth")
+    figure.suptitle(
+        "Worst direction and worst spin on the grid; radius: tilt of the shaft, angle: its azimuth"
+    )
     return figure
 
 
-def capability_by_tilt(workspace: Workspace, on_grid: Capability, limit_A: float) -> Figure:
+def capability_by_tilt(
+    workspace: Workspace, on_grid: Capability, worst: Mapping[str, Array], limit_A: float
+) -> Figure:
     """Torque and copper loss against tilt: worst pose, median, and best pose.
 
     Parameters
     ----------
     workspace, on_grid, limit_A
         As in `capability_map`.
+    worst : mapping of str to (t,) array
+        Worst figures at each reachable tilt, searched between the grid's poses: ``least_norm_Nm``,
+        ``best_Nm`` and ``copper_W_per_Nm2``.
     """
     figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
     torque, copper = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     tilt = np.degrees(workspace.tilt_rad)
-    series = (("best currents", on_grid.best_Nm), ("least-norm currents", on_grid.least_norm_Nm))
-    for colour, (name, values) in zip(SERIES, series, strict=False):
-        low, middle, high = _spread(workspace, values)
+    series = (("best currents", "best_Nm"), ("least-norm currents", "least_norm_Nm"))
+    for colour, (name, figure_of_merit) in zip(SERIES, series, strict=False):
+        _, middle, high = _spread(workspace, getattr(on_grid, figure_of_merit))
+        low = _at_all_tilts(workspace, worst[figure_of_merit])
         torque.fill_between(tilt, low, high, color=colour, alpha=0.2, linewidth=0)
         torque.plot(tilt, low, color=colour, label=f"{name}: worst pose")
         torque.plot(tilt, middle, color=colour, linestyle=":", label=f"{name}: median")
     torque.set_ylim(bottom=0.0)
     torque.set_ylabel("torque in every direction, N·m")
     torque.set_title(f"Torque capability at {limit_A:g} A a group", loc="left")
-    _, middle, high = _spread(workspace, on_grid.copper_W_per_Nm2)
+    _, middle, _ = _spread(workspace, on_grid.copper_W_per_Nm2)
+    high = _at_all_tilts(workspace, worst["copper_W_per_Nm2"])
     copper.plot(tilt, high, color=INK, label="worst pose")
     copper.plot(tilt, middle, color=INK, linestyle=":", label="median")
     copper.set_yscale("log")
@@ -95,6 +104,13 @@ def _polar(
     axes.set_rlabel_position(15)
     axes.tick_params(axis="y", colors="white")
     axes.grid(alpha=0.3, color="white")
+
+
+def _at_all_tilts(workspace: Workspace, values: Array) -> Array:
+    """(t,) values of the reachable tilts, NaN at the others."""
+    everywhere = np.full(len(workspace.tilt_rad), np.nan)
+    everywhere[workspace.reachable.any(axis=(1, 2))] = values
+    return everywhere
 
 
 def _over_spin(workspace: Workspace, values: Array, worst: Callable[..., Array]) -> Array:

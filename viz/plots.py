@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spheretwin.models.errors import InputError
+from spheretwin.models.files import whole_file
 from spheretwin.models.telemetry import ANGLES
 from spheretwin.viz.palette import AXIS_COLOURS
 
@@ -56,10 +56,8 @@ def save(figure: Figure, path: Path) -> None:
     InputError
         The file cannot be written there.
     """
-    try:
-        figure.savefig(path, dpi=DPI, metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"output: expected a writable path, {error}") from None
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
 
 
 def margins(values: Mapping[str, float], title: str) -> Figure:

@@ -31,7 +31,7 @@ def print_run(scenario: str, law: str, summary: dict[str, Any]) -> None:
     if summary["max_abs_current_A"] is not None:
         console.print(
             f"largest current {summary['max_abs_current_A']:.2f} A,"
-            f" at the limit for {100 * summary['saturated_fraction']:.1f} % of the ticks"
+            f" the limit cut the torque at {100 * summary['saturated_fraction']:.1f} % of the ticks"
         )
     if summary["realtime_factor"] is not None:
         console.print(

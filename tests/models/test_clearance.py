@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from spheretwin.models.clearance import clearance, overlaps
+from spheretwin.models.clearance import air_gap_m, clearance, overlaps
 
 RADIUS, LENGTH, DISTANCE = 0.011, 0.025, 0.063
 
@@ -68,3 +68,9 @@ def test_poles_overlap_deepest_first(actuator):
     assert {overlap.part for overlap in found} == {"pole"}
     depths = [overlap.depth_m for overlap in found]
     assert np.all(np.diff(depths) < 1e-8)  # equal ones by their indices
+
+
+def test_air_gap_is_the_paper_s_half_millimetre(actuator):
+    assert air_gap_m(actuator) == pytest.approx(0.5e-3, abs=1e-12)
+    inward = replace(actuator, coil=replace(actuator.coil, distance_m=actuator.coil.distance_m - 8e-3))
+    assert air_gap_m(inward) == pytest.approx(-7.5e-3, abs=1e-12)

@@ -253,6 +253,10 @@ HEADER = "phi_deg,torque_Nm_per_A"
         ([HEADER, *(f"{phi},0" for phi in range(0, 181, 20))], "expected a torque somewhere"),
         ([HEADER.replace(",", ";"), *GOOD_ROWS], "expected the columns phi_deg, torque_Nm_per_A"),
         ([HEADER, *GOOD_ROWS[:4], '"80,0.001'], "expected numbers only"),
+        ([HEADER, *GOOD_ROWS[:4], "80,0.001,7", *GOOD_ROWS[5:]], "another number of them in row 5"),
+        ([HEADER + ",phi_deg", *(f"{row},1" for row in GOOD_ROWS)], "a column twice"),
+        ([HEADER, "0,0", "20,1e308", "40,-1e308", *GOOD_ROWS[3:-1], "180,0"], "expected a peak between"),
+        ([HEADER, "0,0", "20,0.1", "20.0000000000001,0.1", *GOOD_ROWS[2:]], "expected rising angles"),
     ],
 )
 def test_bad_csv_is_refused_on_one_line(tmp_path, lines, complaint):

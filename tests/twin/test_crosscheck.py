@@ -85,7 +85,7 @@ def test_every_row_says_what_it_compares_and_why(told):
 
 def test_random_states_are_counted_over_all_plants(told):
     rows = {row["name"]: row for row in json.loads(told[0].stdout)["checks"]}
-    assert rows["inertia matrix M: MuJoCo"]["states"] == 3 * 200
+    assert rows["inertia matrix M: MuJoCo"]["states"] == 4 * 200  # nominal, modelling error, payload, both
     assert set(rows["inertia matrix M: MuJoCo"]["detail"]) == {case.name for case in dynamics.CASES}
 
 

@@ -16,10 +16,11 @@ from spheretwin.models import workspace as workspaces
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.capability import Capability, capability
 from spheretwin.models.errors import InputError
+from spheretwin.models.files import make_folder
 from spheretwin.models.weakest import FIGURES, Found, local_minima, worst_by_tilt
 from spheretwin.models.workspace import Workspace
 from spheretwin.twin.commands import magnetics_warnings
-from spheretwin.twin.commands.reporting import kept, make_folder, print_json, tracked, warn
+from spheretwin.twin.commands.reporting import kept, print_json, tracked, warn
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.viz import magnetic_tables
 
@@ -39,9 +40,9 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             f" received {' '.join(rest)}"
         )
     plots = _plots() if options.out else None
+    actuator = actuators.load(options.mjcf, options.csv)
     if options.out:
         make_folder(options.out)
-    actuator = actuators.load(options.mjcf, options.csv)
     workspace = workspaces.grid(actuator, options.largest_tilt, TILT_STEP_DEG)
     if not workspace.reachable.any():
         raise InputError("magnetics map: expected hinge ranges that hold some pose, received none")
@@ -51,7 +52,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     weak = {name: local_minima(workspace, worst[name], FIGURES[name], actuator) for name in TOLD}
     warnings = [*magnetics_warnings.of_geometry(actuator), *_lost(worst["condition"])]
     warn(warnings)
-    checks = _checks(workspace, on_grid, worst["least_norm"], options.need)
+    checks = _checks(workspace, on_grid, weak["least_norm"], options.need)
     figures: dict[str, Any] = {
         "largest_tilt_deg": options.largest_tilt,
         "poses": int(workspace.reachable.sum()),
@@ -61,7 +62,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         "checks": [check.row() for check in checks],
         "warnings": warnings,
     }
-    files = _draw(plots, options.out, workspace, on_grid, actuator) if plots else []
+    files = _draw(plots, options.out, workspace, on_grid, worst, actuator) if plots else []
     if options.json:
         print_json({**figures, "figures": [str(path) for path in files]})
     else:
@@ -82,13 +83,22 @@ def _plots() -> ModuleType:
 
 
 def _draw(
-    plots: ModuleType, folder: Path, workspace: Workspace, on_grid: Capability, actuator: Actuator
+    plots: ModuleType,
+    folder: Path,
+    workspace: Workspace,
+    on_grid: Capability,
+    worst: dict[str, Found],
+    actuator: Actuator,
 ) -> list[Path]:
+    limit_A = actuator.group.current_limit_A
+    by_tilt = {
+        "least_norm_Nm": worst["least_norm"].capability.least_norm_Nm,
+        "best_Nm": worst["best"].capability.best_Nm,
+        "copper_W_per_Nm2": worst["singular_value"].capability.copper_W_per_Nm2,
+    }
     drawn = {
-        "capability_map.png": plots.capability_map(workspace, on_grid, actuator.group.current_limit_A),
-        "capability_by_tilt.png": plots.capability_by_tilt(
-            workspace, on_grid, actuator.group.current_limit_A
-        ),
+        "capability_map.png": plots.capability_map(workspace, on_grid, limit_A),
+        "capability_by_tilt.png": plots.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
     }
     for name, figure in drawn.items():
         plots.save(figure, folder / name)

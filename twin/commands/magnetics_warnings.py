@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.clearance import Overlap, overlaps
+from spheretwin.models.clearance import Overlap, air_gap_m, overlaps
 from spheretwin.models.errors import InputError
 
 
@@ -22,13 +22,15 @@ def of_model_file(mjcf: Path) -> list[str]:
 
 
 def of_geometry(actuator: Actuator) -> list[str]:
-    """Coils that overlap coils and poles that overlap poles: the deepest pair, and how many more."""
+    """Parts that overlap: coils and the ball, coils and coils, poles and poles (the deepest pair)."""
     found = overlaps(actuator)
     lines = []
     for part, axes in (("coil", actuator.coil_axes), ("pole", actuator.pole_axes)):
         pairs = [overlap for overlap in found if overlap.part == part]
         if pairs:
             lines.append(_line(pairs, axes))
+    if (gap_m := air_gap_m(actuator)) < 0:
+        lines.append(f"the coils' faces reach {-1e3 * gap_m:.2g} mm into the ball that carries the poles")
     return lines
 
 

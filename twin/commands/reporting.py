@@ -12,7 +12,6 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-from spheretwin.models.errors import InputError
 from spheretwin.models.files import whole_file
 from spheretwin.twin.crosscheck.check import Check
 
@@ -38,20 +37,6 @@ def write_text(path: Path, text: str) -> None:
     """Write a file, whole or not at all."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def make_folder(path: Path) -> None:
-    """Make a folder for several files, unless it is there.
-
-    Raises
-    ------
-    InputError
-        It cannot be made.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"output: expected a folder, {error}") from None
 
 
 def kept(what: str, checks: Sequence[Check]) -> bool:

@@ -58,6 +58,7 @@ CASES = (
     Case("nominal", 0.0, 0.0),
     Case("modelling error 0.2", 0.2, 0.0),
     Case("payload 0.05 kg", 0.0, 0.05),
+    Case("both", 0.2, 0.05),
 )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from spheretwin.models.errors import InputError
+from spheretwin.models.files import make_folder, whole_file
 from spheretwin.twin.crosscheck import closed_loop, dynamics, free_rotor, trajectories
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.crosscheck.suite import Evidence
@@ -43,12 +43,7 @@ def prepare(folder: Path) -> None:
             "output: expected the extra `spheretwin[plots]` to draw figures,"
             " received an installation without matplotlib"
         ) from None
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(f"output: expected a writable folder, {error}") from None
+    make_folder(folder)
 
 
 def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path:
@@ -74,10 +69,8 @@ def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path
     for drawing in drawings:
         plots.save(drawing.figure, folder / drawing.file)
     page = folder / PAGE
-    try:
-        page.write_text(markdown(evidence.checks, drawings, versions), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"output: expected a writable path, {error}") from None
+    with whole_file(page) as temporary:
+        temporary.write_text(markdown(evidence.checks, drawings, versions), encoding="utf-8")
     return page
 
 
