@@ -5,6 +5,7 @@ several times, and the fastest of each counts: whatever else the machine does on
 """
 
 import argparse
+import itertools
 import json
 import os
 import subprocess
@@ -89,19 +90,19 @@ def _repeat(calls, q, model, G, scratch):
         fill_torque_matrix(q, model, G, scratch)
 
 
-def run_seconds(record: bool) -> Callable[[], float]:
-    """Time of one run within this process, with or without a recording, s."""
+def run_seconds(folder: Path | None) -> Callable[[], float]:
+    """Time of one run within this process, s; recorded to a new file in `folder` if there is one."""
+    names = itertools.count()
 
     def work() -> None:
         simulation = Simulation(scenarios.load(SCENARIO))
-        if not record:
+        if folder is None:
             simulation.run()
             return
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "run.rrd"
-            scenario = simulation.scenario.model_dump(mode="json")
-            with Recorder(simulation.actuator, simulation.signals, scenario, path=path) as recorder:
-                simulation.run([recorder])
+        path = folder / f"run{next(names)}.rrd"
+        scenario = simulation.scenario.model_dump(mode="json")
+        with Recorder(simulation.actuator, simulation.signals, scenario, path=path) as recorder:
+            simulation.run([recorder])
 
     return lambda: seconds_of(work)
 
@@ -127,10 +128,8 @@ def ratios() -> list[dict[str, object]]:
     """Measure everything; rows with name, value, bound (None: reported only) and the two sides in s."""
     command = [str(Path(sys.executable).with_name("spheretwin")), "simulate", SCENARIO]
     imports = [sys.executable, "-c", "import mujoco, numba, rerun"]
-    inner = fastest({"loop": loop_seconds, "bare": bare_seconds, "G_t": torque_matrix_seconds}, rounds=9)
-    outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
-    runs = fastest({"recorded": run_seconds(True), "silent": run_seconds(False)}, rounds=7)
     with tempfile.TemporaryDirectory() as folder:
+        runs = fastest({"recorded": run_seconds(Path(folder)), "silent": run_seconds(None)}, rounds=9)
         processes = fastest(
             {
                 "recorded": process_seconds(*command, "--record", f"{folder}/run.rrd"),
@@ -139,6 +138,8 @@ def ratios() -> list[dict[str, object]]:
             },
             rounds=5,
         )
+    inner = fastest({"loop": loop_seconds, "bare": bare_seconds, "G_t": torque_matrix_seconds}, rounds=9)
+    outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
     return [
         _row("closed loop over bare mj_step, a physics step", inner["loop"], inner["bare"], at_most=1.25),
         _row("plain Python loop over ours, a physics step", outer["plain"], outer["loop"], at_least=15),
