@@ -19,9 +19,10 @@ import mujoco
 import numpy as np
 import plain
 
+from spheretwin.control.bounded_allocation import SCRATCH_ROWS, allocate_bounded
 from spheretwin.models import actuator as actuators
 from spheretwin.models.compiled import compiled
-from spheretwin.models.magnetics import fill_torque_matrix, torque_model
+from spheretwin.models.magnetics import fill_torque_matrix, torque_matrix, torque_model
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.simulation import Simulation
@@ -83,6 +84,27 @@ def torque_matrix_seconds() -> float:
     return seconds_of(lambda: _repeat(calls, q, model, G, scratch)) / calls
 
 
+def bounded_seconds() -> float:
+    """Time of one bounded allocation where the limit acts, mean over poses and directions, s."""
+    actuator, generator, cases = actuators.load(), np.random.default_rng(0), 2000
+    poses = generator.uniform([-1, -1, -np.pi], [1, 1, np.pi], (cases, 3))
+    G = np.stack([torque_matrix(q, actuator) for q in poses])
+    torque = generator.normal(size=(cases, 3))
+    limit = actuator.group.current_limit_A
+    for matrix, wanted in zip(G, torque, strict=True):  # 1 to 3 times what least-norm currents can give
+        wanted *= generator.uniform(1, 3) * limit / np.abs(np.linalg.pinv(matrix) @ wanted).max()
+    scratch = np.empty((SCRATCH_ROWS, 18))
+    _allocate_all(G[:1], torque, limit, scratch)
+    return seconds_of(lambda: _allocate_all(G, torque, limit, scratch)) / cases
+
+
+@compiled
+def _allocate_all(G, torque, limit, scratch):
+    current = np.empty(G.shape[2])
+    for case in range(G.shape[0]):
+        allocate_bounded(G[case], torque[case], limit, current, scratch)
+
+
 @compiled
 def _repeat(calls, q, model, G, scratch):
     for _ in range(calls):
@@ -138,7 +160,8 @@ def ratios() -> list[dict[str, object]]:
             },
             rounds=5,
         )
-    inner = fastest({"loop": loop_seconds, "bare": bare_seconds, "G_t": torque_matrix_seconds}, rounds=9)
+    parts = {"G_t": torque_matrix_seconds, "bounded": bounded_seconds}
+    inner = fastest({"loop": loop_seconds, "bare": bare_seconds, **parts}, rounds=9)
     outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
     return [
         _row("closed loop over bare mj_step, a physics step", inner["loop"], inner["bare"], at_most=1.25),
@@ -149,6 +172,7 @@ def ratios() -> list[dict[str, object]]:
             "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2
         ),
         _row("one torque matrix over bare mj_step", inner["G_t"], inner["bare"]),
+        _row("one bounded allocation at the limit over bare mj_step", inner["bounded"], inner["bare"]),
     ]
 
 
