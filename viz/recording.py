@@ -154,6 +154,8 @@ class Recorder:
                 self._recording.send_columns(blueprint.entity(signal.name), index, [column])
         self._write_frames(rows)
         self._log(self._events.of(rows))
+        if not self.viewer:
+            self._recording.flush()  # encode it here, beside the loop, rather than all at the end
 
     def _write_frames(self, rows: Table) -> None:
         """Poses, coil colours and traces of the ticks that fall on a frame."""
