@@ -9,7 +9,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
-from spheretwin.models.errors import InputError
+from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry import SIGNALS, Table, width
 from spheretwin.twin import scenario as scenarios
@@ -185,7 +185,7 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
     backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
     backwards.values[:, 0] = np.nan
     recorder.write(backwards)
-    with pytest.raises(Exception):  # noqa: B017, PT011  # whatever Rerun or NumPy makes of it
+    with pytest.raises(SpheretwinError, match="recording: "):
         recorder.close()
 
 
