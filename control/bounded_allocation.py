@@ -22,16 +22,12 @@ the rotor turns, where their columns pass through the plane of the free ones: th
 several answers. A `reserve` of some hundredths of the torque keeps off that edge.
 """
 
-from math import copysign, inf, isfinite, sqrt
-
-import numpy as np
-from numpy.typing import NDArray
+from math import copysign, inf, isfinite
 
 from spheretwin.control.allocation import allocate
+from spheretwin.control.simplex import NOISE, TIE, climb
+from spheretwin.control.vectors import NONE, Array, Vector, column, dot, length, off, plus, unit
 from spheretwin.models.compiled import compiled
-
-Vector = tuple[float, float, float]
-Array = NDArray[np.float64]
 
 # Demands (currents wanted of each group, in limits; past ±1 where it is held at its limit), their rates along
 # the line, the limit that holds each group (-1, 1, or 0 where it is free), lengths of the columns, and steps.
@@ -41,19 +37,13 @@ SCRATCH_ROWS = 5
 # and nearly singular matrices 1.9, but for one in thousands: there this ends the path's going in circles.
 STEPS_PER_GROUP = 2
 
-# Shares of a vector's length that count as none: as a column's height over the plane of others, as a rate,
-# and as an error of the result.
+# Shares of a vector's length that count as none: as a column's height over the plane of others, and as
+# an error of the result.
 FLAT = 1e-10
-NOISE = 1e-12
 EXACT = 1e-11
-
-# Groups within this of their limits (in limits) are taken to meet them at once.
-TIE = 1e-12
 
 # Where the pivots of F F^T, as shares of its trace, are above this, it may be solved as it stands.
 SOUND = 1e-6
-
-NONE: Vector = (0.0, 0.0, 0.0)
 
 
 @compiled
@@ -351,143 +341,6 @@ def is_largest(G: Array, demand: Array, torque: Vector, share: float, normal: Ve
 
 
 @compiled
-def climb(
-    G: Array, torque: Vector, end: float, share: float, most_steps: int, demand: Array
-) -> tuple[float, int]:
-    """Raise the share, by a simplex method with bounds, to `end` or to the largest there is.
-
-    Two groups and the share are basic: they balance what one other group at a time is changed by.
-
-    Parameters
-    ----------
-    G : (3, n) array
-    torque : tuple of three floats
-    end : float
-    share : float
-        What the demands give of the torque at the start.
-    most_steps : int
-    demand : (n,) array
-        Within ±1, changed in place.
-
-    Returns
-    -------
-    tuple of float and int
-        The share, and steps taken.
-    """
-    a, b = first_basis(G, torque)
-    steps = 0
-    while steps < most_steps and share < end:
-        steps += 1
-        g_a, g_b = column(G, a), column(G, b)
-        plane = cross(g_a, g_b)
-        c, growth = entering(G, demand, plane, torque, a, b)
-        if c < 0:
-            break
-        rate_c, growth = copysign(1.0, growth), abs(growth)
-        rest = plus(plus(NONE, growth, torque), -rate_c, column(G, c))  # for a and b to give
-        rate_a = dot(cross(rest, g_b), plane) / dot(plane, plane)
-        rate_b = dot(cross(g_a, rest), plane) / dot(plane, plane)
-        noise = NOISE * (growth * length(torque) + length(column(G, c)))
-        room_a = room(demand[a], rate_a, noise / length(g_a))
-        room_b = room(demand[b], rate_b, noise / length(g_b))
-        room_c = room(demand[c], rate_c, 0.0)
-        remaining = (end - share) / growth
-        stride = min(room_a, room_b, room_c, remaining)
-        demand[a] += stride * rate_a
-        demand[b] += stride * rate_b
-        demand[c] += stride * rate_c
-        share = end if stride == remaining else share + stride * growth
-        a_meets = (room_a - stride) * abs(rate_a) <= TIE
-        b_meets = (room_b - stride) * abs(rate_b) <= TIE
-        if stride == room_c:
-            demand[c] = rate_c
-        elif a_meets and (abs(rate_a) >= abs(rate_b) or not b_meets):  # the faster: the next basis is sounder
-            demand[a] = copysign(1.0, rate_a)
-            a = c
-        elif b_meets:
-            demand[b] = copysign(1.0, rate_b)
-            b = c
-    return share, steps
-
-
-@compiled
-def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
-    """Two groups whose columns and the torque are far from lying in one plane."""
-    a = b = 0
-    for j in range(G.shape[1]):
-        if length(cross(column(G, j), torque)) > length(cross(column(G, a), torque)):
-            a = j
-    plane = cross(column(G, a), torque)
-    for j in range(G.shape[1]):
-        if abs(dot(column(G, j), plane)) > abs(dot(column(G, b), plane)):
-            b = j
-    return a, b
-
-
-@compiled
-def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: int) -> tuple[int, float]:
-    """Group with the most to add to the share (-1 if none has), and the share's growth with its demand."""
-    best, found, found_growth, total = 0.0, -1, 0.0, 0.0
-    for j in range(G.shape[1]):
-        growth = dot(column(G, j), plane) / dot(torque, plane)
-        gain = abs(growth) - growth * demand[j]
-        total += abs(growth)
-        if gain > best and j != a and j != b:
-            best, found, found_growth = gain, j, growth
-    return (found if best > NOISE * total else -1), found_growth
-
-
-@compiled
-def room(demand: float, rate: float, noise: float) -> float:
-    """Steps of a rate until a demand meets its limit; at a rate of rounding's size it never does."""
-    left = 1.0 - demand if rate > 0.0 else 1.0 + demand
-    return max(left, 0.0) / abs(rate) if abs(rate) > noise else inf
-
-
-@compiled
 def clipped(demand: float) -> float:
     """What a group gives of a demand, in units of the limit."""
     return min(max(demand, -1.0), 1.0)
-
-
-@compiled
-def column(G: Array, j: int) -> Vector:
-    """Torque of one ampere in a group."""
-    return G[0, j], G[1, j], G[2, j]
-
-
-@compiled
-def off(a: Vector, e1: Vector, e2: Vector) -> Vector:
-    """What is left of a vector without its parts along two orthonormal axes (or zeros)."""
-    return plus(plus(a, -dot(a, e1), e1), -dot(a, e2), e2)
-
-
-@compiled
-def unit(a: Vector) -> Vector:
-    """Vector of length 1, or of zeros as it was."""
-    square = dot(a, a)
-    return plus(NONE, 1.0 / sqrt(square) if square > 0.0 else 0.0, a)
-
-
-@compiled
-def plus(a: Vector, factor: float, b: Vector) -> Vector:
-    """Sum of a vector and a multiple of another."""
-    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
-
-
-@compiled
-def length(a: Vector) -> float:
-    """Euclidean length."""
-    return sqrt(dot(a, a))
-
-
-@compiled
-def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@compiled
-def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -13,9 +13,9 @@ from spheretwin.control.bounded_allocation import (
     SCRATCH_ROWS,
     STEPS_PER_GROUP,
     allocate_bounded,
-    climb,
     follow_path,
 )
+from spheretwin.control.simplex import climb
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
 

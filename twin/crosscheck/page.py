@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -36,13 +37,11 @@ def prepare(folder: Path) -> None:
     InputError
         matplotlib is not installed, or the folder cannot be made or written to.
     """
-    try:
-        import matplotlib  # noqa: F401  # an extra, and slow to import
-    except ImportError:
+    if find_spec("matplotlib") is None:
         raise InputError(
             "output: expected the extra `spheretwin[plots]` to draw figures,"
             " received an installation without matplotlib"
-        ) from None
+        )
     make_folder(folder)
 
 
