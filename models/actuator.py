@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
 from spheretwin.models.errors import InputError
-from spheretwin.models.mujoco_library import silence_warnings
+from spheretwin.models.mjcf import read
 from spheretwin.models.telemetry import GROUPS
 from spheretwin.models.torque_curve import TorqueCurve
 
@@ -121,28 +121,7 @@ def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
     """
     if (mjcf, curve) == (MJCF_PATH, TORQUE_CURVE_PATH):
         return _shipped()  # read once: another file, or one that it includes, may change meanwhile
-    return from_model(read_spec(mjcf).compile(), torque_curve.read(curve))
-
-
-def read_spec(path: Path) -> mujoco.MjSpec:
-    """Read an MJCF file without what is only drawn: its geoms and meshes.
-
-    Raises
-    ------
-    InputError
-        The file is missing or broken; the engine's complaint on one line.
-    """
-    if not path.is_file():
-        raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
-    silence_warnings()
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        for drawn in [*spec.geoms, *spec.meshes]:
-            spec.delete(drawn)
-        spec.compile()
-    except ValueError as error:
-        raise InputError(f"model {path}: expected valid MJCF, {one_line(error)}") from None
-    return spec
+    return from_model(read(mjcf).described, torque_curve.read(curve))
 
 
 def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
@@ -189,18 +168,13 @@ def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
     InputError
         The file cannot be read, or the model lacks poles or coils.
     """
-    model = read_spec(mjcf).compile()
+    model = read(mjcf).described
     return _magnet(model, _sites(model, "pole_")), _coil(model, _sites(model, "coil_"))
-
-
-def one_line(error: BaseException) -> str:
-    """An error's message without its line breaks."""
-    return " ".join(str(error).split())
 
 
 @cache
 def _shipped() -> Actuator:
-    return from_model(read_spec(MJCF_PATH).compile(), torque_curve.read(TORQUE_CURVE_PATH))
+    return from_model(read(MJCF_PATH).described, torque_curve.read(TORQUE_CURVE_PATH))
 
 
 def _frozen(values: NDArray) -> NDArray:
@@ -304,6 +278,14 @@ def _check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
             raise InputError(
                 f"model: expected joint {i + 1} to be hinge {name} about {axis} through the origin"
             )
+    if np.any(model.qpos0):
+        raise InputError(f"model: expected hinges without ref, received {np.degrees(model.qpos0)} degrees")
+    payload = model.body_mass[_body(model, "payload")]
+    if payload > 0:
+        raise InputError(
+            "model: expected an empty payload mount, whose mass a run sets by plant.payload_kg,"
+            f" received {payload:g} kg"
+        )
     rotor = _body(model, "rotor")
     upright = abs(model.body_iquat[rotor][0]) > 1 - COLLINEAR_TOLERANCE
     if not upright or np.any(np.abs(model.body_ipos[rotor]) > COLLINEAR_TOLERANCE):

@@ -16,8 +16,8 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import MJCF_PATH, Actuator, one_line
-from spheretwin.models.errors import SpheretwinError
+from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.errors import SpheretwinError, one_line
 from spheretwin.models.files import check_writable
 from spheretwin.models.telemetry import SIGNALS, Signal, Table
 from spheretwin.viz import blueprint, palette, scene

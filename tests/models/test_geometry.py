@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models import geometry, mesh_files
+from spheretwin.models import geometry, mesh_files, mjcf
 from spheretwin.models.solids import along
 
 NAMES = ("stator", "outer_ring", "inner_ring", "ball", "hoop", "shaft", "pole", "coil")
@@ -55,7 +55,7 @@ def radii(mesh):
 
 def placements(tilt_deg, direction, spin):
     """Transforms (3, 4) of the bodies with the shaft tilted towards a direction, by the MJCF's own hinges."""
-    model = actuators.read_spec(actuators.MJCF_PATH).compile()
+    model = mjcf.read(actuators.MJCF_PATH).described
     data = mujoco.MjData(model)
     tilt = np.radians(tilt_deg)
     axis = np.array([np.sin(tilt) * np.cos(direction), np.sin(tilt) * np.sin(direction), np.cos(tilt)])

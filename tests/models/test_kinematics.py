@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models import kinematics
+from spheretwin.models import kinematics, mjcf
 
 TILT = np.radians(80)
 poses = st.tuples(
@@ -47,7 +47,7 @@ def test_rate_jacobian_gives_the_rotation_s_derivative(q, qdot):
 
 @pytest.fixture(scope="module")
 def engine():
-    model = actuators.read_spec(actuators.MJCF_PATH).compile()
+    model = mjcf.read(actuators.MJCF_PATH).described
     return model, mujoco.MjData(model)
 
 

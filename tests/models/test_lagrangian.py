@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 
@@ -107,7 +108,7 @@ def test_axisymmetric_rotor_precesses_as_euler_found():
 
 @pytest.fixture(scope="module")
 def engine():
-    model = actuators.read_spec(actuators.MJCF_PATH).compile()
+    model = mjcf.read(actuators.MJCF_PATH).described
     return model, mujoco.MjData(model)
 
 

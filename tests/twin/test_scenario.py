@@ -3,6 +3,7 @@
 import pytest
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.models.errors import InputError
 from spheretwin.twin import flags
 from spheretwin.twin import scenario as scenarios
@@ -22,8 +23,7 @@ def test_nutation_is_the_paper_s_case():
 
 
 def test_physics_step_is_the_one_the_model_file_opens_with():
-    spec = actuators.read_spec(actuators.MJCF_PATH)
-    assert spec.option.timestep == scenarios.load("hold").plant.step_s
+    assert mjcf.read(actuators.MJCF_PATH).described.opt.timestep == scenarios.load("hold").plant.step_s
 
 
 def test_file_and_overrides(tmp_path):

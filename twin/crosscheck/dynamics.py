@@ -17,10 +17,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, one_line
-from spheretwin.models.errors import InputError
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.errors import InputError, one_line
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
+from spheretwin.models.mjcf import PAYLOAD, read
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
@@ -205,7 +206,7 @@ def ask_pinocchio(mjcf: Path, case: Case, states: States) -> Answers:
     joint = model.getJointId("gamma")
     model.inertias[joint].inertia = (1 + case.modelling_error) * model.inertias[joint].inertia
     if case.payload_kg:
-        mount = Rotor(mjcf, STEP_S, "RK4", 0.0, 0.0).model.body("payload").pos
+        mount = read(mjcf).loaded.body(PAYLOAD).pos
         point = pinocchio.Inertia(case.payload_kg, mount, np.zeros((3, 3)))
         model.appendBodyToJoint(joint, point, pinocchio.SE3.Identity())
     data = model.createData()

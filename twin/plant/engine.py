@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from copy import copy
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,8 +13,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import read_spec
 from spheretwin.models.compiled import compiled
+from spheretwin.models.mjcf import PAYLOAD, ROTOR, idle_stages, read
 from spheretwin.models.mujoco_library import library
 
 INTEGRATORS = {
@@ -49,26 +50,36 @@ class Rotor:
         m: the rotor's inertia is (1 + m) times that of the MJCF (11), (54).
     payload_kg : float, kg
         Point mass at the payload mount; 0 for none.
+    gravity_m_s2 : float, m/s²
+        Gravity along -z; the model's own unless given.
     """
 
     def __init__(
-        self, mjcf: Path, step_s: float, integrator: str, modelling_error: float, payload_kg: float
+        self,
+        mjcf: Path,
+        step_s: float,
+        integrator: str,
+        modelling_error: float,
+        payload_kg: float,
+        gravity_m_s2: float | None = None,
     ) -> None:
-        spec = read_spec(mjcf)
-        for site in spec.sites:  # only read and drawn; each costs time in every stage of a step
-            spec.delete(site)
-        self.model = spec.compile()
+        kept = read(mjcf)
+        # Without a payload its empty body is left out: it would be a twentieth of a step.
+        self.model = copy(kept.loaded if payload_kg else kept.bare)
         self.model.opt.timestep = step_s
         self.model.opt.integrator = INTEGRATORS[integrator]
-        self.model.opt.disableflags |= _idle_stages(self.model)
-        rotor = self.model.body("rotor").id
-        self.model.body_inertia[rotor] *= 1 + modelling_error
-        payload = self.model.body("payload").id
-        self.model.body_mass[payload] = payload_kg
-        self.model.body_ipos[payload] = 0.0  # the compiler leaves it elsewhere for a body without mass
+        # A diverged state must stay visible: automatic reset would hide it behind a state of zeros.
+        self.model.opt.disableflags |= idle_stages(self.model) | mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        if gravity_m_s2 is not None:
+            self.model.opt.gravity[:] = 0.0, 0.0, -gravity_m_s2
+        self._rotor = self.model.body(ROTOR).id
+        self.model.body_inertia[self._rotor] *= 1 + modelling_error
+        if payload_kg:
+            payload = self.model.body(PAYLOAD).id
+            self.model.body_mass[payload] = payload_kg
+            self.model.body_ipos[payload] = 0.0  # the compiler leaves it elsewhere for a body without mass
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
-        self._rotor = rotor
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Engine:
         """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""
@@ -83,25 +94,23 @@ class Rotor:
             self.data.qfrc_applied,
         )
 
+    def state(self) -> NDArray[np.float64]:
+        """Everything that the next steps depend on, the solver's warm start included."""
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        return state
+
+    def restore(self, state: NDArray[np.float64]) -> None:
+        """Go on from a state of a rotor with the same model; what `start` returned stays valid."""
+        mujoco.mj_setState(self.model, self.data, state, _STATE)
+
     def warnings(self) -> list[str]:
         """Names of the warnings that MuJoCo has counted since the start."""
         kinds = mujoco.mjtWarning
         return [kinds(i).name for i in range(kinds.mjNWARNING) if self.data.warning[i].number > 0]
 
 
-def _idle_stages(model: mujoco.MjModel) -> int:
-    """Stages of a step that would find nothing to do, a tenth of its time."""
-    bits = mujoco.mjtDisableBit
-    # The run ends where a hinge reaches its range, so no limit needs the constraint solver; and the
-    # controller measures the state itself.
-    idle = bits.mjDSBL_CONSTRAINT | bits.mjDSBL_SENSOR
-    if model.nu == 0:
-        idle |= bits.mjDSBL_ACTUATION
-    if not np.any(model.jnt_stiffness):
-        idle |= bits.mjDSBL_SPRING
-    if not np.any(model.dof_damping):
-        idle |= bits.mjDSBL_DAMPER
-    return int(idle)
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
 # A symbol that LLVM resolves by name can be cached; a ctypes function inside compiled code cannot.

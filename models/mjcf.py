@@ -1,0 +1,191 @@
+"""An MJCF file read once: checked by the engine's compiler, and none of its physics dropped in silence.
+
+Three models are kept of a file. One still has its sites, which the actuator is read from. The two that a run
+steps have neither sites nor sensors nor what is only drawn, because each costs time in every stage of a step;
+what is only drawn is decided by the engine (`MjSpec.discard_visual`): geoms that neither collide nor are
+referenced, whose inertia it keeps.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from spheretwin.models.errors import InputError, one_line
+from spheretwin.models.mujoco_library import silence_warnings
+
+PAYLOAD = "payload"
+ROTOR = "rotor"
+
+# The gimbal rings of the shipped model hold 5e-13 of the rotor's inertia: what the engine needs, and no more.
+NEGLIGIBLE = 1e-9
+
+MOST_KEPT = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Mjcf:
+    """What is kept of a file; a model is copied by whoever changes it.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    described : MjModel
+        With sites: pose of poles, coils, shaft tip.
+    bare, loaded : MjModel
+        To be stepped, without and with the body that carries the payload.
+    """
+
+    path: Path
+    described: mujoco.MjModel
+    bare: mujoco.MjModel
+    loaded: mujoco.MjModel
+
+
+def read(path: Path) -> Mjcf:
+    """Read a model file, or return what was kept of it while no file that it names has changed.
+
+    Raises
+    ------
+    InputError
+        The file is missing or broken; the engine's complaint on one line.
+    """
+    if not path.is_file():
+        raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
+    key = (path.resolve(), _fingerprint(path))
+    if key not in _KEPT:
+        _KEPT[key] = _read(path)
+        while len(_KEPT) > MOST_KEPT:
+            _KEPT.popitem(last=False)
+    return _KEPT[key]
+
+
+_KEPT: OrderedDict[tuple[Path, str], Mjcf] = OrderedDict()
+
+
+def beyond_a_free_rotor(model: mujoco.MjModel) -> list[str]:
+    """Physics that a model holds beside a rigid rotor on three ideal hinges under gravity along -z, by name.
+
+    The engine computes all of it; the Lagrangian model knows none of it.
+    """
+    names = [name for name, present in _stages(model).items() if present]
+    if np.any(model.dof_armature):
+        names.append("armature")
+    if np.any(model.opt.gravity[:2]) or model.opt.gravity[2] > 0:
+        names.append("gravity other than along -z")
+    return names + [f"mass of body {name}" for name in _other_masses(model)]
+
+
+def idle_stages(model: mujoco.MjModel) -> int:
+    """Disable bits of the stages of a step in which a model has nothing to do, a tenth of the step's time.
+
+    The run ends where a hinge reaches its range, so that a limit without a margin needs no solver; and
+    sensors move nothing.
+    """
+    holds, bits = _stages(model), mujoco.mjtDisableBit
+    passive = ("tendon", "fluid", "gravity compensation", "plugin", "flex", "plasticity")
+    needed_by = {
+        bits.mjDSBL_CONSTRAINT: ("frictionloss", "equality", "tendon", "contact", "flex", "limit margin"),
+        bits.mjDSBL_SPRING: ("stiffness", *passive),
+        bits.mjDSBL_DAMPER: ("damping", *passive),
+        bits.mjDSBL_ACTUATION: ("actuator",),
+    }
+    idle = int(bits.mjDSBL_SENSOR)
+    for stage, names in needed_by.items():
+        if not any(holds[name] for name in names):
+            idle |= int(stage)
+    return idle
+
+
+def _stages(model: mujoco.MjModel) -> dict[str, bool]:
+    """Whether a model holds what the stages of a step are there for."""
+    contact_off = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    touching = np.any(model.geom_contype[:, None] & model.geom_conaffinity[None, :])
+    limited = model.jnt_limited.astype(bool)
+    return {
+        "frictionloss": bool(np.any(model.dof_frictionloss)),
+        "stiffness": bool(np.any(model.jnt_stiffness) or np.any(model.jnt_stiffnesspoly)),
+        "damping": bool(np.any(model.dof_damping) or np.any(model.dof_dampingpoly)),
+        "limit margin": bool(np.any(model.jnt_margin[limited])),
+        "equality": model.neq > 0,
+        "tendon": model.ntendon > 0,
+        "actuator": model.nu > 0,
+        "contact": not contact_off and bool(touching or model.npair),
+        "fluid": bool(model.opt.density or model.opt.viscosity),
+        "gravity compensation": model.ngravcomp > 0,
+        "plugin": model.nplugin > 0,
+        "flex": model.nflex > 0,
+        "plasticity": model.nplastic > 0,
+    }
+
+
+def _other_masses(model: mujoco.MjModel) -> Iterator[str]:
+    """Moving bodies, beside rotor and payload, that hold inertia worth naming."""
+    rotor = model.body(ROTOR).inertia.max() if ROTOR in _body_names(model) else 0.0
+    for i, name in enumerate(_body_names(model)):
+        moves = model.body_weldid[i] != 0
+        # Rotational inertia about the joint centre, at most.
+        size = model.body_inertia[i].max() + model.body_mass[i] * np.sum(model.body_ipos[i] ** 2)
+        if moves and name not in (ROTOR, PAYLOAD) and size > NEGLIGIBLE * rotor:
+            yield name or f"number {i}"
+
+
+def _body_names(model: mujoco.MjModel) -> list[str]:
+    return [model.body(i).name for i in range(model.nbody)]
+
+
+def _read(path: Path) -> Mjcf:
+    silence_warnings()
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        spec.discard_visual()
+        described = spec.compile()
+        for sensor in list(spec.sensors):
+            spec.delete(sensor)
+        if not (spec.tendons or spec.equalities or spec.actuators or spec.plugins):  # they may hold sites
+            for site in list(spec.sites):
+                spec.delete(site)
+        loaded = spec.compile()
+        mount = spec.body(PAYLOAD)
+        if mount and not mount.bodies:
+            spec.delete(mount)
+        bare = spec.compile()
+    except ValueError as error:
+        raise InputError(f"model {path}: expected valid MJCF, {one_line(error)}") from None
+    return Mjcf(path, described, bare, loaded)
+
+
+_NAMED_FILE = re.compile(rb"""\bfile\s*=\s*["']([^"']+)["']""")
+_FOLDERS = re.compile(rb"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)["']""")
+
+
+def _fingerprint(path: Path) -> str:
+    """Digest of a file and its includes, and of when the other files that it names were changed."""
+    digest, waiting, seen = hashlib.sha256(), [path], set()
+    while waiting:
+        source = waiting.pop()
+        if source in seen or not source.is_file():
+            continue
+        seen.add(source)
+        if source.suffix.lower() not in (".xml", ".mjcf", ".urdf"):
+            state = source.stat()
+            digest.update(f"{source} {state.st_mtime_ns} {state.st_size}".encode(errors="surrogateescape"))
+            continue
+        text = source.read_bytes()
+        digest.update(text)
+        folders = [path.parent, source.parent]
+        folders += [folder / _decoded(name) for folder in folders[:1] for name in _FOLDERS.findall(text)]
+        waiting += [folder / _decoded(name) for name in _NAMED_FILE.findall(text) for folder in folders]
+    return digest.hexdigest()
+
+
+def _decoded(name: bytes) -> str:
+    return name.decode("utf-8", errors="surrogateescape")
