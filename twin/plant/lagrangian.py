@@ -44,6 +44,8 @@ class LagrangianRotor:
         m: the rotor's inertia is (1 + m) times that of the actuator (11), (54).
     payload_kg : float, kg
         Point mass at the payload mount; 0 for none.
+    gravity_m_s2 : float, m/s²
+        Pulls the payload along -z of the stator frame where positive.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class LagrangianRotor:
         integrator: str = "RK4",
         modelling_error: float = 0.0,
         payload_kg: float = 0.0,
+        gravity_m_s2: float = GRAVITY_m_s2,
     ) -> None:
         x, y, height = (float(length) for length in actuator.payload_mount_m)
         if integrator != "RK4":
@@ -69,7 +72,7 @@ class LagrangianRotor:
             )
         self._step_s = step_s
         self.inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
-        self.weight_moment = payload_kg * GRAVITY_m_s2 * height
+        self.weight_moment = payload_kg * gravity_m_s2 * height
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Equations:
         """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""

@@ -35,8 +35,8 @@ def states(count, seed=1):
         yield q, generator.uniform(-5, 5, 3), generator.uniform(-50, 50, 3)
 
 
-def potential(q, actuator):
-    return PAYLOAD_KG * 9.81 * (rotation(q) @ actuator.payload_mount_m)[2]
+def potential(q, actuator, gravity_m_s2=9.81):
+    return PAYLOAD_KG * gravity_m_s2 * (rotation(q) @ actuator.payload_mount_m)[2]
 
 
 def kinetic(q, qdot, actuator):
@@ -84,6 +84,19 @@ def test_gravity_is_the_gradient_of_the_potential(actuator):
     for q, _, _ in states(20):
         expected = gradient(lambda pose: potential(pose, actuator), q)
         np.testing.assert_allclose(gravity_torque(q, rotor.weight_moment), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("gravity_m_s2", [1.62, 0.0, -9.81])
+def test_payload_weighs_what_gravity_makes_of_it(actuator, gravity_m_s2):
+    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG, gravity_m_s2=gravity_m_s2)
+    for q, _, _ in states(20):
+        expected = gradient(lambda pose: potential(pose, actuator, gravity_m_s2), q)
+        np.testing.assert_allclose(gravity_torque(q, rotor.weight_moment), expected, atol=1e-12)
+    earth = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
+    np.testing.assert_array_equal(rotor.inertia, earth.inertia)
+    plant = rotor.start(np.array([0.1, 0.0, 0.0]), np.zeros(3))
+    lagrangian.step(plant)
+    assert np.sign(plant.qdot[0]) == np.sign(gravity_m_s2)  # a tilted shaft falls to where gravity pulls
 
 
 def test_acceleration_solves_the_equation_of_motion(actuator):
