@@ -7,7 +7,13 @@ A payload is a point mass on the shaft, at the height l on the rotor's third axi
 angular velocity (w1, w2, w3) in its own frame the mass moves at ``l sqrt(w1**2 + w2**2)``, so its kinetic
 energy ``m l**2 (w1**2 + w2**2) / 2`` adds ``m l**2`` to J1 and J2 and changes the form of neither M nor C;
 its potential energy is ``V = m g l cos(alpha) cos(beta)``, whose gradient is G.
+
+Each formula stands once, on scalars: a plant that steps the motion some thousand times a second cannot
+afford arrays of three. The functions that take and return arrays hand over to those and fill in.
 """
+
+from math import cos, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +21,29 @@ from numpy.typing import NDArray
 from spheretwin.models.compiled import compiled
 
 GRAVITY_m_s2 = 9.81
+
+Triple = tuple[float, float, float]  # an entry for each of alpha, beta, gamma
+
+
+class Turns(NamedTuple):
+    """Cosines and sines of a pose; it enters the equations of motion through nothing else."""
+
+    ca: float
+    sa: float
+    cb: float
+    sb: float
+    cg: float
+    sg: float
+
+
+class InertiaEntries(NamedTuple):
+    """The inertia matrix without what symmetry repeats and without its zero, (beta, gamma); kg·m²."""
+
+    alpha: float
+    beta: float
+    gamma: float
+    alpha_beta: float
+    alpha_gamma: float
 
 
 @compiled
@@ -33,15 +62,11 @@ def inertia_matrix(q: NDArray[np.float64], inertia: NDArray[np.float64]) -> NDAr
     (3, 3) array, kg·m²
         Symmetric; positive definite away from beta = +-90 degrees.
     """
-    J1, J2, J3 = inertia[0], inertia[1], inertia[2]
-    cb, sb = np.cos(q[1]), np.sin(q[1])
-    cg, sg = np.cos(q[2]), np.sin(q[2])
+    entries = inertia_entries(turns(triple(q)), triple(inertia))
     M = np.zeros((3, 3))
-    M[0, 0] = (J1 * cg**2 + J2 * sg**2) * cb**2 + J3 * sb**2
-    M[0, 1] = M[1, 0] = (J1 - J2) * cb * cg * sg
-    M[0, 2] = M[2, 0] = J3 * sb
-    M[1, 1] = J1 * sg**2 + J2 * cg**2
-    M[2, 2] = J3
+    M[0, 0], M[1, 1], M[2, 2] = entries.alpha, entries.beta, entries.gamma
+    M[0, 1] = M[1, 0] = entries.alpha_beta
+    M[0, 2] = M[2, 0] = entries.alpha_gamma
     return M
 
 
@@ -65,24 +90,9 @@ def coriolis_matrix(
     (3, 3) array, kg·m²/s
         C(q, qdot); derived anew, as the paper's appendix is damaged in print.
     """
-    J1, J2, J3 = inertia[0], inertia[1], inertia[2]
-    alpha_rate, beta_rate, gamma_rate = qdot[0], qdot[1], qdot[2]
-    cb, sb = np.cos(q[1]), np.sin(q[1])
-    cg, sg = np.cos(q[2]), np.sin(q[2])
-    D = J1 - J2
-    D_double_angle = D * cb * (cg**2 - sg**2)
-    tilt = (J3 - J1 * cg**2 - J2 * sg**2) * sb * cb
-    sum_half = 0.5 * (D_double_angle + J3 * cb)
-    difference_half = 0.5 * (D_double_angle - J3 * cb)
-    C = np.zeros((3, 3))
-    C[0, 0] = tilt * beta_rate - D * cb**2 * sg * cg * gamma_rate
-    C[0, 1] = tilt * alpha_rate - D * sb * sg * cg * beta_rate + sum_half * gamma_rate
-    C[0, 2] = -D * cb**2 * sg * cg * alpha_rate + sum_half * beta_rate
-    C[1, 0] = -tilt * alpha_rate + difference_half * gamma_rate
-    C[1, 1] = D * sg * cg * gamma_rate
-    C[1, 2] = difference_half * alpha_rate + D * sg * cg * beta_rate
-    C[2, 0] = D * cb**2 * sg * cg * alpha_rate - difference_half * beta_rate
-    C[2, 1] = -difference_half * alpha_rate - D * sg * cg * beta_rate
+    C = np.empty((3, 3))
+    for i, row in enumerate(coriolis_rows(turns(triple(q)), triple(qdot), triple(inertia))):
+        C[i, 0], C[i, 1], C[i, 2] = row
     return C
 
 
@@ -122,9 +132,8 @@ def gravity_torque(q: NDArray[np.float64], weight_moment: float) -> NDArray[np.f
     (3,) array, N·m
         On the left side of (1), so that a positive entry has to be held by a positive torque.
     """
-    G = np.zeros(3)
-    G[0] = -weight_moment * np.sin(q[0]) * np.cos(q[1])
-    G[1] = -weight_moment * np.cos(q[0]) * np.sin(q[1])
+    G = np.empty(3)
+    G[0], G[1], G[2] = gravity_entries(turns(triple(q)), weight_moment)
     return G
 
 
@@ -155,24 +164,11 @@ def acceleration(
     -------
     (3,) array, rad/s²
         ``M**-1 (torque - C qdot - G)``.
-
-    Notes
-    -----
-    M is eliminated from its last row upward. It is positive definite, so that no order needs pivots, and
-    as its entry (2, 3) is zero this order divides by two diagonal entries that never vanish.
     """
-    M = inertia_matrix(q, inertia)
-    C = coriolis_matrix(q, qdot, inertia)
-    G = gravity_torque(q, weight_moment)
-    net = np.empty(3)
-    for i in range(3):
-        net[i] = torque[i] - C[i, 0] * qdot[0] - C[i, 1] * qdot[1] - C[i, 2] * qdot[2] - G[i]
-    to_beta, to_gamma = M[0, 1] / M[1, 1], M[0, 2] / M[2, 2]
-    left = M[0, 0] - to_beta * M[0, 1] - to_gamma * M[0, 2]
     qddot = np.empty(3)
-    qddot[0] = (net[0] - to_beta * net[1] - to_gamma * net[2]) / left
-    qddot[1] = net[1] / M[1, 1] - to_beta * qddot[0]
-    qddot[2] = net[2] / M[2, 2] - to_gamma * qddot[0]
+    qddot[0], qddot[1], qddot[2] = acceleration_entries(
+        turns(triple(q)), triple(qdot), triple(torque), triple(inertia), weight_moment
+    )
     return qddot
 
 
@@ -203,3 +199,91 @@ def coupling_torques(
     coupling[1, 1] = -inertia * cb * qdot[0] * qdot[2]
     coupling[1, 2] = inertia * cb * qdot[0] * qdot[1]
     return coupling
+
+
+@compiled
+def triple(vector: NDArray[np.float64]) -> Triple:
+    """Entries of a (3,) array."""
+    return vector[0], vector[1], vector[2]
+
+
+@compiled
+def turns(q: Triple) -> Turns:
+    """Cosines and sines of a pose (rad)."""
+    return Turns(cos(q[0]), sin(q[0]), cos(q[1]), sin(q[1]), cos(q[2]), sin(q[2]))
+
+
+@compiled
+def inertia_entries(at: Turns, inertia: Triple) -> InertiaEntries:
+    """Entries of `inertia_matrix` (kg·m²)."""
+    J1, J2, J3 = inertia
+    return InertiaEntries(
+        alpha=(J1 * at.cg**2 + J2 * at.sg**2) * at.cb**2 + J3 * at.sb**2,
+        beta=J1 * at.sg**2 + J2 * at.cg**2,
+        gamma=J3,
+        alpha_beta=(J1 - J2) * at.cb * at.cg * at.sg,
+        alpha_gamma=J3 * at.sb,
+    )
+
+
+@compiled
+def coriolis_rows(at: Turns, qdot: Triple, inertia: Triple) -> tuple[Triple, Triple, Triple]:
+    """Rows of `coriolis_matrix` (kg·m²/s)."""
+    J1, J2, J3 = inertia
+    alpha_rate, beta_rate, gamma_rate = qdot
+    cb, sb, cg, sg = at.cb, at.sb, at.cg, at.sg
+    D = J1 - J2
+    D_double_angle = D * cb * (cg**2 - sg**2)
+    tilt = (J3 - J1 * cg**2 - J2 * sg**2) * sb * cb
+    sum_half = 0.5 * (D_double_angle + J3 * cb)
+    difference_half = 0.5 * (D_double_angle - J3 * cb)
+    first = (
+        tilt * beta_rate - D * cb**2 * sg * cg * gamma_rate,
+        tilt * alpha_rate - D * sb * sg * cg * beta_rate + sum_half * gamma_rate,
+        -D * cb**2 * sg * cg * alpha_rate + sum_half * beta_rate,
+    )
+    second = (
+        -tilt * alpha_rate + difference_half * gamma_rate,
+        D * sg * cg * gamma_rate,
+        difference_half * alpha_rate + D * sg * cg * beta_rate,
+    )
+    third = (
+        D * cb**2 * sg * cg * alpha_rate - difference_half * beta_rate,
+        -difference_half * alpha_rate - D * sg * cg * beta_rate,
+        0.0,
+    )
+    return first, second, third
+
+
+@compiled
+def gravity_entries(at: Turns, weight_moment: float) -> Triple:
+    """Entries of `gravity_torque` (N·m)."""
+    return -weight_moment * at.sa * at.cb, -weight_moment * at.ca * at.sb, 0.0
+
+
+@compiled
+def acceleration_entries(
+    at: Turns, qdot: Triple, torque: Triple, inertia: Triple, weight_moment: float
+) -> Triple:
+    """Entries of `acceleration` (rad/s²)."""
+    C_alpha, C_beta, C_gamma = coriolis_rows(at, qdot, inertia)
+    G = gravity_entries(at, weight_moment)
+    net = (
+        torque[0] - C_alpha[0] * qdot[0] - C_alpha[1] * qdot[1] - C_alpha[2] * qdot[2] - G[0],
+        torque[1] - C_beta[0] * qdot[0] - C_beta[1] * qdot[1] - C_beta[2] * qdot[2] - G[1],
+        torque[2] - C_gamma[0] * qdot[0] - C_gamma[1] * qdot[1] - C_gamma[2] * qdot[2] - G[2],
+    )
+    return solve_inertia(inertia_entries(at, inertia), net)
+
+
+@compiled
+def solve_inertia(M: InertiaEntries, torque: Triple) -> Triple:
+    """Vector x with ``M x = torque``, for an inertia matrix or any other with its zero.
+
+    M is eliminated from its last row upward. It is positive definite, so that no order needs pivots, and
+    as its entry (beta, gamma) is zero this order divides by two diagonal entries that never vanish.
+    """
+    to_beta, to_gamma = M.alpha_beta / M.beta, M.alpha_gamma / M.gamma
+    left = M.alpha - to_beta * M.alpha_beta - to_gamma * M.alpha_gamma
+    alpha = (torque[0] - to_beta * torque[1] - to_gamma * torque[2]) / left
+    return alpha, torque[1] / M.beta - to_beta * alpha, torque[2] / M.gamma - to_gamma * alpha

@@ -9,7 +9,13 @@ from scipy.integrate import solve_ivp
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
-from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
+from spheretwin.models.lagrangian import (
+    InertiaEntries,
+    coriolis_matrix,
+    inertia_matrix,
+    solve_inertia,
+    triple,
+)
 
 
 def random_states(count, seed=0):
@@ -146,3 +152,14 @@ def test_rate_jacobian_and_inertia_lose_rank_together(actuator):
     assert np.linalg.det(rate_jacobian(q)) == pytest.approx(np.cos(q[1]), rel=1e-13)
     determinant = np.linalg.det(inertia_matrix(q, actuator.inertia))
     assert determinant == pytest.approx(np.prod(actuator.inertia) * np.cos(q[1]) ** 2, rel=1e-12)
+
+
+def test_solution_is_a_library_s_whatever_is_added_to_the_diagonal(actuator):
+    generator = np.random.default_rng(3)
+    for q, torque in random_states(200):
+        M = inertia_matrix(q, actuator.inertia)
+        M += np.diag(10 ** generator.uniform(-6, 0, 3) * generator.integers(0, 2, 3))
+        entries = InertiaEntries(M[0, 0], M[1, 1], M[2, 2], M[0, 1], M[0, 2])
+        solution, expected = solve_inertia(entries, triple(torque)), np.linalg.solve(M, torque)
+        # Rounding of either, with a condition of 140 at the largest tilt.
+        np.testing.assert_allclose(solution, expected, rtol=0, atol=1e-13 * np.abs(expected).max())

@@ -13,8 +13,14 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.compiled import compiled
 from spheretwin.models.errors import InputError
-from spheretwin.models.kinematics import rate_jacobian
-from spheretwin.models.lagrangian import GRAVITY_m_s2, acceleration, loaded_inertia
+from spheretwin.models.lagrangian import (
+    GRAVITY_m_s2,
+    Triple,
+    acceleration_entries,
+    loaded_inertia,
+    triple,
+    turns,
+)
 
 
 class Equations(NamedTuple):
@@ -90,27 +96,35 @@ def step(plant: Equations) -> None:
     """One physics step of the classical Runge-Kutta method of order four.
 
     Both torques are held over the step, the Cartesian one in the stator frame, as MuJoCo does: its effect
-    on the hinges is evaluated anew at the pose of each stage.
+    on the hinges is evaluated anew at the pose of each stage. The state goes through the stages as tuples:
+    nothing is allocated, and a step takes a tenth of what it takes with arrays of three.
     """
     h = plant.step_s
-    q1, v1 = plant.q.copy(), plant.qdot.copy()
+    q1, v1 = triple(plant.q), triple(plant.qdot)
     a1 = _acceleration(plant, q1, v1)
-    q2, v2 = q1 + 0.5 * h * v1, v1 + 0.5 * h * a1
+    q2, v2 = _moved(q1, 0.5 * h, v1), _moved(v1, 0.5 * h, a1)
     a2 = _acceleration(plant, q2, v2)
-    q3, v3 = q1 + 0.5 * h * v2, v1 + 0.5 * h * a2
+    q3, v3 = _moved(q1, 0.5 * h, v2), _moved(v1, 0.5 * h, a2)
     a3 = _acceleration(plant, q3, v3)
-    q4, v4 = q1 + h * v3, v1 + h * a3
+    q4, v4 = _moved(q1, h, v3), _moved(v1, h, a3)
     a4 = _acceleration(plant, q4, v4)
-    plant.q[:] = q1 + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
-    plant.qdot[:] = v1 + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    for i in range(3):
+        plant.q[i] = q1[i] + h / 6 * (v1[i] + 2 * v2[i] + 2 * v3[i] + v4[i])
+        plant.qdot[i] = v1[i] + h / 6 * (a1[i] + 2 * a2[i] + 2 * a3[i] + a4[i])
 
 
 @compiled
-def _acceleration(plant: Equations, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> NDArray[np.float64]:
-    E = rate_jacobian(q)
-    torque = np.empty(3)
-    for i in range(3):  # torque_q + E^T torque_S
-        torque[i] = plant.torque_q[i]
-        for j in range(3):
-            torque[i] += E[j, i] * plant.torque_S[j]
-    return acceleration(q, qdot, torque, plant.inertia, plant.weight_moment)
+def _acceleration(plant: Equations, q: Triple, qdot: Triple) -> Triple:
+    at = turns(q)
+    S, hinges = plant.torque_S, plant.torque_q
+    torque = (  # torque_q + E^T torque_S; the columns of E are the hinges' axes
+        hinges[0] + S[0],
+        hinges[1] + at.ca * S[1] + at.sa * S[2],
+        hinges[2] + at.sb * S[0] + at.cb * (at.ca * S[2] - at.sa * S[1]),
+    )
+    return acceleration_entries(at, qdot, torque, triple(plant.inertia), plant.weight_moment)
+
+
+@compiled
+def _moved(start: Triple, time: float, rate: Triple) -> Triple:
+    return start[0] + time * rate[0], start[1] + time * rate[1], start[2] + time * rate[2]

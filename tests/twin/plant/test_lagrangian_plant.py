@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from numba.core.runtime import _nrt_python, rtsys
 from scipy.integrate import solve_ivp
 
 from spheretwin.control.law import Law
@@ -20,6 +21,7 @@ from spheretwin.models.lagrangian import (
     inertia_matrix,
 )
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.crosscheck.trajectories import HOLD_s, nutation_pieces
 from spheretwin.twin.plant import engine, lagrangian, stepping
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
@@ -141,6 +143,64 @@ def test_steps_are_of_order_four(actuator):
     errors = [np.abs(end_of_steps(actuator, h, duration, torque_q, torque_S) - exact).max() for h in steps]
     order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
     assert 3.8 < order < 4.2, errors
+
+
+def slow_step(plant):
+    """The classical method as it reads, on the public matrices and with a library's solution."""
+    h, start = plant.step_s, np.concatenate([plant.q, plant.qdot])
+
+    def flow(state):
+        q, qdot = state[:3].copy(), state[3:].copy()
+        torque = plant.torque_q + rate_jacobian(q).T @ plant.torque_S
+        left = coriolis_matrix(q, qdot, plant.inertia) @ qdot + gravity_torque(q, plant.weight_moment)
+        return np.concatenate([qdot, np.linalg.solve(inertia_matrix(q, plant.inertia), torque - left)])
+
+    first = flow(start)
+    second = flow(start + h / 2 * first)
+    third = flow(start + h / 2 * second)
+    fourth = flow(start + h * third)
+    end = start + h / 6 * (first + 2 * second + 2 * third + fourth)
+    plant.q[:], plant.qdot[:] = end[:3], end[3:]
+
+
+@pytest.mark.parametrize("payload_kg", [0.0, PAYLOAD_KG])
+def test_steps_on_scalars_are_those_on_matrices(actuator, payload_kg):
+    # The payload hangs: upright it would fall away from the motion, and blow rounding up by exp(21) in 5 s.
+    rotor = LagrangianRotor(actuator, STEP_S, payload_kg=payload_kg, gravity_m_s2=-9.81)
+    pieces = nutation_pieces(rotor.inertia)
+    ours, slow = (rotor.start(pieces.start[:3], pieces.start[3:]) for _ in range(2))
+    apart = []
+    for torque in pieces.torque:
+        # Half of each torque comes over the rotor's axes, as the coils' does.
+        share = np.linalg.solve(rate_jacobian(slow.q).T, torque / 2)
+        weight = gravity_torque(slow.q, slow.weight_moment)
+        for plant, step in ((ours, lagrangian.step), (slow, slow_step)):
+            plant.torque_q[:], plant.torque_S[:] = torque / 2 + weight, share
+            for _ in range(round(HOLD_s / STEP_S)):
+                step(plant)
+        apart.append(np.abs(ours.q - slow.q).max())
+    # The sums are taken in another order: two units in the last place of 31 rad, 7e-15, with a margin.
+    assert max(apart) < 1e-13
+    assert np.abs(ours.q[2]) > 30
+
+
+@compiled
+def many_steps(plant, count):
+    for _ in range(count):
+        lagrangian.step(plant)
+
+
+def test_a_step_allocates_nothing(actuator):
+    plant = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG).start(START[:3], START[3:])
+    _nrt_python.memsys_enable_stats()
+
+    def allocations(count):
+        before = rtsys.get_allocation_stats().alloc
+        many_steps(plant, count)
+        return rtsys.get_allocation_stats().alloc - before
+
+    # What is left is the wrapping of the arguments, once a call from Python.
+    assert allocations(100) == allocations(1)
 
 
 def test_one_step_is_mujoco_s_under_both_kinds_of_torque(actuator):
