@@ -3,12 +3,74 @@
 from __future__ import annotations
 
 import os
+import secrets
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from spheretwin.models.errors import InputError, SpheretwinError
+
+# A block of a disk: what remains of one that is in use already says nothing of the next.
+_BLOCK_BYTES = 4096
+
+
+class OutputFile:
+    """A file that is written under a hidden name of its own beside the place where it is to appear.
+
+    Whoever else writes to the same place at the same time has another hidden name: each file is whole, and
+    the last to be kept stays. A link stays a link: the file it points to is replaced.
+
+    Parameters
+    ----------
+    target : Path
+        Where the file is to appear.
+
+    Attributes
+    ----------
+    path : Path
+        Where to write it; an empty file is there.
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    """
+
+    def __init__(self, target: Path) -> None:
+        check_writable(target)
+        self._target = _behind_links(target)
+        self.path = self._target.with_name(f".{self._target.name}.{secrets.token_hex(8)}.part")
+        try:
+            self.path.open("xb").close()  # unlike `tempfile`, with the permissions of any new file
+        except OSError as error:
+            raise InputError(f"output: expected a writable path, {error}") from None
+
+    def keep(self) -> None:
+        """Put the file in its place, with the permissions of the file that it replaces."""
+        with suppress(FileNotFoundError):
+            shutil.copymode(self._target, self.path)
+        os.replace(self.path, self._target)
+
+    def discard(self) -> None:
+        """Remove the file, unless it was kept."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+    def obstacle(self) -> OSError | None:
+        """What keeps the file from growing, as a full disk does; None if nothing.
+
+        Found out beside it, since another thread may be writing to it.
+        """
+        try:
+            with tempfile.TemporaryFile(dir=self.path.parent) as probe:
+                probe.seek(self.path.stat().st_size)
+                probe.write(bytes(_BLOCK_BYTES))
+                probe.flush()
+        except OSError as error:
+            return error
+        return None
 
 
 def check_writable(path: Path) -> None:
@@ -19,16 +81,17 @@ def check_writable(path: Path) -> None:
     InputError
         A folder or something else than a file is there, or its folder is missing or read-only.
     """
-    if path.is_dir():
+    target = _behind_links(path)
+    if target.is_dir():
         raise InputError(f"output: expected a file name, received the folder {path}")
-    if path.exists() and not path.is_file():
+    if target.exists() and not target.is_file():
         raise InputError(f"output: expected a regular file, received {path}")
     try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
         os.close(handle)
         os.unlink(temporary)
-        if path.exists():
-            path.open("ab").close()
+        if target.exists():
+            target.open("ab").close()
     except OSError as error:
         raise InputError(f"output: expected a writable path, {error}") from None
 
@@ -46,17 +109,14 @@ def whole_file(path: Path) -> Iterator[Path]:
     SpheretwinError
         Writing failed, as on a full disk; what was at `path` before is untouched.
     """
-    target = path.resolve()
-    check_writable(target)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    output = OutputFile(path)
     try:
-        yield temporary
-        os.replace(temporary, target)
+        yield output.path
+        output.keep()
     except OSError as error:
         raise SpheretwinError(f"output: {path} could not be written, {error}") from None
     finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        output.discard()
 
 
 def make_folder(path: Path) -> None:
@@ -73,3 +133,10 @@ def make_folder(path: Path) -> None:
             pass
     except OSError as error:
         raise InputError(f"output: expected a writable folder, {error}") from None
+
+
+def _behind_links(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):  # the latter until Python 3.13
+        raise InputError(f"output: expected a file name, received {path}, a link in a circle") from None

@@ -1,11 +1,14 @@
 """Output files: whole or not at all."""
 
+import errno
 import os
+import resource
+import stat
 
 import pytest
 
 from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.files import check_writable, whole_file
+from spheretwin.models.files import OutputFile, check_writable, whole_file
 
 
 def test_file_appears_when_the_block_ends(tmp_path):
@@ -41,6 +44,80 @@ def test_link_stays_a_link(tmp_path):
         temporary.write_text("new")
     assert link.is_symlink()
     assert (tmp_path / "real.txt").read_text() == "new"
+
+
+def test_link_to_a_file_that_is_not_there_yet_makes_it(tmp_path):
+    (tmp_path / "folder").mkdir()
+    (link := tmp_path / "link.txt").symlink_to("folder/real.txt")
+    with whole_file(link) as temporary:
+        temporary.write_text("new")
+    assert link.is_symlink()
+    assert os.listdir(tmp_path / "folder") == ["real.txt"]
+    assert link.read_text() == "new"
+
+
+def test_link_in_a_circle_is_bad_input(tmp_path):
+    (loop := tmp_path / "loop.txt").symlink_to("loop.txt")
+    with pytest.raises(InputError, match="circle"):
+        check_writable(loop)
+    assert loop.is_symlink()
+
+
+def test_two_writers_of_one_path_each_leave_a_whole_file(tmp_path):
+    path = tmp_path / "out.txt"
+    with whole_file(path) as first:
+        first.write_text("one")
+        with whole_file(path) as second:
+            second.write_text("two")
+            first.write_text("one, at length")
+        assert path.read_text() == "two"
+    assert path.read_text() == "one, at length"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_neighbours_whose_names_end_in_part_are_left_alone(tmp_path):
+    neighbours = ["out.txt.part", f".out.txt.{os.getpid()}.part"]
+    for name in neighbours:
+        (tmp_path / name).write_text("mine")
+    with whole_file(tmp_path / "out.txt") as temporary:
+        temporary.write_text("new")
+    assert sorted(os.listdir(tmp_path)) == sorted([*neighbours, "out.txt"])
+    assert {(tmp_path / name).read_text() for name in neighbours} == {"mine"}
+
+
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o077, 0o600), (0o002, 0o664)])
+def test_permissions_are_those_of_any_new_file(tmp_path, umask, mode):
+    before = os.umask(umask)
+    try:
+        with whole_file(tmp_path / "out.txt") as temporary:
+            temporary.write_text("new")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "out.txt").stat().st_mode) == mode
+
+
+def test_permissions_of_a_replaced_file_stay(tmp_path):
+    (path := tmp_path / "out.txt").write_text("old")
+    path.chmod(0o640)
+    with whole_file(path) as temporary:
+        temporary.write_text("new")
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+def test_obstacle_is_what_keeps_a_file_from_growing(tmp_path):
+    output = OutputFile(tmp_path / "out.txt")
+    output.path.write_bytes(bytes(10_000))
+    assert output.obstacle() is None
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        obstacle = output.obstacle()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert obstacle.errno == errno.EFBIG
+    assert output.path.stat().st_size == 10_000
+    output.discard()
+    assert os.listdir(tmp_path) == []
 
 
 def test_places_where_no_file_can_be_put(tmp_path):
