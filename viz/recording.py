@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from threading import Semaphore
 from types import TracebackType
 from typing import Any
 
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.errors import SpheretwinError, one_line
-from spheretwin.models.files import check_writable
+from spheretwin.models.files import OutputFile
 from spheretwin.models.telemetry import SIGNALS, Signal, Table
 from spheretwin.viz import blueprint, palette, scene
 from spheretwin.viz.events import Events
@@ -31,6 +30,13 @@ Index = list[rr.TimeColumn]
 # What only the eye needs: poses, coil colours, traces.
 FRAME_RATE_Hz = 60.0
 
+# Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
+# does not gather in memory.
+PENDING_CHUNKS = 16
+
+# The last bytes of a whole recording begin with this. Rerun does not tell when it cannot write them.
+_END, _END_BYTES = b"RRF2FOOT", 12
+
 _SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
 
 _COMMON = {signal.name for signal in SIGNALS}
@@ -40,10 +46,12 @@ class Recorder:
     """Takes a run's telemetry chunk by chunk and streams it to Rerun.
 
     Every signal is recorded at the rate of the control ticks, bit for bit; poses, coil colours and traces
-    at 60 Hz. The file appears under its name when the recording closes; until then it ends in ``.part``.
+    at 60 Hz. The file appears under its name when the recording closes; until then it is hidden, under a
+    name of its own that ends in ``.part``.
 
     All work is done by one thread beside the simulation, which leaves the interpreter free while its
-    compiled loop runs; what goes wrong there is raised by `close`, so that the run itself goes on.
+    compiled loop runs. What goes wrong there ends the recording and is raised by `close`, so that the run
+    itself goes on.
 
     Parameters
     ----------
@@ -57,6 +65,11 @@ class Recorder:
         Recording to write.
     live : bool
         Serve a viewer on 127.0.0.1.
+
+    Raises
+    ------
+    InputError
+        A mesh of the model cannot be read, or no file can be put at `path`; nothing is left there.
     """
 
     def __init__(
@@ -71,33 +84,33 @@ class Recorder:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
         self._actuator = actuator
         self._limit_A = scenario["drive"]["current_limit_A"]
+        self._mjcf = Path(scenario["plant"]["mjcf"] or MJCF_PATH)
+        scene.read_model(self._mjcf)  # a run needs no mesh, and would find out only now that one is missing
         self._path = path
-        self._part = path and path.with_name(path.name + ".part")
         self._events = Events()
         self._next_frame = 0
         self._last_tips: dict[str, NDArray[np.float64]] = {}
         self._recording = rr.RecordingStream(APPLICATION)
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.viewer = Viewer() if live else None
+        self._output = OutputFile(path) if path else None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
-        self._pending: deque[Future[None]] = deque()
-        if self._part:
-            check_writable(self._part)
+        self._room = Semaphore(PENDING_CHUNKS)
+        self._fault: str | None = None
         self._submit(self._connect, signals, scenario)
 
     def _connect(self, signals: tuple[Signal, ...], scenario: dict[str, Any]) -> None:
         """Open the sinks, log all that stays the same, then let a viewer in."""
         own = tuple(signal for signal in signals if signal.name not in _COMMON)
         sinks: list[Any] = []
-        if self._part:
-            sinks.append(rr.FileSink(self._part))
+        if self._output:
+            sinks.append(rr.FileSink(self._output.path))
         if self.viewer:
             sinks.append(self.viewer.sink)
         layout = blueprint.layout(scenario["duration"], self._limit_A, own, live=self.viewer is not None)
         self._recording.set_sinks(*sinks, default_blueprint=layout)
         self._recording.send_recording_name(f"{scenario['name']}, {scenario['controller']['law']}")
-        mjcf = Path(scenario["plant"]["mjcf"] or MJCF_PATH)
-        scene.log_static(self._recording, self._actuator, mjcf, scenario["plant"]["payload_kg"])
+        scene.log_static(self._recording, self._actuator, self._mjcf, scenario["plant"]["payload_kg"])
         blueprint.log_styles(self._recording, signals)
         text = rr.TextDocument(_as_markdown(scenario), media_type=rr.MediaType.MARKDOWN)
         self._recording.log(blueprint.SCENARIO, text, static=True)
@@ -113,7 +126,7 @@ class Recorder:
         self.close()
 
     def write(self, rows: Table) -> None:
-        """Record the rows of one chunk, which must not change any more."""
+        """Record the rows of one chunk, which must not change any more; wait while many are pending."""
         if len(rows):
             self._submit(self._write, rows)
 
@@ -131,20 +144,40 @@ class Recorder:
         """
         self._submit(self._recording.flush)
         self._worker.shutdown()
-        failed = next(filter(None, (work.exception() for work in self._pending)), None)
-        with suppress(Exception):  # a full disk was told by the flush already
+        with suppress(Exception):  # a full disk: the flush, or the missing end, has told or will tell
             self._recording.disconnect()
         if self.viewer:
             self.viewer.close()
-        if failed:
-            raise SpheretwinError(f"recording: {self._part or 'live view'}: {one_line(failed)}") from failed
-        if self._part and self._path:
-            os.replace(self._part, self._path)
+        if self._output and not self._fault and not _is_whole(self._output.path):
+            self._fault = self._cause("the end of the recording could not be written")
+        if self._fault and self._output:
+            raise SpheretwinError(
+                f"recording: {self._path} could not be completed, {self._fault};"
+                f" what there is of it is in {self._output.path}"
+            )
+        if self._fault:
+            raise SpheretwinError(f"recording: live view: {self._fault}")
+        if self._output:
+            self._output.keep()
 
     def _submit(self, work: Callable[..., None], *arguments: Any) -> None:
-        while self._pending and self._pending[0].done() and not self._pending[0].exception():
-            self._pending.popleft()
-        self._pending.append(self._worker.submit(work, *arguments))
+        self._room.acquire()
+        self._worker.submit(self._perform, work, *arguments)
+
+    def _perform(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Do one piece of work, unless one before it has failed."""
+        try:
+            if not self._fault:
+                work(*arguments)
+        except BaseException as error:  # a panic inside Rerun is no `Exception`
+            self._fault = self._cause(one_line(error) or type(error).__name__)
+        finally:
+            self._room.release()
+
+    def _cause(self, complaint: str) -> str:
+        """Why recording failed; of a file that cannot be written, Rerun tells no more than that it is so."""
+        obstacle = self._output and self._output.obstacle()
+        return (obstacle and obstacle.strerror) or complaint
 
     def _write(self, rows: Table) -> None:
         index = _time_index(rows["t_s"])
@@ -209,6 +242,12 @@ def _strips(segments: NDArray[np.float64]) -> pa.Array:
     points = pa.FixedSizeListArray.from_arrays(flat, type=kind.value_type)
     starts = np.arange(len(segments) + 1, dtype=np.int32) * segments.shape[1]
     return pa.ListArray.from_arrays(pa.array(starts), points, type=kind)
+
+
+def _is_whole(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _END_BYTES))
+        return file.read().startswith(_END)
 
 
 def _time_index(t_s: NDArray[np.float64]) -> Index:

@@ -12,7 +12,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator
+from spheretwin.models.actuator import Actuator, one_line
+from spheretwin.models.errors import InputError
 from spheretwin.viz import palette
 
 WORLD = "world"
@@ -31,10 +32,21 @@ class Drawn:
     triangles: NDArray[np.int64]  # (m, 3)
 
 
+def read_model(mjcf: Path) -> mujoco.MjModel:
+    """Read the model with all its meshes, which a run does without.
+
+    Raises
+    ------
+    InputError
+        A mesh is missing or broken.
+    """
+    return _model(mjcf, _changed_ns(mjcf))
+
+
 def log_static(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, payload_kg: float) -> None:
     """Log everything that keeps its shape: meshes by body and colour, coils as one mesh."""
     recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for entity, mesh in _meshes(mjcf, mjcf.stat().st_mtime_ns).items():
+    for entity, mesh in _meshes(mjcf, _changed_ns(mjcf)).items():
         recording.log(entity, mesh, static=True)
     if payload_kg > 0:
         mount = [actuator.payload_mount_m]
@@ -64,12 +76,24 @@ def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]
 
 
 @lru_cache(maxsize=2)
-def _meshes(mjcf: Path, _: int) -> dict[str, rr.Mesh3D]:
+def _model(mjcf: Path, _: int) -> mujoco.MjModel:
+    try:
+        return mujoco.MjModel.from_xml_path(str(mjcf))
+    except ValueError as error:
+        raise InputError(f"model {mjcf}: expected meshes that can be drawn, {one_line(error)}") from None
+
+
+def _changed_ns(mjcf: Path) -> int:
+    return mjcf.stat().st_mtime_ns
+
+
+@lru_cache(maxsize=2)
+def _meshes(mjcf: Path, changed_ns: int) -> dict[str, rr.Mesh3D]:
     """Meshes by entity, one for each body and colour, and one for all coils; read once while unchanged.
 
     An entity is named after the first geom that it draws.
     """
-    model = mujoco.MjModel.from_xml_path(str(mjcf))
+    model = _model(mjcf, changed_ns)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     coils: list[Drawn] = []

@@ -1,6 +1,12 @@
 """Recordings read back: the telemetry bit for bit, poses, colours, texts and events."""
 
 import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
 
 import numpy as np
 import pyarrow as pa
@@ -9,13 +15,14 @@ import rerun as rr
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
+from spheretwin.models import actuator as actuators
 from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry import SIGNALS, Table, width
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.simulation import Simulation
 from spheretwin.viz import blueprint, palette, scene
-from spheretwin.viz.recording import Recorder
+from spheretwin.viz.recording import PENDING_CHUNKS, Recorder
 
 
 def recorded(path, name="nutation", **changes):
@@ -185,6 +192,133 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
     backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
     backwards.values[:, 0] = np.nan
     recorder.write(backwards)
+    with pytest.raises(SpheretwinError, match="recording: .*run.rrd could not be completed") as raised:
+        recorder.close()
+    (kept,) = os.listdir(tmp_path)
+    assert f"{raised.value}".endswith(kept)
+
+
+def resolved_hold(**changes):
+    simulation = Simulation(scenarios.load("hold", {"duration": 0.1, **changes}))
+    return simulation, simulation.scenario.model_dump(mode="json")
+
+
+def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
+    path = tmp_path / "run.rrd"
+    (mine := tmp_path / "run.rrd.part").write_text("mine")
+    simulation, resolved = resolved_hold()
+    _, longer = resolved_hold(duration=0.2)
+    with Recorder(simulation.actuator, simulation.signals, resolved, path=path) as first:
+        with Recorder(simulation.actuator, simulation.signals, longer, path=path) as second:
+            Simulation(scenarios.load("hold", {"duration": 0.2})).run([second])
+            assert not path.exists()
+        assert len(rows_of(path, blueprint.entity("q_rad"), "Scalars:scalars")[0]) == 200
+        simulation.run([first])
+    assert len(rows_of(path, blueprint.entity("q_rad"), "Scalars:scalars")[0]) == 100
+    assert sorted(os.listdir(tmp_path)) == ["run.rrd", "run.rrd.part"]
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_recording_at_a_link_replaces_the_file_behind_it(tmp_path, there):
+    (folder := tmp_path / "folder").mkdir()
+    if there:
+        (folder / "real.rrd").write_text("old")
+    (link := tmp_path / "link.rrd").symlink_to("folder/real.rrd")
+    recorded(link, "hold", duration=0.1)
+    assert link.is_symlink()
+    assert os.listdir(folder) == ["real.rrd"]
+    assert len(rows_of(folder / "real.rrd", blueprint.entity("q_rad"), "Scalars:scalars")[0]) == 100
+
+
+def broken_model(folder, content):
+    """The shipped model with one mesh missing, or with something else in its place."""
+    shutil.copytree(actuators.FOLDER / "assets", folder / "assets")
+    mesh = folder / "assets" / "stator.obj"
+    mesh.unlink()
+    if content is not None:
+        mesh.write_text(content)
+    return shutil.copy(actuators.MJCF_PATH, folder / "broken.xml")
+
+
+@pytest.mark.parametrize("content", [None, "no mesh"], ids=["missing", "garbage"])
+def test_mesh_that_cannot_be_read_is_bad_input_before_the_run(tmp_path, content):
+    (folder := tmp_path / "model").mkdir()
+    simulation, resolved = resolved_hold(**{"plant.mjcf": str(broken_model(folder, content))})
+    with pytest.raises(InputError, match=r"model .*broken\.xml: .*stator") as raised:
+        Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd")
+    assert "\n" not in f"{raised.value}"
+    assert os.listdir(tmp_path) == ["model"]
+
+
+LIMITED = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
+from spheretwin.twin.cli import main
+sys.exit(main(["simulate", "hold", "--duration", "0.5", "--record", sys.argv[2], "--json"]))
+"""
+
+
+def limited(path, size):
+    command = [sys.executable, "-c", LIMITED, f"{size}", path]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_full_disk_costs_the_recording_and_not_the_run(tmp_path):
+    whole = limited(tmp_path / "whole.rrd", 10**9)
+    assert (whole.returncode, whole.stderr) == (0, "")
+    size = (tmp_path / "whole.rrd").stat().st_size
+    # Full from the first bytes, amid the chunks, and before the last bytes; the size varies by some bytes
+    # from run to run, as the wall clock's time in it is packed.
+    for full in (100, size // 2, size - 2000):
+        path = tmp_path / f"{full}.rrd"
+        broken = limited(path, full)
+        assert broken.returncode == 1
+        assert json.loads(broken.stdout)["status"] == "completed"
+        (line,) = broken.stderr.splitlines()
+        assert line.startswith(f"spheretwin: recording: {path} could not be completed, File too large;")
+        (kept,) = tmp_path.glob(f".{path.name}.*.part")
+        assert line.endswith(f"{kept}")
+        assert not path.exists()
+
+
+def busy(recorder):
+    """Occupy the recorder's thread until the event that is returned."""
+    done = threading.Event()
+    recorder._submit(done.wait)
+    return done
+
+
+def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
+    simulation, resolved = resolved_hold()
+    rows = Table(simulation.signals, np.zeros((1, width(simulation.signals))))
+    with Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd") as recorder:
+        done, written = busy(recorder), []
+
+        def write_all():
+            for _ in range(3 * PENDING_CHUNKS):
+                recorder.write(rows)
+                written.append(1)
+
+        writer = threading.Thread(target=write_all)
+        writer.start()
+        try:
+            while len(written) < PENDING_CHUNKS - 2:  # room for the work at hand, and for one before it
+                time.sleep(0.001)
+            time.sleep(0.05)  # time enough for hundreds more, were there no bound
+            assert len(written) < PENDING_CHUNKS
+        finally:
+            done.set()
+            writer.join()
+    assert len(rows_of(tmp_path / "run.rrd", blueprint.entity("q_rad"), "Scalars:scalars")[0]) == len(written)
+
+
+def test_recorder_that_has_failed_keeps_no_run_waiting(tmp_path):
+    simulation, resolved = resolved_hold()
+    recorder = Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd")
+    bad = Table(simulation.signals, np.full((2, width(simulation.signals)), np.nan))
+    for _ in range(3 * PENDING_CHUNKS):
+        recorder.write(bad)
     with pytest.raises(SpheretwinError, match="recording: "):
         recorder.close()
 
