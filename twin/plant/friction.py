@@ -4,9 +4,9 @@ On hinge i friction opposes the rate v with ``(viscous + coulomb / sqrt(v**2 + s
 jump at rest is thus smoothed over a stated rate: the term is odd and grows with v up to the Coulomb level,
 of which it has 71 % at the smoothing rate and 99.5 % at ten times that. A hyperbolic tangent would come
 closer to the level, but as a factor k(v) of the rate it is 0/0 at rest; the root is not, and needs no
-exponential. What holds the rotor at rest is k(0) = viscous + coulomb / smoothing, a stiff damping: an
-explicit torque of it would throw the rotor back and forth as soon as the step times k passes twice the
-inertia. It is therefore solved implicitly (`friction_torque`), and stable at any step.
+exponential. What holds the rotor at rest is k(0) = viscous + coulomb / smoothing, a stiff damping: taken at
+the rates before a step, its torque would turn the rotor back as soon as the step times k passes the inertia,
+and never let it rest. It is taken at the rates after the step instead (`friction_torque`): stable at any.
 """
 
 from math import isfinite, sqrt
