@@ -1,0 +1,61 @@
+"""How messages word what they were given: on one line, short, in digits that differ, with a near name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+# A path or a name of everyday length stays whole; digits by the thousand do not.
+LONGEST_VALUE, LONGEST_WORD, LONGEST_LINE = 120, 300, 2000
+
+FEWEST_DIGITS, MOST_DIGITS = 6, 17  # 17 significant digits tell any two floats apart
+
+
+def one_line(text: str) -> str:
+    """A message as a terminal can show it: one line, no control characters, nothing without end.
+
+    Line breaks, escape sequences and whatever else cannot be printed appear as Python's own `ascii` writes
+    them. What is too long keeps both its ends.
+    """
+    printable = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    return shortened(" ".join(shortened(word, LONGEST_WORD) for word in printable.split(" ")), LONGEST_LINE)
+
+
+def shortened(text: str, longest: int) -> str:
+    """A text of at most `longest` characters, its middle left out where it is longer."""
+    if len(text) <= longest:
+        return text
+    head = (longest - 1) // 2
+    return f"{text[:head]}…{text[head + 1 - longest :]}"
+
+
+def shown(value: object) -> str:
+    """What was received, of any type, as Python writes it: on one line, and not without end."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of more digits than Python writes
+        return f"{type(value).__name__} of too many digits"
+    return shortened(" ".join(line.strip() for line in text.splitlines()), LONGEST_VALUE)
+
+
+def told_apart(*numbers: float) -> list[str]:
+    """Numbers in as few digits as tell those apart that differ, and in no fewer than six.
+
+    Parameters
+    ----------
+    *numbers : float
+        What one message names: what it received beside the bounds that it expected.
+    """
+    different = len(set(numbers))
+    for digits in range(FEWEST_DIGITS, MOST_DIGITS):
+        texts = [f"{number:.{digits}g}" for number in numbers]
+        if len(set(texts)) >= different:
+            return texts
+    return [f"{number:.{MOST_DIGITS}g}" for number in numbers]
+
+
+def did_you_mean(received: str, valid: Iterable[str]) -> str:
+    """``"; did you mean NAME?"`` for the valid name nearest to what was received, or nothing."""
+    # Beyond this length no name is meant, and the comparison would take seconds.
+    near = difflib.get_close_matches(received, valid, n=1) if len(received) < LONGEST_WORD else []
+    return f"; did you mean {near[0]}?" if near else ""
