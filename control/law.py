@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.errors import InputError
 from spheretwin.models.telemetry import SIGNALS, Signal, width
+from spheretwin.models.wording import shown
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
@@ -37,16 +38,17 @@ class Law:
         one that is left out, or is no number, ends the run as ``diverged``. So does an exception in
         compiled code; one in plain Python is raised to the caller.
     parameters : (n,) array
-        Numbers handed to every call.
+        Numbers handed to every call; copied, so that what becomes of the caller's array is no matter.
     state : (m,) array
-        Memory at the start of a run; the run works on a copy.
+        Memory at the start of a run, copied too; the run works on a copy of its own.
     signals : tuple of Signal
         Names of the leading entries of the state, which the loop logs after every call.
 
     Raises
     ------
     InputError
-        The numbers are not one-dimensional arrays, or the signals do not fit the state.
+        The name is no text, the step no function, the numbers are not real, finite and in one dimension,
+        or the signals do not fit the state.
     """
 
     name: str
@@ -56,18 +58,49 @@ class Law:
     signals: tuple[Signal, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise InputError(f"law: expected a name, received {shown(self.name)}")
+        if not callable(self.step):
+            raise InputError(f"law {self.name}: expected step as a function, received {shown(self.step)}")
         for field in ("parameters", "state"):
-            numbers = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
-            if np.ndim(getattr(self, field)) != 1:
-                raise InputError(
-                    f"law {self.name}: expected {field} as a one-dimensional array, received {numbers.shape}"
-                )
-            object.__setattr__(self, field, numbers)  # compiled code takes this layout alone
+            object.__setattr__(self, field, _numbers(self.name, field, getattr(self, field)))
+        object.__setattr__(self, "signals", _signals(self.name, self.signals))
         if width(self.signals) > len(self.state):
             raise InputError(
                 f"law {self.name}: expected signals of at most {len(self.state)} numbers, the size of its"
-                f" state, received {width(self.signals)}"
+                f" state, received {shown(width(self.signals))}"
             )
         names = [signal.name for signal in (*SIGNALS, *self.signals)]
-        if twice := {name for name in names if names.count(name) > 1}:
+        if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
+
+
+def _numbers(law: str, field: str, given: ArrayLike) -> NDArray[np.float64]:
+    """A copy of what was given, in the one layout that compiled code takes."""
+    try:
+        found = np.asarray(given)
+    except ValueError:  # rows of different lengths
+        raise InputError(f"law {law}: expected {field} as an array, received {shown(given)}") from None
+    # Anything else would be parsed, or lose its imaginary part, without a word.
+    if found.dtype.kind not in "biuf":
+        raise InputError(f"law {law}: expected {field} as real numbers, received {shown(given)}")
+    if found.ndim != 1:
+        raise InputError(
+            f"law {law}: expected {field} as a one-dimensional array, received shape {found.shape}"
+        )
+    with np.errstate(over="ignore"):  # a wider float becomes infinite, and is refused below
+        numbers = np.array(found, dtype=np.float64, order="C")
+    if not np.all(np.isfinite(numbers)):
+        entry = int(np.argmin(np.isfinite(numbers)))
+        raise InputError(
+            f"law {law}: expected finite numbers in {field}, received {numbers[entry]} as entry {entry}"
+        )
+    return numbers
+
+
+def _signals(law: str, given: Iterable[Signal]) -> tuple[Signal, ...]:
+    signals = tuple(given) if isinstance(given, Iterable) else (given,)
+    for signal in signals:
+        if not isinstance(signal, Signal):
+            raise InputError(f"law {law}: expected signals of type Signal, received {shown(signal)}")
+    return signals

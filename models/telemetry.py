@@ -12,18 +12,70 @@ from numpy.typing import NDArray
 
 from spheretwin.models.errors import InputError
 from spheretwin.models.files import whole_file
+from spheretwin.models.wording import shown
 
 
 @dataclass(frozen=True)
 class Signal:
-    """One column of telemetry."""
+    """One column of telemetry.
+
+    Attributes
+    ----------
+    name : str
+        Name of the column.
+    unit : str
+        Unit of every entry.
+    size : int
+        Numbers a row, at least 1.
+    meaning : str
+        What it says, for tables and figures.
+    labels : tuple of str
+        A short name for each entry of a vector, without commas; or none.
+
+    Raises
+    ------
+    InputError
+        The name is no text or empty, the size no whole number above 0, or the labels do not fit it.
+    """
 
     name: str
     unit: str
     size: int
     meaning: str
     labels: tuple[str, ...] = ()
-    """A short name for each entry of a vector."""
+
+    def __post_init__(self) -> None:
+        if not _is_text(self.name) or not self.name:
+            raise InputError(f"signal: expected a name of printable characters, received {shown(self.name)}")
+        for field in ("unit", "meaning"):
+            if not _is_text(getattr(self, field)):
+                raise InputError(
+                    f"signal {self.name}: expected {field} as printable text,"
+                    f" received {shown(getattr(self, field))}"
+                )
+        # A size below 1 would let the loop write beside its rows.
+        if not isinstance(self.size, int) or isinstance(self.size, bool) or self.size < 1:
+            raise InputError(
+                f"signal {self.name}: expected size as a whole number above 0, received {shown(self.size)}"
+            )
+        if not isinstance(self.labels, tuple | list) or not all(map(_is_label, self.labels)):
+            raise InputError(
+                f"signal {self.name}: expected labels as texts without commas, received {shown(self.labels)}"
+            )
+        if len(self.labels) not in (0, self.size):
+            raise InputError(
+                f"signal {self.name}: expected {self.size} labels or none, received {len(self.labels)}"
+            )
+        object.__setattr__(self, "labels", tuple(self.labels))
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and value.isprintable()
+
+
+def _is_label(value: object) -> bool:
+    # A file keeps the labels in one text, parted by commas.
+    return isinstance(value, str) and value.isprintable() and value != "" and "," not in value
 
 
 ANGLES = ("α", "β", "γ")
