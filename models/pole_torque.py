@@ -16,9 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models import curve_origin
 from spheretwin.models.actuator import Coil, Magnet
 from spheretwin.models.errors import InputError
-from spheretwin.models.torque_curve import TorqueCurve
+from spheretwin.models.torque_curve import TorqueCurve, head
 
 Array = NDArray[np.float64]
 
@@ -115,7 +116,7 @@ def compute_curve(
     angles = track(range(len(phi_rad)))
     torque = np.array([_torque(magnet, coil, phi_rad[i], mesh or Mesh(), solenoid) for i in angles])
     torque[(phi_rad == 0.0) | (phi_rad == np.pi)] = 0.0  # by symmetry; the sum leaves 1e-18
-    return TorqueCurve(phi_rad, torque)
+    return TorqueCurve(phi_rad, torque, curve_origin.numbers(magnet, coil))
 
 
 def convergence(
@@ -161,6 +162,7 @@ def provenance(magnet: Magnet, coil: Coil, measured: Convergence, mesh: Mesh | N
         f" length {_mm(magnet.length_m)}, centre at {_mm(magnet.distance_m)}.",
         f"Coil: {coil.turns:g} turns in air, radii {_mm(coil.inner_radius_m)} to {_mm(coil.outer_radius_m)},"
         f" length {_mm(coil.length_m)}, centre at {_mm(coil.distance_m)}.",
+        *head(curve_origin.numbers(magnet, coil)),
         "Method: torque on the magnet's equivalent current sheet in the exact field of solenoids (magpylib"
         f" {magpylib.__version__}).",
         f"Quadrature: {mesh.along} points along the sheet, {mesh.around} on half its circumference,"

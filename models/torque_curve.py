@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,12 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.errors import InputError
+from spheretwin.models.wording import told_apart
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 COLUMNS = ("phi_deg", "torque_Nm_per_A")
 FEWEST_ROWS = 8
+
+# Begins a comment that names a number of the geometry.
+COMPUTED_FOR = "Computed for"
+HEAD_LINE = re.compile(rf"^# *{COMPUTED_FOR} ((?:magnet|coil) \w+):[ \t]*(.*?)[ \t]*\r?$", re.MULTILINE)
 
 # Angles closer than this are one angle twice; peaks beyond these are slips of the unit.
 CLOSEST_DEG = 1e-6
@@ -39,10 +46,17 @@ class TorqueCurve:
         Angle between pole axis and coil axis, rising from 0 to pi.
     torque_Nm_per_A : (n,) array, N·m/A
         Positive where a positive current pulls a north pole towards the coil's axis.
+    computed_for : mapping of str to float, optional
+        Numbers of the geometry that it was computed for, such as ``coil turns``; None where it does not
+        say, as data from a bench.
+    name : str
+        What warnings call it.
     """
 
     phi_rad: NDArray[np.float64]
     torque_Nm_per_A: NDArray[np.float64]
+    computed_for: Mapping[str, float] | None = None
+    name: str = "torque curve"
 
     @cached_property
     def spline(self) -> CubicSpline:
@@ -81,12 +95,13 @@ class TorqueCurve:
 def read(path: Path) -> TorqueCurve:
     """Read a torque curve from CSV: a header, then ``phi_deg`` and ``torque_Nm_per_A`` a row.
 
-    Lines that begin with ``#`` are comments (the provenance).
+    Lines that begin with ``#`` are comments (the provenance); those that `head` wrote are read back.
 
     Raises
     ------
     InputError
-        The file cannot be read, lacks a column, or its samples are no curve from 0 to 180 degrees.
+        The file cannot be read, lacks a column, its samples are no curve from 0 to 180 degrees, or its head
+        names a number that is none.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
@@ -111,7 +126,14 @@ def read(path: Path) -> TorqueCurve:
         where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
         raise InputError(f"torque curve {path}: expected each column once in every row, received {where}")
     _check(path, samples)
-    return TorqueCurve(np.radians(samples[:, 0]), samples[:, 1])
+    computed_for = _computed_for(path, text)
+    return TorqueCurve(np.radians(samples[:, 0]), samples[:, 1], computed_for, f"torque curve {path.name}")
+
+
+def head(computed_for: Mapping[str, float]) -> list[str]:
+    """Lines of provenance that tell, to a person and to `read`, what a curve was computed for."""
+    # 12 digits hide the rounding of a length that was a sum, and nothing that `read` is asked to tell.
+    return [f"{COMPUTED_FOR} {name}: {value:.12g}" for name, value in computed_for.items()]
 
 
 def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
@@ -126,6 +148,22 @@ def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
     return text.getvalue()
 
 
+def _computed_for(path: Path, text: str) -> dict[str, float] | None:
+    """Numbers in the lines that `head` wrote."""
+    found = {}
+    for name, number in HEAD_LINE.findall(text):
+        try:
+            found[name] = float(number)
+        except ValueError:
+            found[name] = np.nan
+        if not np.isfinite(found[name]):
+            raise InputError(
+                f"torque curve {path}: expected a finite number after {COMPUTED_FOR} {name}:,"
+                f" received {number or 'none'}"
+            )
+    return found or None
+
+
 def _check(path: Path, samples: NDArray[np.float64]) -> None:
     if len(samples) < FEWEST_ROWS:
         raise InputError(
@@ -136,26 +174,26 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
     angles, torque = samples.T
     outside = (angles < 0.0) | (angles > 180.0)
     if np.any(outside):
+        least, largest, received = told_apart(0.0, 180.0, angles[np.argmax(outside)])
         raise InputError(
-            f"torque curve {path}: expected angles from 0 to 180 degrees,"
-            f" received {angles[np.argmax(outside)]:g}, which is outside"
+            f"torque curve {path}: expected angles from {least} to {largest} degrees,"
+            f" received {received}, which is outside"
         )
     if np.any(np.diff(angles) < CLOSEST_DEG):
         row = int(np.argmax(np.diff(angles) < CLOSEST_DEG))
-        raise InputError(
-            f"torque curve {path}: expected rising angles,"
-            f" received {angles[row]:g} then {angles[row + 1]:g} degrees"
-        )
+        first, then = told_apart(angles[row], angles[row + 1])
+        raise InputError(f"torque curve {path}: expected rising angles, received {first} then {then} degrees")
     if angles[0] != 0.0 or angles[-1] != 180.0:
+        least, largest, first, last = told_apart(0.0, 180.0, angles[0], angles[-1])
         raise InputError(
-            f"torque curve {path}: expected angles from 0 to 180 degrees,"
-            f" received {angles[0]:g} to {angles[-1]:g}"
+            f"torque curve {path}: expected angles from {least} to {largest} degrees,"
+            f" received {first} to {last}"
         )
     peak = np.max(np.abs(torque))
     if not (peak == 0.0 or LEAST_PEAK < peak < LARGEST_PEAK):
+        least, largest, received = told_apart(LEAST_PEAK, LARGEST_PEAK, peak)
         raise InputError(
-            f"torque curve {path}: expected a peak between {LEAST_PEAK:g} and {LARGEST_PEAK:g} N·m/A,"
-            f" received {peak:g}"
+            f"torque curve {path}: expected a peak between {least} and {largest} N·m/A, received {received}"
         )
     if peak == 0.0:
         raise InputError(f"torque curve {path}: expected a torque somewhere, received zeros only")

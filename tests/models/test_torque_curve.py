@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.constants import mu_0
 from scipy.spatial.transform import Rotation
 
-from spheretwin.models import pole_torque, torque_curve
+from spheretwin.models import curve_origin, pole_torque, torque_curve
 from spheretwin.models.actuator import TORQUE_CURVE_PATH, Coil, Magnet, load
 from spheretwin.models.errors import InputError
 from spheretwin.models.pole_torque import Convergence, Mesh, compute_curve
@@ -221,6 +221,27 @@ def test_csv_round_trip(tmp_path, shipped):
     assert np.array_equal(again.torque_Nm_per_A, shipped.torque_Nm_per_A)
 
 
+def test_head_is_read_back(tmp_path, magnet, coil, shipped):
+    geometry = curve_origin.numbers(replace(magnet, remanence_T=1.25), replace(coil, turns=123456.5))
+    path = tmp_path / "curve.csv"
+    path.write_text(torque_curve.to_csv(shipped, ["Before", *torque_curve.head(geometry), "after"]))
+    again = torque_curve.read(path)
+    assert again.computed_for == pytest.approx(geometry, rel=1e-11)  # written with 12 digits
+    assert again.name == "torque curve curve.csv"
+
+
+def test_shipped_head_is_what_the_curve_was_computed_for(magnet, coil, shipped):
+    fresh = compute_curve(magnet, coil, np.radians([0.0, 10.0, 180.0]), COARSE)
+    assert fresh.computed_for == pytest.approx(shipped.computed_for, rel=1e-11)
+    assert len(shipped.computed_for) == 9
+
+
+def test_data_from_elsewhere_say_nothing_of_a_geometry(tmp_path, shipped):
+    path = tmp_path / "bench.csv"
+    path.write_text(torque_curve.to_csv(shipped, ["Computed for the bench: two weeks", "coil turns: 3"]))
+    assert torque_curve.read(path).computed_for is None
+
+
 GOOD_ROWS = [f"{phi},0.001" for phi in range(0, 181, 20)]
 HEADER = "phi_deg,torque_Nm_per_A"
 
@@ -256,7 +277,26 @@ HEADER = "phi_deg,torque_Nm_per_A"
         ([HEADER, *GOOD_ROWS[:4], "80,0.001,7", *GOOD_ROWS[5:]], "another number of them in row 5"),
         ([HEADER + ",phi_deg", *(f"{row},1" for row in GOOD_ROWS)], "a column twice"),
         ([HEADER, "0,0", "20,1e308", "40,-1e308", *GOOD_ROWS[3:-1], "180,0"], "expected a peak between"),
-        ([HEADER, "0,0", "20,0.1", "20.0000000000001,0.1", *GOOD_ROWS[2:]], "expected rising angles"),
+        (
+            [HEADER, "0,0", "20,0.1", "20.0000000000001,0.1", *GOOD_ROWS[2:]],
+            "expected rising angles, received 20 then 20.0000000000001",
+        ),
+        (
+            [HEADER, *GOOD_ROWS[:-1], "180.00000001,0"],
+            "angles from 0 to 180 degrees, received 180.00000001, which is outside",
+        ),
+        (
+            ["# Computed for coil turns: many", HEADER, "0,0", *GOOD_ROWS[1:-1], "180,0"],
+            "expected a finite number after Computed for coil turns:, received many",
+        ),
+        (
+            ["# Computed for coil turns: nan", HEADER, "0,0", *GOOD_ROWS[1:-1], "180,0"],
+            "expected a finite number after Computed for coil turns:, received nan",
+        ),
+        (
+            ["# Computed for coil turns:", HEADER, "0,0", *GOOD_ROWS[1:-1], "180,0"],
+            "expected a finite number after Computed for coil turns:, received none",
+        ),
     ],
 )
 def test_bad_csv_is_refused_on_one_line(tmp_path, lines, complaint):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -227,8 +228,10 @@ def test_map_warns_of_lost_rank_and_goes_on(capsys, changed_model):
 def test_overlapping_coils_are_named(capsys, coarse, changed_model, arguments):
     path = changed_model(('size="0.011 0.0125"', 'size="0.012 0.0125"'))
     code, out, err = here(capsys, *arguments, "--mjcf", path, "--json")
-    (warning,) = json.loads(out)["warnings"]
-    assert f"spheretwin: warning: {warning}" in err.splitlines()
+    warning, curve = json.loads(out)["warnings"]
+    for line in (warning, curve):
+        assert f"spheretwin: warning: {line}" in err.splitlines()
+    assert curve.endswith("was computed for coil outer_radius_m 0.011, the model has 0.012")
     assert "coil 0 (latitude 28°, azimuth 0°) and coil 1" in warning
     assert "23 more pairs" in warning
     # The curve is the shipped coil's: that breaks `check`, the overlap alone breaks nothing.
@@ -285,3 +288,24 @@ def test_missing_magpylib_is_named(capsys, monkeypatch):
     code, _, err = here(capsys, "check", "--poses", "1")
     assert code == 2
     assert "spheretwin[magnetics]" in one_line(err)
+
+
+# A curve beside the geometry it was computed for
+
+
+def test_a_curve_of_another_geometry_is_named_beside_the_parts(actuator):
+    from spheretwin.twin.commands import magnetics_warnings
+
+    assert magnetics_warnings.of_geometry(actuator) == []
+    coil = replace(actuator.coil, turns=640.0)
+    (line,) = magnetics_warnings.of_geometry(replace(actuator, coil=coil))
+    assert line == "torque curve torque_curve.csv was computed for coil turns 320, the model has 640"
+
+
+def test_a_curve_about_to_be_computed_is_not_held_against_the_shipped_one(changed_model):
+    from spheretwin.twin.commands import magnetics_warnings
+
+    path = changed_model(('_turns" data="320"', '_turns" data="640"'))
+    assert magnetics_warnings.of_model_file(path) == []
+    (line,) = magnetics_warnings.of_model_file(path, actuators.TORQUE_CURVE_PATH)
+    assert "coil turns 320" in line

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         raise InputError("command line: expected --out or --csv, received both")
     if options.out:
         check_writable(options.out)
-    warnings = magnetics_warnings.of_model_file(options.mjcf)
+    warnings = magnetics_warnings.of_model_file(options.mjcf, options.csv)
     warn(warnings)
     if options.csv:
         return _judge(options.csv, options.mjcf, options.json, warnings)

@@ -10,18 +10,34 @@ from numpy.typing import NDArray
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.clearance import Overlap, air_gap_m, overlaps
+from spheretwin.models.curve_origin import disagreements
 from spheretwin.models.errors import InputError
 
 
-def of_model_file(mjcf: Path) -> list[str]:
-    """Warnings for a model file that may still lack what the torque curve does not need."""
+def of_model_file(mjcf: Path, curve: Path | None = None) -> list[str]:
+    """Warnings for a model file that may still lack what the torque curve does not need.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file.
+    curve : Path, optional
+        Torque curve that is held against it; none where one is about to be computed.
+    """
     try:
-        return of_geometry(actuators.load(mjcf))
+        if curve is None:
+            return of_parts(actuators.load(mjcf))
+        return of_geometry(actuators.load(mjcf, curve))
     except InputError:
         return []
 
 
 def of_geometry(actuator: Actuator) -> list[str]:
+    """Parts that overlap, then numbers that differ from what the torque curve was computed for."""
+    return [*of_parts(actuator), *disagreements(actuator)]
+
+
+def of_parts(actuator: Actuator) -> list[str]:
     """Parts that overlap: coils and the ball, coils and coils, poles and poles (the deepest pair)."""
     found = overlaps(actuator)
     lines = []

@@ -1,0 +1,74 @@
+"""What a torque curve was computed for, held against the model that uses it."""
+
+from dataclasses import fields, replace
+
+import pytest
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.actuator import Coil, Magnet
+from spheretwin.models.curve_origin import disagreements, numbers
+
+TEXT = actuators.MJCF_PATH.read_text()
+
+
+def loaded(tmp_path, old, new):
+    assert old in TEXT
+    (path := tmp_path / "mine.xml").write_text(TEXT.replace(old, new))
+    return actuators.load(path)
+
+
+def test_shipped_model_agrees_with_its_curve(actuator):
+    assert disagreements(actuator) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ('_turns" data="320"', '_turns" data="640"', "coil turns 320, the model has 640"),
+        ('data="1.2"', 'data="1.3"', "magnet remanence_T 1.2, the model has 1.3"),
+        ('data="1.2"', 'data="1.20000001"', "magnet remanence_T 1.2, the model has 1.20000001"),
+        ('pos="0.045 0 0"', 'pos="0.044 0 0"', "magnet distance_m 0.045, the model has 0.044"),
+        ('pos="0.063 0 0"', 'pos="0.064 0 0"', "coil distance_m 0.063, the model has 0.064"),
+    ],
+)
+def test_a_changed_model_file_is_named(tmp_path, old, new, line):
+    assert disagreements(loaded(tmp_path, old, new)) == [
+        f"torque curve torque_curve.csv was computed for {line}"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [(part, field.name) for part, kind in (("magnet", Magnet), ("coil", Coil)) for field in fields(kind)],
+)
+def test_every_number_of_magnet_and_coil_is_compared(actuator, part, name):
+    data = getattr(actuator, part)
+    changed = replace(actuator, **{part: replace(data, **{name: getattr(data, name) * (1 + 1e-8)})})
+    (line,) = disagreements(changed)
+    assert f"{part} {name} " in line
+    # Less than any rounding of a sum or a rotation is no difference.
+    changed = replace(actuator, **{part: replace(data, **{name: getattr(data, name) * (1 + 1e-11)})})
+    assert disagreements(changed) == []
+
+
+def test_each_number_has_a_line_of_its_own(actuator):
+    coil = replace(actuator.coil, turns=1.0, length_m=0.03)
+    assert len(disagreements(replace(actuator, coil=coil))) == 2
+
+
+def test_a_curve_that_does_not_say_is_taken_as_it_is(actuator):
+    curve = replace(actuator.torque_curve, computed_for=None)
+    coil = replace(actuator.coil, turns=1.0)
+    assert disagreements(replace(actuator, torque_curve=curve, coil=coil)) == []
+
+
+def test_a_file_s_name_cannot_break_the_line(actuator):
+    curve = replace(actuator.torque_curve, name="torque curve a\x1b[2J\nb.csv")
+    (line,) = disagreements(replace(actuator, torque_curve=curve, coil=replace(actuator.coil, turns=1.0)))
+    assert line.isprintable()
+
+
+def test_numbers_are_told_by_part_and_name(actuator):
+    named = numbers(actuator.magnet, actuator.coil)
+    assert named["coil turns"] == 320
+    assert len(named) == len(fields(Magnet)) + len(fields(Coil))
