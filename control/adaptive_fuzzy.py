@@ -1,16 +1,19 @@
 """Adaptive fuzzy law (AF): AFSM without its switching terms, ``v = theta^T Psi - K s``."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.control.fuzzy import CONSEQUENTS, approximate_and_adapt
 from spheretwin.control.gains import FUZZY_RATE, INERTIA, PERIOD, REACHING_GAIN, SURFACE_SLOPE, Gains
 from spheretwin.control.law import Law
-from spheretwin.control.sliding import sliding_surface
-from spheretwin.models.actuator import Actuator
+from spheretwin.control.sliding import SLIDING_SIGNAL, sliding_surface
 from spheretwin.models.telemetry import ANGLES, Signal
 
-SIGNALS = (Signal("fuzzy_torque_Nm", "N·m", 3, "torque of the fuzzy approximator", ANGLES),)
-FUZZY, THETA = 0, 3  # layout of the state
+SIGNALS = (
+    SLIDING_SIGNAL,
+    Signal("fuzzy_torque_Nm", "N·m", 3, "torque of the fuzzy approximator", ANGLES),
+)
+SLIDING, FUZZY, THETA = 0, 3, 6  # layout of the state
 
 
 def step(t, reference, measurement, parameters, state, torque):  # type: ignore[no-untyped-def]  # noqa: D103
@@ -23,10 +26,11 @@ def step(t, reference, measurement, parameters, state, torque):  # type: ignore[
         fuzzy = approximate_and_adapt(rate, angle, drive, state[first : first + CONSEQUENTS])
         factor = parameters[INERTIA + axis]
         torque[axis] = factor * (fuzzy - parameters[REACHING_GAIN] * s)
+        state[SLIDING + axis] = s
         state[FUZZY + axis] = factor * fuzzy
 
 
-def adaptive_fuzzy(gains: Gains, actuator: Actuator, period: float) -> Law:
+def adaptive_fuzzy(gains: Gains, inertia: NDArray[np.float64], period: float) -> Law:
     """Adaptive fuzzy law; every consequent starts at 0."""
-    parameters = gains.pack(period, actuator.inertia)
+    parameters = gains.pack(period, inertia)
     return Law("adaptive_fuzzy", step, parameters, np.zeros(THETA + 3 * CONSEQUENTS), SIGNALS)

@@ -6,6 +6,7 @@ zeta only ever grow.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.control.fuzzy import CONSEQUENTS, approximate_and_adapt
 from spheretwin.control.gains import (
@@ -19,17 +20,17 @@ from spheretwin.control.gains import (
     Gains,
 )
 from spheretwin.control.law import Law
-from spheretwin.control.sliding import sliding_surface
-from spheretwin.models.actuator import Actuator
+from spheretwin.control.sliding import SLIDING_SIGNAL, sliding_surface
 from spheretwin.models.telemetry import ANGLES, Signal
 
 SIGNALS = (
+    SLIDING_SIGNAL,
     Signal("fuzzy_torque_Nm", "N·m", 3, "torque of the fuzzy approximator", ANGLES),
     Signal("switching_torque_Nm", "N·m", 3, "torque of the two switching terms", ANGLES),
     Signal("switching_gain", "1", 3, "estimate ξ̂ of the approximation error's bound", ANGLES),
     Signal("bound_gain", "1", 3, "estimate ζ̂ of the coupling's bound", ANGLES),
 )
-FUZZY, SWITCHING, XI, ZETA, THETA = 0, 3, 6, 9, 12  # layout of the state
+SLIDING, FUZZY, SWITCHING, XI, ZETA, THETA = 0, 3, 6, 9, 12, 15  # layout of the state
 
 
 def step(t, reference, measurement, parameters, state, torque):  # type: ignore[no-untyped-def]  # noqa: D103
@@ -45,13 +46,14 @@ def step(t, reference, measurement, parameters, state, torque):  # type: ignore[
         switching = -np.sign(s) * (state[XI + axis] + state[ZETA + axis] * coupling)
         factor = parameters[INERTIA + axis]
         torque[axis] = factor * (fuzzy + switching - parameters[REACHING_GAIN] * s)
+        state[SLIDING + axis] = s
         state[FUZZY + axis] = factor * fuzzy
         state[SWITCHING + axis] = factor * switching
         state[XI + axis] += parameters[SWITCHING_RATE] * abs(s) * period
         state[ZETA + axis] += parameters[BOUND_RATE] * abs(s) * coupling * period
 
 
-def afsm(gains: Gains, actuator: Actuator, period: float) -> Law:
+def afsm(gains: Gains, inertia: NDArray[np.float64], period: float) -> Law:
     """AFSM law; every estimate starts at 0."""
-    parameters = gains.pack(period, actuator.inertia)
+    parameters = gains.pack(period, inertia)
     return Law("afsm", step, parameters, np.zeros(THETA + 3 * CONSEQUENTS), SIGNALS)

@@ -1,10 +1,10 @@
 """Proportional-derivative law, the paper's baseline: ``v = -lambda e - K edot``."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.control.gains import INERTIA, REACHING_GAIN, SURFACE_SLOPE, Gains
 from spheretwin.control.law import Law
-from spheretwin.models.actuator import Actuator
 
 
 def step(t, reference, measurement, parameters, state, torque):  # type: ignore[no-untyped-def]  # noqa: D103
@@ -15,6 +15,6 @@ def step(t, reference, measurement, parameters, state, torque):  # type: ignore[
         torque[axis] = -parameters[INERTIA + axis] * (stiffness * error + damping * error_rate)
 
 
-def pd(gains: Gains, actuator: Actuator, period: float) -> Law:
+def pd(gains: Gains, inertia: NDArray[np.float64], period: float) -> Law:
     """PD law with stiffness `surface_slope` (1/s²) and damping `reaching_gain` (1/s)."""
-    return Law("pd", step, gains.pack(period, actuator.inertia), np.zeros(0))
+    return Law("pd", step, gains.pack(period, inertia), np.zeros(0))

@@ -1,6 +1,9 @@
 """The sliding surface ``s = lambda e + edot`` (30); linear, although the paper calls it terminal."""
 
 from spheretwin.models.compiled import compiled
+from spheretwin.models.telemetry import ANGLES, Signal
+
+SLIDING_SIGNAL = Signal("sliding_s", "rad/s", 3, "sliding variable s = λe + ė (30)", ANGLES)
 
 
 @compiled

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.extending import register_jitable
 
 from spheretwin.models.cache import cache_folder
 
@@ -49,3 +50,16 @@ class _cache_folder_in_use:
 
     def __exit__(self, *_: object) -> None:
         numba.config.CACHE_DIR = self.previous
+
+
+def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The plain Python function behind a compiled one, or the function itself."""
+    return getattr(function, "py_func", function)
+
+
+def compilable(function: Callable[..., Any]) -> Any:
+    """Leave a function to Python, and let compiled code that calls it compile it, as `compiled` does.
+
+    For what calls functions of its users: in the uncompiled loop these are plain Python.
+    """
+    return register_jitable(**_OPTIONS)(function)

@@ -23,8 +23,3 @@ class InputError(SpheretwinError):
 
 class EngineError(SpheretwinError):
     """The physics engine reported a fault that no input explains."""
-
-
-def one_line(error: BaseException) -> str:
-    """An error's message without its line breaks."""
-    return " ".join(str(error).split())

@@ -152,6 +152,38 @@ def fill_torque_matrix(
         G_z[j] = x * s_y[j] - y * s_x[j]
 
 
+class KeptMatrix(NamedTuple):
+    """A torque matrix and the pose it belongs to: at the same pose it need not be filled again."""
+
+    q: NDArray[np.float64]  # (3,) rad; NaN as long as nothing is kept
+    G: NDArray[np.float64]  # (3, 18) N·m/A
+    scratch: NDArray[np.float64]  # (2, 18)
+
+
+def kept_matrix(groups: int) -> KeptMatrix:
+    """Room for the torque matrix of a number of groups, nothing kept as yet."""
+    return KeptMatrix(np.full(3, np.nan), np.empty((3, groups)), np.empty((2, groups)))
+
+
+@compiled
+def torque_matrix_at(q: NDArray[np.float64], model: TorqueModel, kept: KeptMatrix) -> NDArray[np.float64]:
+    """Torque matrix at a pose, filled anew only where the pose is another than the kept one."""
+    if not (q[0] == kept.q[0] and q[1] == kept.q[1] and q[2] == kept.q[2]):
+        fill_torque_matrix(q, model, kept.G, kept.scratch)
+        kept.q[0], kept.q[1], kept.q[2] = q[0], q[1], q[2]
+    return kept.G
+
+
+@compiled
+def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S: NDArray[np.float64]) -> None:
+    """``torque_S = G current`` (15)."""
+    for i in range(3):
+        total = 0.0
+        for j in range(current.shape[0]):
+            total += G[i, j] * current[j]
+        torque_S[i] = total
+
+
 def _kept_table(curve: TorqueCurve) -> NDArray[np.float64]:
     """Look-up table from the cache where possible: the spline is slow to import."""
     samples = curve.phi_rad.tobytes() + curve.torque_Nm_per_A.tobytes()

@@ -18,11 +18,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from spheretwin.models.errors import InputError, one_line
+from spheretwin.models.errors import InputError
 from spheretwin.models.mujoco_library import silence_warnings
+from spheretwin.models.wording import without_breaks
 
 PAYLOAD = "payload"
 ROTOR = "rotor"
+
+OTHER_GRAVITY = "gravity other than along -z"
 
 # The gimbal rings of the shipped model hold 5e-13 of the rotor's inertia: what the engine needs, and no more.
 NEGLIGIBLE = 1e-9
@@ -80,7 +83,7 @@ def beyond_a_free_rotor(model: mujoco.MjModel) -> list[str]:
     if np.any(model.dof_armature):
         names.append("armature")
     if np.any(model.opt.gravity[:2]) or model.opt.gravity[2] > 0:
-        names.append("gravity other than along -z")
+        names.append(OTHER_GRAVITY)
     return names + [f"mass of body {name}" for name in _other_masses(model)]
 
 
@@ -159,7 +162,7 @@ def _read(path: Path) -> Mjcf:
             spec.delete(mount)
         bare = spec.compile()
     except ValueError as error:
-        raise InputError(f"model {path}: expected valid MJCF, {one_line(error)}") from None
+        raise InputError(f"model {path}: expected valid MJCF, {without_breaks(error)}") from None
     return Mjcf(path, described, bare, loaded)
 
 

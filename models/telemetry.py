@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import accumulate
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.errors import InputError
 from spheretwin.models.files import whole_file
-from spheretwin.models.wording import shown
+from spheretwin.models.wording import shown, without_breaks
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,14 @@ def _is_label(value: object) -> bool:
     return isinstance(value, str) and value.isprintable() and value != "" and "," not in value
 
 
+# Numbers that change little from row to row: their bytes are split by significance, then compressed; that
+# takes less time and space than a dictionary of values, few of which occur twice.
+PARQUET_FORMAT: dict[str, Any] = {
+    "compression": "zstd",
+    "use_dictionary": False,
+    "use_byte_stream_split": True,
+}
+
 ANGLES = ("α", "β", "γ")
 AXES = ("x", "y", "z")
 GROUPS = tuple(f"group {j}" for j in range(18))
@@ -95,19 +108,39 @@ SIGNALS = (
     Signal("current_command_A", "A", 18, "group currents asked of the amplifiers", GROUPS),
     Signal("current_A", "A", 18, "group currents, mean over the physics step that begins now", GROUPS),
     Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
-    Signal("sliding_s", "rad/s", 3, "sliding variable s = λe + ė (30)", ANGLES),
 )
+"""Logged by every run, in this order."""
+
+MEASURED_SIGNALS = (
+    Signal("q_measured_rad", "rad", 3, "hinge angles as the controller has them", ANGLES),
+    Signal("qdot_estimated_rad_s", "rad/s", 3, "hinge rates as the controller has them", ANGLES),
+)
+"""Logged where the controller does not have the true state."""
+
+FRICTION_SIGNALS = (
+    Signal("friction_Nm", "N·m", 3, "friction on the hinges, over the physics step that begins now", ANGLES),
+)
+"""Logged where the hinges have friction."""
 
 
+@cache
 def offsets(signals: tuple[Signal, ...]) -> dict[str, int]:
-    """First column of each signal in a flat row."""
+    """First column of each signal in a flat row; not to be changed."""
     ends = accumulate((signal.size for signal in signals), initial=0)
     return dict(zip((signal.name for signal in signals), ends, strict=False))
 
 
+@cache
 def width(signals: tuple[Signal, ...]) -> int:
     """Numbers in one flat row."""
     return sum(signal.size for signal in signals)
+
+
+@cache
+def _places(signals: tuple[Signal, ...]) -> dict[str, tuple[int, int]]:
+    """First column and size of each signal."""
+    first = offsets(signals)
+    return {signal.name: (first[signal.name], signal.size) for signal in signals}
 
 
 class Table:
@@ -128,17 +161,15 @@ class Table:
             )
         self.signals = signals
         self.values = values
-        self._offsets = offsets(signals)
-        self._by_name = {signal.name: signal for signal in signals}
 
     def __len__(self) -> int:
         return len(self.values)
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        if name not in self._by_name:
-            raise InputError(f"telemetry: expected one of {', '.join(self._by_name)}, received {name}")
-        first = self._offsets[name]
-        size = self._by_name[name].size
+        places = _places(self.signals)
+        if name not in places:
+            raise InputError(f"telemetry: expected one of {', '.join(places)}, received {name}")
+        first, size = places[name]
         return self.values[:, first] if size == 1 else self.values[:, first : first + size]
 
     def rows(self, first: int, last: int) -> Table:
@@ -158,9 +189,10 @@ class Table:
         import pyarrow.parquet  # slow to import, and most runs write no file
 
         with whole_file(path) as temporary:
-            pyarrow.parquet.write_table(self._arrow(metadata), temporary)
+            pyarrow.parquet.write_table(self.arrow(metadata), temporary, **PARQUET_FORMAT)
 
-    def _arrow(self, metadata: Mapping[str, str]):  # type: ignore[no-untyped-def]  # pyarrow has no types
+    def arrow(self, metadata: Mapping[str, str]) -> pa.Table:
+        """Arrow table of the same columns; units and words as metadata of the fields."""
         import pyarrow as pa
 
         fields, columns = [], []
@@ -173,8 +205,15 @@ class Table:
         return pa.table(columns, schema=pa.schema(fields, metadata=dict(metadata)))
 
 
-def read_parquet(path: Path) -> tuple[Table, dict[str, str]]:
+def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str]]:
     """Read a table back, with the metadata of its file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    rows : bool
+        Without them the table is empty, and only the file's end is read.
 
     Raises
     ------
@@ -185,10 +224,12 @@ def read_parquet(path: Path) -> tuple[Table, dict[str, str]]:
     import pyarrow.parquet
 
     try:
-        arrow = pyarrow.parquet.read_table(path)
+        arrow = pyarrow.parquet.read_table(path) if rows else pyarrow.parquet.read_schema(path).empty_table()
         signals = tuple(_signal(field) for field in arrow.schema)
     except (OSError, pa.ArrowException, KeyError) as error:
-        raise InputError(f"telemetry {path}: expected a Parquet file of a run, {error}") from None
+        raise InputError(
+            f"telemetry {path}: expected a Parquet file of a run, {without_breaks(error)}"
+        ) from None
     parts = [_flat(arrow[signal.name], signal.size) for signal in signals]
     metadata = {key.decode(): value.decode() for key, value in (arrow.schema.metadata or {}).items()}
     return Table(signals, np.concatenate(parts, axis=1)), metadata

@@ -21,6 +21,11 @@ def one_line(text: str) -> str:
     return shortened(" ".join(shortened(word, LONGEST_WORD) for word in printable.split(" ")), LONGEST_LINE)
 
 
+def without_breaks(error: BaseException) -> str:
+    """Message of another library's error, its lines joined by spaces."""
+    return " ".join(str(error).split())
+
+
 def shortened(text: str, longest: int) -> str:
     """A text of at most `longest` characters, its middle left out where it is longer."""
     if len(text) <= longest:

@@ -9,17 +9,27 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+import numpy as np
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializeAsAny,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from spheretwin.control.gains import Gains, NonNegative, Positive
+from spheretwin.control.laws import LAWS
 from spheretwin.models.errors import InputError
 from spheretwin.twin.plant.disturbance import Disturbance
-from spheretwin.twin.trajectory import Trajectory, Triple
+from spheretwin.twin.trajectory import Bounded, Trajectory, Triple
+
+NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 
 FOLDER = resources.files("spheretwin.twin") / "scenarios"
-
-# An hour at 1 kHz; the telemetry of a run is held in memory, about 0.6 kB a tick.
-MOST_TICKS = 3_600_000
 
 # A tick must end before its user does: 10,000 physics steps take some 50 ms.
 MOST_SUBSTEPS = 10_000
@@ -40,9 +50,20 @@ class Controller(Gains):
     )
 
 
-class Plant(_Section):
-    """The rotor and how its motion is integrated."""
+class OwnController(_Section):
+    """What a run under a law of the user's says of it, in the place of `Controller`."""
 
+    law: str = Field(description="name of the law")
+    period_s: float = Field(description="control period, s")
+    parameters: tuple[float, ...] = Field(description="numbers handed to the law")
+
+
+class Plant(_Section):
+    """The rotor as it really is, and how its motion is integrated."""
+
+    engine: Literal["mujoco", "lagrangian"] = Field(
+        "mujoco", description="what computes the motion: MuJoCo, or the equations of motion (faster)"
+    )
     step_s: Annotated[float, Field(ge=1e-7, le=1)] = Field(5e-4, description="physics step, s")
     integrator: Literal["RK4", "Euler", "implicitfast"] = Field("RK4", description="MuJoCo integrator")
     modelling_error: Annotated[float, Field(gt=-1, le=100)] = Field(
@@ -51,10 +72,26 @@ class Plant(_Section):
     modelling_torque_Nm: Triple = Field(
         (0.0, 0.0, 0.0), description="constant torque the controller does not know, N·m (paper: ΔG)"
     )
+    gravity_m_s2: Annotated[float, Field(ge=0, le=100)] | None = Field(
+        None, description="gravity along -z, m/s²; the model's unless given"
+    )
+    coulomb_Nm: NonNegativeTriple = Field(
+        (0.0, 0.0, 0.0), description="Coulomb friction of each hinge, N·m, beside what the model has"
+    )
+    viscous_Nm_s: NonNegativeTriple = Field(
+        (0.0, 0.0, 0.0), description="viscous friction of each hinge, N·m·s, beside what the model has"
+    )
+    friction_smoothing_rad_s: Annotated[float, Field(ge=1e-9, le=1e3)] = Field(
+        0.01, description="rate over which Coulomb friction changes sign, rad/s"
+    )
+    group_gain: tuple[Bounded, ...] | None = Field(
+        None, description="torque an ampere of each group over that of the torque curve; 1 unless given"
+    )
     payload_kg: NonNegative = Field(0.0, description="point mass on the shaft's payload mount, kg")
     initial_rad: Triple | None = Field(
-        None, description="pose at rest at the start, rad; the trajectory's first unless given"
+        None, description="pose at the start, rad; the trajectory's first unless given"
     )
+    initial_rad_s: Triple = Field((0.0, 0.0, 0.0), description="rates at the start, rad/s")
     mjcf: Annotated[str, Field(min_length=1)] | None = Field(
         None, description="model file; the shipped one unless given"
     )
@@ -63,13 +100,43 @@ class Plant(_Section):
     )
 
 
+class Nominal(_Section):
+    """The model that the controller has; what is not given is as the plant is without modelling error."""
+
+    torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="torque curve as CSV; the plant's unless given"
+    )
+    torque_scale: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
+        1.0, description="torque matrix over that of the torque curve; below 0, its sign is wrong"
+    )
+    inertia_kg_m2: tuple[Positive, Positive, Positive] | None = Field(
+        None, description="principal inertias of the rotor, kg·m²; the model file's unless given"
+    )
+    current_limit_A: Positive | None = Field(
+        None, description="largest group current asked for, A; the drive's unless given"
+    )
+
+    @field_validator("torque_scale")
+    @classmethod
+    def _not_zero(cls, scale: float) -> float:
+        if scale == 0:
+            raise PydanticCustomError("zero", "Input should be other than 0")
+        return scale
+
+
+class SensorsSection(_Section):
+    """How the controller sees the rotor."""
+
+    angle_offset_rad: Triple = Field((0.0, 0.0, 0.0), description="constant error of each angle, rad")
+
+
 class DriveSection(_Section):
     """Amplifiers and coils; what is not given comes from the model file."""
 
     time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
         None, description="current lag L/R, s; 0 for none"
     )
-    current_limit_A: Positive | None = Field(None, description="largest group current, A")
+    current_limit_A: Positive | None = Field(None, description="largest group current of the amplifiers, A")
 
 
 class Scenario(_Section):
@@ -84,7 +151,9 @@ class Scenario(_Section):
         description="currents for a torque: least-norm and scaled at the limit (16), or all the limit allows",
     )
     trajectory: Trajectory
-    controller: Controller = Controller()
+    controller: SerializeAsAny[Controller] = Controller()
+    nominal: Nominal = Nominal()
+    sensors: SensorsSection = SensorsSection()
     plant: Plant = Plant()
     drive: DriveSection = DriveSection()
     disturbance: Disturbance = Disturbance()
@@ -97,9 +166,9 @@ class Scenario(_Section):
                 f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
                 f" received {self.controller.period_s:g} and {self.plant.step_s:g} s"
             )
-        if not 1 <= self.ticks <= MOST_TICKS:
+        if self.ticks < 1:
             raise ValueError(
-                f"expected a duration of 1 to {MOST_TICKS} control periods, received {self.duration:g} s"
+                f"expected a duration of at least one control period, received {self.duration:g} s"
             )
         return self
 
@@ -137,11 +206,39 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     fields = _read(source)
     for dotted, value in (overrides or {}).items():
         _override(fields, dotted, value)
-    try:
-        # By way of JSON, so that arrays become tuples while numbers stay strictly typed.
-        return Scenario.model_validate_json(json.dumps(fields, default=str))
-    except ValidationError as error:
-        raise InputError(f"scenario {source}: {explain(error)}") from None
+    return _validated(fields, source)
+
+
+def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
+    """Scenario from what a run said of itself, the fields by section.
+
+    Raises
+    ------
+    InputError
+        It was run under a law of its user's, or by a version with other fields.
+    """
+    law = fields.get("controller", {}).get("law")
+    if law not in LAWS:
+        raise InputError(
+            f"scenario {source}: expected a run under {', '.join(LAWS)}, received one under {law},"
+            " a law that its file does not hold"
+        )
+    return _validated(fields, source)
+
+
+def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
+    """Scenario with another value of one field, checked as a whole.
+
+    Raises
+    ------
+    InputError
+        A field that is unknown, of the wrong type or out of range.
+    """
+    fields = scenario.model_dump(mode="json")
+    if isinstance(scenario.controller, OwnController):
+        fields["controller"] = {"period_s": scenario.controller.period_s}
+    _override(fields, dotted, value)
+    return _validated(fields, scenario.name)
 
 
 def explain(error: ValidationError) -> str:
@@ -170,6 +267,19 @@ def fields_of(section: type[BaseModel] | BaseModel, prefix: str = "") -> dict[st
         else:
             found[prefix + name] = field
     return found
+
+
+def _validated(fields: Mapping[str, Any], source: str) -> Scenario:
+    try:
+        # By way of JSON, so that arrays become tuples while numbers stay strictly typed.
+        return Scenario.model_validate_json(json.dumps(fields, default=_plain))
+    except ValidationError as error:
+        raise InputError(f"scenario {source}: {explain(error)}") from None
+
+
+def _plain(value: Any) -> Any:
+    """Arrays and NumPy's numbers as Python has them; dates of a TOML file as text."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 
 def _read(source: str) -> dict[str, Any]:

@@ -45,7 +45,7 @@ def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], l
     current_limit_A : float, A
         Range of the current axis.
     own : tuple of Signal
-        Signals of the law itself, each in a tab.
+        Signals that not every run has, each in a tab; the sliding variable among the plots.
     live : bool
         Follow the run instead of playing from its start.
     """
@@ -69,11 +69,17 @@ def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], l
     currents = plot("currents of the 18 groups [A]", "current_A", legend=False, axis_y=limits)
     tilt, spin = only(angles, [True, True, False]), only(angles, [False, False, True])
     whole_share = rrb.ScalarAxis(range=(0, 1.05))
+    torques = plot("generalised torque [N·m]", "torque_command_Nm", "disturbance_Nm")
+    slides = "sliding_s" in {signal.name for signal in own}
+    demand = plot("sliding variable s [rad/s]", "sliding_s") if slides else torques
+    tabs = [
+        plot(f"{signal.name} [{signal.unit}]", signal.name) for signal in own if signal.name != "sliding_s"
+    ]
     plots = rrb.Grid(
         plot("tilt α red, β green, desired muted [rad]", *angles, legend=False, overrides=tilt),
         plot("tracking error [rad]", "error_rad"),
         plot("spin γ, desired muted [rad]", *angles, legend=False, overrides=spin),
-        plot("sliding variable s [rad/s]", "sliding_s"),
+        demand,
         plot("torque of the coils, stator frame [N·m]", "torque_Nm"),
         plot("share of the commanded torque [1]", "allocation_scale", legend=False, axis_y=whole_share),
         grid_columns=2,
@@ -81,8 +87,8 @@ def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], l
     texts = rrb.Tabs(
         rrb.TextDocumentView(origin=f"/{SCENARIO}", name="scenario"),
         rrb.TextLogView(origin=f"/{EVENTS}", name="events"),
-        plot("generalised torque [N·m]", "torque_command_Nm", "disturbance_Nm"),
-        *(plot(f"{signal.name} [{signal.unit}]", signal.name) for signal in own),
+        *([torques] if slides else []),
+        *tabs,
         active_tab="scenario",
     )
     return rrb.Blueprint(

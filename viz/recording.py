@@ -16,9 +16,10 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import MJCF_PATH, Actuator
-from spheretwin.models.errors import SpheretwinError, one_line
+from spheretwin.models.errors import SpheretwinError
 from spheretwin.models.files import OutputFile
 from spheretwin.models.telemetry import SIGNALS, Signal, Table
+from spheretwin.models.wording import without_breaks
 from spheretwin.viz import blueprint, palette, scene
 from spheretwin.viz.events import Events
 from spheretwin.viz.live import Viewer
@@ -170,7 +171,7 @@ class Recorder:
             if not self._fault:
                 work(*arguments)
         except BaseException as error:  # a panic inside Rerun is no `Exception`
-            self._fault = self._cause(one_line(error) or type(error).__name__)
+            self._fault = self._cause(without_breaks(error) or type(error).__name__)
         finally:
             self._room.release()
 

@@ -12,8 +12,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, one_line
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.errors import InputError
+from spheretwin.models.wording import without_breaks
 from spheretwin.viz import palette
 
 WORLD = "world"
@@ -80,7 +81,9 @@ def _model(mjcf: Path, _: int) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as error:
-        raise InputError(f"model {mjcf}: expected meshes that can be drawn, {one_line(error)}") from None
+        raise InputError(
+            f"model {mjcf}: expected meshes that can be drawn, {without_breaks(error)}"
+        ) from None
 
 
 def _changed_ns(mjcf: Path) -> int:

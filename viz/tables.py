@@ -38,6 +38,8 @@ def print_run(scenario: str, law: str, summary: dict[str, Any]) -> None:
             f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.3f} s:"
             f" {summary['realtime_factor']:.0f} times real time"
         )
+    for warning in summary["warnings"]:
+        console.print(f"[yellow]warning[/yellow]  {escape(warning)}", soft_wrap=True)
 
 
 def print_files(record: Path | None, telemetry: Path | None) -> None:

@@ -21,11 +21,13 @@ import plain
 
 from spheretwin.control.bounded_allocation import SCRATCH_ROWS, allocate_bounded
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.models.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, torque_matrix, torque_model
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.simulation import Simulation
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz.recording import Recorder
 
 SCENARIO = "nutation"
@@ -51,7 +53,7 @@ def seconds_of(work: Callable[[], object]) -> float:
 
 def loop_seconds() -> float:
     """Loop time of one physics step, s."""
-    run = Simulation(scenarios.load(SCENARIO)).run()
+    run = simulate(scenarios.load(SCENARIO))
     return run.wall_s / (len(run.telemetry) * run.scenario.substeps)
 
 
@@ -68,7 +70,7 @@ def plain_seconds() -> float:
     actuator, rotor = actuators.load(), _rotor()
     t = scenario.controller.period_s * np.arange(PLAIN_TICKS)
     reference = scenario.trajectory.sample(t)
-    disturbance = scenario.disturbance.sample(t, np.random.default_rng(0))
+    disturbance = scenario.disturbance.sample(t, np.random.default_rng(0).random(PLAIN_TICKS))
     rotor.start(reference[0, 0], np.zeros(3))
     work = seconds_of(
         lambda: plain.run(rotor.model, rotor.data, actuator, scenario, reference, disturbance, PLAIN_TICKS)
@@ -117,14 +119,14 @@ def run_seconds(folder: Path | None) -> Callable[[], float]:
     names = itertools.count()
 
     def work() -> None:
-        simulation = Simulation(scenarios.load(SCENARIO))
-        if folder is None:
-            simulation.run()
-            return
-        path = folder / f"run{next(names)}.rrd"
-        scenario = simulation.scenario.model_dump(mode="json")
-        with Recorder(simulation.actuator, simulation.signals, scenario, path=path) as recorder:
-            simulation.run([recorder])
+        scenario = scenarios.load(SCENARIO)
+        with Session(scenario) as session:
+            if folder is None:
+                follow(session, scenario.ticks, [])
+                return
+            path, resolved = folder / f"run{next(names)}.rrd", session.begun_as.model_dump(mode="json")
+            with Recorder(session.actuator, session.signals, resolved, path=path) as recorder:
+                follow(session, scenario.ticks, [recorder])
 
     return lambda: seconds_of(work)
 
@@ -140,7 +142,11 @@ def process_seconds(*command: str) -> Callable[[], float]:
 def _rotor() -> Rotor:
     plant = scenarios.load(SCENARIO).plant
     rotor = Rotor(
-        actuators.MJCF_PATH, plant.step_s, plant.integrator, plant.modelling_error, plant.payload_kg
+        mjcf.read(actuators.MJCF_PATH),
+        plant.step_s,
+        plant.integrator,
+        plant.modelling_error,
+        plant.payload_kg,
     )
     rotor.start(np.zeros(3), np.array([0.2 * np.pi, 0.2, 2 * np.pi]))
     return rotor

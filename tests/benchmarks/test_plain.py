@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.simulation import simulate
@@ -21,7 +22,9 @@ def test_plain_loop_runs_the_same_physics():
     table = simulate(scenario).telemetry
     reference = scenario.trajectory.sample(table["t_s"])
     section = scenario.plant
-    rotor = Rotor(actuators.MJCF_PATH, section.step_s, section.integrator, section.modelling_error, 0.0)
+    rotor = Rotor(
+        mjcf.read(actuators.MJCF_PATH), section.step_s, section.integrator, section.modelling_error, 0.0
+    )
     rotor.start(np.zeros(3), np.zeros(3))
     rows = plain.run(
         rotor.model, rotor.data, actuators.load(), scenario, reference, table["disturbance_Nm"], TICKS

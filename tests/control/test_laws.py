@@ -48,7 +48,7 @@ class SlowLaw:
 @pytest.mark.parametrize("name", ["pd", "adaptive_fuzzy", "afsm"])
 def test_law_follows_the_paper(actuator, name, level):
     gains = Gains(law=name, level=level)
-    law, slow = laws.build(gains, actuator, PERIOD), SlowLaw(gains, actuator.inertia)
+    law, slow = laws.build(gains, actuator.inertia, PERIOD), SlowLaw(gains, actuator.inertia)
     compiled = compiled_callback(SIGNATURE, law.step)
     generator = np.random.default_rng(0)
     state, torque = law.state.copy(), np.empty(3)
@@ -61,20 +61,21 @@ def test_law_follows_the_paper(actuator, name, level):
 
 
 def test_estimates_are_logged_as_they_are(actuator):
-    law = laws.build(Gains(law="afsm"), actuator, PERIOD)
+    law = laws.build(Gains(law="afsm"), actuator.inertia, PERIOD)
     state, torque = law.state.copy(), np.empty(3)
     measurement = np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
     law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, state, torque)
     s = 50 * measurement[0]
     names = [signal.name for signal in law.signals]
-    assert names == ["fuzzy_torque_Nm", "switching_torque_Nm", "switching_gain", "bound_gain"]
-    np.testing.assert_allclose(state[6:9], 10 * np.abs(s) * PERIOD)
-    np.testing.assert_allclose(state[9:12], 10 * np.abs(s) * (1 + np.abs(s) + s**2) * PERIOD)
+    assert names == ["sliding_s", "fuzzy_torque_Nm", "switching_torque_Nm", "switching_gain", "bound_gain"]
+    np.testing.assert_allclose(state[:3], s, rtol=1e-15)
+    np.testing.assert_allclose(state[9:12], 10 * np.abs(s) * PERIOD)
+    np.testing.assert_allclose(state[12:15], 10 * np.abs(s) * (1 + np.abs(s) + s**2) * PERIOD)
 
 
 def test_without_its_rates_afsm_is_the_adaptive_fuzzy_law(actuator):
-    still = laws.build(Gains(law="afsm", switching_rate=0.0, bound_rate=0.0), actuator, PERIOD)
-    fuzzy = laws.build(Gains(law="adaptive_fuzzy"), actuator, PERIOD)
+    still = laws.build(Gains(law="afsm", switching_rate=0.0, bound_rate=0.0), actuator.inertia, PERIOD)
+    fuzzy = laws.build(Gains(law="adaptive_fuzzy"), actuator.inertia, PERIOD)
     states = [still.state.copy(), fuzzy.state.copy()]
     generator = np.random.default_rng(1)
     for _ in range(20):
@@ -86,8 +87,8 @@ def test_without_its_rates_afsm_is_the_adaptive_fuzzy_law(actuator):
 
 def test_no_error_asks_for_no_switching(actuator):
     # sgn(0) = 0: on the surface the law must not push to either side.
-    law = laws.build(Gains(law="afsm"), actuator, PERIOD)
+    law = laws.build(Gains(law="afsm"), actuator.inertia, PERIOD)
     state, torque = law.state.copy(), np.empty(3)
-    state[6:12] = 5.0  # grown estimates
+    state[9:15] = 5.0  # grown estimates
     law.step(0.0, np.zeros((3, 3)), np.zeros((2, 3)), law.parameters, state, torque)
     np.testing.assert_array_equal(torque, np.zeros(3))

@@ -4,7 +4,7 @@ import dataclasses
 import json
 import subprocess
 import sys
-from types import SimpleNamespace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
-from spheretwin.twin import simulation as simulations
+from spheretwin.twin import assembly
 from spheretwin.twin.crosscheck import (
     closed_loop,
     dynamics,
@@ -24,9 +24,9 @@ from spheretwin.twin.crosscheck import (
     trajectories,
 )
 from spheretwin.twin.crosscheck.check import Check
-from spheretwin.twin.plant import lagrangian
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
+from spheretwin.twin.simulation import simulate
 
 FEW = 50
 QUANTITIES = [quantity.name for quantity in dynamics.QUANTITIES]
@@ -120,7 +120,8 @@ def test_wrong_orientation_breaks_its_row(monkeypatch, actuator):
 
 
 def test_wrong_gravity_is_seen_under_the_payload_alone(monkeypatch, actuator):
-    monkeypatch.setattr(lagrangian, "GRAVITY_m_s2", 9.80665)
+    elsewhere = partial(LagrangianRotor, gravity_m_s2=9.80665)
+    monkeypatch.setattr(dynamics, "LagrangianRotor", elsewhere)
     checks = dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks
     assert broken(checks) == of_both("bias C q̇ + G", "inverse dynamics", "forward dynamics")
     for check in checks:
@@ -213,24 +214,21 @@ def test_a_rotor_that_is_not_axisymmetric_does_not_move_as_euler_found(monkeypat
     ],
 )
 def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
-    def heavier(actuator, step_s, integrator, modelling_error, payload_kg):
-        return LagrangianRotor(actuator, step_s, integrator, modelling_error + error, payload_kg)
+    def heavier(actuator, step_s, integrator, modelling_error, payload_kg, **rest):
+        return LagrangianRotor(actuator, step_s, integrator, modelling_error + error, payload_kg, **rest)
 
-    monkeypatch.setattr(simulations, "LagrangianRotor", heavier)
+    monkeypatch.setattr(assembly, "LagrangianRotor", heavier)
     assert broken(closed_loop.compare(actuators.MJCF_PATH).checks) == rows
 
 
 def test_runs_that_end_apart_break_their_rows(monkeypatch):
-    brief = SimpleNamespace(status="left_workspace")
-    run = simulations.Simulation.run
-
-    def ends_early(self):
-        finished = run(self)
+    def ends_early(scenario):
+        finished = simulate(scenario)
         cut = finished.telemetry.rows(0, 4000)
-        early = isinstance(self._rotor, LagrangianRotor)
-        return dataclasses.replace(finished, status=brief.status, telemetry=cut) if early else finished
+        early = scenario.plant.engine == "lagrangian"
+        return dataclasses.replace(finished, status="left_workspace", telemetry=cut) if early else finished
 
-    monkeypatch.setattr(closed_loop.Simulation, "run", ends_early)
+    monkeypatch.setattr(closed_loop, "simulate", ends_early)
     checks = closed_loop.compare(actuators.MJCF_PATH).checks
     assert len(broken(checks)) == 3
     assert checks[0].row()["value"] is None

@@ -12,8 +12,10 @@ from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry import Signal
 from spheretwin.twin import loop as loops
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin import session as sessions
 from spheretwin.twin import simulation as simulations
-from spheretwin.twin.simulation import Simulation, simulate
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow, simulate
 
 
 def run(name, law=None, **overrides):
@@ -109,7 +111,11 @@ def test_chunks_change_nothing(monkeypatch):
 def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
     overrides = {"controller__law": name, "duration": 0.1}
     compiled = run("nutation", **overrides)
-    monkeypatch.setattr(simulations, "_matching", lambda law: (loops.loop.py_func, law.step))
+    monkeypatch.setattr(
+        sessions,
+        "_matching",
+        lambda law, allocate: sessions._Functions(loops.loop.py_func, law.step, allocate, ()),
+    )
     plain = run("nutation", **overrides)
     # Fused multiply-adds round once where Python rounds twice. Where sgn(s) first flips, a rounding may
     # decide its tick; up to there the traces differ by rounding alone.
@@ -171,9 +177,10 @@ def test_a_law_that_loses_its_number_ends_the_run_and_keeps_it():
 
 def test_stop_request_keeps_what_was_computed():
     asked = iter([False, False, True])
-    finished = Simulation(scenarios.load("nutation")).run(stop_requested=lambda: next(asked))
-    assert finished.status == "interrupted"
-    assert len(finished.telemetry) == simulations.CHUNK_STEPS
+    session = Session(scenarios.load("nutation"))
+    assert follow(session, 5000, [], stop_requested=lambda: next(asked)) == "interrupted"
+    assert session.tick == simulations.CHUNK_STEPS
+    assert session.status == "running"
 
 
 def test_sinks_are_handed_every_row_once():
@@ -196,9 +203,10 @@ def test_live_keeps_pace_with_the_clock():
     import time
 
     started = time.perf_counter()
-    finished = Simulation(scenarios.load("hold", {"duration": 0.3})).run(live=True)
+    session = Session(scenarios.load("hold"))
+    follow(session, 300, [], live=True)
     assert time.perf_counter() - started >= 0.3
-    assert finished.wall_s < 0.3
+    assert session.loop_s < 0.3
 
 
 def test_scenario_is_resolved_from_the_model(nutation):
@@ -254,8 +262,8 @@ def test_a_law_that_writes_no_torque_ends_the_run():
 
 
 def test_a_law_cannot_change_what_is_logged():
-    simulation = Simulation(scenarios.load("hold", {"duration": 0.05}), Law("s", scribbling, [], []))
-    first, again = simulation.run(), simulation.run()
+    scenario, law = scenarios.load("hold", {"duration": 0.05}), Law("s", scribbling, [], [])
+    first, again = simulate(scenario, law), simulate(scenario, law)
     np.testing.assert_array_equal(first.telemetry["q_ref_rad"], np.tile([0.2, -0.1, 0.3], (50, 1)))
     np.testing.assert_array_equal(first.telemetry.values, again.telemetry.values)
 

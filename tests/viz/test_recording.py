@@ -20,23 +20,25 @@ from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry import SIGNALS, Table, width
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import Simulation
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz import blueprint, palette, scene
 from spheretwin.viz.recording import PENDING_CHUNKS, Recorder
 
 
 def recorded(path, name="nutation", **changes):
-    simulation = Simulation(scenarios.load(name, {"duration": 2.3, **changes}))
-    resolved = simulation.scenario.model_dump(mode="json")
-    with Recorder(simulation.actuator, simulation.signals, resolved, path=path) as recorder:
-        return simulation, simulation.run([recorder])
+    scenario = scenarios.load(name, {"duration": 2.3, **changes})
+    session = Session(scenario)
+    resolved = session.scenario.model_dump(mode="json")
+    with Recorder(session.actuator, session.signals, resolved, path=path) as recorder:
+        return session, simulate(scenario, sinks=[recorder])
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     path = tmp_path_factory.mktemp("recording") / "run.rrd"
-    simulation, finished = recorded(path)
-    return path, simulation, finished
+    session, finished = recorded(path)
+    return path, session, finished
 
 
 def rows_of(path, entity, component):
@@ -87,13 +89,13 @@ def test_frames_come_at_sixty_hertz(run):
 
 
 def test_both_coils_of_a_group_show_its_current(run):
-    path, simulation, finished = run
+    path, session, finished = run
     times, pixels = rows_of(path, scene.COILS, "Mesh3D:albedo_texture_buffer")
     colours = pixels.reshape(len(times), 36, 3)
     current = finished.telemetry["current_A"][times // 1_000_000]
-    expected = palette.current_colours(current, simulation.scenario.drive.current_limit_A)
+    expected = palette.current_colours(current, session.scenario.drive.current_limit_A)
     for side in range(2):
-        np.testing.assert_array_equal(colours[:, simulation.actuator.groups[:, side]], expected)
+        np.testing.assert_array_equal(colours[:, session.actuator.groups[:, side]], expected)
 
 
 def test_trace_follows_the_shaft_tip(run, actuator):
@@ -164,12 +166,12 @@ def test_payload_is_drawn_where_it_is_mounted(tmp_path):
 
 def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
     path = tmp_path / "run.rrd"
-    simulation = Simulation(scenarios.load("hold", {"duration": 0.1}))
-    resolved = simulation.scenario.model_dump(mode="json")
+    session = Session(scenarios.load("hold", {"duration": 0.1}))
+    resolved = session.scenario.model_dump(mode="json")
 
     def interrupted():
-        with Recorder(simulation.actuator, simulation.signals, resolved, path=path) as recorder:
-            simulation.run([recorder])
+        with Recorder(session.actuator, session.signals, resolved, path=path) as recorder:
+            follow(session, session.scenario.ticks, [recorder])
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -186,9 +188,9 @@ def test_unwritable_path_is_bad_input(tmp_path, actuator):
 
 
 def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
-    simulation = Simulation(scenarios.load("hold", {"duration": 0.1}))
-    resolved = simulation.scenario.model_dump(mode="json")
-    recorder = Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd")
+    session = Session(scenarios.load("hold", {"duration": 0.1}))
+    resolved = session.scenario.model_dump(mode="json")
+    recorder = Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
     backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
     backwards.values[:, 0] = np.nan
     recorder.write(backwards)
@@ -199,21 +201,21 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
 
 
 def resolved_hold(**changes):
-    simulation = Simulation(scenarios.load("hold", {"duration": 0.1, **changes}))
-    return simulation, simulation.scenario.model_dump(mode="json")
+    session = Session(scenarios.load("hold", {"duration": 0.1, **changes}))
+    return session, session.scenario.model_dump(mode="json")
 
 
 def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
     path = tmp_path / "run.rrd"
     (mine := tmp_path / "run.rrd.part").write_text("mine")
-    simulation, resolved = resolved_hold()
+    session, resolved = resolved_hold()
     _, longer = resolved_hold(duration=0.2)
-    with Recorder(simulation.actuator, simulation.signals, resolved, path=path) as first:
-        with Recorder(simulation.actuator, simulation.signals, longer, path=path) as second:
-            Simulation(scenarios.load("hold", {"duration": 0.2})).run([second])
+    with Recorder(session.actuator, session.signals, resolved, path=path) as first:
+        with Recorder(session.actuator, session.signals, longer, path=path) as second:
+            simulate(scenarios.load("hold", {"duration": 0.2}), sinks=[second])
             assert not path.exists()
         assert len(rows_of(path, blueprint.entity("q_rad"), "Scalars:scalars")[0]) == 200
-        simulation.run([first])
+        follow(session, session.scenario.ticks, [first])
     assert len(rows_of(path, blueprint.entity("q_rad"), "Scalars:scalars")[0]) == 100
     assert sorted(os.listdir(tmp_path)) == ["run.rrd", "run.rrd.part"]
     assert mine.read_text() == "mine"
@@ -244,9 +246,9 @@ def broken_model(folder, content):
 @pytest.mark.parametrize("content", [None, "no mesh"], ids=["missing", "garbage"])
 def test_mesh_that_cannot_be_read_is_bad_input_before_the_run(tmp_path, content):
     (folder := tmp_path / "model").mkdir()
-    simulation, resolved = resolved_hold(**{"plant.mjcf": str(broken_model(folder, content))})
+    session, resolved = resolved_hold(**{"plant.mjcf": str(broken_model(folder, content))})
     with pytest.raises(InputError, match=r"model .*broken\.xml: .*stator") as raised:
-        Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd")
+        Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
     assert "\n" not in f"{raised.value}"
     assert os.listdir(tmp_path) == ["model"]
 
@@ -290,9 +292,9 @@ def busy(recorder):
 
 
 def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
-    simulation, resolved = resolved_hold()
-    rows = Table(simulation.signals, np.zeros((1, width(simulation.signals))))
-    with Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd") as recorder:
+    session, resolved = resolved_hold()
+    rows = Table(session.signals, np.zeros((1, width(session.signals))))
+    with Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd") as recorder:
         done, written = busy(recorder), []
 
         def write_all():
@@ -314,9 +316,9 @@ def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
 
 
 def test_recorder_that_has_failed_keeps_no_run_waiting(tmp_path):
-    simulation, resolved = resolved_hold()
-    recorder = Recorder(simulation.actuator, simulation.signals, resolved, path=tmp_path / "run.rrd")
-    bad = Table(simulation.signals, np.full((2, width(simulation.signals)), np.nan))
+    session, resolved = resolved_hold()
+    recorder = Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+    bad = Table(session.signals, np.full((2, width(session.signals)), np.nan))
     for _ in range(3 * PENDING_CHUNKS):
         recorder.write(bad)
     with pytest.raises(SpheretwinError, match="recording: "):

@@ -16,9 +16,13 @@ import numpy as np
 
 from spheretwin.models.errors import InputError
 from spheretwin.models.files import check_writable
-from spheretwin.twin import flags, metrics
+from spheretwin.models.telemetry_file import TelemetryFile
+from spheretwin.twin import flags, metrics, replay
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import Run, Simulation
+from spheretwin.twin.metrics import Figures
+from spheretwin.twin.replay import Plan
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import COMPLETED, follow
 from spheretwin.viz import tables
 from spheretwin.viz.progress import Progress
 
@@ -45,6 +49,9 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--live", action="store_true", help="run at the pace of the clock, with a viewer on 127.0.0.1"
     )
+    parser.add_argument(
+        "--replay", type=Path, metavar="RUN.parquet", help="run again what a telemetry file says of itself"
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
     parser.add_argument("-h", "--help", action="store_true", help="show this help and the scenario's fields")
     parser.set_defaults(run=run, parser=parser)
@@ -57,57 +64,83 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         scenario = scenarios.load(options.scenario or EXAMPLE, flags.overrides(rest))
         tables.print_fields(scenario.name, flags.described(scenario))
         return True
+    plan = _planned(options, rest)
+    _check_outputs([path for path in (options.record, options.telemetry) if path])
+    with contextlib.ExitStack() as stack:
+        stop_requested = stack.enter_context(_interruptible())
+        session = stack.enter_context(Session(plan.scenario))
+        figures = Figures(plan.ticks)
+        progress = Progress(plan.scenario.name, plan.ticks)
+        file = _telemetry_file(session, options)
+        recorders = [stack.enter_context(_recorder(session, options))] if _records(options) else []
+        with progress:
+            status = follow(
+                session,
+                plan.ticks,
+                [progress, figures, *([file] if file else []), *recorders],
+                journal=plan.journal,
+                live=options.live,
+                stop_requested=stop_requested,
+            )
+        _report(session, plan, status, figures, options)
+        if file:
+            file.close(replay.facts(session))
+        if options.live and sys.stderr.isatty():
+            print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
+            while not stop_requested():
+                time.sleep(0.1)
+    return status == COMPLETED
+
+
+def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
+    """What to run, from a scenario and flags or from a run's own file."""
+    if options.replay:
+        if options.scenario or rest:
+            received = " ".join([*filter(None, [options.scenario]), *rest])
+            raise InputError(
+                f"command line: expected --replay without scenario and fields, received {received}"
+            )
+        return replay.read(options.replay)
     if options.scenario is None:
         raise InputError(
             f"command line: expected a scenario ({', '.join(scenarios.shipped())}), received none"
         )
     scenario = scenarios.load(options.scenario, flags.overrides(rest))
-    _check_outputs([path for path in (options.record, options.telemetry) if path])
-    with contextlib.ExitStack() as stack:
-        stop_requested = stack.enter_context(_interruptible())
-        simulation = Simulation(scenario)
-        progress = Progress(scenario.name, simulation.scenario.ticks)
-        recorders = [stack.enter_context(_recorder(simulation, options))] if _records(options) else []
-        with progress:
-            finished = simulation.run(
-                [progress, *recorders], live=options.live, stop_requested=stop_requested
-            )
-        _report(finished, options)
-        if options.live and sys.stderr.isatty():
-            print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
-            while not stop_requested():
-                time.sleep(0.1)
-    return finished.status == "completed"
+    return Plan(scenario, scenario.ticks, ())
 
 
 def _records(options: argparse.Namespace) -> bool:
     return bool(options.record or options.live)
 
 
-def _recorder(simulation: Simulation, options: argparse.Namespace) -> Recorder:
+def _telemetry_file(session: Session, options: argparse.Namespace) -> TelemetryFile | None:
+    if not options.telemetry:
+        return None
+    return TelemetryFile(options.telemetry, session.signals, replay.facts(session))
+
+
+def _recorder(session: Session, options: argparse.Namespace) -> Recorder:
     from spheretwin.viz.recording import Recorder  # Rerun is slow to import
 
-    scenario = simulation.scenario.model_dump(mode="json")
-    recorder = Recorder(
-        simulation.actuator, simulation.signals, scenario, path=options.record, live=options.live
-    )
+    scenario = session.begun_as.model_dump(mode="json")
+    recorder = Recorder(session.actuator, session.signals, scenario, path=options.record, live=options.live)
     if recorder.viewer:
         print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
     return recorder
 
 
-def _report(finished: Run, options: argparse.Namespace) -> None:
-    """Write the telemetry, print the figures."""
-    summary = metrics.summary(finished)
-    if options.telemetry:
-        finished.telemetry.write_parquet(options.telemetry, _metadata(summary))
+def _report(session: Session, plan: Plan, status: str, figures: Figures, options: argparse.Namespace) -> None:
+    """Print the figures, and how the run ended where it did not complete."""
+    scenario = session.begun_as
+    summary = metrics.summary(scenario, status, figures, session.tick, session.loop_s, session.warnings())
     if options.json:
         print(json.dumps(summary, allow_nan=False), flush=True)
     else:
-        tables.print_run(finished.scenario.name, finished.scenario.controller.law, summary)
+        tables.print_run(scenario.name, scenario.controller.law, summary)
         tables.print_files(options.record, options.telemetry)
-    if finished.status != "completed":
-        print(f"spheretwin: {_ending(finished)}", file=sys.stderr, flush=True)
+    if status != COMPLETED:
+        planned_s = plan.ticks * scenario.controller.period_s
+        print(f"spheretwin: {_ending(session, status, planned_s)}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
@@ -127,15 +160,6 @@ _ENDINGS = [
 ]
 
 
-def _metadata(summary: dict[str, Any]) -> dict[str, str]:
-    """What the telemetry file says of itself: nothing that differs between two equal runs."""
-    return {
-        "scenario": json.dumps(summary["scenario"]),
-        "status": summary["status"],
-        "versions": json.dumps(summary["versions"]),
-    }
-
-
 def _check_outputs(paths: Sequence[Path]) -> None:
     """Find out before the run whether its files can be written."""
     for path in paths:
@@ -144,9 +168,9 @@ def _check_outputs(paths: Sequence[Path]) -> None:
         raise InputError(f"output: expected a path of its own for each file, received {paths[0]} twice")
 
 
-def _ending(run: Run) -> str:
-    if len(run.telemetry) == 0:
-        return f"the run ended before its first tick was complete: {run.status}"
-    t_s, q = run.telemetry["t_s"][-1], np.degrees(run.telemetry["q_rad"][-1])
-    pose = ", ".join(f"{name} {angle:.1f}°" for name, angle in zip("αβγ", q, strict=True))
-    return f"the run ended at {t_s:.3f} s of {run.scenario.duration:g} s: {run.status} ({pose})"
+def _ending(session: Session, status: str, planned_s: float) -> str:
+    if session.tick == 0:
+        return f"the run ended before its first tick was complete: {status}"
+    angles = np.degrees(session.q_rad)
+    pose = ", ".join(f"{name} {angle:.1f}°" for name, angle in zip("αβγ", angles, strict=True))
+    return f"the run ended at {session.t_s:.3f} s of {planned_s:g} s: {status} ({pose})"

@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.errors import InputError, one_line
+from spheretwin.models.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf import PAYLOAD, read
+from spheretwin.models.wording import without_breaks
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
@@ -168,7 +169,7 @@ def random_states(count: int) -> States:
 
 def ask_mujoco(mjcf: Path, case: Case, states: States) -> Answers:
     """Answers of MuJoCo, from its public functions."""
-    rotor = Rotor(mjcf, STEP_S, "RK4", case.modelling_error, case.payload_kg)
+    rotor = Rotor(read(mjcf), STEP_S, "RK4", case.modelling_error, case.payload_kg)
     model, data, body = rotor.model, rotor.data, rotor.model.body("rotor").id
     answers = _empty(len(states.q))
     axes = np.eye(3)
@@ -202,7 +203,9 @@ def ask_pinocchio(mjcf: Path, case: Case, states: States) -> Answers:
     try:
         model = pinocchio.buildModelFromMJCF(str(mjcf))
     except (ValueError, RuntimeError) as error:
-        raise InputError(f"model {mjcf}: expected MJCF that Pinocchio reads, {one_line(error)}") from None
+        raise InputError(
+            f"model {mjcf}: expected MJCF that Pinocchio reads, {without_breaks(error)}"
+        ) from None
     joint = model.getJointId("gamma")
     model.inertias[joint].inertia = (1 + case.modelling_error) * model.inertias[joint].inertia
     if case.payload_kg:

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.kinematics import rotation, rotor_rate_jacobian
+from spheretwin.models.mjcf import read
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant.engine import Rotor
 
@@ -94,7 +95,7 @@ def check(mjcf: Path, actuator: Actuator) -> FreeRotor:
 
 def fly(mjcf: Path, inertia: Array, spin_rad_s: float) -> Motion:
     """Motion without torque in MuJoCo, of a rotor with the given principal inertias."""
-    rotor = Rotor(mjcf, STEP_s, "RK4", 0.0, 0.0)
+    rotor = Rotor(read(mjcf), STEP_s, "RK4", 0.0, 0.0)
     rotor.model.body("rotor").inertia = inertia
     mujoco.mj_setConst(rotor.model, rotor.data)
     plant = rotor.start(START_rad, spin_rad_s * NODDING)

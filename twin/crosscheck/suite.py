@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models.errors import InputError
+from spheretwin.models.mjcf import beyond_a_free_rotor, read
 from spheretwin.twin.crosscheck import STATES, closed_loop, dynamics, free_rotor, identities, trajectories
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.crosscheck.closed_loop import ClosedLoop
@@ -55,11 +57,16 @@ def run(
     Raises
     ------
     InputError
-        The model cannot be read.
+        The model cannot be read, or holds physics that the Lagrangian does not know.
     EngineError
         The reference trajectory could not be integrated.
     """
     actuator = actuators.load(mjcf)
+    if unknown := beyond_a_free_rotor(read(mjcf).loaded):
+        raise InputError(
+            f"crosscheck {mjcf}: expected a rigid rotor on three ideal hinges, which the Lagrangian is,"
+            f" received a model with {', '.join(unknown)}"
+        )
     begun("dynamics")
     compared = dynamics.compare(mjcf, actuator, states)
     begun("identities")

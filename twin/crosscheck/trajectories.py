@@ -20,6 +20,7 @@ from scipy.integrate import solve_ivp
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.errors import EngineError
 from spheretwin.models.lagrangian import acceleration, coriolis_matrix, inertia_matrix
+from spheretwin.models.mjcf import read
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant import lagrangian
 from spheretwin.twin.plant.engine import Rotor
@@ -132,7 +133,7 @@ def integrate(pieces: Pieces, inertia: Array) -> Array:
 
 def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Array:
     """States at the ends of the pieces by MuJoCo."""
-    rotor = Rotor(mjcf, step_s, integrator, 0.0, 0.0)
+    rotor = Rotor(read(mjcf), step_s, integrator, 0.0, 0.0)
     plant = rotor.start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]
     for torque in pieces.torque:

@@ -27,22 +27,22 @@ class Disturbance(BaseModel):
         "decaying", description="exp(-πt) or, as printed, exp(πt) on the third axis"
     )
 
-    def sample(self, t: NDArray[np.float64], generator: np.random.Generator) -> NDArray[np.float64]:
+    def sample(self, t: NDArray[np.float64], draws: NDArray[np.float64]) -> NDArray[np.float64]:
         """Disturbance at the control ticks, each held for a control period.
 
         Parameters
         ----------
         t : (n,) array, s
             Times of the ticks.
-        generator : numpy Generator
-            Source of r, one draw a tick.
+        draws : (n,) array
+            Uniform random numbers from 0 to 1, one a tick, that r is made of.
 
         Returns
         -------
         (n, 3) array, N·m
             Generalised torque, subtracted in (1); not finite where the growing envelope overflows.
         """
-        r = generator.uniform(-self.random_bound_Nm, self.random_bound_Nm, size=len(t))
+        r = -self.random_bound_Nm + 2 * self.random_bound_Nm * draws
         growth = np.pi if self.gamma_envelope == "growing" else -np.pi
         with np.errstate(over="ignore"):
             third = np.exp(growth * t) if self.random_bound_Nm else np.zeros_like(t)

@@ -17,6 +17,7 @@ class Drive(NamedTuple):
     mean_share: float
     """Share of that distance that is left on average over the step."""
     current_limit_A: float
+    """Of the amplifiers, whatever is asked of them."""
 
 
 def drive(time_constant_s: float, step_s: float, current_limit_A: float) -> Drive:
@@ -41,13 +42,15 @@ def advance(
     drive : Drive
         Lag of the groups.
     command : (18,) array, A
-        Held over the step.
+        Held over the step; the amplifiers follow it as far as their limit.
     current : (18,) array, A
         At the start of the step; on return, at its end.
     mean : (18,) array, A
         Mean over the step, which is what acts on the rotor.
     """
+    limit = drive.current_limit_A
     for j in range(command.shape[0]):
-        distance = current[j] - command[j]
-        mean[j] = command[j] + drive.mean_share * distance
-        current[j] = command[j] + drive.decay * distance
+        target = min(max(command[j], -limit), limit)
+        distance = current[j] - target
+        mean[j] = target + drive.mean_share * distance
+        current[j] = target + drive.decay * distance

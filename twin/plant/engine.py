@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from copy import copy
-from pathlib import Path
 from typing import NamedTuple
 
 import llvmlite.binding
@@ -14,7 +13,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from spheretwin.models.compiled import compiled
-from spheretwin.models.mjcf import PAYLOAD, ROTOR, idle_stages, read
+from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf, idle_stages
 from spheretwin.models.mujoco_library import library
 
 INTEGRATORS = {
@@ -40,8 +39,8 @@ class Rotor:
 
     Parameters
     ----------
-    mjcf : Path
-        Model file.
+    mjcf : Mjcf
+        Model file, as it is kept.
     step_s : float, s
         Physics step.
     integrator : str
@@ -56,21 +55,21 @@ class Rotor:
 
     def __init__(
         self,
-        mjcf: Path,
+        mjcf: Mjcf,
         step_s: float,
         integrator: str,
         modelling_error: float,
         payload_kg: float,
         gravity_m_s2: float | None = None,
     ) -> None:
-        kept = read(mjcf)
         # Without a payload its empty body is left out: it would be a twentieth of a step.
-        self.model = copy(kept.loaded if payload_kg else kept.bare)
+        self.model = copy(mjcf.loaded if payload_kg else mjcf.bare)
         self.model.opt.timestep = step_s
         self.model.opt.integrator = INTEGRATORS[integrator]
         # A diverged state must stay visible: automatic reset would hide it behind a state of zeros.
-        self.model.opt.disableflags |= idle_stages(self.model) | mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(self.model)
         if gravity_m_s2 is not None:
+            self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
             self.model.opt.gravity[:] = 0.0, 0.0, -gravity_m_s2
         self._rotor = self.model.body(ROTOR).id
         self.model.body_inertia[self._rotor] *= 1 + modelling_error
@@ -108,6 +107,10 @@ class Rotor:
         """Names of the warnings that MuJoCo has counted since the start."""
         kinds = mujoco.mjtWarning
         return [kinds(i).name for i in range(kinds.mjNWARNING) if self.data.warning[i].number > 0]
+
+    def warned(self) -> bool:
+        """Whether there are any."""
+        return bool(self.data.warning.number.any())
 
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)

@@ -84,11 +84,24 @@ class LagrangianRotor:
         """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""
         pose, rates = np.array(q, dtype=np.float64), np.array(qdot, dtype=np.float64)
         torques = np.zeros((2, 3))
+        self._state = pose, rates
         return Equations(self._step_s, self.inertia, self.weight_moment, pose, rates, torques[0], torques[1])
+
+    def state(self) -> NDArray[np.float64]:
+        """Everything that the next steps depend on."""
+        return np.concatenate(self._state)
+
+    def restore(self, state: NDArray[np.float64]) -> None:
+        """Go on from a state; what `start` returned stays valid."""
+        self._state[0][:], self._state[1][:] = state[:3], state[3:]
 
     def warnings(self) -> list[str]:
         """None: whatever goes wrong shows in the state, which the loop watches."""
         return []
+
+    def warned(self) -> bool:
+        """Never."""
+        return False
 
 
 @compiled

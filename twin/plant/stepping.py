@@ -1,6 +1,6 @@
-"""One name for a physics step, whichever plant is stepped.
+"""One name for a physics step, whichever engine takes it.
 
-Compiled code needs to know its plant when it is compiled: the loop is compiled once for each kind, from
+Compiled code needs to know its rotor when it is compiled: the loop is compiled once for each kind, from
 the same source, and holds a direct call to that kind's step.
 """
 
@@ -15,25 +15,26 @@ from spheretwin.twin.plant import engine, lagrangian
 from spheretwin.twin.plant.engine import Engine
 from spheretwin.twin.plant.lagrangian import Equations
 
-Plant = Engine | Equations
+Stepped = Engine | Equations
+"""What compiled code steps: it has `q`, `qdot`, and takes `torque_S` and `torque_q`."""
 
 _STEPS: dict[type, Callable[[Any], None]] = {Engine: engine.step, Equations: lagrangian.step}
 
 
-def step(plant: Plant) -> None:
-    """One physics step of a plant, from compiled code or from Python."""
-    _STEPS[type(plant)](plant)
+def step(rotor: Stepped) -> None:
+    """One physics step of a rotor, from compiled code or from Python."""
+    _STEPS[type(rotor)](rotor)
 
 
 @overload(step)
-def _compiled_step(plant: Any) -> Callable[[Any], None] | None:
+def _compiled_step(rotor: Any) -> Callable[[Any], None] | None:
     """Tell numba, which knows a named tuple by its class, what `step` does."""
-    kind: Any = getattr(plant, "instance_class", None)
+    kind: Any = getattr(rotor, "instance_class", None)
     if kind not in _STEPS:
         return None
     step_of_kind = _STEPS[kind]
 
-    def call(plant: Any) -> None:
-        step_of_kind(plant)
+    def call(rotor: Any) -> None:
+        step_of_kind(rotor)
 
     return call

@@ -9,14 +9,14 @@ T = np.linspace(0, 2, 2001)
 
 
 def test_load_is_constant_on_every_axis():
-    sampled = Disturbance(load=2.0).sample(T, np.random.default_rng(0))
+    sampled = Disturbance(load=2.0).sample(T, np.random.default_rng(0).random(len(T)))
     np.testing.assert_array_equal(sampled, np.full((len(T), 3), 0.1))
 
 
 @pytest.mark.parametrize(("envelope", "sign"), [("decaying", -1), ("growing", 1)])
 def test_random_torque_is_equation_56(envelope, sign):
     disturbance = Disturbance(random_bound_Nm=0.05, gamma_envelope=envelope)
-    sampled = disturbance.sample(T, np.random.default_rng(0))
+    sampled = disturbance.sample(T, np.random.default_rng(0).random(len(T)))
     r = sampled[:, 0] / np.cos(np.pi * T)
     r = np.where(np.abs(np.cos(np.pi * T)) > 0.1, r, np.nan)
     known = np.isfinite(r)
@@ -28,6 +28,8 @@ def test_random_torque_is_equation_56(envelope, sign):
 
 def test_seed_decides():
     disturbance = Disturbance(random_bound_Nm=0.05)
-    first, again, other = (disturbance.sample(T, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    first, again, other = (
+        disturbance.sample(T, np.random.default_rng(seed).random(len(T))) for seed in (1, 1, 2)
+    )
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)

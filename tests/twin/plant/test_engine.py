@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.models.kinematics import rotor_rate_jacobian
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.twin.plant.engine import Rotor, step
@@ -13,7 +14,7 @@ STEP_S = 5e-4
 
 
 def rotor(**changes):
-    return Rotor(**{"mjcf": actuators.MJCF_PATH, "step_s": STEP_S, "integrator": "RK4"}
+    return Rotor(**{"mjcf": mjcf.read(actuators.MJCF_PATH), "step_s": STEP_S, "integrator": "RK4"}
                  | {"modelling_error": 0.0, "payload_kg": 0.0} | changes)  # fmt: skip
 
 

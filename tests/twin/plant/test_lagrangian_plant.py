@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.models.compiled import compiled
 from spheretwin.models.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
@@ -25,7 +26,7 @@ from spheretwin.twin.crosscheck.trajectories import HOLD_s, nutation_pieces
 from spheretwin.twin.plant import engine, lagrangian, stepping
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.simulation import Simulation
+from spheretwin.twin.simulation import simulate
 
 STEP_S, PAYLOAD_KG = 5e-4, 0.05
 
@@ -206,7 +207,7 @@ def test_a_step_allocates_nothing(actuator):
 def test_one_step_is_mujoco_s_under_both_kinds_of_torque(actuator):
     settings = (STEP_S, "RK4", 0.2, PAYLOAD_KG)
     ours = LagrangianRotor(actuator, *settings).start(START[:3], START[3:])
-    mujoco_rotor = Rotor(actuators.MJCF_PATH, *settings)
+    mujoco_rotor = Rotor(mjcf.read(actuators.MJCF_PATH), *settings)
     theirs = mujoco_rotor.start(START[:3], START[3:])
     for plant in (ours, theirs):
         plant.torque_S[:], plant.torque_q[:] = [0.3, -0.2, 0.1], [0.05, 0.1, -0.2]
@@ -228,7 +229,9 @@ def test_compiled_code_steps_what_python_steps(actuator, kind):
         # Kept alive: compiled code holds bare addresses of MuJoCo's own.
         settings = (STEP_S, "RK4", 0.0, 0.0)
         rotor = (
-            Rotor(actuators.MJCF_PATH, *settings) if kind is engine else LagrangianRotor(actuator, *settings)
+            Rotor(mjcf.read(actuators.MJCF_PATH), *settings)
+            if kind is engine
+            else LagrangianRotor(actuator, *settings)
         )
         return rotor, rotor.start(START[:3], START[3:])
 
@@ -254,9 +257,12 @@ def proportional(t, reference, measurement, parameters, state, torque):
 
 
 def test_a_plain_python_law_runs_on_both_plants():
-    scenario = scenarios.load("hold", {"duration": 0.1, "plant.payload_kg": PAYLOAD_KG})
+    changes = {"duration": 0.1, "plant.payload_kg": PAYLOAD_KG}
     law = Law("mine", proportional, np.zeros(0), np.zeros(0))
-    tables = [Simulation(scenario, law, plant).run().telemetry for plant in ("mujoco", "lagrangian")]
+    tables = [
+        simulate(scenarios.load("hold", {**changes, "plant.engine": name}), law).telemetry
+        for name in ("mujoco", "lagrangian")
+    ]
     # A smooth law: the gimbal rings and rounding, nothing that grows.
     np.testing.assert_allclose(tables[1]["q_rad"], tables[0]["q_rad"], atol=1e-12)
 
@@ -264,17 +270,16 @@ def test_a_plain_python_law_runs_on_both_plants():
 def test_only_runge_kutta_and_a_payload_on_the_axis_are_known(actuator):
     with pytest.raises(InputError, match="expected the integrator RK4, received Euler"):
         LagrangianRotor(actuator, STEP_S, "Euler")
-    scenario = scenarios.load("hold", {"plant.integrator": "implicitfast"})
+    scenario = scenarios.load("hold", {"plant.integrator": "implicitfast", "plant.engine": "lagrangian"})
     with pytest.raises(InputError, match="implicitfast"):
-        Simulation(scenario, plant="lagrangian")
+        simulate(scenario)
 
 
 SECOND_PROCESS = """
 from spheretwin.twin import loop, scenario
-from spheretwin.twin.simulation import Simulation
-brief = scenario.load("hold", {"duration": 0.01})
-for plant in ("mujoco", "lagrangian"):
-    Simulation(brief, plant=plant).run()
+from spheretwin.twin.simulation import simulate
+for engine in ("mujoco", "lagrangian"):
+    simulate(scenario.load("hold", {"duration": 0.01, "plant.engine": engine}))
 print(sum(loop.loop.stats.cache_hits.values()), sum(loop.loop.stats.cache_misses.values()))
 """
 

@@ -1,0 +1,25 @@
+"""The ways from a torque to currents, by name, behind one signature."""
+
+from numba import types
+
+from spheretwin.control.allocation import allocate
+from spheretwin.control.bounded_allocation import allocate_bounded
+
+_vector = types.float64[::1]
+_matrix = types.float64[:, ::1]
+
+SIGNATURE = types.float64(_matrix, _vector, types.float64, _vector, _matrix)
+"""G (3, n), torque_S (3,), current limit, current (n,), scratch (5, n); the share given."""
+
+
+def least_norm(G, torque_S, limit, current, scratch):  # type: ignore[no-untyped-def]
+    """Least-norm currents, scaled as a whole to respect the limit (16)."""
+    return allocate(G, torque_S, limit, current)
+
+
+def bounded(G, torque_S, limit, current, scratch):  # type: ignore[no-untyped-def]
+    """All that the limit allows."""
+    return allocate_bounded(G, torque_S, limit, current, scratch)
+
+
+ALLOCATIONS = {"least_norm": least_norm, "bounded": bounded}

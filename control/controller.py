@@ -1,0 +1,123 @@
+"""One control tick: from what was measured to the currents asked for, by the nominal model alone."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.control import allocations
+from spheretwin.control import law as laws
+from spheretwin.control.bounded_allocation import SCRATCH_ROWS
+from spheretwin.models.callbacks import function_at
+from spheretwin.models.compiled import compilable
+from spheretwin.models.kinematics import cartesian_torque
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, torque_matrix_at
+
+# Whatever a law may ask for while it loses the rotor; beyond it the allocation's products would overflow.
+LARGEST_TORQUE_Nm = 1e100
+
+LOST = -1.0
+"""Share of the torque that is returned where the law gave none."""
+
+law_at = function_at(laws.SIGNATURE)
+allocation_at = function_at(allocations.SIGNATURE)
+
+
+class Controller(NamedTuple):
+    """What the near side of the wires knows and remembers: nothing of the plant itself."""
+
+    parameters: NDArray[np.float64]  # of the law
+    memory: NDArray[np.float64]  # state of the law
+    magnetics: TorqueModel  # nominal
+    kept: KeptMatrix
+    current_limit_A: float
+    logged: int  # leading entries of the memory that are logged
+    torque_q: NDArray[np.float64]  # (3,) N·m, what the law asked for in this tick
+    torque_S: NDArray[np.float64]  # (3,) N·m, the same in the stator frame
+    pose: NDArray[np.float64]  # (3,) rad, as measured
+    scratch: NDArray[np.float64]  # of the allocation
+
+
+def controller(
+    law: laws.Law, magnetics: TorqueModel, kept: KeptMatrix, current_limit_A: float, logged: int
+) -> Controller:
+    """Controller at the start of a run.
+
+    Parameters
+    ----------
+    law : Law
+        Its parameters and state are copied: a law may change both.
+    magnetics : TorqueModel
+        Nominal.
+    kept : KeptMatrix
+        Shared with the plant only where both have the same model.
+    current_limit_A : float, A
+        Largest group current the controller asks for.
+    logged : int
+        Numbers of the law's state that the telemetry logs.
+    """
+    groups = magnetics.group_axes.shape[1]
+    vectors = np.zeros((3, 3))
+    return Controller(
+        law.parameters.copy(),
+        law.state.copy(),
+        magnetics,
+        kept,
+        current_limit_A,
+        logged,
+        *vectors,
+        np.empty((SCRATCH_ROWS, groups)),
+    )
+
+
+@compilable
+def control_tick(
+    controller: Controller,
+    law: Any,
+    allocate: Any,
+    t: float,
+    reference: NDArray[np.float64],
+    measurement: NDArray[np.float64],
+    command: NDArray[np.float64],
+) -> float:
+    """Law, generalised torque to Cartesian (at the measured pose), allocation (by the nominal matrix).
+
+    Parameters
+    ----------
+    controller : Controller
+        Changed in place.
+    law, allocate : address or callable
+        Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`: addresses in compiled code.
+    t : float, s
+        Time of the tick.
+    reference : (3, 3) array
+        Desired angle, rate and acceleration as rows; the law may write into it.
+    measurement : (2, 3) array
+        Measured angle (rad) and rate (rad/s); the law may write into it.
+    command : (n,) array, A
+        Result: group currents asked of the amplifiers.
+
+    Returns
+    -------
+    float
+        Share of the law's torque that `command` gives; `LOST` where the law gave no torque, or one beyond
+        `LARGEST_TORQUE_Nm`, or logs what is no number.
+    """
+    torque_q, pose = controller.torque_q, controller.pose
+    for i in range(3):
+        torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
+        pose[i] = measurement[0, i]
+    law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
+    for i in range(3):
+        if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
+            return LOST
+    for i in range(controller.logged):
+        if not abs(controller.memory[i]) < np.inf:
+            return LOST
+    cartesian_torque(pose, torque_q, controller.torque_S)
+    G = torque_matrix_at(pose, controller.magnetics, controller.kept)
+    return allocation_at(allocate)(
+        G, controller.torque_S, controller.current_limit_A, command, controller.scratch
+    )

@@ -1,0 +1,174 @@
+"""Telemetry streamed to a Parquet file while a run goes on, in memory that does not grow with it.
+
+What has been flushed lies in a hidden folder beside the file, in parts that are whole Parquet files: a killed
+process leaves them, any Parquet reader opens them, and `join` makes one file of them.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from spheretwin.models.errors import InputError, SpheretwinError
+from spheretwin.models.files import check_writable, whole_file
+from spheretwin.models.telemetry import PARQUET_FORMAT, Signal, Table, read_parquet, width
+
+# Rows of a part, and of a row group of the file: half a minute at 1 kHz, some 25 MB in memory.
+PART_ROWS = 32_768
+
+
+class TelemetryFile:
+    """Follows a run into a Parquet file, which appears when it is closed.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    signals : tuple of Signal
+        Columns, for a run that ends before its first row.
+    facts : mapping
+        What is known of the run before it starts; kept with every part.
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    """
+
+    def __init__(self, path: Path, signals: tuple[Signal, ...], facts: Mapping[str, str]) -> None:
+        check_writable(path)
+        self._path, self._facts = path, dict(facts)
+        self._rows = Table(signals, np.empty((0, width(signals))))
+        self._waiting: list[Table] = []
+        self._parts: list[Path] = []
+        self._fault: SpheretwinError | None = None
+
+    def write(self, rows: Table) -> None:
+        """Take the rows of one chunk, which must not change any more.
+
+        What goes wrong is raised by `close`, so that the run itself goes on.
+        """
+        if self._fault:
+            return
+        if rows.signals != self._rows.signals:
+            self._flush()
+            self._rows = rows.rows(0, 0)
+        self._waiting.append(rows)
+        if sum(map(len, self._waiting)) >= PART_ROWS:
+            self._flush()
+
+    def finish(self, status: str) -> None:
+        """Take note of how the run ended."""
+        self._facts["status"] = status
+
+    def close(self, facts: Mapping[str, str]) -> None:
+        """Make the file.
+
+        Parameters
+        ----------
+        facts : mapping
+            What is known of the run now that it has ended, as its command journal.
+
+        Raises
+        ------
+        SpheretwinError
+            It could not be written: what was there before is untouched, and the parts are kept.
+        """
+        known = {**self._facts, **facts}
+        if self._fault:
+            raise self._fault
+        if not self._parts:
+            self._pending().write_parquet(self._path, known)
+            return
+        self._flush()
+        if self._fault:
+            raise self._fault
+        join(self._parts, self._path, known)
+        shutil.rmtree(self._parts[0].parent, ignore_errors=True)
+
+    def _pending(self) -> Table:
+        values = [self._rows.values, *(rows.values for rows in self._waiting)]
+        return Table(self._rows.signals, np.concatenate(values))
+
+    def _flush(self) -> None:
+        rows, self._waiting = self._pending(), []
+        if not len(rows):
+            return
+        try:
+            folder = self._parts[0].parent if self._parts else self._new_folder()
+            part = folder / f"{len(self._parts):06d}.parquet"
+            rows.write_parquet(part, self._facts)
+        except (OSError, SpheretwinError) as error:
+            kept = f"; {len(self._parts)} parts are kept in {self._parts[0].parent}" if self._parts else ""
+            self._fault = SpheretwinError(f"output: {self._path} could not be written, {error}{kept}")
+        else:
+            self._parts.append(part)
+
+    def _new_folder(self) -> Path:
+        target = self._path.resolve()
+        return Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.", suffix=".parts"))
+
+
+def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = None) -> int:
+    """Make one file of the parts that a run has flushed.
+
+    Parameters
+    ----------
+    parts : sequence of Path
+        In their order. Where one lacks a column that another has (the law was changed), it is NaN there.
+    path : Path
+        The file.
+    facts : mapping, optional
+        Metadata of the file; those of the first part unless given.
+
+    Returns
+    -------
+    int
+        Rows of the file.
+
+    Raises
+    ------
+    InputError
+        There is no part, or one is no telemetry.
+    SpheretwinError
+        Writing failed; what was there before is untouched.
+    """
+    import pyarrow.parquet  # slow to import, and most runs write no file
+
+    if not parts:
+        raise InputError("telemetry: expected at least one part, received none")
+    signals = _all_signals(parts)
+    known = read_parquet(parts[0])[1] if facts is None else facts
+    schema = Table(signals, np.empty((0, width(signals)))).arrow(known).schema
+    rows = 0
+    with (
+        whole_file(path) as temporary,
+        pyarrow.parquet.ParquetWriter(temporary, schema, **PARQUET_FORMAT) as writer,
+    ):
+        for part in parts:
+            table = _widened(read_parquet(part)[0], signals)
+            writer.write_table(table.arrow(known), row_group_size=PART_ROWS)
+            rows += len(table)
+    return rows
+
+
+def _all_signals(parts: Iterable[Path]) -> tuple[Signal, ...]:
+    """Columns of all parts, each once, in the order in which they first appear."""
+    found: dict[str, Signal] = {}
+    for part in parts:
+        for signal in read_parquet(part, rows=False)[0].signals:
+            found.setdefault(signal.name, signal)
+    return tuple(found.values())
+
+
+def _widened(table: Table, signals: tuple[Signal, ...]) -> Table:
+    if table.signals == signals:
+        return table
+    wide = Table(signals, np.full((len(table), width(signals)), np.nan))
+    for signal in table.signals:
+        wide[signal.name][:] = table[signal.name]
+    return wide

@@ -1,0 +1,273 @@
+"""From a scenario to the parts of its loop: open values filled in, controller and plant built."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from spheretwin.control import laws
+from spheretwin.control.controller import Controller, controller
+from spheretwin.control.law import Law
+from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.curve_origin import disagreements
+from spheretwin.models.errors import InputError
+from spheretwin.models.lagrangian import loaded_inertia
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, kept_matrix, torque_model
+from spheretwin.models.mjcf import Mjcf
+from spheretwin.models.telemetry import (
+    FRICTION_SIGNALS,
+    MEASURED_SIGNALS,
+    SIGNALS,
+    Signal,
+    width,
+)
+from spheretwin.twin import trajectory
+from spheretwin.twin.loop import Columns
+from spheretwin.twin.plant.drive import drive
+from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.plant.friction import friction
+from spheretwin.twin.plant.lagrangian import LagrangianRotor
+from spheretwin.twin.plant.plant import Plant, plant
+from spheretwin.twin.plant.stepping import Stepped
+from spheretwin.twin.scenario import DriveSection, OwnController, Scenario
+from spheretwin.twin.scenario import Plant as PlantSection
+from spheretwin.twin.sensors import Sensors, sensors
+
+UNWRITTEN_STEP_s = 0.002
+
+AnyRotor = Rotor | LagrangianRotor
+
+
+def model_of(section: PlantSection) -> Mjcf:
+    """Model file of a plant, as it is kept."""
+    return mjcf.read(Path(section.mjcf or actuators.MJCF_PATH))
+
+
+def actuator_of(section: PlantSection, curve: str | None = None) -> Actuator:
+    """Actuator of a plant; with another torque curve, as a controller may assume it."""
+    chosen = curve or section.torque_curve or actuators.TORQUE_CURVE_PATH
+    return actuators.load(Path(section.mjcf or actuators.MJCF_PATH), Path(chosen))
+
+
+def resolved(scenario: Scenario, model: Mjcf, actuator: Actuator, law: Law | None) -> Scenario:
+    """Scenario whose open values are filled in from the model and the trajectory.
+
+    Raises
+    ------
+    InputError
+        The first pose is outside the hinges' range, or a list does not fit the actuator.
+    """
+    group, given, nominal, section = actuator.group, scenario.drive, scenario.nominal, scenario.plant
+    lag_s, limit_A = given.time_constant_s, given.current_limit_A
+    drive_section = DriveSection(
+        time_constant_s=group.inductance_H / group.resistance_ohm if lag_s is None else lag_s,
+        current_limit_A=group.current_limit_A if limit_A is None else limit_A,
+    )
+    filled: dict[str, Any] = {
+        "drive": drive_section,
+        "nominal": nominal.model_copy(
+            update={
+                "inertia_kg_m2": nominal.inertia_kg_m2 or tuple(actuator.inertia.tolist()),
+                "current_limit_A": nominal.current_limit_A or drive_section.current_limit_A,
+            }
+        ),
+        "plant": section.model_copy(
+            update={
+                "initial_rad": section.initial_rad or _first_pose(scenario),
+                "gravity_m_s2": _gravity(section, model),
+            }
+        ),
+    }
+    if law:
+        own = OwnController(
+            law=law.name, period_s=scenario.controller.period_s, parameters=tuple(law.parameters.tolist())
+        )
+        filled["controller"] = own
+    made = scenario.model_copy(update=filled)
+    _check_pose(made.plant.initial_rad or (0.0, 0.0, 0.0), actuator)
+    _check_groups(section, actuator)
+    return made
+
+
+def law_of(scenario: Scenario, actuator: Actuator) -> Law:
+    """Law that a resolved scenario names, for its nominal inertia."""
+    section = scenario.controller
+    return laws.build(section, np.array(scenario.nominal.inertia_kg_m2), section.period_s)
+
+
+def signals_of(scenario: Scenario, law: Law) -> tuple[Signal, ...]:
+    """Columns of a run's telemetry: common ones, those of its stages, then the law's own."""
+    found = SIGNALS
+    if any(scenario.sensors.angle_offset_rad):
+        found += MEASURED_SIGNALS
+    if _has_friction(scenario.plant):
+        found += FRICTION_SIGNALS
+    return found + law.signals
+
+
+def columns_of(scenario: Scenario, law: Law) -> Columns:
+    """Where the loop finds the columns that not every run has."""
+    measured = friction_column = -1
+    end = width(SIGNALS)
+    if any(scenario.sensors.angle_offset_rad):
+        measured, end = end, end + width(MEASURED_SIGNALS)
+    if _has_friction(scenario.plant):
+        friction_column, end = end, end + width(FRICTION_SIGNALS)
+    return Columns(measured, friction_column, end)
+
+
+def sensors_of(scenario: Scenario) -> Sensors:
+    """Sensors of a scenario."""
+    return sensors(scenario.sensors.angle_offset_rad)
+
+
+def warnings_of(scenario: Scenario, actuator: Actuator) -> list[str]:
+    """What a user should know of model and scenario before believing the figures; one line each."""
+    section, option = scenario.plant, model_of(scenario.plant).described.opt
+    found = disagreements(actuator)
+    # The compiler's own 2 ms stands where a file says nothing.
+    if option.timestep not in (section.step_s, UNWRITTEN_STEP_s):
+        found.append(
+            f"the model's own timestep of {option.timestep:g} s is not used: plant.step_s is"
+            f" {section.step_s:g} s"
+        )
+    return found
+
+
+def true_magnetics(scenario: Scenario) -> TorqueModel:
+    """Magnetics of the plant."""
+    return torque_model(actuator_of(scenario.plant))
+
+
+def nominal_magnetics(scenario: Scenario) -> TorqueModel:
+    """Magnetics as the controller has them; the plant's very own where nothing says otherwise."""
+    nominal = scenario.nominal
+    model = torque_model(actuator_of(scenario.plant, nominal.torque_curve))
+    if nominal.torque_scale == 1:
+        return model
+    return model._replace(line_weights=nominal.torque_scale * model.line_weights)
+
+
+def controller_of(scenario: Scenario, law: Law, magnetics: TorqueModel, kept: KeptMatrix) -> Controller:
+    """Controller of a resolved scenario, at the start of a run."""
+    limit_A = scenario.nominal.current_limit_A or 0.0
+    return controller(law, magnetics, kept, limit_A, width(law.signals))
+
+
+def plant_of(scenario: Scenario, actuator: Actuator, stepped: Stepped, kept: KeptMatrix) -> Plant:
+    """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
+    section, groups = scenario.plant, len(actuator.groups)
+    height = float(actuator.payload_mount_m[2])
+    inertia = loaded_inertia((1 + section.modelling_error) * actuator.inertia, section.payload_kg, height)
+    lag_s, limit_A = scenario.drive.time_constant_s or 0.0, scenario.drive.current_limit_A or 0.0
+    return plant(
+        stepped,
+        true_magnetics(scenario),
+        kept,
+        drive(lag_s, section.step_s, limit_A),
+        friction(
+            np.array(section.coulomb_Nm),
+            np.array(section.viscous_Nm_s),
+            section.friction_smoothing_rad_s,
+            inertia,
+            section.step_s,
+        ),
+        np.array(section.group_gain or (1.0,) * groups),
+        np.array(section.modelling_torque_Nm),
+        actuator.hinge_range_rad,
+        scenario.substeps,
+        np.zeros(groups),
+    )
+
+
+def kept_matrices(groups: int, shared: bool) -> tuple[KeptMatrix, KeptMatrix]:
+    """Kept torque matrices of controller and plant: one and the same only where both have one model."""
+    nominal = kept_matrix(groups)
+    return nominal, nominal if shared else kept_matrix(groups)
+
+
+def rotor_of(scenario: Scenario, actuator: Actuator) -> AnyRotor:
+    """Rotor of a resolved scenario, in the engine that it names.
+
+    Raises
+    ------
+    InputError
+        The engine does not know all that the model holds.
+    """
+    return ENGINES[scenario.plant.engine](scenario.plant, actuator)
+
+
+def _mujoco(section: PlantSection, _: Actuator) -> Rotor:
+    return Rotor(
+        model_of(section),
+        section.step_s,
+        section.integrator,
+        section.modelling_error,
+        section.payload_kg,
+        section.gravity_m_s2,
+    )
+
+
+def _lagrangian(section: PlantSection, actuator: Actuator) -> LagrangianRotor:
+    unknown = mjcf.beyond_a_free_rotor(model_of(section).loaded)
+    if section.gravity_m_s2 is not None:
+        unknown = [name for name in unknown if name != mjcf.OTHER_GRAVITY]
+    if unknown:
+        raise InputError(
+            "Lagrangian plant: expected a rigid rotor on three ideal hinges, received a model with"
+            f" {', '.join(unknown)}; plant.engine mujoco computes it"
+        )
+    return LagrangianRotor(
+        actuator,
+        section.step_s,
+        section.integrator,
+        section.modelling_error,
+        section.payload_kg,
+        gravity_m_s2=section.gravity_m_s2 or 0.0,
+    )
+
+
+ENGINES: dict[str, Callable[[PlantSection, Actuator], AnyRotor]] = {
+    "mujoco": _mujoco,
+    "lagrangian": _lagrangian,
+}
+
+
+def _has_friction(section: PlantSection) -> bool:
+    return any(section.coulomb_Nm) or any(section.viscous_Nm_s)
+
+
+def _first_pose(scenario: Scenario) -> trajectory.Triple:
+    return tuple(scenario.trajectory.sample(np.zeros(1))[0, 0].tolist())
+
+
+def _gravity(section: PlantSection, model: Mjcf) -> float | None:
+    """Gravity along -z; None where the model's is not along it, so that the model's stays in force."""
+    if section.gravity_m_s2 is not None:
+        return section.gravity_m_s2
+    option = model.described.opt
+    if option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+        return 0.0
+    return None if mjcf.OTHER_GRAVITY in mjcf.beyond_a_free_rotor(model.described) else -option.gravity[2]
+
+
+def _check_pose(pose: trajectory.Triple, actuator: Actuator) -> None:
+    low, high = actuator.hinge_range_rad.T
+    if np.any(pose < low) or np.any(pose > high):
+        limits = ", ".join(f"{a:.4g} to {b:.4g}" for a, b in actuator.hinge_range_rad)
+        received = ", ".join(f"{angle:.4g}" for angle in pose)
+        raise InputError(f"scenario: expected a first pose within {limits} rad, received {received}")
+
+
+def _check_groups(section: PlantSection, actuator: Actuator) -> None:
+    groups = len(actuator.groups)
+    if section.group_gain is not None and len(section.group_gain) != groups:
+        raise InputError(
+            f"scenario: expected plant.group_gain for {groups} groups, received {len(section.group_gain)}"
+        )

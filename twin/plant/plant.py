@@ -1,0 +1,135 @@
+"""One control period of the true plant: from the currents asked for to where the rotor is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.compiled import compiled
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, rotor_torque, torque_matrix_at
+from spheretwin.twin.plant.drive import Drive, advance
+from spheretwin.twin.plant.friction import Friction, friction_torque
+from spheretwin.twin.plant.stepping import Stepped, step
+
+GOING, LEFT_WORKSPACE, DIVERGED = 0, 1, 2
+
+# The rotor's fastest move within the workspace is some hundred rad/s; far above it, and far below the
+# engine's own bound of 1e10, the motion is no longer one.
+FASTEST_RATE_rad_s = 1e6
+
+
+class Plant(NamedTuple):
+    """The far side of the wires: nothing of it is known to the controller."""
+
+    rotor: Stepped
+    magnetics: TorqueModel  # true
+    kept: KeptMatrix
+    drive: Drive
+    friction: Friction
+    group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
+    unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
+    hinge_range: NDArray[np.float64]  # (3, 2) rad
+    substeps: int
+    current: NDArray[np.float64]  # (n,) A, now
+    mean_current: NDArray[np.float64]  # (n,) A, over the physics step
+    pulling: NDArray[np.float64]  # (n,) A, the same times the gain
+    friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, in the physics step
+
+
+class Delivered(NamedTuple):
+    """What acts over the first physics step of a control period: the plant's part of a telemetry row."""
+
+    current: NDArray[np.float64]  # (n,) A
+    torque_S: NDArray[np.float64]  # (3,) N·m
+    friction_q: NDArray[np.float64]  # (3,) N·m
+
+
+def plant(
+    rotor: Stepped,
+    magnetics: TorqueModel,
+    kept: KeptMatrix,
+    drive: Drive,
+    friction: Friction,
+    group_gain: NDArray[np.float64],
+    unmodelled_torque: NDArray[np.float64],
+    hinge_range: NDArray[np.float64],
+    substeps: int,
+    current: NDArray[np.float64],
+) -> Plant:
+    """Plant with a rotor that has been started and the given currents (A)."""
+    working = np.zeros((2, len(current)))
+    return Plant(
+        rotor,
+        magnetics,
+        kept,
+        drive,
+        friction,
+        group_gain,
+        unmodelled_torque,
+        hinge_range,
+        substeps,
+        current,
+        *working,
+        np.zeros(3),
+    )
+
+
+@compiled
+def plant_tick(
+    plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: Delivered
+) -> int:
+    """Advance the plant by one control period.
+
+    Each physics step: coil currents, torque of the coils at the true pose, friction, rotor.
+
+    Parameters
+    ----------
+    plant : Plant
+        Changed in place.
+    command : (n,) array, A
+        Group currents asked for, held over the period.
+    disturbance : (3,) array, N·m
+        Generalised, subtracted in (1), held over the period.
+    delivered : Delivered
+        Result.
+
+    Returns
+    -------
+    int
+        `GOING`, `LEFT_WORKSPACE` or `DIVERGED`.
+    """
+    rotor = plant.rotor
+    for substep in range(plant.substeps):
+        G = torque_matrix_at(rotor.q, plant.magnetics, plant.kept)
+        advance(plant.drive, command, plant.current, plant.mean_current)
+        for j in range(plant.pulling.shape[0]):
+            plant.pulling[j] = plant.group_gain[j] * plant.mean_current[j]
+        rotor_torque(G, plant.pulling, rotor.torque_S)
+        for i in range(3):
+            rotor.torque_q[i] = -disturbance[i] - plant.unmodelled_torque[i]
+        if plant.friction.acts:
+            friction_torque(plant.friction, rotor.q, rotor.qdot, plant.friction_q)
+            for i in range(3):
+                rotor.torque_q[i] += plant.friction_q[i]
+        if substep == 0:
+            keep(delivered, plant)
+        step(rotor)
+        for i in range(3):
+            if not abs(rotor.qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
+                return DIVERGED
+    for i in range(3):
+        if not plant.hinge_range[i, 0] <= rotor.q[i] <= plant.hinge_range[i, 1]:
+            return LEFT_WORKSPACE
+    return GOING
+
+
+@compiled
+def keep(delivered: Delivered, plant: Plant) -> None:
+    """Copy what acts; a slice would be checked for overlap, at twice the time."""
+    for j in range(plant.mean_current.shape[0]):
+        delivered.current[j] = plant.mean_current[j]
+    for i in range(3):
+        delivered.torque_S[i] = plant.rotor.torque_S[i]
+        delivered.friction_q[i] = plant.friction_q[i]

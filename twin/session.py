@@ -1,0 +1,429 @@
+"""A twin that runs for as long as it is asked to: advanced in chunks, changed between them, kept, restored."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
+from numpy.typing import NDArray
+
+from spheretwin.control import allocations
+from spheretwin.control import law as laws
+from spheretwin.control.allocations import ALLOCATIONS
+from spheretwin.control.law import Law
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.compiled import compiled_callback, uncompiled
+from spheretwin.models.errors import InputError, SpheretwinError
+from spheretwin.models.telemetry import Signal, Table, width
+from spheretwin.twin import assembly, trajectory
+from spheretwin.twin import loop as loops
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.exogenous import Exogenous
+from spheretwin.twin.plant.plant import DIVERGED, GOING, LEFT_WORKSPACE
+from spheretwin.twin.scenario import Scenario
+
+RUNNING = "running"
+STATUS = {GOING: RUNNING, LEFT_WORKSPACE: "left_workspace", DIVERGED: "diverged"}
+
+# What a run is begun with cannot be changed on its way.
+FIXED = (
+    "name",
+    "description",
+    "duration",
+    "seed",
+    "controller.period_s",
+    "plant.step_s",
+    "plant.engine",
+    "plant.mjcf",
+    "plant.initial_rad",
+    "plant.initial_rad_s",
+)
+
+
+class Change(NamedTuple):
+    """One entry of the command journal."""
+
+    tick: int
+    """First tick that it is in force."""
+    name: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """All that a session goes on from; it can be pickled."""
+
+    scenario: Scenario
+    begun_as: Scenario
+    own_law: str | None
+    tick: int
+    status: str
+    rotor: NDArray[np.float64]
+    current: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+    memory: NDArray[np.float64]
+    exogenous: dict[str, Any]
+    journal: tuple[Change, ...]
+
+
+class Session:
+    """One twin, ready to be advanced; its horizon is open.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        From `scenario.load`; its duration is of no concern here.
+    law : Law, optional
+        Runs instead of the law that the scenario names.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        In force now: what was left open is filled in from the model and the trajectory.
+    begun_as : Scenario
+        The same at tick 0; with the journal it says all that has happened.
+    actuator : Actuator
+        What is simulated.
+    law : Law
+        In force now.
+    signals : tuple of Signal
+        Columns of the telemetry; a change of law may change them.
+    journal : tuple of Change
+        What `set` did.
+    tick : int
+        Control ticks done.
+    loop_s : float
+        Wall time spent in the loop alone, s.
+
+    Raises
+    ------
+    InputError
+        The model file, the torque curve, the law or a value of the scenario cannot be used.
+
+    Notes
+    -----
+    A session belongs to one thread at a time: calls from a second one while the first is at work are refused.
+    """
+
+    def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
+        self._busy = threading.Lock()
+        self._closed = False
+        self._own_law = law
+        self.tick, self.loop_s = 0, 0.0
+        self.journal: tuple[Change, ...] = ()
+        self._status = RUNNING
+        self.actuator: Actuator = assembly.actuator_of(scenario.plant)
+        self.scenario = self.begun_as = self._resolved(scenario)
+        self._exogenous = Exogenous(self.scenario)
+        self._build_rotor()
+        self._build_controller()
+        self._build_plant()
+        self._warm_up()
+
+    @property
+    def status(self) -> str:
+        """``running``, ``left_workspace`` or ``diverged``."""
+        return self._status
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time, s."""
+        return self.tick * self.scenario.controller.period_s
+
+    @property
+    def q_rad(self) -> NDArray[np.float64]:
+        """Hinge angles now, (3,) in rad."""
+        return self._stepped.q.copy()
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Columns of the telemetry: the common ones, those of its stages, then the law's own."""
+        return self._signals
+
+    def advance(self, ticks: int) -> Table:
+        """Run some control ticks.
+
+        Parameters
+        ----------
+        ticks : int
+            How many at most; fewer are run where the status becomes other than ``running``.
+
+        Returns
+        -------
+        Table
+            One row for each tick.
+        """
+        if ticks < 0:
+            raise InputError(f"session: expected a number of ticks from 0 on, received {ticks}")
+        log = np.empty((ticks, self._columns))
+        return Table(self._signals, log[: self.advance_into(log)])
+
+    def advance_into(self, log: NDArray[np.float64]) -> int:
+        """Run a control tick for each row of an array of the caller's; returns how many were run."""
+        with self._alone():
+            return self._advance(log)
+
+    def check_horizon(self, ticks: int) -> None:
+        """Find out whether reference and disturbance are numbers up to a tick to come.
+
+        Raises
+        ------
+        InputError
+            They are not.
+        """
+        self._exogenous.check_horizon(max(ticks - 1, self.tick))
+
+    def set(self, name: str, value: Any) -> None:
+        """Change a field of the scenario from the next tick on, or the law itself.
+
+        Parameters
+        ----------
+        name : str
+            Dotted, as ``disturbance.load``.
+        value : any
+            Checked as a scenario is; for ``controller.law`` also a `Law`.
+
+        Raises
+        ------
+        InputError
+            A field that is unknown, fixed for the run, or a value out of range; nothing has changed then.
+        """
+        with self._alone():
+            if name in FIXED:
+                raise InputError(f"session: expected a field that may change during a run, received {name}")
+            own = value if isinstance(value, Law) else None
+            if own and name != "controller.law":
+                raise InputError(f"session: expected a law for controller.law, received one for {name}")
+            self._change(name, value, own)
+            recorded = own.name if own else _recorded(value)
+            self.journal += (Change(self.tick, name, recorded),)
+
+    def snapshot(self) -> Snapshot:
+        """All that this session goes on from."""
+        with self._alone():
+            return Snapshot(
+                self.scenario,
+                self.begun_as,
+                self._own_law.name if self._own_law else None,
+                self.tick,
+                self._status,
+                self._rotor.state(),
+                self._plant.current.copy(),
+                self._controller.parameters.copy(),
+                self._controller.memory.copy(),
+                self._exogenous.state(),
+                self.journal,
+            )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot, bit for bit as the session that it was taken of.
+
+        Raises
+        ------
+        InputError
+            It was taken under a law of the user's that this session does not have, or on another model.
+        """
+        with self._alone():
+            own = self._own_law.name if self._own_law else None
+            if snapshot.own_law not in (None, own):
+                raise InputError(
+                    f"session: expected a snapshot under the law {self.law.name},"
+                    f" received one under {snapshot.own_law}"
+                )
+            if snapshot.own_law is None:
+                self._own_law = None
+            self._restore(snapshot)
+
+    def close(self) -> None:
+        """Give the parts back; the session cannot be used any more."""
+        self._closed = True
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def warnings(self) -> list[str]:
+        """What a user should know of model and scenario before believing the figures; one line each."""
+        return assembly.warnings_of(self.scenario, self.actuator)
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        if not self._busy.acquire(blocking=False):
+            raise SpheretwinError("session: expected one thread at a time, received a call from a second one")
+        try:
+            if self._closed:
+                raise SpheretwinError("session: expected an open session, received a call to a closed one")
+            yield
+        finally:
+            self._busy.release()
+
+    def _advance(self, log: NDArray[np.float64]) -> int:
+        done = 0
+        while done < len(log) and self._status == RUNNING:
+            try:
+                inputs = self._exogenous.rows(self.tick, len(log) - done)
+            except InputError:
+                if done:  # first hand over what there is; the next call will say it
+                    break
+                raise
+            done += self._run(inputs, log[done : done + len(inputs.t)])
+        return done
+
+    def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> int:
+        started = time.perf_counter()
+        try:
+            ticks, code = self._call(inputs, log)
+        except BaseException:  # a law in plain Python: the state is somewhere within a tick
+            self._status = STATUS[DIVERGED]
+            raise
+        self.loop_s += time.perf_counter() - started
+        self.tick += ticks
+        if code == GOING and self._rotor.warned():
+            code = DIVERGED
+        self._status = STATUS[code]
+        return ticks
+
+    def _call(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
+        functions = self._functions
+        return functions.loop(
+            inputs,
+            functions.law,
+            functions.allocate,
+            self._controller,
+            self._sensors,
+            self._plant,
+            self._places,
+            log,
+        )
+
+    def _resolved(self, scenario: Scenario) -> Scenario:
+        model = assembly.model_of(scenario.plant)
+        return assembly.resolved(scenario, model, self.actuator, self._own_law)
+
+    def _build_rotor(self) -> None:
+        section = self.scenario.plant
+        self._rotor = assembly.rotor_of(self.scenario, self.actuator)
+        self._stepped = self._rotor.start(_array(section.initial_rad), _array(section.initial_rad_s))
+
+    def _build_controller(self) -> None:
+        """Law, allocation and what they know; the plant shares what both have the same of."""
+        scenario = self.scenario
+        self.law = self._own_law or assembly.law_of(scenario, self.actuator)
+        self._signals = assembly.signals_of(scenario, self.law)
+        self._columns, self._places = width(self._signals), assembly.columns_of(scenario, self.law)
+        magnetics = assembly.nominal_magnetics(scenario)
+        shared = magnetics is assembly.true_magnetics(scenario)
+        self._kept = assembly.kept_matrices(len(self.actuator.groups), shared)
+        self._controller = assembly.controller_of(scenario, self.law, magnetics, self._kept[0])
+        self._sensors = assembly.sensors_of(scenario)
+        self._functions = _matching(self.law, ALLOCATIONS[scenario.allocation])
+
+    def _build_plant(self) -> None:
+        self._plant = assembly.plant_of(self.scenario, self.actuator, self._stepped, self._kept[1])
+
+    def _warm_up(self) -> None:
+        """Compile, or load, the loop for these parts: no clock around a chunk should see it."""
+        self._call(self._exogenous.rows(self.tick, 1), np.empty((0, self._columns)))
+
+    def _change(self, name: str, value: Any, own: Law | None) -> None:
+        before = self._own_law
+        if own:
+            self._own_law, scenario = own, self.scenario
+        else:
+            scenario = scenarios.changed(self.scenario, name, value)
+            if name == "controller.law":
+                self._own_law = None
+            elif before and name.startswith("controller."):
+                raise InputError(f"session: expected no field of a shipped law, as {before.name} is not one")
+        try:
+            self._apply(self._resolved(scenario))
+        except InputError:
+            self._own_law = before
+            raise
+
+    def _apply(self, scenario: Scenario) -> None:
+        """Build anew what a scenario changes, and carry over what it is in the midst of."""
+        before = self.scenario
+        self.scenario = self._exogenous.scenario = scenario
+        outside = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
+        if before.model_copy(update=outside) == scenario and self._own_law in (None, self.law):
+            return
+        if scenario.plant != before.plant:
+            rotor = assembly.rotor_of(scenario, self.actuator)
+            self._stepped = rotor.start(self._stepped.q, self._stepped.qdot)
+            self._rotor = rotor
+        law, memory, current = self.law, self._controller.memory, self._plant.current
+        self._build_controller()
+        if self.law.name == law.name and len(memory) == len(self._controller.memory):
+            self._controller.memory[:] = memory
+        self._build_plant()
+        self._plant.current[:] = current
+        self._warm_up()
+
+    def _restore(self, snapshot: Snapshot) -> None:
+        self.actuator = assembly.actuator_of(snapshot.scenario.plant)
+        self.scenario, self.begun_as = snapshot.scenario, snapshot.begun_as
+        self._build_rotor()
+        if len(self._rotor.state()) != len(snapshot.rotor):
+            raise InputError(
+                f"session: expected a snapshot of {len(self._rotor.state())} numbers of the engine's state,"
+                f" received {len(snapshot.rotor)}"
+            )
+        self._build_controller()
+        self._build_plant()
+        self._rotor.restore(snapshot.rotor)
+        self._plant.current[:] = snapshot.current
+        self._controller.parameters[:] = snapshot.parameters
+        self._controller.memory[:] = snapshot.memory
+        self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
+        self._exogenous = Exogenous(self.scenario)
+        self._exogenous.restore(snapshot.exogenous)
+        self._warm_up()
+
+
+class _Functions(NamedTuple):
+    """The loop, and the functions of its users as it takes them."""
+
+    loop: Callable[..., tuple[int, int]]
+    law: Any
+    allocate: Any
+    alive: tuple[Any, ...]
+    """Compiled code holds bare addresses: what they belong to must not go."""
+
+
+def _matching(law: Law, allocate: Callable[..., float]) -> _Functions:
+    """The compiled loop for a law that can be compiled, the uncompiled one for a plain function."""
+    own = not law.step.__module__.startswith("spheretwin.")
+    if numba.config.DISABLE_JIT or (own and not isinstance(law.step, Dispatcher)):
+        return _Functions(uncompiled(loops.loop), uncompiled(law.step), allocate, ())
+    try:
+        stepping = compiled_callback(laws.SIGNATURE, law.step)
+    except (NumbaError, TypeError) as error:
+        complaint = next(filter(None, map(str.strip, str(error).splitlines())), "")
+        raise InputError(
+            f"law {law.name}: expected a function that compiles as {laws.SIGNATURE}, received: {complaint}"
+        ) from error
+    allocating = compiled_callback(allocations.SIGNATURE, allocate)
+    return _Functions(loops.loop, stepping.address, allocating.address, (stepping, allocating))
+
+
+def _array(values: trajectory.Triple | None) -> NDArray[np.float64]:
+    return np.array(values or (0.0, 0.0, 0.0))
+
+
+def _recorded(value: Any) -> Any:
+    """A value as JSON holds it."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
