@@ -1,16 +1,19 @@
 """A folder for what is expensive to make and can always be made again.
 
-Its name is a digest of every source file that can hold compiled code, and of the versions of the
-packages it is made with, so that nothing in it can be stale: numba itself keys a cached function by its
-own file alone, and an edited callee in another file would go on returning its old answer.
+Its name is a digest of every source file that can hold compiled code, and of the versions of what it is
+made with, so that nothing in it can be stale: numba itself keys a cached function by its own file alone, and
+an edited callee in another file would go on returning its old answer.
+
+Each entry begins with a digest of what follows: one that was cut short or damaged is made again. A folder
+that cannot be written is done without.
 """
 
-import atexit
 import hashlib
 import importlib.metadata
 import importlib.util
+import io
 import os
-import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -20,12 +23,41 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.errors import SpheretwinError
+from spheretwin.models.files import whole_file
+
 COMPILED_PACKAGES = ("spheretwin.models", "spheretwin.control", "spheretwin.twin")
 
 
-def cache_folder() -> Path:
-    """Folder for these sources and versions; `SPHERETWIN_CACHE_DIR` moves it elsewhere."""
-    return _root() / _digest()
+def cache_folder() -> Path | None:
+    """Folder for these sources and versions, None where none can be had.
+
+    `SPHERETWIN_CACHE_DIR` moves it elsewhere.
+    """
+    root = _root()
+    return root and root / _digest()
+
+
+def kept(name: str) -> bytes | None:
+    """What was kept under a name; None if nothing was, or if it is damaged."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    try:
+        entry = (folder / name).read_bytes()
+    except OSError:
+        return None
+    digest, content = entry[:_DIGEST_BYTES], entry[_DIGEST_BYTES:]
+    return content if digest == hashlib.sha256(content).digest() else None
+
+
+def keep(name: str, content: bytes) -> None:
+    """Keep something under a name, unless the folder cannot take it: it can always be made again."""
+    if folder := cache_folder():
+        with suppress(OSError, SpheretwinError):
+            folder.mkdir(parents=True, exist_ok=True)
+            with whole_file(folder / name) as temporary:
+                temporary.write_bytes(hashlib.sha256(content).digest() + content)
 
 
 def kept_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -38,21 +70,21 @@ def kept_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArra
     compute : callable
         Makes the array.
     """
-    path = cache_folder() / f"{hashlib.sha256(key).hexdigest()[:32]}.npy"
-    try:
-        return np.load(path)
-    except (OSError, ValueError, EOFError):
-        array = compute()
-    with suppress(OSError):  # it can always be made again
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            np.save(file, array)
-        os.replace(file.name, path)
+    name = f"{hashlib.sha256(key).hexdigest()[:32]}.npy"
+    if content := kept(name):
+        with suppress(ValueError, EOFError):  # whole, but no array
+            return np.load(io.BytesIO(content))
+    array, content = compute(), io.BytesIO()
+    np.save(content, array)
+    keep(name, content.getvalue())
     return array
 
 
+_DIGEST_BYTES = hashlib.sha256().digest_size
+
+
 @cache
-def _root() -> Path:
+def _root() -> Path | None:
     for folder in _candidates():
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -60,10 +92,7 @@ def _root() -> Path:
                 return folder
         except OSError:
             continue
-    # Nowhere to keep anything: work for this process, in a folder of its own.
-    folder = Path(tempfile.mkdtemp(prefix="spheretwin-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
+    return None
 
 
 def _candidates() -> Iterator[Path]:
@@ -77,8 +106,8 @@ def _candidates() -> Iterator[Path]:
 
 @cache
 def _digest() -> str:
-    digest = hashlib.sha256()
-    for package in ("numba", "mujoco", "numpy", "scipy"):
+    digest = hashlib.sha256((sys.implementation.cache_tag or sys.version).encode())
+    for package in ("numba", "llvmlite", "mujoco", "numpy", "scipy"):
         digest.update(importlib.metadata.version(package).encode())
     for source in _sources():
         digest.update(source.name.encode())

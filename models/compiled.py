@@ -1,31 +1,50 @@
 """The one `compiled` decorator: numba with a cache that cannot go stale."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core.ccallback import CFunc
 from numba.extending import register_jitable
 
-from spheretwin.models.cache import cache_folder
+from spheretwin.models.machine_code import MachineCode
+
+COMPILES = not numba.config.DISABLE_JIT
+"""Whether functions are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as they are written, to debug them."""
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+
+# Where a plain function has its compiled callbacks: they hold it, and must not outlive it.
+_CALLBACKS = "__spheretwin_callbacks__"
 
 
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a function at its first call and keep the machine code between processes.
 
-    The uncompiled function stays reachable as ``.py_func``. The interpreter lock is released while
+    The uncompiled function stays reachable with `uncompiled`. The interpreter lock is released while
     compiled code runs; division by zero gives inf or NaN, as in NumPy; a product and a sum may be fused
     into one instruction, which rounds once instead of twice.
     """
+    if not COMPILES:
+        return function
     dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-    with _cache_folder_in_use():
-        dispatcher.enable_caching()
+    dispatcher._cache = MachineCode(function, "function")  # as its `enable_caching` does with numba's own
     return dispatcher
+
+
+def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the plain function that numba has wrapped, or the function itself."""
+    plain: Callable[..., Any] = getattr(function, "py_func", function)
+    return plain
 
 
 def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
     """Compile a function behind a fixed signature, so that callers need no compilation of their own.
+
+    It is compiled once for a function and a signature, with the values that global variables have then,
+    and kept as long as the function.
 
     Parameters
     ----------
@@ -34,27 +53,22 @@ def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
     function : callable
         A plain function, or one that numba has already wrapped.
     """
-    python_function = getattr(function, "py_func", function)
+    plain = uncompiled(function)
+    if not COMPILES:
+        return plain
+    callbacks = plain.__dict__.setdefault(_CALLBACKS, {})
+    if signature not in callbacks:
+        callbacks[signature] = _callback(signature, plain)
+    return callbacks[signature]
+
+
+def _callback(signature: Any, function: Callable[..., Any]) -> CFunc:
+    callback = CFunc(function, (signature.args, signature.return_type), {}, {"nopython": True, **_OPTIONS})
     # Only these sources are watched by the cache; another's would go stale.
-    cached = python_function.__module__.startswith("spheretwin.")
-    with _cache_folder_in_use():
-        return numba.cfunc(signature, nopython=True, cache=cached, **_OPTIONS)(python_function)
-
-
-class _cache_folder_in_use:
-    """Numba reads its cache folder from a global at the moment a function is decorated."""
-
-    def __enter__(self) -> None:
-        self.previous = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(cache_folder())
-
-    def __exit__(self, *_: object) -> None:
-        numba.config.CACHE_DIR = self.previous
-
-
-def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The plain Python function behind a compiled one, or the function itself."""
-    return getattr(function, "py_func", function)
+    if function.__module__.startswith("spheretwin."):
+        callback._cache = MachineCode(function, "callback")
+    callback.compile()
+    return callback
 
 
 def compilable(function: Callable[..., Any]) -> Any:

@@ -1,17 +1,46 @@
 """The compile cache: kept between processes, and never stale."""
 
+import gc
+import hashlib
 import os
+import pickle
 import shutil
 import subprocess
 import sys
+import weakref
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
+from numba import types
 
 from spheretwin.models import cache, compiled
 
 SOURCE = Path(compiled.__file__).parent
+
+
+CALLER = """
+import numba
+from numba import types
+from spheretwin.models.callee import answer
+from spheretwin.models.compiled import compiled, compiled_callback
+
+@compiled
+def ask():
+    return answer()
+
+def callback():
+    return answer()
+
+if __name__ == "__main__":
+    before = numba.config.CACHE_DIR
+    import spheretwin.models.caller as caller
+    called_back = compiled_callback(types.int64(), caller.callback)
+    assert called_back.ctypes() == caller.ask()
+    assert numba.config.CACHE_DIR == before
+    print(caller.ask(), sum(caller.ask.stats.cache_hits.values()), called_back.cache_hits)
+"""
 
 
 @pytest.fixture
@@ -20,18 +49,12 @@ def package(tmp_path):
     models = tmp_path / "spheretwin" / "models"
     models.mkdir(parents=True)
     (models / "__init__.py").write_text("")
-    for name in ("cache.py", "compiled.py"):
+    for name in ("cache.py", "compiled.py", "errors.py", "files.py", "machine_code.py"):
         shutil.copy(SOURCE / name, models)
     (models / "callee.py").write_text(
         "from spheretwin.models.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"
     )
-    (models / "caller.py").write_text(
-        "from spheretwin.models.callee import answer\n"
-        "from spheretwin.models.compiled import compiled\n"
-        "@compiled\ndef ask():\n    return answer()\n"
-        "if __name__ == '__main__':\n    import spheretwin.models.caller as c\n"
-        "    print(c.ask(), sum(c.ask.stats.cache_hits.values()))\n"
-    )
+    (models / "caller.py").write_text(CALLER)
     return tmp_path
 
 
@@ -51,8 +74,13 @@ def python(code, **environment):
 def ask(package):
     cache = str(package / "cache")
     printed = python(RUN, **{**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": cache})
-    answer, hits = printed.split()
-    return int(answer), int(hits)
+    answer, hits, callback_hits = map(int, printed.split())
+    assert hits == callback_hits  # the function and its callback come from entries of their own
+    return answer, hits
+
+
+def entries(package):
+    return sorted(path for path in (package / "cache").rglob("*") if path.is_file())
 
 
 def test_second_process_compiles_nothing(package):
@@ -65,6 +93,112 @@ def test_edited_callee_in_another_file_is_seen(package):
     callee = package / "spheretwin" / "models" / "callee.py"
     callee.write_text(callee.read_text().replace("41", "42"))
     assert ask(package) == (42, 0)
+
+
+def truncate(content):
+    return content[: len(content) // 2]
+
+
+def overwrite(content):
+    middle = len(content) // 2
+    return content[:middle] + b"garbage in the midst of machine code" + content[middle + 36 :]
+
+
+@pytest.mark.parametrize("damage", [truncate, overwrite, lambda _: b"", lambda _: b"nonsense"])
+def test_damaged_entry_is_made_again(package, damage):
+    assert ask(package) == (41, 0)
+    kept = entries(package)
+    assert len(kept) == 3  # the caller, its callee, its callback
+    for path in kept:
+        path.write_bytes(damage(path.read_bytes()))
+    assert ask(package) == (41, 0)
+    assert ask(package) == (41, 1)
+    assert entries(package) == kept
+
+
+@pytest.mark.parametrize("content", [5, ("another signature", ()), ((), (1, 2, 3))])
+def test_whole_entry_that_cannot_be_used_is_made_again(package, content):
+    assert ask(package) == (41, 0)
+    for path in entries(package):
+        pickled = pickle.dumps(content)
+        path.write_bytes(hashlib.sha256(pickled).digest() + pickled)
+    assert ask(package) == (41, 0)
+    assert ask(package) == (41, 1)
+
+
+def test_file_in_place_of_the_folder_is_done_without(package):
+    assert ask(package) == (41, 0)
+    (folder,) = (package / "cache").iterdir()
+    shutil.rmtree(folder)
+    folder.write_text("no folder")
+    for _ in range(2):
+        assert ask(package) == (41, 0)
+    assert folder.read_text() == "no folder"
+
+
+def test_full_disk_is_done_without(package):
+    environment = {**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": str(package / "cache")}
+    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
+    assert python(full + RUN, **environment).split() == ["41", "0", "0"]
+    assert entries(package) == []
+
+
+def test_no_folder_at_all_is_done_without(package):
+    nowhere = {"SPHERETWIN_CACHE_DIR": "/proc", "XDG_CACHE_HOME": "/proc", "HOME": "/proc"}
+    environment = {**os.environ, **nowhere, "PYTHONPATH": str(package)}
+    assert python(RUN, **environment).split() == ["41", "0", "0"]
+
+
+def test_run_without_compilation(tmp_path):
+    """Everything a run calls works as plain Python, and to rounding says the same."""
+    code = (
+        "from spheretwin.twin import scenario; from spheretwin.twin.simulation import simulate\n"
+        "run = simulate(scenario.load('hold', {'duration': 0.02}))\n"
+        "print(*run.telemetry['q_rad'][-1], run.status)"
+    )
+    compiled_run, plain_run = (
+        python(code, **{**os.environ, "NUMBA_DISABLE_JIT": flag}).split() for flag in ("0", "1")
+    )
+    assert plain_run[-1] == compiled_run[-1] == "completed"
+    # Products and sums are not fused in Python; each of 20 ticks may differ by some ulp, hardly amplified.
+    np.testing.assert_allclose(
+        np.array(plain_run[:-1], float), np.array(compiled_run[:-1], float), rtol=1e-9, atol=0
+    )
+
+
+SIGNATURE = types.float64(types.float64)
+
+
+def test_callback_is_compiled_once_for_a_function_and_a_signature():
+    def double(x):
+        return 2 * x
+
+    callback = compiled.compiled_callback(SIGNATURE, double)
+    assert callback.ctypes(2.0) == 4.0
+    assert compiled.compiled_callback(SIGNATURE, double) is callback
+    assert compiled.compiled_callback(SIGNATURE, numba.njit(double)) is callback
+    other = compiled.compiled_callback(types.int64(types.int64), double)
+    assert other is not callback
+    assert other.ctypes(3) == 6
+
+
+def test_callback_lives_no_longer_than_its_function():
+    def double(x):
+        return 2 * x
+
+    compiled.compiled_callback(SIGNATURE, double)
+    alive = weakref.ref(double)
+    del double
+    gc.collect()
+    assert alive() is None
+
+
+def test_uncompiled_is_the_plain_function():
+    def double(x):
+        return 2 * x
+
+    assert compiled.uncompiled(numba.njit(double)) is double
+    assert compiled.uncompiled(double) is double
 
 
 def test_read_only_home_still_compiles():

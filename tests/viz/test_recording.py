@@ -194,7 +194,7 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
     backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
     backwards.values[:, 0] = np.nan
     recorder.write(backwards)
-    with pytest.raises(SpheretwinError, match="recording: .*run.rrd could not be completed") as raised:
+    with pytest.raises(SpheretwinError, match=r"recording: .*run\.rrd could not be completed") as raised:
         recorder.close()
     (kept,) = os.listdir(tmp_path)
     assert f"{raised.value}".endswith(kept)

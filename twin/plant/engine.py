@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from copy import copy
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import llvmlite.binding
 import mujoco
@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import COMPILES, compiled
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf, idle_stages
 from spheretwin.models.mujoco_library import library
 
@@ -116,9 +116,14 @@ class Rotor:
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
-# A symbol that LLVM resolves by name can be cached; a ctypes function inside compiled code cannot.
-llvmlite.binding.add_symbol("mj_step", ctypes.cast(library().mj_step, ctypes.c_void_p).value)
-_mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
+_address = ctypes.cast(library().mj_step, ctypes.c_void_p).value
+_mj_step: Any
+if COMPILES:
+    # A symbol that LLVM resolves by name can be cached; a ctypes function inside compiled code cannot.
+    llvmlite.binding.add_symbol("mj_step", _address)
+    _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
+else:
+    _mj_step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(_address)
 
 
 @compiled
