@@ -12,9 +12,16 @@ from typing import Any
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.errors import NumbaWarning
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.cpython import hashing
+from numba.experimental import function_type
 
 from spheretwin.models import cache
+
+# What machine code needs when it is loaded, beside the math and the run-time library, is there once these
+# are imported: the symbols of hashes, and the type of a callback that is handed to compiled code.
+_REGISTERED = hashing, function_type
 
 
 class MachineCode(NullCache):
@@ -33,8 +40,7 @@ class MachineCode(NullCache):
 
     def __init__(self, function: Callable[..., Any], kind: str) -> None:
         self._name = f"{function.__module__}.{function.__qualname__}"
-        closure = [cell.cell_contents for cell in function.__closure__ or ()]
-        self._key = kind, function.__code__.co_firstlineno, dumps(closure)
+        self._function, self._kind = function, kind
 
     @property
     def cache_path(self) -> str | None:
@@ -44,7 +50,8 @@ class MachineCode(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Machine code for a signature, None if there is none that can be used."""
-        target_context.refresh()
+        # Numba's cache would import all that can be compiled, with scipy.linalg: a third of a short run.
+        rtsys.initialize(target_context)
         content = cache.kept(self._entry(sig, target_context.codegen()))
         if content is None:
             return None
@@ -66,6 +73,8 @@ class MachineCode(NullCache):
 
     def _entry(self, sig: Any, codegen: Any) -> str:
         """Name of an entry: of a function, its signature and the processor; readable at its beginning."""
-        key = repr((self._name, self._key, str(sig), codegen.magic_tuple()))
+        line = self._function.__code__.co_firstlineno
+        closure = dumps([cell.cell_contents for cell in self._function.__closure__ or ()])
+        key = repr((self._name, line, closure, self._kind, str(sig), codegen.magic_tuple()))
         readable = re.sub(r"\W+", "-", self._name.removeprefix("spheretwin."))[:60]
         return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"

@@ -43,6 +43,32 @@ if __name__ == "__main__":
 """
 
 
+LOADED = """
+import sys
+import numpy as np
+from numba import types
+from spheretwin.models.compiled import compiled, compiled_callback
+
+@compiled
+def through(function, x):
+    return function(np.full(3, x)[1:])
+
+def largest(values):
+    return np.exp(np.sort(values)[-1])
+
+@compiled
+def hashed(text):
+    return hash(text)
+
+if __name__ == "__main__":
+    import spheretwin.models.loaded as loaded
+    callback = compiled_callback(types.float64(types.float64[::1]), loaded.largest)
+    assert loaded.through(callback, 0.0) == 1.0
+    assert loaded.hashed("secret of this process") == hash("secret of this process")
+    print("scipy.linalg" in sys.modules)
+"""
+
+
 @pytest.fixture
 def package(tmp_path):
     """A small package under the same name, with the real decorator and two modules."""
@@ -55,6 +81,7 @@ def package(tmp_path):
         "from spheretwin.models.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"
     )
     (models / "caller.py").write_text(CALLER)
+    (models / "loaded.py").write_text(LOADED)
     return tmp_path
 
 
@@ -93,6 +120,18 @@ def test_edited_callee_in_another_file_is_seen(package):
     callee = package / "spheretwin" / "models" / "callee.py"
     callee.write_text(callee.read_text().replace("41", "42"))
     assert ask(package) == (42, 0)
+
+
+def test_machine_code_is_loaded_without_all_that_can_be_compiled(package):
+    """Memory, mathematics, hashes and callbacks work without the modules that compile them."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(package),
+        "SPHERETWIN_CACHE_DIR": str(package / "cache"),
+    }
+    run = RUN.replace("caller", "loaded")
+    assert python(run, **environment).strip() == "True"  # compiled, which needs them
+    assert python(run, **environment).strip() == "False"
 
 
 def truncate(content):
