@@ -12,9 +12,6 @@ from pathlib import Path
 
 from spheretwin.models.errors import InputError, SpheretwinError
 
-# A block of a disk: what remains of one that is in use already says nothing of the next.
-_BLOCK_BYTES = 4096
-
 
 class OutputFile:
     """A file that is written under a hidden name of its own beside the place where it is to appear.
@@ -57,20 +54,6 @@ class OutputFile:
         """Remove the file, unless it was kept."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
-
-    def obstacle(self) -> OSError | None:
-        """What keeps the file from growing, as a full disk does; None if nothing.
-
-        Found out beside it, since another thread may be writing to it.
-        """
-        try:
-            with tempfile.TemporaryFile(dir=self.path.parent) as probe:
-                probe.seek(self.path.stat().st_size)
-                probe.write(bytes(_BLOCK_BYTES))
-                probe.flush()
-        except OSError as error:
-            return error
-        return None
 
 
 def check_writable(path: Path) -> None:

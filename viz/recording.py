@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from pathlib import Path
 from threading import Semaphore
 from types import TracebackType
@@ -22,6 +21,7 @@ from spheretwin.models.telemetry import SIGNALS, Signal, Table
 from spheretwin.models.wording import without_breaks
 from spheretwin.viz import blueprint, palette, scene
 from spheretwin.viz.events import Events
+from spheretwin.viz.file_pipe import FilePipe
 from spheretwin.viz.live import Viewer
 
 APPLICATION = "spheretwin"
@@ -34,9 +34,6 @@ FRAME_RATE_Hz = 60.0
 # Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
 # does not gather in memory.
 PENDING_CHUNKS = 16
-
-# The last bytes of a whole recording begin with this. Rerun does not tell when it cannot write them.
-_END, _END_BYTES = b"RRF2FOOT", 12
 
 _SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
 
@@ -95,6 +92,7 @@ class Recorder:
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.viewer = Viewer() if live else None
         self._output = OutputFile(path) if path else None
+        self._pipe = FilePipe(self._output.path) if self._output else None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
         self._room = Semaphore(PENDING_CHUNKS)
         self._fault: str | None = None
@@ -104,8 +102,8 @@ class Recorder:
         """Open the sinks, log all that stays the same, then let a viewer in."""
         own = tuple(signal for signal in signals if signal.name not in _COMMON)
         sinks: list[Any] = []
-        if self._output:
-            sinks.append(rr.FileSink(self._output.path))
+        if self._pipe:
+            sinks.append(rr.FileSink(self._pipe.path))
         if self.viewer:
             sinks.append(self.viewer.sink)
         layout = blueprint.layout(scenario["duration"], self._limit_A, own, live=self.viewer is not None)
@@ -145,12 +143,13 @@ class Recorder:
         """
         self._submit(self._recording.flush)
         self._worker.shutdown()
-        with suppress(Exception):  # a full disk: the flush, or the missing end, has told or will tell
-            self._recording.disconnect()
+        self._recording.disconnect()
+        if self._pipe:
+            self._pipe.close()
         if self.viewer:
             self.viewer.close()
-        if self._output and not self._fault and not _is_whole(self._output.path):
-            self._fault = self._cause("the end of the recording could not be written")
+        if self._pipe and self._pipe.error:
+            self._fault = self._pipe.error.strerror
         if self._fault and self._output:
             raise SpheretwinError(
                 f"recording: {self._path} could not be completed, {self._fault};"
@@ -171,14 +170,9 @@ class Recorder:
             if not self._fault:
                 work(*arguments)
         except BaseException as error:  # a panic inside Rerun is no `Exception`
-            self._fault = self._cause(without_breaks(error) or type(error).__name__)
+            self._fault = without_breaks(error) or type(error).__name__
         finally:
             self._room.release()
-
-    def _cause(self, complaint: str) -> str:
-        """Why recording failed; of a file that cannot be written, Rerun tells no more than that it is so."""
-        obstacle = self._output and self._output.obstacle()
-        return (obstacle and obstacle.strerror) or complaint
 
     def _write(self, rows: Table) -> None:
         index = _time_index(rows["t_s"])
@@ -243,12 +237,6 @@ def _strips(segments: NDArray[np.float64]) -> pa.Array:
     points = pa.FixedSizeListArray.from_arrays(flat, type=kind.value_type)
     starts = np.arange(len(segments) + 1, dtype=np.int32) * segments.shape[1]
     return pa.ListArray.from_arrays(pa.array(starts), points, type=kind)
-
-
-def _is_whole(path: Path) -> bool:
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - _END_BYTES))
-        return file.read().startswith(_END)
 
 
 def _time_index(t_s: NDArray[np.float64]) -> Index:

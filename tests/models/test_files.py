@@ -1,14 +1,12 @@
 """Output files: whole or not at all."""
 
-import errno
 import os
-import resource
 import stat
 
 import pytest
 
 from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.files import OutputFile, check_writable, whole_file
+from spheretwin.models.files import check_writable, whole_file
 
 
 def test_file_appears_when_the_block_ends(tmp_path):
@@ -102,22 +100,6 @@ def test_permissions_of_a_replaced_file_stay(tmp_path):
     with whole_file(path) as temporary:
         temporary.write_text("new")
     assert stat.S_IMODE(path.stat().st_mode) == 0o640
-
-
-def test_obstacle_is_what_keeps_a_file_from_growing(tmp_path):
-    output = OutputFile(tmp_path / "out.txt")
-    output.path.write_bytes(bytes(10_000))
-    assert output.obstacle() is None
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
-    try:
-        obstacle = output.obstacle()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert obstacle.errno == errno.EFBIG
-    assert output.path.stat().st_size == 10_000
-    output.discard()
-    assert os.listdir(tmp_path) == []
 
 
 def test_places_where_no_file_can_be_put(tmp_path):
