@@ -15,6 +15,7 @@ from spheretwin.models.errors import InputError
 from spheretwin.models.mjcf import read
 from spheretwin.models.telemetry import GROUPS
 from spheretwin.models.torque_curve import TorqueCurve
+from spheretwin.models.wording import told_apart
 
 FOLDER = Path(__file__).resolve().parent
 MJCF_PATH = FOLDER / "actuator.xml"
@@ -22,9 +23,16 @@ SCENE_PATH = FOLDER / "scene.xml"
 TORQUE_CURVE_PATH = FOLDER / "torque_curve.csv"
 
 HINGES = ("alpha", "beta", "gamma")
+LOCKED_DEG = 90.0
 
 # Axes of one group are exact opposites in the MJCF; rotations built from degrees keep 1e-15.
 COLLINEAR_TOLERANCE = 1e-9
+
+# Beyond these a number is a slip of its unit; within them no product or quotient of theirs overflows, and
+# the drive takes all that the model file has.
+LEAST, LARGEST = 1e-9, 1e9
+LEAST_LENGTH_M, LARGEST_LENGTH_M = 1e-6, 1e3
+LONGEST_TIME_CONSTANT_S = 1e3
 
 
 @dataclass(frozen=True)
@@ -134,8 +142,8 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
+    _check_bounded(model)
     _check_joint(model, data)
-    _check_finite(model)
     poles = _sites(model, "pole_")
     coils = _sites(model, "coil_")
     R_SR = data.body(_body(model, "rotor")).xmat.reshape(3, 3)
@@ -151,11 +159,7 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
         payload_mount_m=_frozen(model.body_pos[_body(model, "payload")]),
         magnet=_magnet(model, poles),
         coil=_coil(model, coils),
-        group=Group(
-            resistance_ohm=_number(model, "group_resistance_ohm"),
-            inductance_H=_number(model, "group_inductance_H"),
-            current_limit_A=_number(model, "group_current_limit_A"),
-        ),
+        group=_group(model),
         torque_curve=curve,
     )
 
@@ -169,6 +173,7 @@ def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
         The file cannot be read, or the model lacks poles or coils.
     """
     model = read(mjcf).described
+    _check_bounded(model)
     return _magnet(model, _sites(model, "pole_")), _coil(model, _sites(model, "coil_"))
 
 
@@ -200,9 +205,13 @@ def _site(model: mujoco.MjModel, name: str) -> int:
 
 def _number(model: mujoco.MjModel, name: str) -> float:
     _named(model, mujoco.mjtObj.mjOBJ_NUMERIC, "custom numeric", name)
-    value = float(model.numeric(name).data[0])
-    if not 0 < value < np.inf:
-        raise InputError(f"model: expected {name} finite and above zero, received {value:g}")
+    return _within(float(model.numeric(name).data[0]), LEAST, LARGEST, name)
+
+
+def _within(value: float, least: float, largest: float, what: str) -> float:
+    if not least <= value <= largest:
+        low, high, received = told_apart(least, largest, value)
+        raise InputError(f"model: expected {what} from {low} to {high}, received {received}")
     return value
 
 
@@ -221,8 +230,11 @@ def _polarity(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
     polarity = model.site_user[poles, 0] if model.nuser_site else np.zeros(len(poles))
     for pole, value in zip(poles, polarity, strict=True):
         if value not in (-1.0, 1.0):
-            name = model.site(pole).name
-            raise InputError(f"model: expected polarity 1 or -1 as user value of {name}, received {value:g}")
+            north, south, received = told_apart(1.0, -1.0, value)
+            raise InputError(
+                f"model: expected polarity {north} or {south} as user value of {model.site(pole).name},"
+                f" received {received}"
+            )
     return polarity
 
 
@@ -258,11 +270,27 @@ def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
         turns=_number(model, "coil_turns"),
     )
     if coil.inner_radius_m >= coil.outer_radius_m:
+        outer, inner = told_apart(coil.outer_radius_m, coil.inner_radius_m)
         raise InputError(
-            f"model: expected coil_inner_radius_m below the coils' radius of {coil.outer_radius_m:g} m,"
-            f" received {coil.inner_radius_m:g}"
+            f"model: expected coil_inner_radius_m below the coils' radius of {outer} m, received {inner}"
         )
     return coil
+
+
+def _group(model: mujoco.MjModel) -> Group:
+    group = Group(
+        resistance_ohm=_number(model, "group_resistance_ohm"),
+        inductance_H=_number(model, "group_inductance_H"),
+        current_limit_A=_number(model, "group_current_limit_A"),
+    )
+    time_constant_s = group.inductance_H / group.resistance_ohm
+    if time_constant_s > LONGEST_TIME_CONSTANT_S:
+        longest, received = told_apart(LONGEST_TIME_CONSTANT_S, time_constant_s)
+        raise InputError(
+            f"model: expected group_inductance_H / group_resistance_ohm of at most {longest} s,"
+            f" received {received}"
+        )
+    return group
 
 
 def _check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -292,11 +320,16 @@ def _check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         raise InputError(
             "model: expected the rotor's centre of mass at the origin and its principal axes along its own"
         )
-    if np.any(np.abs(_hinge_range(model)[1]) >= np.pi / 2):
-        raise InputError("model: expected a range of beta inside -90 to 90 degrees, where the joint locks")
+    range_deg = np.degrees(_hinge_range(model)[1])
+    if np.any(np.abs(range_deg) >= LOCKED_DEG):
+        least, largest, low, high = told_apart(-LOCKED_DEG, LOCKED_DEG, *range_deg)
+        raise InputError(
+            f"model: expected a range of beta inside {least} to {largest} degrees, where the joint locks,"
+            f" received {low} to {high}"
+        )
 
 
-def _check_finite(model: mujoco.MjModel) -> None:
+def _check_bounded(model: mujoco.MjModel) -> None:
     arrays = {
         name: getattr(model, name)
         for name in ("body_mass", "body_inertia", "body_pos", "site_pos", "site_size", "jnt_range")
@@ -304,6 +337,9 @@ def _check_finite(model: mujoco.MjModel) -> None:
     for name, numbers in {**arrays, "gravity": model.opt.gravity}.items():
         if not np.all(np.isfinite(numbers)):
             raise InputError(f"model: expected finite numbers, received NaN or infinity in {name}")
+        if np.any(np.abs(numbers) > LARGEST):
+            largest, received = told_apart(LARGEST, numbers.flat[np.argmax(np.abs(numbers))])
+            raise InputError(f"model: expected numbers of at most {largest}, received {received} in {name}")
 
 
 def _hinge_range(model: mujoco.MjModel) -> NDArray[np.float64]:
@@ -314,5 +350,6 @@ def _hinge_range(model: mujoco.MjModel) -> NDArray[np.float64]:
 
 def _shared(values: NDArray[np.float64], what: str) -> float:
     if np.ptp(values) > COLLINEAR_TOLERANCE:
-        raise InputError(f"model: expected one {what}, received {values.min():g} to {values.max():g} m")
-    return float(values[0])
+        least, largest = told_apart(values.min(), values.max())
+        raise InputError(f"model: expected one {what}, received {least} to {largest} m")
+    return _within(float(values[0]), LEAST_LENGTH_M, LARGEST_LENGTH_M, f"a {what} in metres")

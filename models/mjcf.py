@@ -61,7 +61,11 @@ def read(path: Path) -> Mjcf:
     InputError
         The file is missing or broken; the engine's complaint on one line.
     """
-    if not path.is_file():
+    try:
+        found = path.is_file()
+    except OSError as error:  # a name that no file can have
+        raise InputError(f"model: expected an MJCF file, {error}") from None
+    if not found:
         raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
     key = (path.resolve(), _fingerprint(path))
     if key not in _KEPT:

@@ -1,12 +1,15 @@
 """The actuator read from its MJCF, and models that are none."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.simulation import simulate
 
 TEXT = actuators.MJCF_PATH.read_text()
 GAMMA = '<joint name="gamma" axis="0 0 1"/>'
@@ -48,11 +51,32 @@ def test_shipped_actuator_is_read_once():
         (GAMMA, GAMMA.replace("/>", ' type="slide"/>'), "hinge gamma about z"),
         (GAMMA, "", "expected valid MJCF"),
         ('range="-80 80"', 'range="-170 170"', "range of beta"),
-        ('data="8"', 'data="inf"', "group_current_limit_A finite"),
-        ('data="8"', 'data="-8"', "above zero"),
+        ('range="-80 80"', 'range="-80 90"', "where the joint locks, received -80 to 90"),
+        ('data="8"', 'data="inf"', "group_current_limit_A from 1e-09 to 1e+09, received inf"),
+        ('data="8"', 'data="-8"', "received -8"),
+        ('data="8"', 'data="1e12"', "group_current_limit_A from 1e-09 to 1e+09, received 1e+12"),
+        ('data="8"', 'data="1000000001"', "from 1e-09 to 1000000000, received 1000000001"),
+        ('data="8"', 'data="1e-300"', "received 1e-300"),
+        ('data="1.3"', 'data="1e-300"', "group_resistance_ohm from"),
+        ('data="1.3"', 'data="1e-8"', "_H / group_resistance_ohm of at most 1000 s, received 90000"),
+        ('data="0.9e-3"', 'data="1301"', "of at most 1000 s, received 1000.77"),
+        ('data="0.9e-3"', 'data="1300.0000013"', "of at most 1000 s, received 1000.000001"),
+        ('data="0.9e-3"', 'data="0"', "group_inductance_H from"),
+        ('data="1.2"', 'data="1e300"', "magnet_remanence_T from"),
+        ('data="320"', 'data="1e-300"', "coil_turns from"),
+        ('size="0.010 0.005"', 'size="1e-300 0.005"', "a radius of the poles in metres from 1e-06 to 1000"),
+        ('size="0.010 0.005"', 'size="0.010 1e-12"', "a length of the poles in metres"),
+        ('size="0.011 0.0125"', 'size="1e6 0.0125"', "a radius of the coils in metres from 1e-06 to 1000"),
+        ('size="0.011 0.0125"', 'size="0.011 1e300"', "at most 1e+09, received 1e+300 in site_size"),
+        ('pos="0.045 0 0"', 'pos="0 0 0"', "a distance of the poles in metres from 1e-06"),
+        ('pos="0.063 0 0"', 'pos="1e300 0 0"', "in site_pos"),
+        ('name="coil_middle" class="coil" pos="0.063', 'name="coil_middle" class="coil" pos="0.06300001',
+         "one distance of the coils, received 0.063 to 0.06300001 m"),
+        ('diaginertia="2.219e-3 2.176e-3 2.256e-3"', 'diaginertia="1e300 1e300 1e300"', "in body_inertia"),
         ('name="coil_turns" data="320"', 'name="coil_windings" data="320"', '"coil_turns"'),
         ('data="0.003"', 'data="0.012"', "below the coils' radius"),
         ('user="-1"', 'user="2"', "polarity 1 or -1"),
+        ('user="-1"', 'user="-1.00000001"', "of pole_upper_south0, received -1.00000001"),
         ('name="shaft_tip"', 'name="tip"', '"shaft_tip"'),
         ('pos="0 0 0.12"', 'pos="0 0 nan"', "finite numbers"),
         ('<inertial pos="0 0 0" mass="1.6"', '<inertial pos="0 0 0.01" mass="1.6"', "centre of mass"),
@@ -83,3 +107,25 @@ def test_mujoco_leaves_no_log_behind(tmp_path, monkeypatch, capfd):
         actuators.load(path)
     assert [entry.name for entry in tmp_path.iterdir()] == ["mine.xml"]
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("limit", ["1e-9", "1e9"])
+@pytest.mark.parametrize(("resistance", "inductance"), [("1e-9", "1e-6"), ("1e9", "1e-9"), ("1e6", "1e9")])
+def test_a_run_takes_every_drive_that_a_model_may_have(tmp_path, limit, resistance, inductance):
+    text = TEXT.replace('data="8"', f'data="{limit}"').replace('data="1.3"', f'data="{resistance}"')
+    (path := tmp_path / "mine.xml").write_text(text.replace('data="0.9e-3"', f'data="{inductance}"'))
+    scenario = scenarios.load("hold", {"plant.mjcf": str(path), "duration": 0.003})
+    assert simulate(scenario).status == "completed"
+
+
+def test_a_path_that_no_file_can_have_is_told_in_one_line():
+    with pytest.raises(InputError, match="expected an MJCF file") as caught:
+        actuators.load(Path("x" * 20_000))
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("old", ['pos="0.045 0 0"', 'pos="0.063 0 0"'])
+def test_a_model_without_bounds_yields_no_magnet_and_no_coil(tmp_path, old):
+    (path := tmp_path / "mine.xml").write_text(TEXT.replace(old, 'pos="1e300 0 0"'))
+    with pytest.raises(InputError, match="site_pos"):
+        actuators.read_magnet_and_coil(path)
