@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.errors import InputError
 from spheretwin.models.files import whole_file
-from spheretwin.models.wording import shown, without_breaks
+from spheretwin.models.wording import did_you_mean, shown, without_breaks
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -168,7 +168,10 @@ class Table:
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         places = _places(self.signals)
         if name not in places:
-            raise InputError(f"telemetry: expected one of {', '.join(places)}, received {name}")
+            raise InputError(
+                f"telemetry: expected one of {', '.join(places)},"
+                f" received {name}{did_you_mean(str(name), places)}"
+            )
         first, size = places[name]
         return self.values[:, first] if size == 1 else self.values[:, first : first + size]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 
 # A path or a name of everyday length stays whole; digits by the thousand do not.
@@ -41,6 +42,11 @@ def shown(value: object) -> str:
     except ValueError:  # an integer of more digits than Python writes
         return f"{type(value).__name__} of too many digits"
     return shortened(" ".join(line.strip() for line in text.splitlines()), LONGEST_VALUE)
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text has neither control characters nor bytes that are no text (lone surrogates)."""
+    return not any(unicodedata.category(each) in ("Cc", "Cs") for each in text)
 
 
 def told_apart(*numbers: float) -> list[str]:

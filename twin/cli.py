@@ -6,13 +6,16 @@ Exit 0: done. 1: a run or a check failed. 2: bad input, told in one line.
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import os
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from typing import NoReturn
 
 from spheretwin.models.errors import InputError, SpheretwinError
+from spheretwin.models.wording import is_plain, one_line, shown
 from spheretwin.twin.commands import crosscheck, magnetics, simulate
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -24,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters
     try:
-        options, rest = _parser().parse_known_args(arguments)
+        options, rest = _parser().parse_known_args(_plain(sys.argv[1:] if arguments is None else arguments))
         succeeded = options.run(options, rest)
         sys.stdout.flush()
     except InputError as error:
@@ -37,14 +40,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _discard_stdout()
         return FAILED
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:  # no file can have the name that was given
+            return _refused(f"command line: expected a shorter path, {error}", BAD_INPUT)
         _discard_stdout()
         return _refused(f"output: {error}", FAILED)
     return DONE if succeeded else FAILED
 
 
 def _refused(message: str, code: int) -> int:
-    print(f"spheretwin: {message}", file=sys.stderr)
+    print(f"spheretwin: {one_line(message)}", file=sys.stderr)
     return code
+
+
+def _plain(arguments: Sequence[str]) -> Sequence[str]:
+    """Arguments that can be shown, and kept in files that other programs read."""
+    for argument in arguments:
+        if not is_plain(argument):
+            raise InputError(
+                f"command line: expected text without control characters, received {shown(argument)}"
+            )
+    return arguments
 
 
 def _discard_stdout() -> None:
@@ -65,6 +80,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Digital twin of a permanent-magnet spherical actuator.",
         allow_abbrev=False,
     )
+    parser.add_argument("--version", action="version", version=f"spheretwin {version('spheretwin')}")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
     simulate.add_to(verbs)
     crosscheck.add_to(verbs)

@@ -1,6 +1,7 @@
 """Dotted flags: every field of a scenario can be set from the command line."""
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any, get_args
 
@@ -60,9 +61,11 @@ def _value(name: str, text: str) -> Any:
         return text
     for read in (json.loads, float):
         try:
-            return read(text)
+            value = read(text)
         except (ValueError, RecursionError):
             continue
+        # Digits without end read as infinity; a complaint about them shall show what was given.
+        return text if value in (math.inf, -math.inf) and "inf" not in text.lower() else value
     return text
 
 

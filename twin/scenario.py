@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import tomllib
 from collections.abc import Mapping
 from importlib import resources
@@ -24,6 +26,7 @@ from pydantic_core import PydanticCustomError
 from spheretwin.control.gains import Gains, NonNegative, Positive
 from spheretwin.control.laws import LAWS
 from spheretwin.models.errors import InputError
+from spheretwin.models.wording import did_you_mean, is_plain, shown
 from spheretwin.twin.plant.disturbance import Disturbance
 from spheretwin.twin.trajectory import Bounded, Trajectory, Triple
 
@@ -164,11 +167,11 @@ class Scenario(_Section):
         if round(ratio) < 1 or round(ratio) > MOST_SUBSTEPS or abs(ratio - round(ratio)) > WHOLE * ratio:
             raise ValueError(
                 f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
-                f" received {self.controller.period_s:g} and {self.plant.step_s:g} s"
+                f" received {self.controller.period_s!r} and {self.plant.step_s!r} s"
             )
         if self.ticks < 1:
             raise ValueError(
-                f"expected a duration of at least one control period, received {self.duration:g} s"
+                f"expected a duration of at least one control period, received {self.duration!r} s"
             )
         return self
 
@@ -194,9 +197,10 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     Parameters
     ----------
     source : str
-        A shipped name, or the path of a TOML file.
+        A shipped name, or the path of a TOML file; ``~`` is the user's home. Paths in the file are taken
+        from where the file is.
     overrides : mapping, optional
-        Values by dotted name, such as ``{"controller.law": "pd"}``.
+        Values by dotted name, such as ``{"controller.law": "pd"}``; paths are taken from the working folder.
 
     Raises
     ------
@@ -206,7 +210,7 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     fields = _read(source)
     for dotted, value in (overrides or {}).items():
         _override(fields, dotted, value)
-    return _validated(fields, source)
+    return _validated(_beside("", fields), source)
 
 
 def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
@@ -245,15 +249,28 @@ def explain(error: ValidationError) -> str:
     """First complaint of a validation on one line: field, what was expected, what was received."""
     first = error.errors(include_url=False)[0]
     path = [str(part) for part in first["loc"]]
-    if first["type"] == "value_error" and not path:
-        return str(first["ctx"]["error"])
-    if first["type"] == "extra_forbidden":
-        valid = ", ".join(_names_at(path[:-1]))
-        return f"expected one of {valid} in {_dotted(path[:-1]) or 'the scenario'}, received {path[-1]}"
-    if first["type"] == "missing":
-        return f"{_dotted(path)}: expected a value, received none"
+    field, received = _dotted(path), shown(first["input"])
+    match first["type"]:
+        case "value_error":
+            complaint = str(first["ctx"]["error"])
+            return f"{field}: {complaint}" if path else complaint
+        case "json_invalid":
+            return f"expected sections and values as TOML has them, received {first['ctx']['error']}"
+        case "extra_forbidden":
+            return _unknown(path)
+        case "missing":
+            return f"{field}: expected a value, received none"
+        case "union_tag_not_found" | "union_tag_invalid":
+            tag, shapes = first["ctx"].get("tag"), [*_by_shape()]
+            near = did_you_mean(str(tag), shapes)
+            received = "none" if tag is None else shown(tag)
+            return f"{field}.shape: expected one of {', '.join(shapes)}, received {received}{near}"
+        case "literal_error":
+            valid = re.findall("'([^']*)'", first["ctx"]["expected"])
+            near = did_you_mean(str(first["input"]), valid)
+            return f"{field}: expected {first['ctx']['expected']}, received {received}{near}"
     expected = first["msg"].removeprefix("Input should be ")
-    return f"{_dotted(path)}: expected {expected}, received {first['input']!r}"
+    return f"{field}: expected {expected}, received {received}"
 
 
 def fields_of(section: type[BaseModel] | BaseModel, prefix: str = "") -> dict[str, Any]:
@@ -271,44 +288,53 @@ def fields_of(section: type[BaseModel] | BaseModel, prefix: str = "") -> dict[st
 
 def _validated(fields: Mapping[str, Any], source: str) -> Scenario:
     try:
-        # By way of JSON, so that arrays become tuples while numbers stay strictly typed.
-        return Scenario.model_validate_json(json.dumps(fields, default=_plain))
+        scenario = Scenario.model_validate_json(_as_json(source, fields))
     except ValidationError as error:
         raise InputError(f"scenario {source}: {explain(error)}") from None
-
-
-def _plain(value: Any) -> Any:
-    """Arrays and NumPy's numbers as Python has them; dates of a TOML file as text."""
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+    _check_texts(source, scenario)
+    return scenario
 
 
 def _read(source: str) -> dict[str, Any]:
+    path = _from_home(source)
     if source in shipped():
         text = (FOLDER / f"{source}.toml").read_text(encoding="utf-8")
     elif source.endswith(".toml"):
         try:
-            text = Path(source).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
+            text = Path(path).read_text(encoding="utf-8-sig")  # some editors write a byte-order mark
+        except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
             raise InputError(f"scenario {source}: expected a readable TOML file, {error}") from None
     else:
-        raise InputError(f"scenario: expected {', '.join(shipped())} or a .toml file, received {source}")
+        raise InputError(
+            f"scenario: expected {', '.join(shipped())} or a .toml file,"
+            f" received {shown(source)}{did_you_mean(source, shipped())}"
+        )
     try:
         fields = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"scenario {source}: expected valid TOML, {error}") from None
-    return _beside(Path(source), fields)
+    return _beside(os.path.dirname(path), fields)
 
 
-def _beside(source: Path, fields: dict[str, Any]) -> dict[str, Any]:
-    """Take the paths that a scenario file names from where the file is."""
+def _beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
+    """Take the paths that a scenario names from a folder; a second time changes nothing."""
     plant = fields.get("plant")
     for name in ("mjcf", "torque_curve"):
         if isinstance(plant, dict) and isinstance(plant.get(name), str) and plant[name]:
-            plant[name] = str(source.parent / plant[name])
+            plant[name] = os.path.join(folder, _from_home(plant[name]))
     return fields
 
 
+def _from_home(path: str) -> str:
+    try:
+        return os.path.expanduser(path)
+    except ValueError:  # a zero in the name of a user; it is refused where the path is used
+        return path
+
+
 def _override(fields: dict[str, Any], dotted: str, value: Any) -> None:
+    if not isinstance(dotted, str) or not all(dotted.split(".")):
+        raise InputError(f"scenario: expected a field such as controller.law, received {shown(dotted)}")
     *sections, name = dotted.split(".")
     for section in sections:
         fields = fields.setdefault(section, {})
@@ -317,12 +343,52 @@ def _override(fields: dict[str, Any], dotted: str, value: Any) -> None:
     fields[name] = value
 
 
+def _as_json(source: str, fields: Mapping[str, Any]) -> bytes:
+    """Fields as JSON, so that arrays become tuples while numbers stay strictly typed."""
+    try:
+        return json.dumps(fields, default=_plain, ensure_ascii=False).encode()
+    except (TypeError, ValueError, RecursionError) as error:  # endless digits, bytes that are no text, depth
+        raise InputError(
+            f"scenario {source}: expected sections and values as TOML has them, {error}"
+        ) from None
+
+
+def _plain(value: Any) -> Any:
+    """Arrays and NumPy's numbers as Python has them; a date of a TOML file as text."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+
+
+def _check_texts(source: str, scenario: Scenario) -> None:
+    """Names and paths end up in terminals, in file names and in other programs' files."""
+    for dotted in fields_of(scenario):
+        text: Any = scenario
+        for part in dotted.split("."):
+            text = getattr(text, part)
+        breaks = "\n\t" if dotted == "description" else ""
+        if isinstance(text, str) and not is_plain("".join(each for each in text if each not in breaks)):
+            raise InputError(
+                f"scenario {source}: {dotted}: expected text without control characters,"
+                f" received {shown(text)}"
+            )
+
+
+def _unknown(path: list[str]) -> str:
+    """Complaint about a name that its section does not have."""
+    *section, name = path
+    valid = _names_at(section)
+    elsewhere = next((f"; did you mean {d}?" for d in fields_of(Scenario) if d.endswith(f".{name}")), "")
+    return (
+        f"expected one of {', '.join(valid)} in {_dotted(section) or 'the scenario'},"
+        f" received {name}{did_you_mean(name, valid) or elsewhere}"
+    )
+
+
 def _names_at(path: list[str]) -> list[str]:
     """Valid names of the section at `path`, whose union tags pydantic puts into the path."""
     section: Any = Scenario
     for part in path:
         if part == "trajectory":
-            section = {kind.model_fields["shape"].default: kind for kind in _shapes()}
+            section = _by_shape()
         elif isinstance(section, dict):
             section = section[part]
         else:
@@ -330,11 +396,11 @@ def _names_at(path: list[str]) -> list[str]:
     return list(section.model_fields)
 
 
-def _shapes() -> tuple[type[BaseModel], ...]:
+def _by_shape() -> dict[str, type[BaseModel]]:
     union, *_ = Trajectory.__args__
-    return union.__args__
+    return {kind.model_fields["shape"].default: kind for kind in union.__args__}
 
 
 def _dotted(path: list[str]) -> str:
-    tags = {kind.model_fields["shape"].default for kind in _shapes()}
+    tags = _by_shape()
     return ".".join(part for i, part in enumerate(path) if not (i == 1 and part in tags))

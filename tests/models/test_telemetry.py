@@ -30,6 +30,11 @@ def test_unknown_column_names_the_known_ones(table):
         table["colour"]
 
 
+def test_misspelt_column_gets_a_suggestion(table):
+    with pytest.raises(InputError, match=r"received q_rads; did you mean q_rad\?"):
+        table["q_rads"]
+
+
 def test_rows_of_the_wrong_width_are_refused():
     with pytest.raises(InputError, match="expected rows of"):
         Table(SIGNALS, np.zeros((3, 4)))

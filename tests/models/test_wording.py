@@ -13,6 +13,7 @@ from spheretwin.models.wording import (
     LONGEST_VALUE,
     LONGEST_WORD,
     did_you_mean,
+    is_plain,
     one_line,
     shown,
     told_apart,
@@ -59,6 +60,12 @@ def test_a_received_value_is_shown_on_one_line():
     assert shown(np.eye(2)) == "array([[1., 0.], [0., 1.]])"
     assert len(shown(list(range(1000)))) == LONGEST_VALUE
     assert shown(10**5000) == "int of too many digits"
+
+
+@pytest.mark.parametrize("each", ["\n", "\t", "\0", "\x1b", "\x7f", "\x9b", "\udcff"])
+def test_control_characters_are_not_plain(each):
+    assert not is_plain(f"a{each}b")
+    assert is_plain("Nutation für α · 猫 🐈\u200d⬛")
 
 
 def test_every_error_of_the_package_is_one_line_in_python_too():

@@ -70,13 +70,42 @@ def test_flags_reach_every_field():
         ({"plant.initial_rad": [1, 2]}, ["initial_rad"]),
         ({"disturbance.load": 1e300}, ["load", "1000"]),
         ({"seed.deep": 1}, ["seed.deep"]),
+        ({"controler.law": "pd"}, ["received controler; did you mean controller?"]),
+        ({"plant.modeling_error": 1}, ["received modeling_error; did you mean modelling_error?"]),
+        ({"law": "pd"}, ["received law; did you mean controller.law?"]),
+        ({"controller.law": "afms"}, ["received 'afms'; did you mean afsm?"]),
+        (
+            {"trajectory.shape": "sinus"},
+            ["trajectory.shape", "hold", "received 'sinus'; did you mean sinusoid?"],
+        ),
+        ({"trajectory": {}}, ["trajectory.shape: expected one of sinusoid", "received none"]),
+        ({"trajectory": 3}, ["trajectory", "3"]),
+        ({"controller.period_s": 1.0000001e-3}, ["received 0.0010000001 and 0.0005 s"]),
+        ({"duration": 3600.001}, ["3600000", "received 3600.001 s"]),
+        ({"seed": 10**5000}, ["digits"]),
+        ({"seed": "9" * 5000}, ["seed", "integer", "9…9"]),
+        ({"seed": None}, ["seed", "None"]),
+        ({"name": "a\x1b[31mb"}, ["name: expected text without control characters", r"a\x1b[31mb"]),
+        ({"name": "a\nb"}, ["name", r"a\nb"]),
+        ({"name": "\udcff"}, ["udcff"]),
+        ({"description": "\x07"}, ["description", r"\x07"]),
+        ({"plant.mjcf": "a\0b"}, ["plant.mjcf", r"a\x00b"]),
+        ({"plant.mjcf": "~\0/b"}, ["plant.mjcf", r"\x00"]),
+        ({"": 1}, ["a field such as controller.law, received ''"]),
+        ({"a..b": 1}, ["a field such as controller.law, received 'a..b'"]),
+        ({"controller.": 1}, ["a field such as controller.law"]),
+        ({3: 1}, ["a field such as controller.law, received 3"]),
+        ({".".join("a" * 5000): 1}, ["scenario nutation"]),
+        ({"plant": {("a", 1): 2}}, ["sections and values"]),
+        ({"a\x1b[2J": 1}, [r"received a\x1b[2J"]),
     ],
 )
 def test_bad_input_is_told_in_one_line(overrides, parts):
     with pytest.raises(InputError) as caught:
         scenarios.load("nutation", {"seed": 0, **overrides})
     message = str(caught.value)
-    assert "\n" not in message
+    assert message.isprintable()
+    assert len(message) < 1000
     for part in parts:
         assert part in message
 
@@ -88,12 +117,71 @@ def test_bad_input_is_told_in_one_line(overrides, parts):
         ("missing.toml", None, "missing.toml"),
         ("broken.toml", "duration = = 2", "TOML"),
         ("empty.toml", "", "trajectory"),
+        ("nutatoin", None, "received 'nutatoin'; did you mean nutation?"),
+        ("", None, "received ''"),
+        ("a\x1b\nb", None, r"received 'a\\x1b\\nb'"),
+        (f"{'x' * 20_000}.toml", None, "too long"),
+        ("a\0b.toml", None, r"a\\x00b.toml: expected a readable"),
+        ("digits.toml", f"seed = {'9' * 5000}", "digits"),
+        ("deep.toml", f"{'a.' * 3000}a = 1", "deep.toml"),
+        ("lists.toml", f"seed = {'[' * 3000}{']' * 3000}", "lists.toml"),
+        ("zero.toml", "duration = 1\0", "TOML"),
+        ("date.toml", "seed = 1979-05-27\n[trajectory]\nshape = 'hold'", "seed"),
+        ("latin.toml", b"name = '\xff'", "readable TOML file"),
     ],
 )
 def test_bad_source_is_told_in_one_line(tmp_path, monkeypatch, source, text, part):
     monkeypatch.chdir(tmp_path)
     if text is not None:
-        (tmp_path / source).write_text(text)
+        (tmp_path / source).write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError, match=part) as caught:
         scenarios.load(source)
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 1000
+
+
+HOLD = '[trajectory]\nshape = "hold"\n[plant]\n'
+
+
+def test_a_byte_order_mark_is_no_part_of_a_scenario(tmp_path):
+    (path := tmp_path / "mine.toml").write_text("\ufeffduration = 2\n" + HOLD, encoding="utf-8")
+    assert scenarios.load(str(path)).duration == 2.0
+
+
+def test_a_tilde_is_the_user_s_home_and_other_paths_stay_beside_the_file(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "mine").mkdir()
+    text = f'{HOLD}mjcf = "~/a.xml"\ntorque_curve = "curves/b.csv"\n'
+    (tmp_path / "mine" / "s.toml").write_text(text)
+    plant = scenarios.load("~/mine/s.toml").plant
+    assert (plant.mjcf, plant.torque_curve) == (f"{tmp_path}/a.xml", f"{tmp_path}/mine/curves/b.csv")
+    flags_ = {"plant.mjcf": "here.xml", "plant.torque_curve": "~/c.csv"}
+    plant = scenarios.load("~/mine/s.toml", flags_).plant
+    assert (plant.mjcf, plant.torque_curve) == ("here.xml", f"{tmp_path}/c.csv")
+    monkeypatch.chdir(tmp_path / "mine")
+    assert scenarios.load("s.toml").plant.torque_curve == "curves/b.csv"
+
+
+def test_a_folder_called_tilde_is_one(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", "/elsewhere")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "~").mkdir()
+    (tmp_path / "~" / "s.toml").write_text(f'{HOLD}mjcf = "a.xml"\n')
+    assert scenarios.load("./~/s.toml").plant.mjcf == "./~/a.xml"
+
+
+def test_a_description_may_have_several_lines(tmp_path):
+    (path := tmp_path / "mine.toml").write_text(f'description = """\na\n\tb"""\n{HOLD}')
+    assert scenarios.load(str(path)).description == "a\n\tb"
+
+
+def test_a_long_seed_is_taken_and_an_endless_one_told():
+    assert scenarios.load("hold", flags.overrides(["--seed", "9" * 4000])).seed == 10**4000 - 1
+    for digits in (4301, 100_000):
+        with pytest.raises(InputError, match=r"seed: expected a valid integer, received '9+…9+'"):
+            scenarios.load("hold", flags.overrides(["--seed", "9" * digits]))
+
+
+def test_an_overflow_is_told_as_it_was_given():
+    with pytest.raises(InputError, match="received '1e999'"):
+        scenarios.load("hold", flags.overrides(["--duration", "1e999"]))
