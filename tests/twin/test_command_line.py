@@ -85,7 +85,8 @@ value = st.sampled_from(VALUES) | st.text(st.characters(), max_size=12) | st.flo
 valid = st.sampled_from(["--seed=3", "--duration=2", "--controller.law=pd", "--name=a", "--json", "--live"])
 argument = valid | flag | value | st.builds(lambda name, text: f"{name}={text}", flag, value)
 scenario = st.sampled_from(["hold", *scenarios.shipped(), "nutatoin", "none.toml"]) | value
-help_or_refused = st.sampled_from(["--help", "-h", "--duration=-1", "--no.such.field=1"])
+# After a bare -- the word -h is a value.
+help_or_refused = st.sampled_from(["--help", "--duration=-1", "--no.such.field=1"])
 
 
 # 300 examples: some seconds.
