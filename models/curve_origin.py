@@ -14,8 +14,8 @@ SAME = 1e-9
 
 def numbers(magnet: Magnet, coil: Coil) -> dict[str, float]:
     """Every number that a computed curve depends on, by part and name, such as ``coil turns``."""
-    parts = {"magnet": magnet, "coil": coil}
-    return {f"{part} {name}": value for part, data in parts.items() for name, value in asdict(data).items()}
+    parts = {"magnet": asdict(magnet), "coil": asdict(coil)}
+    return {f"{part} {name}": value for part, data in parts.items() for name, value in data.items()}
 
 
 def disagreements(actuator: Actuator) -> list[str]:
