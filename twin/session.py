@@ -1,4 +1,4 @@
-"""A twin that runs for as long as it is asked to: advanced in chunks, changed between them, kept, restored."""
+"""A twin that runs for as long as it is asked to: advanced in chunks, changed between them, restored."""
 
 from __future__ import annotations
 
