@@ -94,7 +94,7 @@ help_or_refused = st.sampled_from(["--help", "--duration=-1", "--no.such.field=1
 @given(scenario, st.lists(valid, max_size=6) | st.lists(argument, max_size=6), help_or_refused)
 def test_any_arguments_end_in_an_exit_code(source, arguments, last):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulate, "Simulation", _not_run)
+        patch.setattr(simulate, "Session", _not_run)
         code, _, stderr = called("simulate", source, *arguments, last)
     assert code in (0, 2)
     if code == 2:

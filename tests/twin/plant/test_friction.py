@@ -1,5 +1,7 @@
 """Friction of the hinges: exact motions, contraction at any step, and MuJoCo's own damping."""
 
+from copy import copy
+
 import mujoco
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 from numba.core.runtime import _nrt_python, rtsys
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.models.compiled import compiled
 from spheretwin.models.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix, loaded_inertia
@@ -185,7 +188,7 @@ DURATION_s = 0.4
 
 def by_mujoco(step_s, integrator, damping, resistance=None, start=START, duration=DURATION_s):
     """State at the end by stock MuJoCo: its own damping of the hinges, or our friction applied to them."""
-    model = actuators.read_spec(actuators.MJCF_PATH).compile()
+    model = copy(mjcf.read(actuators.MJCF_PATH).bare)
     model.opt.timestep, model.opt.integrator = step_s, integrator
     model.dof_damping[:] = damping
     data = mujoco.MjData(model)
