@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free
 
 # Below this share of the torque matrix's size, squared, a direction counts as lost: the currents for it
 # would be a million times those for the strongest direction.
 SINGULAR = 1e-12
 
 
-@compiled
+@allocation_free
 def allocate(
     G: NDArray[np.float64], torque_S: NDArray[np.float64], limit: float, current: NDArray[np.float64]
 ) -> float:

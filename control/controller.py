@@ -13,7 +13,7 @@ from spheretwin.control.bounded_allocation import SCRATCH_ROWS
 from spheretwin.models.callbacks import function_at
 from spheretwin.models.compiled import compilable
 from spheretwin.models.kinematics import cartesian_torque
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, torque_matrix_at
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix
 
 # Whatever a law may ask for while it loses the rotor; beyond it the allocation's products would overflow.
 LARGEST_TORQUE_Nm = 1e100
@@ -117,7 +117,7 @@ def control_tick(
         if not abs(controller.memory[i]) < np.inf:
             return LOST
     cartesian_torque(pose, torque_q, controller.torque_S)
-    G = torque_matrix_at(pose, controller.magnetics, controller.kept)
+    keep_torque_matrix(pose, controller.magnetics, controller.kept)
     return allocation_at(allocate)(
-        G, controller.torque_S, controller.current_limit_A, command, controller.scratch
+        controller.kept.G, controller.torque_S, controller.current_limit_A, command, controller.scratch
     )

@@ -9,7 +9,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free
 
 CENTRES = (-3.0, -1.5, 0.0, 1.5, 3.0)
 WIDTH = 1.0  # sigma of (57)
@@ -19,7 +19,7 @@ RULES = SETS * SETS
 CONSEQUENTS = 3 * RULES
 
 
-@compiled
+@allocation_free
 def memberships(x: float) -> tuple[float, float, float, float, float]:
     """Degrees of membership of `x` in the five sets, normalised to sum 1.
 
@@ -35,13 +35,13 @@ def memberships(x: float) -> tuple[float, float, float, float, float]:
     return a * share, b * share, c * share, d * share, e * share
 
 
-@compiled
+@allocation_free
 def exponent(x: float, k: int) -> float:
     """Logarithm of the membership of `x` in set `k` (57)."""
     return -SHAPE * ((x - CENTRES[k]) / (2.0 * WIDTH)) ** 2
 
 
-@compiled
+@allocation_free
 def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: NDArray[np.float64]) -> float:
     """Output ``theta^T Psi`` (33), then one Euler step ``theta += drive Psi`` of its adaptation (43).
 

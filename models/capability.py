@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.compiled import compiled
-from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, torque_model
+from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, scratch_of, torque_model
 
 Array = NDArray[np.float64]
 
@@ -75,9 +75,8 @@ def capability(q: Array, actuator: Actuator, track: Callable[[range], Iterable[i
 
 def torque_matrices(q: Array, actuator: Actuator) -> Array:
     """Torque matrices of many poses: (n, 3) in rad to (n, 3, 18) in N·m/A."""
-    groups = len(actuator.groups)
-    G = np.empty((len(q), 3, groups))
-    _fill_torque_matrices(np.ascontiguousarray(q), torque_model(actuator), G, np.empty((2, groups)))
+    model, G = torque_model(actuator), np.empty((len(q), 3, len(actuator.groups)))
+    _fill_torque_matrices(np.ascontiguousarray(q), model, G, scratch_of(model))
     return G
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numba
 from numba.core.ccallback import CFunc
+from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
 from spheretwin.models.machine_code import MachineCode
@@ -27,11 +28,28 @@ def compiled(function: Callable[..., Any]) -> Any:
     compiled code runs; division by zero gives inf or NaN, as in NumPy; a product and a sum may be fused
     into one instruction, which rounds once instead of twice.
     """
-    if not COMPILES:
-        return function
-    dispatcher = numba.njit(nogil=True, **_OPTIONS)(function)
-    dispatcher._cache = MachineCode(function, "function")  # as its `enable_caching` does with numba's own
-    return dispatcher
+    return _compiled(function)
+
+
+def allocation_free(function: Callable[..., Any]) -> Any:
+    """Compile a function, as `compiled` does, that makes no array: it fills those that it is handed.
+
+    Nothing in it then needs its references counted, which would be a third of the loop's own time: each
+    array in a tuple is counted up and down, with a locked instruction, wherever the tuple is handed on.
+    """
+    return _compiled(function, _nrt=False)
+
+
+def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
+    """The machine code of a compiled function for arguments of given types, to be called with such alone.
+
+    Numba looks at the type of every argument at every call, 8 µs for the many arrays of a loop. What is
+    returned does not look: with other types it would read memory that is not there.
+    """
+    if not isinstance(function, Dispatcher):
+        return uncompiled(function)
+    entry: Callable[..., Any] = function.compile(tuple(map(numba.typeof, arguments)))
+    return entry
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -72,8 +90,16 @@ def _callback(signature: Any, function: Callable[..., Any]) -> CFunc:
 
 
 def compilable(function: Callable[..., Any]) -> Any:
-    """Leave a function to Python, and let compiled code that calls it compile it, as `compiled` does.
+    """Leave a function to Python, and let compiled code that calls it compile it, as `allocation_free` does.
 
     For what calls functions of its users: in the uncompiled loop these are plain Python.
     """
-    return register_jitable(**_OPTIONS)(function)
+    return register_jitable(_nrt=False, **_OPTIONS)(function)
+
+
+def _compiled(function: Callable[..., Any], **more: Any) -> Any:
+    if not COMPILES:
+        return function
+    dispatcher = numba.njit(nogil=True, **_OPTIONS, **more)(function)
+    dispatcher._cache = MachineCode(function, "function")  # as its `enable_caching` does with numba's own
+    return dispatcher

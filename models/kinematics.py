@@ -9,7 +9,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free, compiled
 
 Row = tuple[float, float, float]
 
@@ -38,7 +38,7 @@ def rotation(q: NDArray[np.float64]) -> NDArray[np.float64]:
     return R_SR
 
 
-@compiled
+@allocation_free
 def rotation_rows(q: NDArray[np.float64]) -> tuple[Row, Row, Row]:
     """Rows of `rotation` as tuples: allocating an array would be a third of a torque matrix's time."""
     ca, sa = cos(q[0]), sin(q[0])
@@ -96,7 +96,7 @@ def rotor_rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
     return B
 
 
-@compiled
+@allocation_free
 def cartesian_torque(
     q: NDArray[np.float64], torque_q: NDArray[np.float64], torque_S: NDArray[np.float64]
 ) -> None:

@@ -186,10 +186,10 @@ def plant_of(scenario: Scenario, actuator: Actuator, stepped: Stepped, kept: Kep
     )
 
 
-def kept_matrices(groups: int, shared: bool) -> tuple[KeptMatrix, KeptMatrix]:
+def kept_matrices(nominal: TorqueModel, true: TorqueModel) -> tuple[KeptMatrix, KeptMatrix]:
     """Kept torque matrices of controller and plant: one and the same only where both have one model."""
-    nominal = kept_matrix(groups)
-    return nominal, nominal if shared else kept_matrix(groups)
+    kept = kept_matrix(nominal)
+    return kept, kept if nominal is true else kept_matrix(true)
 
 
 def rotor_of(scenario: Scenario, actuator: Actuator) -> AnyRotor:

@@ -7,7 +7,7 @@ what they do not concern.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ class Exogenous:
         self._generator = np.random.default_rng(scenario.seed)
         self._before: dict[str, Any] = self._generator.bit_generator.state
         self._first = -BLOCK_TICKS  # tick at which the present block begins
+        self._numbers = BLOCK_TICKS  # rows of it that are numbers
         self._draws: NDArray[np.float64] = np.empty(0)
         self.scenario = scenario
 
@@ -61,11 +62,17 @@ class Exogenous:
         if self._block is None:
             ticks = np.arange(self._first, self._first + BLOCK_TICKS, dtype=np.float64)
             self._block = self._sampled(ticks, self._draws)
+            self._numbers = (
+                BLOCK_TICKS if _finite(self._block).all() else int(np.argmin(_finite(self._block)))
+            )
         first = tick - self._first
-        rows = slice(first, min(first + most, BLOCK_TICKS))
-        block = Inputs(*(values[rows] for values in self._block))
-        self._check(block)
-        return block
+        last = min(first + most, BLOCK_TICKS)
+        t, reference, disturbance = self._block
+        if last > self._numbers:
+            if first >= self._numbers:
+                self._refuse(self._block, first)
+            last = self._numbers
+        return Inputs(t[first:last], reference[first:last], disturbance[first:last])
 
     def check_horizon(self, tick: int) -> None:
         """Refuse before a run what would only be found out at its end.
@@ -75,7 +82,9 @@ class Exogenous:
         InputError
             Reference or disturbance is beyond what a number can hold at a tick to come.
         """
-        self._check(self._sampled(np.array([tick], dtype=np.float64), np.ones(1)))
+        end = self._sampled(np.array([tick], dtype=np.float64), np.ones(1))
+        if not _finite(end).all():
+            self._refuse(end, 0)
 
     def state(self) -> dict[str, Any]:
         """The random stream where the present block begins, and that tick."""
@@ -95,11 +104,15 @@ class Exogenous:
         reference = np.ascontiguousarray(scenario.trajectory.sample(t))
         return Inputs(t, reference, scenario.disturbance.sample(t, draws))
 
-    def _check(self, rows: Inputs) -> None:
-        for name, samples in (("trajectory", rows.reference), ("disturbance", rows.disturbance)):
-            lost = np.flatnonzero(~np.isfinite(samples.reshape(len(rows.t), -1)).all(axis=1))
-            if len(lost):
-                raise InputError(
-                    f"scenario {self._scenario.name}: expected a finite {name},"
-                    f" received infinity at {rows.t[lost[0]]:g} s"
-                )
+    def _refuse(self, rows: Inputs, row: int) -> NoReturn:
+        name = "disturbance" if np.isfinite(rows.reference[row]).all() else "trajectory"
+        raise InputError(
+            f"scenario {self._scenario.name}: expected a finite {name},"
+            f" received infinity at {rows.t[row]:g} s"
+        )
+
+
+def _finite(rows: Inputs) -> NDArray[np.bool_]:
+    """Whether each row holds numbers alone."""
+    reference = np.isfinite(rows.reference).all(axis=(1, 2))
+    return reference & np.isfinite(rows.disturbance).all(axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.controller import LOST, control_tick
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free
 from spheretwin.models.telemetry import SIGNALS, offsets
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, plant_tick
 from spheretwin.twin.sensors import measure
@@ -35,8 +35,15 @@ class Columns(NamedTuple):
     of_the_law: int
 
 
-@compiled
-def loop(inputs, law, allocate, controller, sensors, plant, columns, log):  # type: ignore[no-untyped-def]
+class Scratch(NamedTuple):
+    """Working space."""
+
+    reference: NDArray[np.float64]  # (3, 3), what the law is handed
+    measurement: NDArray[np.float64]  # (2, 3)
+
+
+@allocation_free
+def loop(inputs, law, allocate, controller, sensors, plant, columns, scratch, log):  # type: ignore[no-untyped-def]
     """Run one control tick for each row of `log`.
 
     Parameters
@@ -50,6 +57,8 @@ def loop(inputs, law, allocate, controller, sensors, plant, columns, log):  # ty
     sensors : Sensors
     plant : Plant
     columns : Columns
+    scratch : Scratch
+        What it holds does not matter.
     log : (ticks, width) array
         Telemetry; rows are written as they happen.
 
@@ -58,7 +67,7 @@ def loop(inputs, law, allocate, controller, sensors, plant, columns, log):  # ty
     tuple of int
         Rows written, and `GOING`, `LEFT_WORKSPACE` or `DIVERGED`.
     """
-    reference, measurement = np.empty((3, 3)), np.empty((2, 3))
+    reference, measurement = scratch.reference, scratch.measurement
     groups = plant.current.shape[0]
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
@@ -84,7 +93,7 @@ def loop(inputs, law, allocate, controller, sensors, plant, columns, log):  # ty
     return log.shape[0], GOING
 
 
-@compiled
+@allocation_free
 def write_motion(row, t, reference, q, qdot, disturbance):  # type: ignore[no-untyped-def]
     """Write the part of a telemetry row that says where the rotor is and should be."""
     row[TIME] = t
@@ -94,14 +103,14 @@ def write_motion(row, t, reference, q, qdot, disturbance):  # type: ignore[no-un
         row[ERROR + i], row[DISTURBANCE + i] = q[i] - reference[0, i], disturbance[i]
 
 
-@compiled
+@allocation_free
 def put(row: NDArray[np.float64], first: int, values: NDArray[np.float64], count: int) -> None:
     """Copy leading values into a row; a slice would be checked for overlap, at twice the time."""
     for i in range(count):
         row[first + i] = values[i]
 
 
-@compiled
+@allocation_free
 def copy_matrix(source: NDArray[np.float64], target: NDArray[np.float64]) -> None:
     """Copy a matrix of three columns."""
     for i in range(source.shape[0]):

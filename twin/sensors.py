@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free
 
 
 class Sensors(NamedTuple):
@@ -20,7 +20,7 @@ def sensors(offset_rad: tuple[float, float, float]) -> Sensors:
     return Sensors(np.array(offset_rad), not any(offset_rad))
 
 
-@compiled
+@allocation_free
 def measure(
     sensors: Sensors,
     q: NDArray[np.float64],

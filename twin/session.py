@@ -21,7 +21,7 @@ from spheretwin.control import law as laws
 from spheretwin.control.allocations import ALLOCATIONS
 from spheretwin.control.law import Law
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.compiled import compiled_callback, uncompiled
+from spheretwin.models.compiled import compiled_callback, for_types_of, uncompiled
 from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry import Signal, Table, width
 from spheretwin.twin import assembly, trajectory
@@ -117,6 +117,7 @@ class Session:
     def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
         self._busy = threading.Lock()
         self._closed = False
+        self._scratch = loops.Scratch(np.empty((3, 3)), np.empty((2, 3)))
         self._own_law = law
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
@@ -127,7 +128,7 @@ class Session:
         self._build_rotor()
         self._build_controller()
         self._build_plant()
-        self._warm_up()
+        self._connect()
 
     @property
     def status(self) -> str:
@@ -168,7 +169,19 @@ class Session:
         return Table(self._signals, log[: self.advance_into(log)])
 
     def advance_into(self, log: NDArray[np.float64]) -> int:
-        """Run a control tick for each row of an array of the caller's; returns how many were run."""
+        """Run a control tick for each row of an array of the caller's; returns how many were run.
+
+        Raises
+        ------
+        InputError
+            The array does not have the columns of the telemetry as rows of contiguous float64.
+        """
+        fits = log.ndim == 2 and log.shape[1] == self._columns and log.flags.c_contiguous
+        if not (fits and log.dtype == np.float64 and log.flags.writeable):
+            raise InputError(
+                f"session: expected contiguous rows of {self._columns} float64, received {log.dtype}"
+                f" of shape {log.shape}"
+            )
         with self._alone():
             return self._advance(log)
 
@@ -285,7 +298,7 @@ class Session:
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> int:
         started = time.perf_counter()
         try:
-            ticks, code = self._call(inputs, log)
+            ticks, code = self._loop(inputs, *self._parts, log)
         except BaseException:  # a law in plain Python: the state is somewhere within a tick
             self._status = STATUS[DIVERGED]
             raise
@@ -295,19 +308,6 @@ class Session:
             code = DIVERGED
         self._status = STATUS[code]
         return ticks
-
-    def _call(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
-        functions = self._functions
-        return functions.loop(
-            inputs,
-            functions.law,
-            functions.allocate,
-            self._controller,
-            self._sensors,
-            self._plant,
-            self._places,
-            log,
-        )
 
     def _resolved(self, scenario: Scenario) -> Scenario:
         model = assembly.model_of(scenario.plant)
@@ -325,8 +325,7 @@ class Session:
         self._signals = assembly.signals_of(scenario, self.law)
         self._columns, self._places = width(self._signals), assembly.columns_of(scenario, self.law)
         magnetics = assembly.nominal_magnetics(scenario)
-        shared = magnetics is assembly.true_magnetics(scenario)
-        self._kept = assembly.kept_matrices(len(self.actuator.groups), shared)
+        self._kept = assembly.kept_matrices(magnetics, assembly.true_magnetics(scenario))
         self._controller = assembly.controller_of(scenario, self.law, magnetics, self._kept[0])
         self._sensors = assembly.sensors_of(scenario)
         self._functions = _matching(self.law, ALLOCATIONS[scenario.allocation])
@@ -334,9 +333,20 @@ class Session:
     def _build_plant(self) -> None:
         self._plant = assembly.plant_of(self.scenario, self.actuator, self._stepped, self._kept[1])
 
-    def _warm_up(self) -> None:
-        """Compile, or load, the loop for these parts: no clock around a chunk should see it."""
-        self._call(self._exogenous.rows(self.tick, 1), np.empty((0, self._columns)))
+    def _connect(self) -> None:
+        """Put the parts into the order of the loop; compile it, or load it, for their types."""
+        functions = self._functions
+        self._parts = (
+            functions.law,
+            functions.allocate,
+            self._controller,
+            self._sensors,
+            self._plant,
+            self._places,
+            self._scratch,
+        )
+        inputs, log = self._exogenous.rows(self.tick, 1), np.empty((0, self._columns))
+        self._loop = for_types_of(functions.loop, inputs, *self._parts, log)
 
     def _change(self, name: str, value: Any, own: Law | None) -> None:
         before = self._own_law
@@ -371,7 +381,7 @@ class Session:
             self._controller.memory[:] = memory
         self._build_plant()
         self._plant.current[:] = current
-        self._warm_up()
+        self._connect()
 
     def _restore(self, snapshot: Snapshot) -> None:
         self.actuator = assembly.actuator_of(snapshot.scenario.plant)
@@ -391,7 +401,7 @@ class Session:
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
         self._exogenous = Exogenous(self.scenario)
         self._exogenous.restore(snapshot.exogenous)
-        self._warm_up()
+        self._connect()
 
 
 class _Functions(NamedTuple):

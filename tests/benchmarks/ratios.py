@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import mujoco
@@ -23,7 +24,7 @@ from spheretwin.control.bounded_allocation import SCRATCH_ROWS, allocate_bounded
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.compiled import compiled
-from spheretwin.models.magnetics import fill_torque_matrix, torque_matrix, torque_model
+from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.session import Session
@@ -32,6 +33,8 @@ from spheretwin.viz.recording import Recorder
 
 SCENARIO = "nutation"
 PLAIN_TICKS = 500
+FEW_TICKS = 900  # within one block of what comes from outside
+SESSIONS = 8
 
 
 def fastest(measures: dict[str, Callable[[], float]], rounds: int) -> dict[str, float]:
@@ -55,6 +58,52 @@ def loop_seconds() -> float:
     """Loop time of one physics step, s."""
     run = simulate(scenarios.load(SCENARIO))
     return run.wall_s / (len(run.telemetry) * run.scenario.substeps)
+
+
+def lagrangian_seconds() -> float:
+    """Loop time of one physics step on the Lagrangian, s."""
+    run = simulate(scenarios.load(SCENARIO, {"plant.engine": "lagrangian"}))
+    return run.wall_s / (len(run.telemetry) * run.scenario.substeps)
+
+
+def single_tick_seconds() -> float:
+    """Time of one tick in a session that is advanced tick by tick, s."""
+    with Session(scenarios.load(SCENARIO)) as session:
+        return seconds_of(lambda: [session.advance(1) for _ in range(FEW_TICKS)]) / FEW_TICKS
+
+
+def tick_seconds() -> float:
+    """Time of one tick in a session that is advanced by as many at once, s."""
+    with Session(scenarios.load(SCENARIO)) as session:
+        return seconds_of(lambda: session.advance(FEW_TICKS)) / FEW_TICKS
+
+
+def set_up_seconds() -> float:
+    """Time until a session is ready, s."""
+    scenario = scenarios.load(SCENARIO)
+    return seconds_of(lambda: Session(scenario))
+
+
+def brief_run_seconds() -> float:
+    """Time of a whole run of one second, s."""
+    scenario = scenarios.load(SCENARIO, {"duration": 1.0})
+    return seconds_of(lambda: simulate(scenario))
+
+
+def brief_loop_seconds() -> float:
+    """Loop time of a run of one second, s."""
+    return simulate(scenarios.load(SCENARIO, {"duration": 1.0})).wall_s
+
+
+def threads_seconds(threads: int) -> Callable[[], float]:
+    """Time of some prepared sessions on some threads, s."""
+
+    def work() -> float:
+        sessions = [Session(scenarios.load(SCENARIO)) for _ in range(SESSIONS)]
+        with ThreadPoolExecutor(threads) as pool:
+            return seconds_of(lambda: list(pool.map(lambda session: session.advance(2000), sessions)))
+
+    return work
 
 
 def bare_seconds() -> float:
@@ -81,7 +130,7 @@ def plain_seconds() -> float:
 def torque_matrix_seconds() -> float:
     """Time of one torque matrix, s."""
     model, calls = torque_model(actuators.load()), 100_000
-    q, G, scratch = np.array([0.1, 0.2, 0.3]), np.empty((3, 18)), np.empty((2, 18))
+    q, G, scratch = np.array([0.1, 0.2, 0.3]), np.empty((3, 18)), scratch_of(model)
     _repeat(1, q, model, G, scratch)
     return seconds_of(lambda: _repeat(calls, q, model, G, scratch)) / calls
 
@@ -166,19 +215,41 @@ def ratios() -> list[dict[str, object]]:
             },
             rounds=5,
         )
-    parts = {"G_t": torque_matrix_seconds, "bounded": bounded_seconds}
-    inner = fastest({"loop": loop_seconds, "bare": bare_seconds, **parts}, rounds=9)
+    inner = fastest(
+        {
+            "loop": loop_seconds,
+            "bare": bare_seconds,
+            "lagrangian": lagrangian_seconds,
+            "G_t": torque_matrix_seconds,
+            "bounded": bounded_seconds,
+            "single": single_tick_seconds,
+            "tick": tick_seconds,
+            "set-up": set_up_seconds,
+            "brief run": brief_run_seconds,
+            "brief loop": brief_loop_seconds,
+        },
+        rounds=9,
+    )
+    threads = fastest({"one": threads_seconds(1), "two": threads_seconds(2)}, rounds=5)
     outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
+    bare, loop = inner["bare"], inner["loop"]
     return [
-        _row("closed loop over bare mj_step, a physics step", inner["loop"], inner["bare"], at_most=1.25),
+        _row("closed loop over bare mj_step, a physics step", loop, bare, at_most=1.25),
+        _row("loop on the Lagrangian over that on MuJoCo", inner["lagrangian"], loop, at_most=0.2),
         _row("plain Python loop over ours, a physics step", outer["plain"], outer["loop"], at_least=15),
+        _row("session ready, in bare mj_steps", inner["set-up"], bare, at_most=600),
+        _row(
+            "advance(1) beyond its tick, in bare mj_steps", inner["single"] - inner["tick"], bare, at_most=3
+        ),
+        _row("a run of one second over its loop", inner["brief run"], inner["brief loop"], at_most=1.35),
+        _row("one thread over two, prepared sessions", threads["one"], threads["two"], at_least=1.7),
         _row("run that records over one that does not", runs["recorded"], runs["silent"], at_most=1.3),
         _row("warm command with --record over without", processes["recorded"], processes["silent"]),
         _row(
             "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2
         ),
-        _row("one torque matrix over bare mj_step", inner["G_t"], inner["bare"]),
-        _row("one bounded allocation at the limit over bare mj_step", inner["bounded"], inner["bare"]),
+        _row("one torque matrix over bare mj_step", inner["G_t"], bare),
+        _row("one bounded allocation at the limit over bare mj_step", inner["bounded"], bare),
     ]
 
 

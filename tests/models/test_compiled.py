@@ -75,7 +75,7 @@ def package(tmp_path):
     models = tmp_path / "spheretwin" / "models"
     models.mkdir(parents=True)
     (models / "__init__.py").write_text("")
-    for name in ("cache.py", "compiled.py", "errors.py", "files.py", "machine_code.py"):
+    for name in ("cache.py", "compiled.py", "errors.py", "wording.py", "files.py", "machine_code.py"):
         shutil.copy(SOURCE / name, models)
     (models / "callee.py").write_text(
         "from spheretwin.models.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"

@@ -16,6 +16,7 @@ import numpy as np
 
 from spheretwin.models.errors import InputError
 from spheretwin.models.files import check_writable
+from spheretwin.models.mujoco_library import timers_stopped
 from spheretwin.models.telemetry_file import TelemetryFile
 from spheretwin.twin import flags, metrics, replay
 from spheretwin.twin import scenario as scenarios
@@ -73,7 +74,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         progress = Progress(plan.scenario.name, plan.ticks)
         file = _telemetry_file(session, options)
         recorders = [stack.enter_context(_recorder(session, options))] if _records(options) else []
-        with progress:
+        with progress, timers_stopped():
             status = follow(
                 session,
                 plan.ticks,

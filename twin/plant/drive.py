@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free
 
 
 class Drive(NamedTuple):
@@ -28,7 +28,7 @@ def drive(time_constant_s: float, step_s: float, current_limit_A: float) -> Driv
     return Drive(exp(-steps), -expm1(-steps) / steps, current_limit_A)
 
 
-@compiled
+@allocation_free
 def advance(
     drive: Drive,
     command: NDArray[np.float64],

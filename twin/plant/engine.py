@@ -79,6 +79,7 @@ class Rotor:
             self.model.body_ipos[payload] = 0.0  # the compiler leaves it elsewhere for a body without mass
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
+        self._counts = self.data.warning.number  # a view
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Engine:
         """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""
@@ -106,11 +107,11 @@ class Rotor:
     def warnings(self) -> list[str]:
         """Names of the warnings that MuJoCo has counted since the start."""
         kinds = mujoco.mjtWarning
-        return [kinds(i).name for i in range(kinds.mjNWARNING) if self.data.warning[i].number > 0]
+        return [kinds(i).name for i in range(kinds.mjNWARNING) if self._counts[i] > 0]
 
     def warned(self) -> bool:
         """Whether there are any."""
-        return bool(self.data.warning.number.any())
+        return bool(self._counts.any())
 
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free
 from spheretwin.models.errors import InputError
 from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia, triple, turns
 
@@ -72,7 +72,7 @@ def friction(
     return Friction(coulomb, viscous, float(smoothing_rate_rad_s), moments, float(step_s), acts)
 
 
-@compiled
+@allocation_free
 def friction_torque(
     friction: Friction,
     q: NDArray[np.float64],
@@ -128,7 +128,7 @@ def friction_torque(
         torque_q[i] = -k[i] * v[i]
 
 
-@compiled
+@allocation_free
 def _factor(friction: Friction, qdot: NDArray[np.float64], hinge: int) -> float:
     """Friction of a hinge over its rate, N·m·s."""
     rate, smoothing = qdot[hinge], friction.smoothing_rate_rad_s

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.compiled import compiled
+from spheretwin.models.compiled import allocation_free
 from spheretwin.models.errors import InputError
 from spheretwin.models.lagrangian import (
     GRAVITY_m_s2,
@@ -104,7 +104,7 @@ class LagrangianRotor:
         return False
 
 
-@compiled
+@allocation_free
 def step(plant: Equations) -> None:
     """One physics step of the classical Runge-Kutta method of order four.
 
@@ -126,7 +126,7 @@ def step(plant: Equations) -> None:
         plant.qdot[i] = v1[i] + h / 6 * (a1[i] + 2 * a2[i] + 2 * a3[i] + a4[i])
 
 
-@compiled
+@allocation_free
 def _acceleration(plant: Equations, q: Triple, qdot: Triple) -> Triple:
     at = turns(q)
     S, hinges = plant.torque_S, plant.torque_q
@@ -138,6 +138,6 @@ def _acceleration(plant: Equations, q: Triple, qdot: Triple) -> Triple:
     return acceleration_entries(at, qdot, torque, triple(plant.inertia), plant.weight_moment)
 
 
-@compiled
+@allocation_free
 def _moved(start: Triple, time: float, rate: Triple) -> Triple:
     return start[0] + time * rate[0], start[1] + time * rate[1], start[2] + time * rate[2]

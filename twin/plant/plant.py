@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import compiled
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, rotor_torque, torque_matrix_at
+from spheretwin.models.compiled import allocation_free
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
 from spheretwin.twin.plant.drive import Drive, advance
 from spheretwin.twin.plant.friction import Friction, friction_torque
 from spheretwin.twin.plant.stepping import Stepped, step
@@ -76,7 +76,7 @@ def plant(
     )
 
 
-@compiled
+@allocation_free
 def plant_tick(
     plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: Delivered
 ) -> int:
@@ -100,36 +100,44 @@ def plant_tick(
     int
         `GOING`, `LEFT_WORKSPACE` or `DIVERGED`.
     """
-    rotor = plant.rotor
+    # Taken out of the tuple once: each time costs a count of references.
+    rotor, magnetics, kept, drive = plant.rotor, plant.magnetics, plant.kept, plant.drive
+    q, qdot, torque_S, torque_q = rotor.q, rotor.qdot, rotor.torque_S, rotor.torque_q
+    current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
+    gain, unmodelled, friction, friction_q = (
+        plant.group_gain,
+        plant.unmodelled_torque,
+        plant.friction,
+        plant.friction_q,
+    )
     for substep in range(plant.substeps):
-        G = torque_matrix_at(rotor.q, plant.magnetics, plant.kept)
-        advance(plant.drive, command, plant.current, plant.mean_current)
-        for j in range(plant.pulling.shape[0]):
-            plant.pulling[j] = plant.group_gain[j] * plant.mean_current[j]
-        rotor_torque(G, plant.pulling, rotor.torque_S)
+        keep_torque_matrix(q, magnetics, kept)
+        advance(drive, command, current, mean_current)
+        for j in range(pulling.shape[0]):
+            pulling[j] = gain[j] * mean_current[j]
+        rotor_torque(kept.G, pulling, torque_S)
         for i in range(3):
-            rotor.torque_q[i] = -disturbance[i] - plant.unmodelled_torque[i]
-        if plant.friction.acts:
-            friction_torque(plant.friction, rotor.q, rotor.qdot, plant.friction_q)
+            torque_q[i] = -disturbance[i] - unmodelled[i]
+        if friction.acts:
+            friction_torque(friction, q, qdot, friction_q)
             for i in range(3):
-                rotor.torque_q[i] += plant.friction_q[i]
+                torque_q[i] += friction_q[i]
         if substep == 0:
-            keep(delivered, plant)
+            put(mean_current, delivered.current)
+            put(torque_S, delivered.torque_S)
+            put(friction_q, delivered.friction_q)
         step(rotor)
         for i in range(3):
-            if not abs(rotor.qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
+            if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
                 return DIVERGED
     for i in range(3):
-        if not plant.hinge_range[i, 0] <= rotor.q[i] <= plant.hinge_range[i, 1]:
+        if not plant.hinge_range[i, 0] <= q[i] <= plant.hinge_range[i, 1]:
             return LEFT_WORKSPACE
     return GOING
 
 
-@compiled
-def keep(delivered: Delivered, plant: Plant) -> None:
-    """Copy what acts; a slice would be checked for overlap, at twice the time."""
-    for j in range(plant.mean_current.shape[0]):
-        delivered.current[j] = plant.mean_current[j]
-    for i in range(3):
-        delivered.torque_S[i] = plant.rotor.torque_S[i]
-        delivered.friction_q[i] = plant.friction_q[i]
+@allocation_free
+def put(values: NDArray[np.float64], target: NDArray[np.float64]) -> None:
+    """Copy; a slice would be checked for overlap, at twice the time."""
+    for j in range(target.shape[0]):
+        target[j] = values[j]
