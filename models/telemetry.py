@@ -227,7 +227,8 @@ def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str
     import pyarrow.parquet
 
     try:
-        arrow = pyarrow.parquet.read_table(path) if rows else pyarrow.parquet.read_schema(path).empty_table()
+        with pyarrow.parquet.ParquetFile(path) as file:  # `read_table` would import the datasets of Arrow
+            arrow = file.read(use_threads=False) if rows else file.schema_arrow.empty_table()
         signals = tuple(_signal(field) for field in arrow.schema)
     except (OSError, pa.ArrowException, KeyError) as error:
         raise InputError(

@@ -17,8 +17,8 @@ from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.files import check_writable, whole_file
 from spheretwin.models.telemetry import PARQUET_FORMAT, Signal, Table, read_parquet, width
 
-# Rows of a part, and of a row group of the file: half a minute at 1 kHz, some 25 MB in memory.
-PART_ROWS = 32_768
+# Rows of a part, and of a row group of the file: four seconds at 1 kHz, some 3 MB in memory.
+PART_ROWS = 4096
 
 
 class TelemetryFile:

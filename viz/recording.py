@@ -33,7 +33,10 @@ FRAME_RATE_Hz = 60.0
 
 # Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
 # does not gather in memory.
-PENDING_CHUNKS = 16
+PENDING_CHUNKS = 4
+
+# Rerun keeps some bytes of each chunk to the end of a recording. Chunks therefore grow with it, up to this.
+MOST_ROWS = 8192
 
 _SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
 
@@ -86,7 +89,8 @@ class Recorder:
         scene.read_model(self._mjcf)  # a run needs no mesh, and would find out only now that one is missing
         self._path = path
         self._events = Events()
-        self._next_frame = 0
+        self._next_frame = self._handed_over = 0
+        self._waiting: list[Table] = []
         self._last_tips: dict[str, NDArray[np.float64]] = {}
         self._recording = rr.RecordingStream(APPLICATION)
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
@@ -126,11 +130,18 @@ class Recorder:
 
     def write(self, rows: Table) -> None:
         """Record the rows of one chunk, which must not change any more; wait while many are pending."""
-        if len(rows):
-            self._submit(self._write, rows)
+        if not len(rows):
+            return
+        if self._waiting and rows.signals != self._waiting[-1].signals:
+            self._hand_over()
+        self._waiting.append(rows)
+        due = 0 if self.viewer else min(self._handed_over // 4, MOST_ROWS)
+        if sum(map(len, self._waiting)) >= due:
+            self._hand_over()
 
     def finish(self, status: str) -> None:
         """Record how the run ended."""
+        self._hand_over()
         self._submit(lambda: self._log([self._events.end(status)]))
 
     def close(self) -> None:
@@ -141,6 +152,7 @@ class Recorder:
         SpheretwinError
             Some of the recording could not be made or written; what there is of it keeps ``.part``.
         """
+        self._hand_over()
         self._submit(self._recording.flush)
         self._worker.shutdown()
         self._recording.disconnect()
@@ -159,6 +171,15 @@ class Recorder:
             raise SpheretwinError(f"recording: live view: {self._fault}")
         if self._output:
             self._output.keep()
+
+    def _hand_over(self) -> None:
+        """Give what is waiting to the worker as one chunk."""
+        if not self._waiting:
+            return
+        waiting, self._waiting = self._waiting, []
+        rows = Table(waiting[0].signals, np.concatenate([table.values for table in waiting]))
+        self._handed_over += len(rows)
+        self._submit(self._write, rows)
 
     def _submit(self, work: Callable[..., None], *arguments: Any) -> None:
         self._room.acquire()

@@ -10,25 +10,22 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from spheretwin.models.errors import InputError
-from spheretwin.models.files import check_writable
+from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.mujoco_library import timers_stopped
-from spheretwin.models.telemetry_file import TelemetryFile
 from spheretwin.twin import flags, metrics, replay
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.commands import outputs
+from spheretwin.twin.commands.outputs import Outputs
 from spheretwin.twin.metrics import Figures
 from spheretwin.twin.replay import Plan
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import COMPLETED, follow
 from spheretwin.viz import tables
 from spheretwin.viz.progress import Progress
-
-if TYPE_CHECKING:
-    from spheretwin.viz.recording import Recorder
 
 EXAMPLE = "nutation"
 
@@ -66,31 +63,29 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         tables.print_fields(scenario.name, flags.described(scenario))
         return True
     plan = _planned(options, rest)
-    _check_outputs([path for path in (options.record, options.telemetry) if path])
-    with contextlib.ExitStack() as stack:
-        stop_requested = stack.enter_context(_interruptible())
-        session = stack.enter_context(Session(plan.scenario))
-        figures = Figures(plan.ticks)
-        progress = Progress(plan.scenario.name, plan.ticks)
-        file = _telemetry_file(session, options)
-        recorders = [stack.enter_context(_recorder(session, options))] if _records(options) else []
-        with progress, timers_stopped():
-            status = follow(
-                session,
-                plan.ticks,
-                [progress, figures, *([file] if file else []), *recorders],
-                journal=plan.journal,
-                live=options.live,
-                stop_requested=stop_requested,
-            )
-        _report(session, plan, status, figures, options)
-        if file:
-            file.close(replay.facts(session))
-        if options.live and sys.stderr.isatty():
-            print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
-            while not stop_requested():
-                time.sleep(0.1)
-    return status == COMPLETED
+    outputs.check([path for path in (options.record, options.telemetry) if path])
+    with _interruptible() as stop_requested, Session(plan.scenario) as session:
+        figures, progress = Figures(plan.ticks), Progress(plan.scenario.name, plan.ticks)
+        files = Outputs(session, options.record, options.telemetry, options.live)
+        try:
+            with progress, timers_stopped():
+                status = follow(
+                    session,
+                    plan.ticks,
+                    [progress, figures, *files.sinks],
+                    journal=plan.journal,
+                    live=options.live,
+                    stop_requested=stop_requested,
+                )
+            _report(session, plan, status, figures, options.json)
+            if options.live and sys.stderr.isatty():
+                print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
+                while not stop_requested():
+                    time.sleep(0.1)
+        finally:
+            faults = files.close()
+            _report_files(files, faults, options.json)
+    return status == COMPLETED and not faults
 
 
 def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
@@ -110,38 +105,25 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
     return Plan(scenario, scenario.ticks, ())
 
 
-def _records(options: argparse.Namespace) -> bool:
-    return bool(options.record or options.live)
-
-
-def _telemetry_file(session: Session, options: argparse.Namespace) -> TelemetryFile | None:
-    if not options.telemetry:
-        return None
-    return TelemetryFile(options.telemetry, session.signals, replay.facts(session))
-
-
-def _recorder(session: Session, options: argparse.Namespace) -> Recorder:
-    from spheretwin.viz.recording import Recorder  # Rerun is slow to import
-
-    scenario = session.begun_as.model_dump(mode="json")
-    recorder = Recorder(session.actuator, session.signals, scenario, path=options.record, live=options.live)
-    if recorder.viewer:
-        print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
-    return recorder
-
-
-def _report(session: Session, plan: Plan, status: str, figures: Figures, options: argparse.Namespace) -> None:
+def _report(session: Session, plan: Plan, status: str, figures: Figures, as_json: bool) -> None:
     """Print the figures, and how the run ended where it did not complete."""
     scenario = session.begun_as
     summary = metrics.summary(scenario, status, figures, session.tick, session.loop_s, session.warnings())
-    if options.json:
+    if as_json:
         print(json.dumps(summary, allow_nan=False), flush=True)
     else:
         tables.print_run(scenario.name, scenario.controller.law, summary)
-        tables.print_files(options.record, options.telemetry)
     if status != COMPLETED:
         planned_s = plan.ticks * scenario.controller.period_s
         print(f"spheretwin: {_ending(session, status, planned_s)}", file=sys.stderr, flush=True)
+
+
+def _report_files(files: Outputs, faults: Sequence[SpheretwinError], as_json: bool) -> None:
+    """Print where the files are that were written whole, and why others were not."""
+    if not as_json:
+        tables.print_files(files.record, files.telemetry)
+    for fault in faults:
+        print(f"spheretwin: {fault}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
@@ -159,14 +141,6 @@ def _interruptible() -> Iterator[Callable[[], bool]]:
 _ENDINGS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 ]
-
-
-def _check_outputs(paths: Sequence[Path]) -> None:
-    """Find out before the run whether its files can be written."""
-    for path in paths:
-        check_writable(path)
-    if len({path.resolve() for path in paths}) < len(paths):
-        raise InputError(f"output: expected a path of its own for each file, received {paths[0]} twice")
 
 
 def _ending(session: Session, status: str, planned_s: float) -> str:

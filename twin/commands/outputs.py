@@ -1,0 +1,93 @@
+"""Files and live view of a run: opened before it, closed after it, each whatever becomes of the other."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from spheretwin.models.errors import InputError, SpheretwinError
+from spheretwin.models.files import check_writable
+from spheretwin.models.telemetry_file import TelemetryFile
+from spheretwin.twin import replay
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import Sink
+
+if TYPE_CHECKING:
+    from spheretwin.viz.recording import Recorder
+
+
+def check(paths: list[Path]) -> None:
+    """Find out before a run whether its files can be written.
+
+    Raises
+    ------
+    InputError
+        One cannot, or two are one.
+    """
+    for path in paths:
+        check_writable(path)
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise InputError(f"output: expected a path of its own for each file, received {paths[0]} twice")
+
+
+class Outputs:
+    """What follows a session into files and into a viewer.
+
+    Parameters
+    ----------
+    session : Session
+        Before its first tick.
+    record, telemetry : Path, optional
+        Files to write.
+    live : bool
+        Serve a viewer on 127.0.0.1.
+
+    Attributes
+    ----------
+    record, telemetry : Path or None
+        Files that were written whole, once they are closed.
+
+    Raises
+    ------
+    InputError
+        A file cannot be made, or the model cannot be drawn; nothing is left behind.
+    """
+
+    def __init__(self, session: Session, record: Path | None, telemetry: Path | None, live: bool) -> None:
+        self._session = session
+        self.record, self.telemetry = record, telemetry
+        self._recorder = _recorder(session, record, live) if record or live else None
+        self._file = TelemetryFile(telemetry, session.signals, replay.facts(session)) if telemetry else None
+
+    @property
+    def sinks(self) -> list[Sink]:
+        """To be handed the telemetry."""
+        return [sink for sink in (self._file, self._recorder) if sink]
+
+    def close(self) -> list[SpheretwinError]:
+        """Complete every file; returns what went wrong."""
+        faults = []
+        if self._recorder:  # first: its memory is free then
+            try:
+                self._recorder.close()
+            except SpheretwinError as error:
+                faults.append(error)
+                self.record = None
+        if self._file:
+            try:
+                self._file.close(replay.facts(self._session))
+            except SpheretwinError as error:
+                faults.append(error)
+                self.telemetry = None
+        return faults
+
+
+def _recorder(session: Session, path: Path | None, live: bool) -> Recorder:
+    from spheretwin.viz.recording import Recorder  # Rerun is slow to import
+
+    scenario = session.begun_as.model_dump(mode="json")
+    recorder = Recorder(session.actuator, session.signals, scenario, path=path, live=live)
+    if recorder.viewer:
+        print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
+    return recorder
