@@ -8,10 +8,13 @@ referenced, whose inertia it keeps.
 
 from __future__ import annotations
 
+import codecs
 import hashlib
+import html
+import os
 import re
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,12 +65,11 @@ def read(path: Path) -> Mjcf:
         The file is missing or broken; the engine's complaint on one line.
     """
     try:
-        found = path.is_file()
-    except OSError as error:  # a name that no file can have
+        if not path.is_file():
+            raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
+        key = (path.resolve(), _fingerprint(path))
+    except OSError as error:  # a name that no file can have, here or in the file
         raise InputError(f"model: expected an MJCF file, {error}") from None
-    if not found:
-        raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
-    key = (path.resolve(), _fingerprint(path))
     if key not in _KEPT:
         _KEPT[key] = _read(path)
         while len(_KEPT) > MOST_KEPT:
@@ -172,27 +174,44 @@ def _read(path: Path) -> Mjcf:
 
 _NAMED_FILE = re.compile(rb"""\bfile\s*=\s*["']([^"']+)["']""")
 _FOLDERS = re.compile(rb"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)["']""")
+_OTHER_KINDS = (".obj", ".stl", ".msh", ".png", ".ktx", ".skn")
 
 
 def _fingerprint(path: Path) -> str:
     """Digest of a file and its includes, and of when the other files that it names were changed."""
-    digest, waiting, seen = hashlib.sha256(), [path], set()
-    while waiting:
-        source = waiting.pop()
-        if source in seen or not source.is_file():
-            continue
-        seen.add(source)
-        if source.suffix.lower() not in (".xml", ".mjcf", ".urdf"):
-            state = source.stat()
-            digest.update(f"{source} {state.st_mtime_ns} {state.st_size}".encode(errors="surrogateescape"))
-            continue
-        text = source.read_bytes()
-        digest.update(text)
-        folders = [path.parent, source.parent]
-        folders += [folder / _decoded(name) for folder in folders[:1] for name in _FOLDERS.findall(text)]
-        waiting += [folder / _decoded(name) for name in _NAMED_FILE.findall(text) for folder in folders]
+    texts = {path.resolve(): path.read_bytes()}
+    named = _named(path, texts)
+    while includes := {source.resolve() for source in named if _is_xml(source)} - texts.keys():
+        texts |= {source: source.read_bytes() for source in includes}
+        named = _named(path, texts)
+    digest = hashlib.sha256()
+    for source, text in sorted(texts.items()):
+        digest.update(f"{source} {len(text)} ".encode(errors="surrogateescape") + text)
+    for source in sorted(named):
+        state = source.stat()
+        # Copying can keep the time of a change and a size, but neither the inode nor its own time.
+        told = f"{source} {state.st_ino} {state.st_mtime_ns} {state.st_ctime_ns} {state.st_size} "
+        digest.update(told.encode(errors="surrogateescape"))
     return digest.hexdigest()
 
 
+def _named(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:
+    """Files that a model's texts name, wherever the engine may look for them."""
+    names = {_decoded(name) for text in texts.values() for name in _NAMED_FILE.findall(text)}
+    names |= {os.path.basename(name) for name in names}  # strippath
+    folders = {path.parent.resolve(), *(source.parent for source in texts)}
+    below = {_decoded(name) for text in texts.values() for name in _FOLDERS.findall(text)}
+    folders |= {folder / name for folder in folders for name in below}
+    return {source for folder in folders for name in names if (source := folder / name).is_file()}
+
+
+def _is_xml(source: Path) -> bool:
+    """Whether a file is one to look into: an include may end in anything but what meshes and images do."""
+    if source.suffix.lower() in _OTHER_KINDS:
+        return False
+    with source.open("rb") as file:
+        return file.read(64).removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<")
+
+
 def _decoded(name: bytes) -> str:
-    return name.decode("utf-8", errors="surrogateescape")
+    return html.unescape(name.decode("utf-8", errors="surrogateescape"))
