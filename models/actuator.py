@@ -308,11 +308,12 @@ def _check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
             )
     if np.any(model.qpos0):
         raise InputError(f"model: expected hinges without ref, received {np.degrees(model.qpos0)} degrees")
-    payload = model.body_mass[_body(model, "payload")]
-    if payload > 0:
+    payload = _body(model, "payload")
+    mass, inertia = model.body_mass[payload], model.body_inertia[payload].max()
+    if mass > 0 or inertia > 0:
         raise InputError(
             "model: expected an empty payload mount, whose mass a run sets by plant.payload_kg,"
-            f" received {payload:g} kg"
+            f" received {mass:g} kg and {inertia:g} kg·m²"
         )
     rotor = _body(model, "rotor")
     upright = abs(model.body_iquat[rotor][0]) > 1 - COLLINEAR_TOLERANCE

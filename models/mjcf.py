@@ -33,6 +33,9 @@ OTHER_GRAVITY = "gravity other than along -z"
 # The gimbal rings of the shipped model hold 5e-13 of the rotor's inertia: what the engine needs, and no more.
 NEGLIGIBLE = 1e-9
 
+# Quaternions of quarter turns keep 1e-15.
+QUARTER_TURN_TOLERANCE = 1e-12
+
 MOST_KEPT = 8
 
 
@@ -47,7 +50,8 @@ class Mjcf:
     described : MjModel
         With sites: pose of poles, coils, shaft tip.
     bare, loaded : MjModel
-        To be stepped, without and with the body that carries the payload.
+        To be stepped, without and with the body that carries the payload; the same where anything else
+        hangs on that body.
     """
 
     path: Path
@@ -100,7 +104,8 @@ def idle_stages(model: mujoco.MjModel) -> int:
     sensors move nothing.
     """
     holds, bits = _stages(model), mujoco.mjtDisableBit
-    passive = ("tendon", "fluid", "gravity compensation", "plugin", "flex", "plasticity")
+    # An actuator's own damping is not among its forces: it is taken with the joints'.
+    passive = ("tendon", "fluid", "gravity compensation", "actuator", "plugin", "flex", "plasticity")
     needed_by = {
         bits.mjDSBL_CONSTRAINT: ("frictionloss", "equality", "tendon", "contact", "flex", "limit margin"),
         bits.mjDSBL_SPRING: ("stiffness", *passive),
@@ -126,7 +131,7 @@ def _stages(model: mujoco.MjModel) -> dict[str, bool]:
         "limit margin": bool(np.any(model.jnt_margin[limited])),
         "equality": model.neq > 0,
         "tendon": model.ntendon > 0,
-        "actuator": model.nu > 0,
+        "actuator": model.nactuator > 0,
         "contact": not contact_off and bool(touching or model.npair),
         "fluid": bool(model.opt.density or model.opt.viscosity),
         "gravity compensation": model.ngravcomp > 0,
@@ -138,11 +143,13 @@ def _stages(model: mujoco.MjModel) -> dict[str, bool]:
 
 def _other_masses(model: mujoco.MjModel) -> Iterator[str]:
     """Moving bodies, beside rotor and payload, that hold inertia worth naming."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     rotor = model.body(ROTOR).inertia.max() if ROTOR in _body_names(model) else 0.0
     for i, name in enumerate(_body_names(model)):
         moves = model.body_weldid[i] != 0
-        # Rotational inertia about the joint centre, at most.
-        size = model.body_inertia[i].max() + model.body_mass[i] * np.sum(model.body_ipos[i] ** 2)
+        # Rotational inertia about the joint centre, at most; a point mass has none but by its place.
+        size = model.body_inertia[i].max() + model.body_mass[i] * np.sum(data.xipos[i] ** 2)
         if moves and name not in (ROTOR, PAYLOAD) and size > NEGLIGIBLE * rotor:
             yield name or f"number {i}"
 
@@ -155,7 +162,8 @@ def _read(path: Path) -> Mjcf:
     silence_warnings()
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        spec.discard_visual()
+        if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+            spec.discard_visual()  # there it is an error: what is drawn says what is heavy
         described = spec.compile()
         for sensor in list(spec.sensors):
             spec.delete(sensor)
@@ -163,13 +171,50 @@ def _read(path: Path) -> Mjcf:
             for site in list(spec.sites):
                 spec.delete(site)
         loaded = spec.compile()
-        mount = spec.body(PAYLOAD)
-        if mount and not mount.bodies:
-            spec.delete(mount)
-        bare = spec.compile()
     except ValueError as error:
         raise InputError(f"model {path}: expected valid MJCF, {without_breaks(error)}") from None
-    return Mjcf(path, described, bare, loaded)
+    kept = Mjcf(path, described, _without_mount(spec, loaded), loaded)
+    for model in (kept.described, kept.loaded, kept.bare):
+        _turn_principal_axes_back(model)
+    return kept
+
+
+# Whatever can hang on a body, or refer to one.
+_HANGING = ("njnt", "ngeom", "nsite", "ncam", "nlight", "nflex", "nskin", "neq", "nwrap", "nactuator",
+            "npair", "nexclude", "ntupledata", "ngravcomp")  # fmt: skip
+
+
+def _without_mount(spec: mujoco.MjSpec, loaded: mujoco.MjModel) -> mujoco.MjModel:
+    """Model without the body that carries the payload; with it where anything else would go with it.
+
+    Whatever refers to a body that is deleted is deleted too, without a word.
+    """
+    mount = spec.body(PAYLOAD)
+    if not mount or mount.bodies:
+        return loaded
+    spec.delete(mount)
+    try:
+        bare = spec.compile()
+    except ValueError:  # some references are not deleted, and lead nowhere
+        return loaded
+    alone = all(getattr(bare, size) == getattr(loaded, size) for size in _HANGING)
+    return bare if alone else loaded
+
+
+def _turn_principal_axes_back(model: mujoco.MjModel) -> None:
+    """Name the rotor's principal axes as its own where they are these in another order.
+
+    The compiler sorts the principal inertias that it computes, greatest first.
+    """
+    if ROTOR not in _body_names(model):
+        return
+    rotor, R = model.body(ROTOR).id, np.empty(9)
+    mujoco.mju_quat2Mat(R, model.body_iquat[rotor])
+    turned = np.abs(R.reshape(3, 3))
+    order = np.round(turned)
+    if np.allclose(turned, order, rtol=0, atol=QUARTER_TURN_TOLERANCE):
+        model.body_inertia[rotor] = order @ model.body_inertia[rotor]
+        model.body_iquat[rotor] = 1, 0, 0, 0
 
 
 _NAMED_FILE = re.compile(rb"""\bfile\s*=\s*["']([^"']+)["']""")
