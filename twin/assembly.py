@@ -27,10 +27,11 @@ from spheretwin.models.telemetry import (
     Signal,
     width,
 )
+from spheretwin.models.wording import told_apart
 from spheretwin.twin import trajectory
 from spheretwin.twin.loop import Columns
 from spheretwin.twin.plant.drive import drive
-from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.plant.engine import Rotor, integrator_name
 from spheretwin.twin.plant.friction import friction
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
 from spheretwin.twin.plant.plant import Plant, plant
@@ -39,7 +40,10 @@ from spheretwin.twin.scenario import DriveSection, OwnController, Scenario
 from spheretwin.twin.scenario import Plant as PlantSection
 from spheretwin.twin.sensors import Sensors, sensors
 
+# What the engine's compiler takes where a file says nothing.
 UNWRITTEN_STEP_s = 0.002
+UNWRITTEN_INTEGRATOR = "Euler"
+UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
 
 AnyRotor = Rotor | LagrangianRotor
 
@@ -129,15 +133,33 @@ def sensors_of(scenario: Scenario) -> Sensors:
 
 def warnings_of(scenario: Scenario, actuator: Actuator) -> list[str]:
     """What a user should know of model and scenario before believing the figures; one line each."""
-    section, option = scenario.plant, model_of(scenario.plant).described.opt
-    found = disagreements(actuator)
-    # The compiler's own 2 ms stands where a file says nothing.
+    return disagreements(actuator) + _overridden(scenario.plant, model_of(scenario.plant).described.opt)
+
+
+def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
+    """What a model file says and a scenario says otherwise; what a file does not say is not overridden."""
+    found = []
     if option.timestep not in (section.step_s, UNWRITTEN_STEP_s):
+        own, used = told_apart(option.timestep, section.step_s)
+        found.append(f"the model's own timestep of {own} s is not used: plant.step_s is {used} s")
+    integrator = integrator_name(option.integrator)
+    if integrator not in (section.integrator, UNWRITTEN_INTEGRATOR):
         found.append(
-            f"the model's own timestep of {option.timestep:g} s is not used: plant.step_s is"
-            f" {section.step_s:g} s"
+            f"the model's own integrator {integrator} is not used: plant.integrator is {section.integrator}"
+        )
+    given, gravity = section.gravity_m_s2, _own_gravity(option)
+    if given is not None and gravity not in ((0.0, 0.0, -given), UNWRITTEN_GRAVITY_m_s2):
+        own = " ".join(f"{component:.10g}" for component in gravity)
+        found.append(
+            f"the model's own gravity of {own} m/s² is not used: plant.gravity_m_s2 is {given:.10g} m/s²"
         )
     return found
+
+
+def _own_gravity(option: mujoco.MjOption) -> tuple[float, ...]:
+    if option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+        return 0.0, 0.0, 0.0
+    return tuple(option.gravity.tolist())
 
 
 def true_magnetics(scenario: Scenario) -> TorqueModel:
@@ -251,10 +273,8 @@ def _gravity(section: PlantSection, model: Mjcf) -> float | None:
     """Gravity along -z; None where the model's is not along it, so that the model's stays in force."""
     if section.gravity_m_s2 is not None:
         return section.gravity_m_s2
-    option = model.described.opt
-    if option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
-        return 0.0
-    return None if mjcf.OTHER_GRAVITY in mjcf.beyond_a_free_rotor(model.described) else -option.gravity[2]
+    own = _own_gravity(model.described.opt)
+    return None if any(own[:2]) or own[2] > 0 else 0.0 - own[2]  # none is 0, not -0
 
 
 def _check_pose(pose: trajectory.Triple, actuator: Actuator) -> None:

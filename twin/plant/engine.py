@@ -23,6 +23,12 @@ INTEGRATORS = {
 }
 
 
+def integrator_name(number: int) -> str:
+    """Name of one of MuJoCo's integrators, as MJCF has it."""
+    names = {int(each): name for name, each in INTEGRATORS.items()}
+    return names.get(number, mujoco.mjtIntegrator(number).name.removeprefix("mjINT_").lower())
+
+
 class Engine(NamedTuple):
     """The engine as compiled code sees it: two addresses, and views of MuJoCo's own arrays."""
 
