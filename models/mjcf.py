@@ -160,6 +160,7 @@ def _body_names(model: mujoco.MjModel) -> list[str]:
 
 def _read(path: Path) -> Mjcf:
     silence_warnings()
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # the engine's own misses a mesh edited within a second
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:

@@ -1,0 +1,316 @@
+"""Model files: read once, read again when anything they name has changed, and no stage off that is needed."""
+
+import os
+import shutil
+
+import mujoco
+import numpy as np
+import pytest
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
+from spheretwin.models.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.simulation import simulate
+
+TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
+INERTIAL = '<inertial pos="0 0 0" mass="1.6" diaginertia="2.219e-3 2.176e-3 2.256e-3"/>'
+GAMMA = '<joint name="gamma" axis="0 0 1"/>'
+LINE = "A line of no meaning, as long as the other.\n"
+
+
+def inertia(path):
+    return actuators.load(path).inertia
+
+
+def edited_unnoticed(path, old, new):
+    """Change a file, but neither its size nor the time of its last change."""
+    before, text = path.stat(), path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert (path.stat().st_size, path.stat().st_mtime_ns) == (before.st_size, before.st_mtime_ns)
+
+
+def test_a_file_is_read_once(tmp_path, monkeypatch):
+    (path := tmp_path / "mine.xml").write_text(TEXT)
+    kept = mjcf.read(path)
+    assert mjcf.read(path) is kept
+    (tmp_path / "other.xml").write_text(TEXT)  # a neighbour that the file does not name
+    path.touch()
+    assert mjcf.read(path) is kept
+    monkeypatch.chdir(tmp_path)
+    assert mjcf.read(path.relative_to(tmp_path)) is kept
+    assert mjcf.read(tmp_path / "other.xml") is not kept
+
+
+def test_an_edit_of_the_same_size_and_time_is_read(tmp_path):
+    (path := tmp_path / "mine.xml").write_text(TEXT)
+    assert inertia(path)[0] == 2.219e-3
+    edited_unnoticed(path, "2.219e-3", "2.220e-3")
+    assert inertia(path)[0] == 2.220e-3
+
+
+def test_only_so_many_files_are_kept(tmp_path):
+    paths = [tmp_path / f"{number}.xml" for number in range(mjcf.MOST_KEPT + 1)]
+    for path in paths:
+        path.write_text(TEXT)
+    first = mjcf.read(paths[0])
+    for path in paths[1:]:
+        mjcf.read(path)
+    assert mjcf.read(paths[-1]) is mjcf.read(paths[-1])
+    assert mjcf.read(paths[0]) is not first
+
+
+def test_a_file_that_was_broken_is_read_when_it_is_mended(tmp_path):
+    (path := tmp_path / "mine.xml").write_text(TEXT.replace("</mujoco>", ""))
+    for _ in range(2):
+        with pytest.raises(InputError, match="expected valid MJCF"):
+            mjcf.read(path)
+    path.write_text(TEXT)
+    assert inertia(path)[0] == 2.219e-3
+
+
+def included(folder, inner, name="rotor.xml", comment=""):
+    """A model whose rotor's inertia stands in another file, named `inner`."""
+    (folder / inner).parent.mkdir(parents=True, exist_ok=True)
+    (folder / inner).write_text(f"<mujoco>{comment}{INERTIAL}</mujoco>")
+    (path := folder / "mine.xml").write_text(TEXT.replace(INERTIAL, f'<include file="{name}"/>'))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("inner", "name"),
+    [
+        ("rotor.xml", "rotor.xml"),
+        ("parts/rotor.xml", "parts/rotor.xml"),
+        ("rotor.inc", "rotor.inc"),
+        ("rotor", "rotor"),
+        ("R&D/rotor.xml", "R&amp;D/rotor.xml"),
+        ("../rotor.xml", "../rotor.xml"),
+    ],
+)
+def test_an_edited_include_is_read_again(tmp_path, inner, name):
+    (folder := tmp_path / "model").mkdir()
+    path = included(folder, inner, name)
+    kept = mjcf.read(path)
+    assert mjcf.read(path) is kept
+    edited_unnoticed(folder / inner, "2.219e-3", "2.220e-3")
+    assert inertia(path)[0] == 2.220e-3
+
+
+@pytest.mark.parametrize("name", ["middle.xml", "middle.inc", "parts/middle.part"])
+def test_an_edited_include_of_an_include_is_read_again(tmp_path, name):
+    path = included(tmp_path, "inner.inc", name)
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    # A byte-order mark and white space come before the first tag.
+    (tmp_path / name).write_text('\ufeff\n <mujoco><include file="inner.inc"/></mujoco>', encoding="utf-8")
+    assert inertia(path)[0] == 2.219e-3
+    edited_unnoticed(tmp_path / "inner.inc", "2.219e-3", "2.220e-3")
+    assert inertia(path)[0] == 2.220e-3
+
+
+def test_text_that_moves_from_one_include_to_the_next_is_a_change(tmp_path):
+    mass, size = 'mass="1.6"', 'mass="1.7"'
+    first = included(tmp_path, "a.xml", "a.xml")
+    text = first.read_text().replace(
+        '<include file="a.xml"/>', '<include file="a.xml"/><!-- file="b.xml" file="c.xml" -->'
+    )
+    first.write_text(text)
+    (tmp_path / "b.xml").write_text(f"<mujoco/>{mass}{size}")
+    (tmp_path / "c.xml").write_text("<mujoco/>")
+    kept = mjcf.read(first)
+    (tmp_path / "b.xml").write_text(f"<mujoco/>{mass}")
+    (tmp_path / "c.xml").write_text(f"{size}<mujoco/>")
+    assert mjcf.read(first) is not kept
+
+
+def test_files_that_name_each_other_are_looked_into_once(tmp_path):
+    (folder := tmp_path / "parts").mkdir()
+    path = included(
+        tmp_path, "parts/rotor.xml", "parts/rotor.xml", '<!-- file="../mine.xml" file="rotor.xml" -->'
+    )
+    assert inertia(path)[0] == 2.219e-3
+    (folder / "loop.xml").symlink_to("loop.xml")
+    (folder / "rotor.xml").write_text(f'<mujoco><!-- file="loop.xml" -->{INERTIAL}</mujoco>')
+    assert inertia(path)[0] == 2.219e-3
+
+
+CUBE = """v -1.00 -1.00 -1.00
+v 1.00 -1.00 -1.00
+v -1.00 1.00 -1.00
+v 1.00 1.00 -1.00
+v -1.00 -1.00 1.00
+v 1.00 -1.00 1.00
+v -1.00 1.00 1.00
+v 1.00 1.00 1.00
+f 1 3 4 2
+f 5 6 8 7
+f 1 2 6 5
+f 3 7 8 4
+f 1 5 7 3
+f 2 4 8 6
+"""
+HEAVY = '<geom type="mesh" mesh="cube" mass="1.5"/>'
+ASSET = '<mesh name="cube" file="{}" scale="0.04 0.04 0.04"/>'
+
+
+def with_a_heavy_mesh(folder, directories, mesh, assets):
+    """A model whose rotor has the inertia of a mesh, and the mesh, beside those that are only drawn."""
+    shutil.copytree(actuators.FOLDER / "assets", (folder / mesh).parent, dirs_exist_ok=True)
+    (folder / mesh).write_text(CUBE)
+    text = TEXT.replace(INERTIAL, HEAVY).replace('meshdir="assets"', directories)
+    (path := folder / "mine.xml").write_text(text.replace("<asset>", f"<asset>{assets}"))
+    return path, folder / mesh
+
+
+@pytest.mark.parametrize("split", [False, True], ids=["one file", "include"])
+@pytest.mark.parametrize(
+    ("directories", "name", "mesh"),
+    [
+        ('meshdir="meshes"', "cube.obj", "meshes/cube.obj"),
+        ('assetdir="meshes"', "cube.obj", "meshes/cube.obj"),
+        ('meshdir="meshes" texturedir="images"', "cube.obj", "meshes/cube.obj"),
+        ('meshdir=".."', "cube.obj", "../cube.obj"),
+        ('meshdir="meshes" strippath="true"', "elsewhere/cube.obj", "meshes/cube.obj"),
+        ("", "cube.obj", "cube.obj"),
+    ],
+)
+def test_an_edited_mesh_is_read_again(tmp_path, directories, name, mesh, split):
+    (folder := tmp_path / "model").mkdir()
+    asset, include = ASSET.format(name), '<include file="more.xml"/>'
+    path, mesh = with_a_heavy_mesh(folder, directories, mesh, include if split else asset)
+    (folder / "more.xml").write_text(f"<mujoco>{asset}</mujoco>")
+    # A cube of 80 mm: m a²/6; its corners are single precision in the engine.
+    np.testing.assert_allclose(inertia(path), 1.5 * 0.08**2 / 6, rtol=1e-6)
+    edited_unnoticed(mesh, "1.00", "0.50")
+    np.testing.assert_allclose(inertia(path), 1.5 * 0.04**2 / 6, rtol=1e-6)
+
+
+def test_a_mesh_that_another_replaces_is_read_again(tmp_path):
+    path, mesh = with_a_heavy_mesh(tmp_path, 'meshdir="."', "cube.obj", ASSET.format("cube.obj"))
+    (smaller := tmp_path / "smaller").write_text(CUBE.replace("1.00", "0.50"))
+    before = inertia(path)
+    shutil.copystat(mesh, smaller)
+    os.replace(smaller, mesh)
+    np.testing.assert_allclose(inertia(path), before / 4, rtol=1e-6)
+
+
+def test_a_run_does_not_change_what_is_kept():
+    kept = mjcf.read(actuators.MJCF_PATH)
+
+    def numbers():
+        return [
+            (model.body_inertia.copy(), model.body_mass.copy(), model.opt.timestep, model.opt.disableflags)
+            for model in (kept.described, kept.bare, kept.loaded)
+        ]
+
+    before = numbers()
+    for payload_kg in (0.0, 0.05):
+        Rotor(kept, 1e-3, "Euler", 0.2, payload_kg, 1.62)
+    for ours, theirs in zip(before, numbers(), strict=True):
+        np.testing.assert_equal(ours, theirs)
+
+
+def bytes_of_a_run(path=None):
+    changes = {"duration": 0.5} | ({"plant.mjcf": str(path)} if path else {})
+    return simulate(scenarios.load("nutation", changes)).telemetry.values.tobytes()
+
+
+def test_a_copy_of_the_shipped_model_runs_the_same_bytes(tmp_path):
+    shipped = bytes_of_a_run()
+    copy = shutil.copy(actuators.MJCF_PATH, tmp_path / "copy.xml")
+    for path in (copy, actuators.MJCF_PATH, actuators.SCENE_PATH):
+        assert bytes_of_a_run(path) == shipped
+
+
+ROTOR = """
+<mujoco>
+  {extension}
+  <option {option}><flag {flag}/></option>
+  <worldbody>
+    <site name="anchor" pos="0 0 1"/>
+    <geom name="floor" type="plane" size="1 1 1" contype="0" conaffinity="0"/>
+    <body name="rotor" {body}>
+      <joint name="hinge" axis="0 1 0" {joint}/>
+      <geom name="ball" size="0.1" {geom}/>
+      <site name="tip" pos="0 0 0.2"/>
+    </body>
+  </worldbody>
+  {sections}
+</mujoco>
+"""
+EDGES = {"extension": "", "option": "", "flag": "", "body": "", "joint": "", "sections": "",
+         "geom": 'contype="0" conaffinity="0"'}  # fmt: skip
+COLLIDING = 'contype="1" conaffinity="1"'
+PAIR = '<contact><pair geom1="ball" geom2="floor"/></contact>'
+PID = '<extension><plugin plugin="mujoco.pid"><instance name="pid"/></plugin></extension>'
+FLEX = (
+    '<deformable><flex name="f" dim="1" body="rotor world" vertex="0 0 0 0 0 1" element="0 1"/></deformable>'
+)
+CONSTRAINT, SPRING, DAMPER, ACTUATION = (
+    int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+    for name in ("CONSTRAINT", "SPRING", "DAMPER", "ACTUATION")
+)
+PASSIVE = SPRING | DAMPER
+
+NEEDED = {
+    "nothing": ({}, [], 0),
+    "limit": ({"joint": 'limited="true" range="-1 1"'}, [], 0),
+    "limit margin": ({"joint": 'limited="true" range="-1 1" margin="0.1"'}, ["limit margin"], CONSTRAINT),
+    "margin of no limit": ({"joint": 'limited="false" range="-1 1" margin="0.1"'}, [], 0),
+    "frictionloss": ({"joint": 'frictionloss="0.1"'}, ["frictionloss"], CONSTRAINT),
+    "stiffness": ({"joint": 'stiffness="1"'}, ["stiffness"], SPRING),
+    "stiffness of higher order": ({"joint": 'stiffness="0 1"'}, ["stiffness"], SPRING),
+    "damping": ({"joint": 'damping="1"'}, ["damping"], DAMPER),
+    "damping of higher order": ({"joint": 'damping="0 1"'}, ["damping"], DAMPER),
+    "armature": ({"joint": 'armature="1"'}, ["armature"], 0),
+    "equality": (
+        {"sections": '<equality><joint joint1="hinge"/></equality>'}, ["equality"], CONSTRAINT
+    ),
+    "fixed tendon": (
+        {"sections": '<tendon><fixed><joint joint="hinge" coef="1"/></fixed></tendon>'},
+        ["tendon"],
+        CONSTRAINT | PASSIVE,
+    ),
+    "spatial tendon": (
+        {"sections": '<tendon><spatial><site site="anchor"/><site site="tip"/></spatial></tendon>'},
+        ["tendon"],
+        CONSTRAINT | PASSIVE,
+    ),
+    "actuator": (
+        {"sections": '<actuator><motor joint="hinge"/></actuator>'}, ["actuator"], ACTUATION | PASSIVE
+    ),
+    "plugin": (
+        {"extension": PID, "sections": '<actuator><plugin joint="hinge" instance="pid"/></actuator>'},
+        ["actuator", "plugin"],
+        ACTUATION | PASSIVE,
+    ),
+    "contact": ({"geom": COLLIDING}, ["contact"], CONSTRAINT),
+    "contact switched off": ({"geom": COLLIDING, "flag": 'contact="disable"'}, [], 0),
+    "pair": ({"sections": PAIR}, ["contact"], CONSTRAINT),
+    "pair switched off": ({"sections": PAIR, "flag": 'contact="disable"'}, [], 0),
+    "density": ({"option": 'density="1"'}, ["fluid"], PASSIVE),
+    "viscosity": ({"option": 'viscosity="1"'}, ["fluid"], PASSIVE),
+    "wind": ({"option": 'wind="1 0 0"'}, [], 0),
+    "gravity compensation": ({"body": 'gravcomp="1"'}, ["gravity compensation"], PASSIVE),
+    "gravity": ({"option": 'gravity="1 0 0"'}, ["gravity other than along -z"], 0),
+    "flex": ({"sections": FLEX}, ["flex"], CONSTRAINT | PASSIVE),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("parts", "names", "needed"), NEEDED.values(), ids=NEEDED)
+def test_a_stage_is_switched_off_only_where_it_has_nothing_to_do(parts, names, needed):
+    model = mujoco.MjModel.from_xml_string(ROTOR.format(**EDGES | parts))
+    idle = mjcf.idle_stages(model)
+    every = CONSTRAINT | SPRING | DAMPER | ACTUATION | int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    assert idle == every & ~needed
+    assert mjcf.beyond_a_free_rotor(model) == names
+
+
+def test_the_shipped_model_needs_no_stage():
+    kept = mjcf.read(actuators.MJCF_PATH)
+    for model in (kept.bare, kept.loaded):
+        for bit in (CONSTRAINT, SPRING, DAMPER, ACTUATION):
+            assert mjcf.idle_stages(model) & bit
