@@ -97,6 +97,14 @@ def beyond_a_free_rotor(model: mujoco.MjModel) -> list[str]:
     return names + [f"mass of body {name}" for name in _other_masses(model)]
 
 
+def gravity(option: mujoco.MjOption) -> tuple[float, float, float]:
+    """Gravity of a model's options, m/s²; none where its flag is off."""
+    if option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+        return 0.0, 0.0, 0.0
+    x, y, z = option.gravity.tolist()
+    return x, y, z
+
+
 def idle_stages(model: mujoco.MjModel) -> int:
     """Disable bits of the stages of a step in which a model has nothing to do, a tenth of the step's time.
 

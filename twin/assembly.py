@@ -14,7 +14,7 @@ from spheretwin.control.controller import Controller, controller
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.actuator import Actuator
+from spheretwin.models.actuator import HINGES, Actuator
 from spheretwin.models.curve_origin import disagreements
 from spheretwin.models.errors import InputError
 from spheretwin.models.lagrangian import loaded_inertia
@@ -147,19 +147,13 @@ def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
         found.append(
             f"the model's own integrator {integrator} is not used: plant.integrator is {section.integrator}"
         )
-    given, gravity = section.gravity_m_s2, _own_gravity(option)
+    given, gravity = section.gravity_m_s2, mjcf.gravity(option)
     if given is not None and gravity not in ((0.0, 0.0, -given), UNWRITTEN_GRAVITY_m_s2):
         own = " ".join(f"{component:.10g}" for component in gravity)
         found.append(
             f"the model's own gravity of {own} m/s² is not used: plant.gravity_m_s2 is {given:.10g} m/s²"
         )
     return found
-
-
-def _own_gravity(option: mujoco.MjOption) -> tuple[float, ...]:
-    if option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
-        return 0.0, 0.0, 0.0
-    return tuple(option.gravity.tolist())
 
 
 def true_magnetics(scenario: Scenario) -> TorqueModel:
@@ -273,16 +267,17 @@ def _gravity(section: PlantSection, model: Mjcf) -> float | None:
     """Gravity along -z; None where the model's is not along it, so that the model's stays in force."""
     if section.gravity_m_s2 is not None:
         return section.gravity_m_s2
-    own = _own_gravity(model.described.opt)
+    own = mjcf.gravity(model.described.opt)
     return None if any(own[:2]) or own[2] > 0 else 0.0 - own[2]  # none is 0, not -0
 
 
 def _check_pose(pose: trajectory.Triple, actuator: Actuator) -> None:
-    low, high = actuator.hinge_range_rad.T
-    if np.any(pose < low) or np.any(pose > high):
-        limits = ", ".join(f"{a:.4g} to {b:.4g}" for a, b in actuator.hinge_range_rad)
-        received = ", ".join(f"{angle:.4g}" for angle in pose)
-        raise InputError(f"scenario: expected a first pose within {limits} rad, received {received}")
+    for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
+        if not low <= angle <= high:
+            least, most, received = told_apart(low, high, angle)
+            raise InputError(
+                f"scenario: expected a first pose with {hinge} from {least} to {most} rad, received {received}"
+            )
 
 
 def _check_groups(section: PlantSection, actuator: Actuator) -> None:

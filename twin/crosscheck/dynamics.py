@@ -21,7 +21,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
-from spheretwin.models.mjcf import PAYLOAD, read
+from spheretwin.models.mjcf import PAYLOAD, gravity, read
 from spheretwin.models.wording import without_breaks
 from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant.engine import Rotor
@@ -206,6 +206,7 @@ def ask_pinocchio(mjcf: Path, case: Case, states: States) -> Answers:
         raise InputError(
             f"model {mjcf}: expected MJCF that Pinocchio reads, {without_breaks(error)}"
         ) from None
+    model.gravity.linear = np.array(gravity(read(mjcf).described.opt))
     joint = model.getJointId("gamma")
     model.inertias[joint].inertia = (1 + case.modelling_error) * model.inertias[joint].inertia
     if case.payload_kg:
@@ -237,7 +238,10 @@ def _differences(
 ) -> dict[str, Array]:
     """Relative differences by quantity, one entry a state."""
     said = ask(mjcf, case, states)
-    rotor = LagrangianRotor(actuator, STEP_S, "RK4", case.modelling_error, case.payload_kg)
+    gravity_m_s2 = -gravity(read(mjcf).described.opt)[2]
+    rotor = LagrangianRotor(
+        actuator, STEP_S, "RK4", case.modelling_error, case.payload_kg, gravity_m_s2=gravity_m_s2
+    )
     pairs = list(zip(states.q, states.qdot, strict=True))
     R = np.array([rotation(q) for q, _ in pairs])
     E = np.array([rate_jacobian(q) for q, _ in pairs])

@@ -103,6 +103,7 @@ def plant_tick(
     # Taken out of the tuple once: each time costs a count of references.
     rotor, magnetics, kept, drive = plant.rotor, plant.magnetics, plant.kept, plant.drive
     q, qdot, torque_S, torque_q = rotor.q, rotor.qdot, rotor.torque_S, rotor.torque_q
+    hinge_range = plant.hinge_range
     current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
     gain, unmodelled, friction, friction_q = (
         plant.group_gain,
@@ -130,9 +131,9 @@ def plant_tick(
         for i in range(3):
             if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
                 return DIVERGED
-    for i in range(3):
-        if not plant.hinge_range[i, 0] <= q[i] <= plant.hinge_range[i, 1]:
-            return LEFT_WORKSPACE
+        for i in range(3):  # at every step: beyond its range a hinge would meet a stop that is not computed
+            if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
+                return LEFT_WORKSPACE
     return GOING
 
 
