@@ -58,8 +58,9 @@ class TelemetryFile:
             self._flush()
             self._rows = rows.rows(0, 0)
         self._waiting.append(rows)
-        if sum(map(len, self._waiting)) >= PART_ROWS:
-            self._flush()
+        # Parts of one length, whatever the chunks: the same rows give the same bytes.
+        while not self._fault and sum(map(len, self._waiting)) >= PART_ROWS:
+            self._flush(PART_ROWS)
 
     def finish(self, status: str) -> None:
         """Take note of how the run ended."""
@@ -87,26 +88,42 @@ class TelemetryFile:
         self._flush()
         if self._fault:
             raise self._fault
-        join(self._parts, self._path, known)
+        try:
+            join(self._parts, self._path, known)
+        except SpheretwinError as error:
+            raise SpheretwinError(f"{error}{self._kept()}") from None
         shutil.rmtree(self._parts[0].parent, ignore_errors=True)
 
     def _pending(self) -> Table:
         values = [self._rows.values, *(rows.values for rows in self._waiting)]
         return Table(self._rows.signals, np.concatenate(values))
 
-    def _flush(self) -> None:
-        rows, self._waiting = self._pending(), []
-        if not len(rows):
+    def _flush(self, most: int | None = None) -> None:
+        """Write the rows that wait into a part, or the first of them; the others wait on."""
+        rows = self._pending()
+        last = len(rows) if most is None else most
+        self._waiting = [rows.rows(last, len(rows))] if last < len(rows) else []
+        if not last:
             return
         try:
-            folder = self._parts[0].parent if self._parts else self._new_folder()
-            part = folder / f"{len(self._parts):06d}.parquet"
-            rows.write_parquet(part, self._facts)
+            self._parts.append(self._written(rows.rows(0, last)))
         except (OSError, SpheretwinError) as error:
-            kept = f"; {len(self._parts)} parts are kept in {self._parts[0].parent}" if self._parts else ""
-            self._fault = SpheretwinError(f"output: {self._path} could not be written, {error}{kept}")
-        else:
-            self._parts.append(part)
+            self._fault = SpheretwinError(f"output: {self._path} could not be written, {error}{self._kept()}")
+            self._waiting = []
+
+    def _written(self, rows: Table) -> Path:
+        folder = self._parts[0].parent if self._parts else self._new_folder()
+        part = folder / f"{len(self._parts):06d}.parquet"
+        try:
+            rows.write_parquet(part, self._facts)
+        except SpheretwinError:
+            if not self._parts:
+                shutil.rmtree(folder, ignore_errors=True)
+            raise
+        return part
+
+    def _kept(self) -> str:
+        return f"; {len(self._parts)} parts are kept in {self._parts[0].parent}" if self._parts else ""
 
     def _new_folder(self) -> Path:
         target = self._path.resolve()
@@ -133,7 +150,7 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
     Raises
     ------
     InputError
-        There is no part, or one is no telemetry.
+        There is no part, one is no telemetry, or two have different columns of one name.
     SpheretwinError
         Writing failed; what was there before is untouched.
     """
@@ -161,7 +178,12 @@ def _all_signals(parts: Iterable[Path]) -> tuple[Signal, ...]:
     found: dict[str, Signal] = {}
     for part in parts:
         for signal in read_parquet(part, rows=False)[0].signals:
-            found.setdefault(signal.name, signal)
+            known = found.setdefault(signal.name, signal)
+            if known != signal:
+                raise InputError(
+                    f"telemetry {part}: expected {signal.name} as {known.size} numbers in {known.unit}"
+                    f" ({known.meaning}), received {signal.size} in {signal.unit} ({signal.meaning})"
+                )
     return tuple(found.values())
 
 
