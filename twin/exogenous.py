@@ -52,7 +52,8 @@ class Exogenous:
         Raises
         ------
         InputError
-            Reference or disturbance is beyond what a number can hold.
+            Reference or disturbance is beyond what a number can hold at that very tick: what comes before
+            does not depend on how many rows are asked for.
         """
         while tick >= self._first + BLOCK_TICKS:
             self._before = self._generator.bit_generator.state
