@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -20,10 +21,12 @@ from spheretwin.control import allocations
 from spheretwin.control import law as laws
 from spheretwin.control.allocations import ALLOCATIONS
 from spheretwin.control.law import Law
+from spheretwin.control.laws import LAWS
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.compiled import compiled_callback, for_types_of, uncompiled
 from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry import Signal, Table, width
+from spheretwin.models.wording import shown
 from spheretwin.twin import assembly, trajectory
 from spheretwin.twin import loop as loops
 from spheretwin.twin import scenario as scenarios
@@ -163,10 +166,11 @@ class Session:
         Table
             One row for each tick.
         """
-        if ticks < 0:
-            raise InputError(f"session: expected a number of ticks from 0 on, received {ticks}")
-        log = np.empty((ticks, self._columns))
-        return Table(self._signals, log[: self.advance_into(log)])
+        if not isinstance(ticks, int | np.integer) or ticks < 0:
+            raise InputError(f"session: expected a number of ticks from 0 on, received {shown(ticks)}")
+        with self._alone():
+            log = np.empty((ticks, self._columns))
+            return Table(self._signals, log[: self._advance(log)])
 
     def advance_into(self, log: NDArray[np.float64]) -> int:
         """Run a control tick for each row of an array of the caller's; returns how many were run.
@@ -174,15 +178,10 @@ class Session:
         Raises
         ------
         InputError
-            The array does not have the columns of the telemetry as rows of contiguous float64.
+            Its rows are not those of the telemetry: compiled code would write beside them.
         """
-        fits = log.ndim == 2 and log.shape[1] == self._columns and log.flags.c_contiguous
-        if not (fits and log.dtype == np.float64 and log.flags.writeable):
-            raise InputError(
-                f"session: expected contiguous rows of {self._columns} float64, received {log.dtype}"
-                f" of shape {log.shape}"
-            )
         with self._alone():
+            _check_rows(log, self._columns)
             return self._advance(log)
 
     def check_horizon(self, ticks: int) -> None:
@@ -211,13 +210,14 @@ class Session:
             A field that is unknown, fixed for the run, or a value out of range; nothing has changed then.
         """
         with self._alone():
-            if name in FIXED:
+            if _is_fixed(name):
                 raise InputError(f"session: expected a field that may change during a run, received {name}")
             own = value if isinstance(value, Law) else None
             if own and name != "controller.law":
                 raise InputError(f"session: expected a law for controller.law, received one for {name}")
-            self._change(name, value, own)
-            recorded = own.name if own else _recorded(value)
+            with self._all_or_nothing():
+                self._change(name, value, own)
+            recorded = _name_of_own(own) if own else _recorded(value)
             self.journal += (Change(self.tick, name, recorded),)
 
     def snapshot(self) -> Snapshot:
@@ -245,7 +245,7 @@ class Session:
         InputError
             It was taken under a law of the user's that this session does not have, or on another model.
         """
-        with self._alone():
+        with self._alone(), self._all_or_nothing():
             own = self._own_law.name if self._own_law else None
             if snapshot.own_law not in (None, own):
                 raise InputError(
@@ -282,6 +282,16 @@ class Session:
             yield
         finally:
             self._busy.release()
+
+    @contextmanager
+    def _all_or_nothing(self) -> Iterator[None]:
+        """Leave the session as it was where a change cannot be made: its parts are replaced, not altered."""
+        before = vars(self).copy()
+        try:
+            yield
+        except BaseException:
+            vars(self).update(before)
+            raise
 
     def _advance(self, log: NDArray[np.float64]) -> int:
         done = 0
@@ -358,46 +368,51 @@ class Session:
                 self._own_law = None
             elif before and name.startswith("controller."):
                 raise InputError(f"session: expected no field of a shipped law, as {before.name} is not one")
-        try:
-            self._apply(self._resolved(scenario))
-        except InputError:
-            self._own_law = before
-            raise
+        self._apply(self._resolved(scenario))
 
     def _apply(self, scenario: Scenario) -> None:
         """Build anew what a scenario changes, and carry over what it is in the midst of."""
-        before = self.scenario
-        self.scenario = self._exogenous.scenario = scenario
+        before, self.scenario = self.scenario, scenario
         outside = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
-        if before.model_copy(update=outside) == scenario and self._own_law in (None, self.law):
-            return
-        if scenario.plant != before.plant:
-            rotor = assembly.rotor_of(scenario, self.actuator)
-            self._stepped = rotor.start(self._stepped.q, self._stepped.qdot)
-            self._rotor = rotor
-        law, memory, current = self.law, self._controller.memory, self._plant.current
+        if before.model_copy(update=outside) != scenario or self._own_law not in (None, self.law):
+            if scenario.plant != before.plant:
+                self._rebuild_rotor()
+            self._rebuild_controller()
+            current = self._plant.current
+            self._build_plant()
+            self._plant.current[:] = current
+            self._connect()
+        self._exogenous.scenario = scenario  # last: it is altered, and what fails must have changed nothing
+
+    def _rebuild_rotor(self) -> None:
+        """Rotor of the present scenario, in the same state."""
+        self.actuator = assembly.actuator_of(self.scenario.plant)
+        rotor = assembly.rotor_of(self.scenario, self.actuator)
+        stepped, state = rotor.start(self._stepped.q, self._stepped.qdot), self._rotor.state()
+        if len(rotor.state()) == len(state):  # else a body has come or gone: pose and rates are what remains
+            rotor.restore(state)
+        self._rotor, self._stepped = rotor, stepped
+
+    def _rebuild_controller(self) -> None:
+        """Controller of the present scenario; a law that stays, if with other gains, keeps its memory."""
+        law, before = self.law, self._controller
         self._build_controller()
-        if self.law.name == law.name and len(memory) == len(self._controller.memory):
-            self._controller.memory[:] = memory
-        self._build_plant()
-        self._plant.current[:] = current
-        self._connect()
+        if self.law.name == law.name and len(before.memory) == len(self._controller.memory):
+            self._controller.memory[:] = before.memory
+        if self.law is law:  # one of the user's, which may have changed its parameters
+            self._controller.parameters[:] = before.parameters
 
     def _restore(self, snapshot: Snapshot) -> None:
         self.actuator = assembly.actuator_of(snapshot.scenario.plant)
         self.scenario, self.begun_as = snapshot.scenario, snapshot.begun_as
         self._build_rotor()
-        if len(self._rotor.state()) != len(snapshot.rotor):
-            raise InputError(
-                f"session: expected a snapshot of {len(self._rotor.state())} numbers of the engine's state,"
-                f" received {len(snapshot.rotor)}"
-            )
         self._build_controller()
         self._build_plant()
+        _check_length("the engine's state", snapshot.rotor, self._rotor.state())
         self._rotor.restore(snapshot.rotor)
-        self._plant.current[:] = snapshot.current
-        self._controller.parameters[:] = snapshot.parameters
-        self._controller.memory[:] = snapshot.memory
+        _fill("currents", self._plant.current, snapshot.current)
+        _fill("the law's parameters", self._controller.parameters, snapshot.parameters)
+        _fill("the law's memory", self._controller.memory, snapshot.memory)
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
         self._exogenous = Exogenous(self.scenario)
         self._exogenous.restore(snapshot.exogenous)
@@ -434,6 +449,40 @@ def _array(values: trajectory.Triple | None) -> NDArray[np.float64]:
     return np.array(values or (0.0, 0.0, 0.0))
 
 
+def _is_fixed(name: str) -> bool:
+    """Whether a name is that of a fixed field, or of a section that holds one."""
+    return any(f"{field}.".startswith(f"{name}.") for field in FIXED)
+
+
+def _name_of_own(law: Law) -> str:
+    """Name of a user's law in the journal, where it must not be taken for a shipped one."""
+    return f"{law.name} of the user's" if law.name in LAWS else law.name
+
+
 def _recorded(value: Any) -> Any:
-    """A value as JSON holds it."""
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
+    return json.loads(json.dumps(value, default=_plain))
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+
+
+def _check_rows(log: NDArray[np.float64], columns: int) -> None:
+    if log.shape[1:] != (columns,) or log.dtype != np.float64 or not log.flags.c_contiguous:
+        raise InputError(
+            f"session: expected contiguous rows of {columns} float64,"
+            f" received {log.dtype} of shape {log.shape}"
+        )
+
+
+def _fill(what: str, target: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    _check_length(what, values, target)
+    target[:] = values
+
+
+def _check_length(what: str, received: NDArray[np.float64], own: NDArray[np.float64]) -> None:
+    if len(received) != len(own):
+        raise InputError(
+            f"session: expected a snapshot with {len(own)} numbers of {what}, received {len(received)}"
+        )
