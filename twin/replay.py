@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from spheretwin.control.laws import LAWS
 from spheretwin.models.errors import InputError
 from spheretwin.models.telemetry import read_parquet
 from spheretwin.twin import metrics
@@ -44,7 +45,7 @@ def read(path: Path) -> Plan:
     _, metadata = read_parquet(path, rows=False)
     try:
         return _plan(metadata, str(path))
-    except (KeyError, ValueError, TypeError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise InputError(f"replay {path}: expected scenario, journal and ticks of a run, {error!r}") from None
 
 
@@ -53,4 +54,16 @@ def _plan(metadata: Mapping[str, str], source: str) -> Plan:
     journal = tuple(
         Change(int(tick), str(name), value) for tick, name, value in json.loads(metadata["journal"])
     )
-    return Plan(scenario, int(metadata["ticks"]), journal)
+    for change in journal:
+        if change.name == "controller.law" and change.value not in LAWS:
+            raise InputError(
+                f"replay {source}: expected changes to {', '.join(LAWS)}, received one to {change.value}"
+                f" at tick {change.tick}, a law that the file does not hold"
+            )
+    ticks = int(metadata["ticks"])
+    if ticks < 1:
+        raise InputError(
+            f"replay {source}: expected a run of at least one tick, received {ticks};"
+            " the parts of a run that was killed do not say how far it went"
+        )
+    return Plan(scenario, ticks, journal)

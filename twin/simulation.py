@@ -125,21 +125,27 @@ def follow(
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
     while session.tick < ticks and session.status == RUNNING and not stop_requested():
-        while waiting and waiting[0].tick <= session.tick:
-            change = waiting.pop(0)
-            session.set(change.name, change.value)
+        _make(session, waiting)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
         rows = _advance(session, last, log)
         for sink in sinks:
             sink.write(rows)
         if live:
             _sleep_until(started + session.t_s - first)
+    _make(session, waiting)  # those after the last tick belong to what the session says of itself
     status = session.status
     if status == RUNNING:
         status = COMPLETED if session.tick >= ticks else INTERRUPTED
     for sink in sinks:
         sink.finish(status)
     return status
+
+
+def _make(session: Session, waiting: list[Change]) -> None:
+    """Make the changes whose tick has come, and wait for them no more."""
+    while waiting and waiting[0].tick <= session.tick:
+        change = waiting.pop(0)
+        session.set(change.name, change.value)
 
 
 def _advance(session: Session, last: int, log: NDArray[np.float64] | None) -> Table:
