@@ -7,6 +7,7 @@ what they do not concern.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NoReturn
 
 import numpy as np
@@ -30,7 +31,7 @@ class Exogenous:
 
     def __init__(self, scenario: Scenario) -> None:
         self._generator = np.random.default_rng(scenario.seed)
-        self._before: dict[str, Any] = self._generator.bit_generator.state
+        self._before: Mapping[str, Any] = self._generator.bit_generator.state
         self._first = -BLOCK_TICKS  # tick at which the present block begins
         self._numbers = BLOCK_TICKS  # rows of it that are numbers
         self._draws: NDArray[np.float64] = np.empty(0)

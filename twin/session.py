@@ -469,9 +469,10 @@ def _plain(value: Any) -> Any:
 
 
 def _check_rows(log: NDArray[np.float64], columns: int) -> None:
-    if log.shape[1:] != (columns,) or log.dtype != np.float64 or not log.flags.c_contiguous:
+    fits = log.shape[1:] == (columns,) and log.dtype == np.float64
+    if not (fits and log.flags.c_contiguous and log.flags.writeable):
         raise InputError(
-            f"session: expected contiguous rows of {columns} float64,"
+            f"session: expected contiguous, writeable rows of {columns} float64,"
             f" received {log.dtype} of shape {log.shape}"
         )
 
