@@ -59,16 +59,17 @@ def controller(
         Numbers of the law's state that the telemetry logs.
     """
     groups = magnetics.group_axes.shape[1]
-    vectors = np.zeros((3, 3))
     return Controller(
-        law.parameters.copy(),
-        law.state.copy(),
-        magnetics,
-        kept,
-        current_limit_A,
-        logged,
-        *vectors,
-        np.empty((SCRATCH_ROWS, groups)),
+        parameters=law.parameters.copy(),
+        memory=law.state.copy(),
+        magnetics=magnetics,
+        kept=kept,
+        current_limit_A=current_limit_A,
+        logged=logged,
+        torque_q=np.zeros(3),
+        torque_S=np.zeros(3),
+        pose=np.zeros(3),
+        scratch=np.empty((SCRATCH_ROWS, groups)),
     )
 
 

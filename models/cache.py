@@ -74,9 +74,9 @@ def kept_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArra
     if content := kept(name):
         with suppress(ValueError, EOFError):  # whole, but no array
             return np.load(io.BytesIO(content))
-    array, content = compute(), io.BytesIO()
-    np.save(content, array)
-    keep(name, content.getvalue())
+    array, made = compute(), io.BytesIO()
+    np.save(made, array)
+    keep(name, made.getvalue())
     return array
 
 

@@ -80,8 +80,10 @@ def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
     return callbacks[signature]
 
 
-def _callback(signature: Any, function: Callable[..., Any]) -> CFunc:
-    callback = CFunc(function, (signature.args, signature.return_type), {}, {"nopython": True, **_OPTIONS})
+def _callback(signature: Any, function: Callable[..., Any]) -> Any:
+    callback: Any = CFunc(
+        function, (signature.args, signature.return_type), {}, {"nopython": True, **_OPTIONS}
+    )
     # Only these sources are watched by the cache; another's would go stale.
     if function.__module__.startswith("spheretwin."):
         callback._cache = MachineCode(function, "callback")

@@ -46,7 +46,7 @@ class MachineCode(NullCache):
     def cache_path(self) -> str | None:
         """Folder of the entries."""
         folder = cache.cache_folder()
-        return folder and str(folder)
+        return str(folder) if folder else None
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Machine code for a signature, None if there is none that can be used."""

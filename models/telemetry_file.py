@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +18,15 @@ from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.files import check_writable, whole_file
 from spheretwin.models.telemetry import PARQUET_FORMAT, Signal, Table, read_parquet, width
 
-# Rows of a part, and of a row group of the file: four seconds at 1 kHz, some 3 MB in memory.
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+# Rows of a part: four seconds at 1 kHz, some 3 MB in memory.
 PART_ROWS = 4096
+
+# Parts of a row group of the file. Arrow keeps 50 kB of each group until the file is whole.
+GROUP_PARTS = 4
 
 
 class TelemetryFile:
@@ -61,6 +69,9 @@ class TelemetryFile:
         # Parts of one length, whatever the chunks: the same rows give the same bytes.
         while not self._fault and sum(map(len, self._waiting)) >= PART_ROWS:
             self._flush(PART_ROWS)
+
+    def note(self, t_s: float, text: str) -> None:
+        """Nothing: the command journal is among the facts that `close` is given."""
 
     def finish(self, status: str) -> None:
         """Take note of how the run ended."""
@@ -159,18 +170,39 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
     if not parts:
         raise InputError("telemetry: expected at least one part, received none")
     signals = _all_signals(parts)
-    known = read_parquet(parts[0])[1] if facts is None else facts
+    known = read_parquet(parts[0], rows=False)[1] if facts is None else facts
     schema = Table(signals, np.empty((0, width(signals)))).arrow(known).schema
-    rows = 0
     with (
         whole_file(path) as temporary,
         pyarrow.parquet.ParquetWriter(temporary, schema, **PARQUET_FORMAT) as writer,
     ):
-        for part in parts:
-            table = _widened(read_parquet(part)[0], signals)
-            writer.write_table(table.arrow(known), row_group_size=PART_ROWS)
-            rows += len(table)
-    return rows
+        return sum(_append(writer, group, signals) for group in _grouped(parts))
+
+
+def _append(writer: pyarrow.parquet.ParquetWriter, parts: Sequence[Path], signals: tuple[Signal, ...]) -> int:
+    """Write some parts as one row group; returns its rows."""
+    import pyarrow as pa
+
+    group = pa.concat_tables([_columns(part, signals) for part in parts])
+    group = group.replace_schema_metadata(writer.schema.metadata)
+    writer.write_table(group, row_group_size=max(1, group.num_rows))
+    pa.default_memory_pool().release_unused()  # else Arrow keeps what a hundred groups have needed
+    return int(group.num_rows)
+
+
+def _columns(part: Path, signals: tuple[Signal, ...]) -> pa.Table:
+    """A part as Arrow has it, with all columns of the file."""
+    import pyarrow.parquet
+
+    with pyarrow.parquet.ParquetFile(part) as file:
+        found = tuple(file.schema_arrow.names)
+        if found == tuple(signal.name for signal in signals):
+            return file.read(use_threads=False)
+    return _widened(read_parquet(part)[0], signals).arrow({})
+
+
+def _grouped(parts: Sequence[Path]) -> Iterator[Sequence[Path]]:
+    return (parts[first : first + GROUP_PARTS] for first in range(0, len(parts), GROUP_PARTS))
 
 
 def _all_signals(parts: Iterable[Path]) -> tuple[Signal, ...]:
@@ -188,8 +220,6 @@ def _all_signals(parts: Iterable[Path]) -> tuple[Signal, ...]:
 
 
 def _widened(table: Table, signals: tuple[Signal, ...]) -> Table:
-    if table.signals == signals:
-        return table
     wide = Table(signals, np.full((len(table), width(signals)), np.nan))
     for signal in table.signals:
         wide[signal.name][:] = table[signal.name]

@@ -32,9 +32,9 @@ from spheretwin.twin import trajectory
 from spheretwin.twin.loop import Columns
 from spheretwin.twin.plant.drive import drive
 from spheretwin.twin.plant.engine import Rotor, integrator_name
-from spheretwin.twin.plant.friction import friction
+from spheretwin.twin.plant.friction import Friction, friction
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.plant.plant import Plant, plant
+from spheretwin.twin.plant.plant import Plant
 from spheretwin.twin.plant.stepping import Stepped
 from spheretwin.twin.scenario import DriveSection, OwnController, Scenario
 from spheretwin.twin.scenario import Plant as PlantSection
@@ -107,7 +107,7 @@ def law_of(scenario: Scenario, actuator: Actuator) -> Law:
 
 def signals_of(scenario: Scenario, law: Law) -> tuple[Signal, ...]:
     """Columns of a run's telemetry: common ones, those of its stages, then the law's own."""
-    found = SIGNALS
+    found: tuple[Signal, ...] = SIGNALS
     if any(scenario.sensors.angle_offset_rad):
         found += MEASURED_SIGNALS
     if _has_friction(scenario.plant):
@@ -179,26 +179,32 @@ def controller_of(scenario: Scenario, law: Law, magnetics: TorqueModel, kept: Ke
 def plant_of(scenario: Scenario, actuator: Actuator, stepped: Stepped, kept: KeptMatrix) -> Plant:
     """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
     section, groups = scenario.plant, len(actuator.groups)
-    height = float(actuator.payload_mount_m[2])
-    inertia = loaded_inertia((1 + section.modelling_error) * actuator.inertia, section.payload_kg, height)
     lag_s, limit_A = scenario.drive.time_constant_s or 0.0, scenario.drive.current_limit_A or 0.0
-    return plant(
-        stepped,
-        true_magnetics(scenario),
-        kept,
-        drive(lag_s, section.step_s, limit_A),
-        friction(
-            np.array(section.coulomb_Nm),
-            np.array(section.viscous_Nm_s),
-            section.friction_smoothing_rad_s,
-            inertia,
-            section.step_s,
-        ),
-        np.array(section.group_gain or (1.0,) * groups),
-        np.array(section.modelling_torque_Nm),
-        actuator.hinge_range_rad,
-        scenario.substeps,
-        np.zeros(groups),
+    return Plant(
+        rotor=stepped,
+        magnetics=true_magnetics(scenario),
+        kept=kept,
+        drive=drive(lag_s, section.step_s, limit_A),
+        friction=_friction(section, actuator),
+        group_gain=np.array(section.group_gain or (1.0,) * groups),
+        unmodelled_torque=np.array(section.modelling_torque_Nm),
+        hinge_range=actuator.hinge_range_rad,
+        substeps=scenario.substeps,
+        current=np.zeros(groups),
+        mean_current=np.zeros(groups),
+        pulling=np.zeros(groups),
+        friction_q=np.zeros(3),
+    )
+
+
+def _friction(section: PlantSection, actuator: Actuator) -> Friction:
+    height = float(actuator.payload_mount_m[2])
+    return friction(
+        np.array(section.coulomb_Nm),
+        np.array(section.viscous_Nm_s),
+        section.friction_smoothing_rad_s,
+        loaded_inertia((1 + section.modelling_error) * actuator.inertia, section.payload_kg, height),
+        section.step_s,
     )
 
 
@@ -276,7 +282,8 @@ def _check_pose(pose: trajectory.Triple, actuator: Actuator) -> None:
         if not low <= angle <= high:
             least, most, received = told_apart(low, high, angle)
             raise InputError(
-                f"scenario: expected a first pose with {hinge} from {least} to {most} rad, received {received}"
+                f"scenario: expected a first pose with {hinge} from {least} to {most} rad,"
+                f" received {received}"
             )
 
 

@@ -116,5 +116,6 @@ class Exogenous:
 
 def _finite(rows: Inputs) -> NDArray[np.bool_]:
     """Whether each row holds numbers alone."""
-    reference = np.isfinite(rows.reference).all(axis=(1, 2))
-    return reference & np.isfinite(rows.disturbance).all(axis=1)
+    every = np.concatenate([rows.reference.reshape(len(rows.t), 9), rows.disturbance], axis=1)
+    finite: NDArray[np.bool_] = np.isfinite(every).all(axis=1)
+    return finite

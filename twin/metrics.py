@@ -51,6 +51,9 @@ class Figures:
         np.add.at(self._squares, pieces, error**2)
         self._rows += len(rows)
 
+    def note(self, t_s: float, text: str) -> None:
+        """It changes no figure."""
+
     def finish(self, status: str) -> None:
         """Nothing remains to be done."""
 

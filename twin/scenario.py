@@ -34,6 +34,9 @@ NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 
 FOLDER = resources.files("spheretwin.twin") / "scenarios"
 
+# A torque matrix of nothing asks for endless currents.
+LEAST_SCALE = 1e-3
+
 # A tick must end before its user does: 10,000 physics steps take some 50 ms.
 MOST_SUBSTEPS = 10_000
 
@@ -121,9 +124,9 @@ class Nominal(_Section):
 
     @field_validator("torque_scale")
     @classmethod
-    def _not_zero(cls, scale: float) -> float:
-        if scale == 0:
-            raise PydanticCustomError("zero", "Input should be other than 0")
+    def _not_nothing(cls, scale: float) -> float:
+        if abs(scale) < LEAST_SCALE:
+            raise PydanticCustomError("scale", f"Input should be at least {LEAST_SCALE:g} in magnitude")
         return scale
 
 

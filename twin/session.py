@@ -197,6 +197,9 @@ class Session:
     def set(self, name: str, value: Any) -> None:
         """Change a field of the scenario from the next tick on, or the law itself.
 
+        What a scenario leaves open was filled in at the start: it does not follow (as the limit that the
+        allocation keeps to does not follow the drive's, unless it is set too).
+
         Parameters
         ----------
         name : str

@@ -30,6 +30,9 @@ class Sink(Protocol):
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, which do not change any more."""
 
+    def note(self, t_s: float, text: str) -> None:
+        """Take note of what happened before the tick at `t_s`."""
+
     def finish(self, status: str) -> None:
         """Take note of how the run ended."""
 
@@ -125,14 +128,14 @@ def follow(
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
     while session.tick < ticks and session.status == RUNNING and not stop_requested():
-        _make(session, waiting)
+        _make(session, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
         rows = _advance(session, last, log)
         for sink in sinks:
             sink.write(rows)
         if live:
             _sleep_until(started + session.t_s - first)
-    _make(session, waiting)  # those after the last tick belong to what the session says of itself
+    _make(session, waiting, sinks)  # those after the last tick belong to what the session says of itself
     status = session.status
     if status == RUNNING:
         status = COMPLETED if session.tick >= ticks else INTERRUPTED
@@ -141,11 +144,13 @@ def follow(
     return status
 
 
-def _make(session: Session, waiting: list[Change]) -> None:
+def _make(session: Session, waiting: list[Change], sinks: Sequence[Sink]) -> None:
     """Make the changes whose tick has come, and wait for them no more."""
     while waiting and waiting[0].tick <= session.tick:
         change = waiting.pop(0)
         session.set(change.name, change.value)
+        for sink in sinks:
+            sink.note(session.t_s, f"{change.name} set to {change.value}")
 
 
 def _advance(session: Session, last: int, log: NDArray[np.float64] | None) -> Table:

@@ -43,6 +43,9 @@ class Progress:
             simulated_s = rows["t_s"][-1]
             self._bars.update(self._task, advance=len(rows), simulated_s=simulated_s, description=self._name)
 
+    def note(self, t_s: float, text: str) -> None:
+        """Nothing is shown of it."""
+
     def finish(self, status: str) -> None:
         """Show how the run ended."""
         self._bars.update(self._task, description=f"{self._name}: {status}")

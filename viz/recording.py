@@ -139,6 +139,11 @@ class Recorder:
         if sum(map(len, self._waiting)) >= due:
             self._hand_over()
 
+    def note(self, t_s: float, text: str) -> None:
+        """Record what happened before the tick at `t_s`."""
+        self._hand_over()
+        self._submit(lambda: self._log([(t_s, "INFO", text)]))
+
     def finish(self, status: str) -> None:
         """Record how the run ended."""
         self._hand_over()

@@ -123,7 +123,7 @@ class Rotor:
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
-_address = ctypes.cast(library().mj_step, ctypes.c_void_p).value
+_address = ctypes.cast(library().mj_step, ctypes.c_void_p).value or 0
 _mj_step: Any
 if COMPILES:
     # A symbol that LLVM resolves by name can be cached; a ctypes function inside compiled code cannot.

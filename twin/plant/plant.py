@@ -46,36 +46,6 @@ class Delivered(NamedTuple):
     friction_q: NDArray[np.float64]  # (3,) N·m
 
 
-def plant(
-    rotor: Stepped,
-    magnetics: TorqueModel,
-    kept: KeptMatrix,
-    drive: Drive,
-    friction: Friction,
-    group_gain: NDArray[np.float64],
-    unmodelled_torque: NDArray[np.float64],
-    hinge_range: NDArray[np.float64],
-    substeps: int,
-    current: NDArray[np.float64],
-) -> Plant:
-    """Plant with a rotor that has been started and the given currents (A)."""
-    working = np.zeros((2, len(current)))
-    return Plant(
-        rotor,
-        magnetics,
-        kept,
-        drive,
-        friction,
-        group_gain,
-        unmodelled_torque,
-        hinge_range,
-        substeps,
-        current,
-        *working,
-        np.zeros(3),
-    )
-
-
 @allocation_free
 def plant_tick(
     plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: Delivered
