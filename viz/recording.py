@@ -33,10 +33,10 @@ FRAME_RATE_Hz = 60.0
 
 # Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
 # does not gather in memory.
-PENDING_CHUNKS = 4
+PENDING_CHUNKS = 3
 
 # Rerun keeps some bytes of each chunk to the end of a recording. Chunks therefore grow with it, up to this.
-MOST_ROWS = 8192
+MOST_ROWS = 12_288
 
 _SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
 
@@ -86,7 +86,7 @@ class Recorder:
         self._actuator = actuator
         self._limit_A = scenario["drive"]["current_limit_A"]
         self._mjcf = Path(scenario["plant"]["mjcf"] or MJCF_PATH)
-        scene.read_model(self._mjcf)  # a run needs no mesh, and would find out only now that one is missing
+        scene.read_meshes(self._mjcf)  # a run needs no mesh, and would find out only now that one is missing
         self._path = path
         self._events = Events()
         self._next_frame = self._handed_over = 0

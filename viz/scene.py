@@ -33,21 +33,27 @@ class Drawn:
     triangles: NDArray[np.int64]  # (m, 3)
 
 
-def read_model(mjcf: Path) -> mujoco.MjModel:
-    """Read the model with all its meshes, which a run does without.
+def read_meshes(mjcf: Path) -> dict[str, rr.Mesh3D]:
+    """Read what is drawn of a model, which a run does without; once while the file is unchanged.
+
+    Returns
+    -------
+    dict of Mesh3D
+        By entity, one for each body and colour, named after the first geom that it draws; and one for all
+        coils.
 
     Raises
     ------
     InputError
         A mesh is missing or broken.
     """
-    return _model(mjcf, _changed_ns(mjcf))
+    return _meshes(mjcf, mjcf.stat().st_mtime_ns)
 
 
 def log_static(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, payload_kg: float) -> None:
     """Log everything that keeps its shape: meshes by body and colour, coils as one mesh."""
     recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for entity, mesh in _meshes(mjcf, _changed_ns(mjcf)).items():
+    for entity, mesh in read_meshes(mjcf).items():
         recording.log(entity, mesh, static=True)
     if payload_kg > 0:
         mount = [actuator.payload_mount_m]
@@ -77,26 +83,14 @@ def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]
 
 
 @lru_cache(maxsize=2)
-def _model(mjcf: Path, _: int) -> mujoco.MjModel:
+def _meshes(mjcf: Path, _: int) -> dict[str, rr.Mesh3D]:
     try:
-        return mujoco.MjModel.from_xml_path(str(mjcf))
+        model = mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as error:
         raise InputError(
             f"model {mjcf}: expected meshes that can be drawn, {without_breaks(error)}"
         ) from None
-
-
-def _changed_ns(mjcf: Path) -> int:
-    return mjcf.stat().st_mtime_ns
-
-
-@lru_cache(maxsize=2)
-def _meshes(mjcf: Path, changed_ns: int) -> dict[str, rr.Mesh3D]:
-    """Meshes by entity, one for each body and colour, and one for all coils; read once while unchanged.
-
-    An entity is named after the first geom that it draws.
-    """
-    model = _model(mjcf, changed_ns)
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # 12 MB of meshes that nobody reads again
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     coils: list[Drawn] = []
