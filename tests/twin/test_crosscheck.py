@@ -4,7 +4,6 @@ import dataclasses
 import json
 import subprocess
 import sys
-from functools import partial
 
 import numpy as np
 import pytest
@@ -120,7 +119,10 @@ def test_wrong_orientation_breaks_its_row(monkeypatch, actuator):
 
 
 def test_wrong_gravity_is_seen_under_the_payload_alone(monkeypatch, actuator):
-    elsewhere = partial(LagrangianRotor, gravity_m_s2=9.80665)
+    def elsewhere(*settings, gravity_m_s2):
+        assert gravity_m_s2 == 9.81  # the model's
+        return LagrangianRotor(*settings, gravity_m_s2=9.80665)
+
     monkeypatch.setattr(dynamics, "LagrangianRotor", elsewhere)
     checks = dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks
     assert broken(checks) == of_both("bias C q̇ + G", "inverse dynamics", "forward dynamics")

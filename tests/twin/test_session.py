@@ -594,7 +594,7 @@ REFUSED = [
     ("controller.law", 3, "'pd'"),
     ("disturbance.load", plain_law(), "a law for controller.law"),
     ("controller.law", Law("broken", numba.njit(not_compilable), [], []), "that compiles"),
-    ("nominal.torque_scale", 0.0, "other than 0"),
+    ("nominal.torque_scale", 0.0, "0.001 in magnitude"),
     ("nominal.torque_curve", "/nowhere/curve.csv", "torque curve"),
     ("plant.torque_curve", "/nowhere/curve.csv", "torque curve"),
     ("plant.group_gain", [1.0, 1.0], "18 groups, received 2"),
