@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from functools import lru_cache
 from typing import Any
 
@@ -32,6 +33,17 @@ def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> No
         ]
         style = rr.SeriesLines(names=names, colors=_colours(signal), widths=[1.5] * len(names))
         recording.log(entity(signal.name), style, static=True)
+
+
+def application(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], live: bool) -> str:
+    """Application id of recordings with one layout, for the arguments of `layout`.
+
+    A viewer keeps one layout for each application: under a common id the second recording that it opens
+    would be shown in the first one's, with its length and its tabs. Of letters, digits and dashes only, else
+    the viewer changes it.
+    """
+    key = repr((duration_s, current_limit_A, [signal.name for signal in own], live))
+    return f"spheretwin-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
 
 
 @lru_cache(maxsize=4)

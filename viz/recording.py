@@ -24,8 +24,6 @@ from spheretwin.viz.events import Events
 from spheretwin.viz.file_pipe import FilePipe
 from spheretwin.viz.live import Viewer
 
-APPLICATION = "spheretwin"
-
 Index = list[rr.TimeColumn]
 
 # What only the eye needs: poses, coil colours, traces.
@@ -92,7 +90,9 @@ class Recorder:
         self._next_frame = self._handed_over = 0
         self._waiting: list[Table] = []
         self._last_tips: dict[str, NDArray[np.float64]] = {}
-        self._recording = rr.RecordingStream(APPLICATION)
+        own = tuple(signal for signal in signals if signal.name not in _COMMON)
+        view = scenario["duration"], self._limit_A, own, live
+        self._recording = rr.RecordingStream(blueprint.application(*view))
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.viewer = Viewer() if live else None
         self._output = OutputFile(path) if path else None
@@ -100,18 +100,21 @@ class Recorder:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
         self._room = Semaphore(PENDING_CHUNKS)
         self._fault: str | None = None
-        self._submit(self._connect, signals, scenario)
+        self._submit(self._connect, signals, scenario, view)
 
-    def _connect(self, signals: tuple[Signal, ...], scenario: dict[str, Any]) -> None:
+    def _connect(
+        self,
+        signals: tuple[Signal, ...],
+        scenario: dict[str, Any],
+        view: tuple[float, float, tuple[Signal, ...], bool],
+    ) -> None:
         """Open the sinks, log all that stays the same, then let a viewer in."""
-        own = tuple(signal for signal in signals if signal.name not in _COMMON)
         sinks: list[Any] = []
         if self._pipe:
             sinks.append(rr.FileSink(self._pipe.path))
         if self.viewer:
             sinks.append(self.viewer.sink)
-        layout = blueprint.layout(scenario["duration"], self._limit_A, own, live=self.viewer is not None)
-        self._recording.set_sinks(*sinks, default_blueprint=layout)
+        self._recording.set_sinks(*sinks, default_blueprint=blueprint.layout(*view))
         self._recording.send_recording_name(f"{scenario['name']}, {scenario['controller']['law']}")
         scene.log_static(self._recording, self._actuator, self._mjcf, scenario["plant"]["payload_kg"])
         blueprint.log_styles(self._recording, signals)

@@ -241,3 +241,15 @@ def test_curve_is_the_shipped_one(tmp_path):
 def test_console_script_is_this_command():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     assert project["scripts"] == {"spheretwin": "spheretwin.twin.cli:main"}
+
+
+def test_what_is_not_chosen_is_not_compiled(tmp_path):
+    """The bounded allocation alone would take longer to compile than all the rest."""
+    environment = {**os.environ, "SPHERETWIN_CACHE_DIR": str(tmp_path / "cache")}
+    command = [*COMMAND, "simulate", "hold", "--duration", "0.01"]
+    subprocess.run(command, env=environment, capture_output=True, check=True)
+    entries = [path.name for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    assert any("allocate" in name or "allocation" in name for name in entries)
+    assert any("engine" in name for name in entries)
+    for part in ("bounded", "simplex", "plant-lagrangian"):
+        assert not [name for name in entries if part in name], part

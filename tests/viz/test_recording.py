@@ -153,7 +153,7 @@ def test_recording_carries_its_blueprint_and_name(run):
     path, *_ = run
     reader = RrdReader(path)
     assert len(reader.blueprints()) == 1
-    assert reader.recordings()[0].application_id == "spheretwin"
+    assert reader.recordings()[0].application_id.startswith("spheretwin-")
 
 
 def test_payload_is_drawn_where_it_is_mounted(tmp_path):
@@ -328,3 +328,21 @@ def test_recorder_that_has_failed_keeps_no_run_waiting(tmp_path):
 def test_strict_mode_is_on(run):
     # Without it Rerun turns a mistake into a warning and drops the data.
     assert rr.strict_mode()
+
+
+def test_recordings_share_an_application_only_where_they_share_a_layout(tmp_path):
+    """A viewer keeps one layout for each application."""
+
+    def application(name, **changes):
+        recorded(path := tmp_path / f"{name}.rrd", **changes)
+        return RrdReader(path).recordings()[0].application_id
+
+    first = application("a", duration=0.02)
+    assert application("b", duration=0.02, seed=3) == first
+    others = [
+        application("c", duration=0.03),
+        application("d", duration=0.02, **{"controller.law": "pd"}),
+        application("e", duration=0.02, **{"drive.current_limit_A": 4}),
+    ]
+    assert len({first, *others}) == 4
+    assert all(set(each) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for each in (first, *others))
