@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import mujoco
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
 from spheretwin.models.errors import InputError
-from spheretwin.models.mjcf import read
+from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.models.telemetry import GROUPS
 from spheretwin.models.torque_curve import TorqueCurve
 from spheretwin.models.wording import told_apart
@@ -129,7 +130,17 @@ def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
     """
     if (mjcf, curve) == (MJCF_PATH, TORQUE_CURVE_PATH):
         return _shipped()  # read once: another file, or one that it includes, may change meanwhile
-    return from_model(read(mjcf).described, torque_curve.read(curve))
+    try:
+        content = curve.read_bytes()
+    except OSError:  # told by the reader of curves, in its words
+        content = b""
+    return _kept(read(mjcf), curve, hashlib.sha256(content).hexdigest())
+
+
+@lru_cache(maxsize=8)
+def _kept(mjcf: Mjcf, curve: Path, _: str) -> Actuator:
+    """One object for files that have not changed: what is made of an actuator is kept with it."""
+    return from_model(mjcf.described, torque_curve.read(curve))
 
 
 def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:

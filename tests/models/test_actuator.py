@@ -129,3 +129,12 @@ def test_a_model_without_bounds_yields_no_magnet_and_no_coil(tmp_path, old):
     (path := tmp_path / "mine.xml").write_text(TEXT.replace(old, 'pos="1e300 0 0"'))
     with pytest.raises(InputError, match="site_pos"):
         actuators.read_magnet_and_coil(path)
+
+
+def test_files_that_have_not_changed_are_one_actuator(tmp_path):
+    (path := tmp_path / "mine.xml").write_text(TEXT)
+    (curve := tmp_path / "mine.csv").write_bytes(actuators.TORQUE_CURVE_PATH.read_bytes())
+    first = actuators.load(path, curve)
+    assert actuators.load(path, curve) is first
+    curve.write_bytes(curve.read_bytes().replace(b"0.000762479810", b"0.000762479811"))
+    assert actuators.load(path, curve) is not first
