@@ -260,7 +260,7 @@ class Session:
             self._restore(snapshot)
 
     def close(self) -> None:
-        """Give the parts back; the session cannot be used any more."""
+        """End the session: whatever is asked of it from then on is refused."""
         self._closed = True
 
     def __enter__(self) -> Session:
