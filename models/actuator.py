@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -130,17 +129,13 @@ def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
     """
     if (mjcf, curve) == (MJCF_PATH, TORQUE_CURVE_PATH):
         return _shipped()  # read once: another file, or one that it includes, may change meanwhile
-    try:
-        content = curve.read_bytes()
-    except OSError:  # told by the reader of curves, in its words
-        content = b""
-    return _kept(read(mjcf), curve, hashlib.sha256(content).hexdigest())
+    return _kept(read(mjcf), curve, torque_curve.read_bytes(curve))
 
 
 @lru_cache(maxsize=8)
-def _kept(mjcf: Mjcf, curve: Path, _: str) -> Actuator:
+def _kept(mjcf: Mjcf, curve: Path, content: bytes) -> Actuator:
     """One object for files that have not changed: what is made of an actuator is kept with it."""
-    return from_model(mjcf.described, torque_curve.read(curve))
+    return from_model(mjcf.described, torque_curve.parse(curve, content))
 
 
 def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:

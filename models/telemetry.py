@@ -143,6 +143,23 @@ def _places(signals: tuple[Signal, ...]) -> dict[str, tuple[int, int]]:
     return {signal.name: (first[signal.name], signal.size) for signal in signals}
 
 
+def allocated(rows: int, columns: int) -> NDArray[np.float64]:
+    """Room for rows of telemetry.
+
+    Raises
+    ------
+    InputError
+        There is not so much memory.
+    """
+    try:
+        return np.empty((rows, columns))
+    except (MemoryError, ValueError):  # the latter beyond what an index can hold
+        needed = rows * columns * 8 / 2**30
+        raise InputError(
+            f"telemetry: expected rows that fit in memory, received {needed:.1f} GiB of them"
+        ) from None
+
+
 class Table:
     """A run's telemetry: ``table["q_rad"]`` is an (n, 3) array, ``table["t_s"]`` an (n,) array.
 

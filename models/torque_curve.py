@@ -103,9 +103,28 @@ def read(path: Path) -> TorqueCurve:
         The file cannot be read, lacks a column, its samples are no curve from 0 to 180 degrees, or its head
         names a number that is none.
     """
+    return parse(path, read_bytes(path))
+
+
+def read_bytes(path: Path) -> bytes:
+    """Content of a curve's file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
     try:
-        text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
-    except (OSError, UnicodeDecodeError) as error:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"torque curve {path}: expected a readable text file, {error}") from None
+
+
+def parse(path: Path, content: bytes) -> TorqueCurve:
+    """Torque curve of a file's content, as `read` takes it; the path is for messages alone."""
+    try:
+        text = content.decode("utf-8-sig")  # spreadsheets write a byte-order mark
+    except UnicodeDecodeError as error:
         raise InputError(f"torque curve {path}: expected a readable text file, {error}") from None
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     rows = csv.DictReader(lines, skipinitialspace=True)

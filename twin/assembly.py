@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -25,6 +26,7 @@ from spheretwin.models.telemetry import (
     MEASURED_SIGNALS,
     SIGNALS,
     Signal,
+    offsets,
     width,
 )
 from spheretwin.models.wording import told_apart
@@ -48,18 +50,41 @@ UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
 AnyRotor = Rotor | LagrangianRotor
 
 
-def model_of(section: PlantSection) -> Mjcf:
-    """Model file of a plant, as it is kept."""
-    return mjcf.read(Path(section.mjcf or actuators.MJCF_PATH))
+class Files(NamedTuple):
+    """What the files of a scenario say, read once for a session: an edit meanwhile changes nothing of it."""
+
+    model: Mjcf
+    actuator: Actuator
+    nominal: Actuator
+    """As the controller has it: the very same unless it has another torque curve."""
 
 
-def actuator_of(section: PlantSection, curve: str | None = None) -> Actuator:
-    """Actuator of a plant; with another torque curve, as a controller may assume it."""
-    chosen = curve or section.torque_curve or actuators.TORQUE_CURVE_PATH
-    return actuators.load(Path(section.mjcf or actuators.MJCF_PATH), Path(chosen))
+def files_of(scenario: Scenario) -> Files:
+    """Read model file and torque curves of a scenario."""
+    path = Path(scenario.plant.mjcf or actuators.MJCF_PATH)
+    curve = Path(scenario.plant.torque_curve or actuators.TORQUE_CURVE_PATH)
+    actuator = actuators.load(path, curve)
+    other = scenario.nominal.torque_curve
+    return Files(mjcf.read(path), actuator, actuators.load(path, Path(other)) if other else actuator)
 
 
-def resolved(scenario: Scenario, model: Mjcf, actuator: Actuator, law: Law | None) -> Scenario:
+def named_files(scenario: Scenario) -> tuple[str | None, ...]:
+    """Names by which a scenario finds its files."""
+    return scenario.plant.mjcf, scenario.plant.torque_curve, scenario.nominal.torque_curve
+
+
+def digest(files: Files) -> str:
+    """Digest of all that files say of the physics, by which a snapshot knows its model."""
+    models = (files.model.described, files.model.loaded)
+    content = [np.empty(mujoco.mj_sizeModel(model), np.uint8) for model in models]
+    for model, buffer in zip(models, content, strict=True):
+        mujoco.mj_saveModel(model, None, buffer)
+    for actuator in (files.actuator, files.nominal):
+        content += [actuator.torque_curve.phi_rad, actuator.torque_curve.torque_Nm_per_A]
+    return hashlib.sha256(b"".join(each.tobytes() for each in content)).hexdigest()
+
+
+def resolved(scenario: Scenario, files: Files, law: Law | None) -> Scenario:
     """Scenario whose open values are filled in from the model and the trajectory.
 
     Raises
@@ -67,7 +92,8 @@ def resolved(scenario: Scenario, model: Mjcf, actuator: Actuator, law: Law | Non
     InputError
         The first pose is outside the hinges' range, or a list does not fit the actuator.
     """
-    group, given, nominal, section = actuator.group, scenario.drive, scenario.nominal, scenario.plant
+    actuator, given, nominal, section = files.actuator, scenario.drive, scenario.nominal, scenario.plant
+    group = actuator.group
     lag_s, limit_A = given.time_constant_s, given.current_limit_A
     drive_section = DriveSection(
         time_constant_s=group.inductance_H / group.resistance_ohm if lag_s is None else lag_s,
@@ -84,7 +110,7 @@ def resolved(scenario: Scenario, model: Mjcf, actuator: Actuator, law: Law | Non
         "plant": section.model_copy(
             update={
                 "initial_rad": section.initial_rad or _first_pose(scenario),
-                "gravity_m_s2": _gravity(section, model),
+                "gravity_m_s2": _gravity(section, files.model),
             }
         ),
     }
@@ -110,20 +136,19 @@ def signals_of(scenario: Scenario, law: Law) -> tuple[Signal, ...]:
     found: tuple[Signal, ...] = SIGNALS
     if any(scenario.sensors.angle_offset_rad):
         found += MEASURED_SIGNALS
-    if _has_friction(scenario.plant):
+    if any(scenario.plant.coulomb_Nm) or any(scenario.plant.viscous_Nm_s):
         found += FRICTION_SIGNALS
     return found + law.signals
 
 
-def columns_of(scenario: Scenario, law: Law) -> Columns:
+def columns_of(signals: tuple[Signal, ...], law: Law) -> Columns:
     """Where the loop finds the columns that not every run has."""
-    measured = friction_column = -1
-    end = width(SIGNALS)
-    if any(scenario.sensors.angle_offset_rad):
-        measured, end = end, end + width(MEASURED_SIGNALS)
-    if _has_friction(scenario.plant):
-        friction_column, end = end, end + width(FRICTION_SIGNALS)
-    return Columns(measured, friction_column, end)
+    first = offsets(signals)
+    return Columns(
+        measured=first.get(MEASURED_SIGNALS[0].name, -1),
+        friction=first.get(FRICTION_SIGNALS[0].name, -1),
+        of_the_law=width(signals) - width(law.signals),
+    )
 
 
 def sensors_of(scenario: Scenario) -> Sensors:
@@ -131,9 +156,9 @@ def sensors_of(scenario: Scenario) -> Sensors:
     return sensors(scenario.sensors.angle_offset_rad)
 
 
-def warnings_of(scenario: Scenario, actuator: Actuator) -> list[str]:
+def warnings_of(scenario: Scenario, files: Files) -> list[str]:
     """What a user should know of model and scenario before believing the figures; one line each."""
-    return disagreements(actuator) + _overridden(scenario.plant, model_of(scenario.plant).described.opt)
+    return disagreements(files.actuator) + _overridden(scenario.plant, files.model.described.opt)
 
 
 def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
@@ -156,18 +181,10 @@ def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
     return found
 
 
-def true_magnetics(scenario: Scenario) -> TorqueModel:
-    """Magnetics of the plant."""
-    return torque_model(actuator_of(scenario.plant))
-
-
-def nominal_magnetics(scenario: Scenario) -> TorqueModel:
+def nominal_magnetics(scenario: Scenario, files: Files) -> TorqueModel:
     """Magnetics as the controller has them; the plant's very own where nothing says otherwise."""
-    nominal = scenario.nominal
-    model = torque_model(actuator_of(scenario.plant, nominal.torque_curve))
-    if nominal.torque_scale == 1:
-        return model
-    return model._replace(line_weights=nominal.torque_scale * model.line_weights)
+    model, scale = torque_model(files.nominal), scenario.nominal.torque_scale
+    return model if scale == 1 else model._replace(line_weights=scale * model.line_weights)
 
 
 def controller_of(scenario: Scenario, law: Law, magnetics: TorqueModel, kept: KeptMatrix) -> Controller:
@@ -182,7 +199,7 @@ def plant_of(scenario: Scenario, actuator: Actuator, stepped: Stepped, kept: Kep
     lag_s, limit_A = scenario.drive.time_constant_s or 0.0, scenario.drive.current_limit_A or 0.0
     return Plant(
         rotor=stepped,
-        magnetics=true_magnetics(scenario),
+        magnetics=torque_model(actuator),
         kept=kept,
         drive=drive(lag_s, section.step_s, limit_A),
         friction=_friction(section, actuator),
@@ -214,7 +231,7 @@ def kept_matrices(nominal: TorqueModel, true: TorqueModel) -> tuple[KeptMatrix, 
     return kept, kept if nominal is true else kept_matrix(true)
 
 
-def rotor_of(scenario: Scenario, actuator: Actuator) -> AnyRotor:
+def rotor_of(scenario: Scenario, files: Files) -> AnyRotor:
     """Rotor of a resolved scenario, in the engine that it names.
 
     Raises
@@ -222,12 +239,12 @@ def rotor_of(scenario: Scenario, actuator: Actuator) -> AnyRotor:
     InputError
         The engine does not know all that the model holds.
     """
-    return ENGINES[scenario.plant.engine](scenario.plant, actuator)
+    return ENGINES[scenario.plant.engine](scenario.plant, files)
 
 
-def _mujoco(section: PlantSection, _: Actuator) -> Rotor:
+def _mujoco(section: PlantSection, files: Files) -> Rotor:
     return Rotor(
-        model_of(section),
+        files.model,
         section.step_s,
         section.integrator,
         section.modelling_error,
@@ -236,8 +253,8 @@ def _mujoco(section: PlantSection, _: Actuator) -> Rotor:
     )
 
 
-def _lagrangian(section: PlantSection, actuator: Actuator) -> LagrangianRotor:
-    unknown = mjcf.beyond_a_free_rotor(model_of(section).loaded)
+def _lagrangian(section: PlantSection, files: Files) -> LagrangianRotor:
+    unknown = mjcf.beyond_a_free_rotor(files.model.loaded)
     if section.gravity_m_s2 is not None:
         unknown = [name for name in unknown if name != mjcf.OTHER_GRAVITY]
     if unknown:
@@ -246,7 +263,7 @@ def _lagrangian(section: PlantSection, actuator: Actuator) -> LagrangianRotor:
             f" {', '.join(unknown)}; plant.engine mujoco computes it"
         )
     return LagrangianRotor(
-        actuator,
+        files.actuator,
         section.step_s,
         section.integrator,
         section.modelling_error,
@@ -255,14 +272,10 @@ def _lagrangian(section: PlantSection, actuator: Actuator) -> LagrangianRotor:
     )
 
 
-ENGINES: dict[str, Callable[[PlantSection, Actuator], AnyRotor]] = {
+ENGINES: dict[str, Callable[[PlantSection, Files], AnyRotor]] = {
     "mujoco": _mujoco,
     "lagrangian": _lagrangian,
 }
-
-
-def _has_friction(section: PlantSection) -> bool:
-    return any(section.coulomb_Nm) or any(section.viscous_Nm_s)
 
 
 def _first_pose(scenario: Scenario) -> trajectory.Triple:

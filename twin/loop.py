@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from spheretwin.control.controller import LOST, control_tick
 from spheretwin.models.compiled import allocation_free
+from spheretwin.models.copying import copy_into, copy_rows
 from spheretwin.models.telemetry import SIGNALS, offsets
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, plant_tick
 from spheretwin.twin.sensors import measure
@@ -72,19 +73,19 @@ def loop(inputs, law, allocate, controller, sensors, plant, columns, scratch, lo
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
         measure(sensors, plant.rotor.q, plant.rotor.qdot, measurement)
-        copy_matrix(inputs.reference[tick], reference)
+        copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called: it may write into all that it is handed.
         write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
         if columns.measured >= 0:
-            put(row, columns.measured, measurement[0], 3)
-            put(row, columns.measured + 3, measurement[1], 3)
+            copy_into(row, columns.measured, measurement[0], 3)
+            copy_into(row, columns.measured + 3, measurement[1], 3)
         command = row[CURRENT_COMMAND : CURRENT_COMMAND + groups]
         share = control_tick(controller, law, allocate, t, reference, measurement, command)
         if share == LOST:
             return tick, DIVERGED
         row[SCALE] = share
-        put(row, TORQUE_COMMAND, controller.torque_q, 3)
-        put(row, columns.of_the_law, controller.memory, controller.logged)
+        copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
+        copy_into(row, columns.of_the_law, controller.memory, controller.logged)
         friction = row[columns.friction : columns.friction + 3] if columns.friction >= 0 else plant.friction_q
         delivered = Delivered(row[CURRENT : CURRENT + groups], row[TORQUE : TORQUE + 3], friction)
         status = plant_tick(plant, command, disturbance, delivered)
@@ -101,18 +102,3 @@ def write_motion(row, t, reference, q, qdot, disturbance):  # type: ignore[no-un
         row[ANGLE + i], row[RATE + i] = q[i], qdot[i]
         row[ANGLE_REF + i], row[RATE_REF + i] = reference[0, i], reference[1, i]
         row[ERROR + i], row[DISTURBANCE + i] = q[i] - reference[0, i], disturbance[i]
-
-
-@allocation_free
-def put(row: NDArray[np.float64], first: int, values: NDArray[np.float64], count: int) -> None:
-    """Copy leading values into a row; a slice would be checked for overlap, at twice the time."""
-    for i in range(count):
-        row[first + i] = values[i]
-
-
-@allocation_free
-def copy_matrix(source: NDArray[np.float64], target: NDArray[np.float64]) -> None:
-    """Copy a matrix of three columns."""
-    for i in range(source.shape[0]):
-        for j in range(3):
-            target[i, j] = source[i, j]

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
@@ -23,9 +22,10 @@ from spheretwin.control.allocations import ALLOCATIONS
 from spheretwin.control.law import Law
 from spheretwin.control.laws import LAWS
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.compiled import compiled_callback, for_types_of, uncompiled
+from spheretwin.models.compiled import COMPILES, compiled_callback, for_types_of, uncompiled
 from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.telemetry import Signal, Table, width
+from spheretwin.models.magnetics import torque_model
+from spheretwin.models.telemetry import Signal, Table, allocated, width
 from spheretwin.models.wording import shown
 from spheretwin.twin import assembly, trajectory
 from spheretwin.twin import loop as loops
@@ -68,6 +68,8 @@ class Snapshot:
     scenario: Scenario
     begun_as: Scenario
     own_law: str | None
+    files: str
+    """Digest of model and torque curves."""
     tick: int
     status: str
     rotor: NDArray[np.float64]
@@ -94,12 +96,10 @@ class Session:
         In force now: what was left open is filled in from the model and the trajectory.
     begun_as : Scenario
         The same at tick 0; with the journal it says all that has happened.
-    actuator : Actuator
-        What is simulated.
     law : Law
         In force now.
     signals : tuple of Signal
-        Columns of the telemetry; a change of law may change them.
+        Columns of the telemetry; a change of law, friction or sensors may change them.
     journal : tuple of Change
         What `set` did.
     tick : int
@@ -122,16 +122,22 @@ class Session:
         self._closed = False
         self._scratch = loops.Scratch(np.empty((3, 3)), np.empty((2, 3)))
         self._own_law = law
+        self._own_laws = {law.name: law} if law else {}
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
         self._status = RUNNING
-        self.actuator: Actuator = assembly.actuator_of(scenario.plant)
+        self._files = assembly.files_of(scenario)
         self.scenario = self.begun_as = self._resolved(scenario)
         self._exogenous = Exogenous(self.scenario)
         self._build_rotor()
         self._build_controller()
         self._build_plant()
         self._connect()
+
+    @property
+    def actuator(self) -> Actuator:
+        """What is simulated."""
+        return self._files.actuator
 
     @property
     def status(self) -> str:
@@ -169,7 +175,7 @@ class Session:
         if not isinstance(ticks, int | np.integer) or ticks < 0:
             raise InputError(f"session: expected a number of ticks from 0 on, received {shown(ticks)}")
         with self._alone():
-            log = np.empty((ticks, self._columns))
+            log = allocated(int(ticks), self._columns)
             return Table(self._signals, log[: self._advance(log)])
 
     def advance_into(self, log: NDArray[np.float64]) -> int:
@@ -230,6 +236,7 @@ class Session:
                 self.scenario,
                 self.begun_as,
                 self._own_law.name if self._own_law else None,
+                assembly.digest(self._files),
                 self.tick,
                 self._status,
                 self._rotor.state(),
@@ -249,18 +256,17 @@ class Session:
             It was taken under a law of the user's that this session does not have, or on another model.
         """
         with self._alone(), self._all_or_nothing():
-            own = self._own_law.name if self._own_law else None
-            if snapshot.own_law not in (None, own):
+            if snapshot.own_law is not None and snapshot.own_law not in self._own_laws:
+                known = ", ".join([*LAWS, *self._own_laws])
                 raise InputError(
-                    f"session: expected a snapshot under the law {self.law.name},"
+                    f"session: expected a snapshot under one of the laws {known},"
                     f" received one under {snapshot.own_law}"
                 )
-            if snapshot.own_law is None:
-                self._own_law = None
+            self._own_law = self._own_laws[snapshot.own_law] if snapshot.own_law is not None else None
             self._restore(snapshot)
 
     def close(self) -> None:
-        """End the session: whatever is asked of it from then on is refused."""
+        """End the session: to advance, set, keep or restore it is refused from then on."""
         self._closed = True
 
     def __enter__(self) -> Session:
@@ -273,12 +279,14 @@ class Session:
 
     def warnings(self) -> list[str]:
         """What a user should know of model and scenario before believing the figures; one line each."""
-        return assembly.warnings_of(self.scenario, self.actuator)
+        return assembly.warnings_of(self.scenario, self._files)
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
         if not self._busy.acquire(blocking=False):
-            raise SpheretwinError("session: expected one thread at a time, received a call from a second one")
+            raise SpheretwinError(
+                "session: expected one thread at a time, received a second call while one is at work"
+            )
         try:
             if self._closed:
                 raise SpheretwinError("session: expected an open session, received a call to a closed one")
@@ -317,18 +325,15 @@ class Session:
             raise
         self.loop_s += time.perf_counter() - started
         self.tick += ticks
-        if code == GOING and self._rotor.warned():
-            code = DIVERGED
         self._status = STATUS[code]
         return ticks
 
     def _resolved(self, scenario: Scenario) -> Scenario:
-        model = assembly.model_of(scenario.plant)
-        return assembly.resolved(scenario, model, self.actuator, self._own_law)
+        return assembly.resolved(scenario, self._files, self._own_law)
 
     def _build_rotor(self) -> None:
         section = self.scenario.plant
-        self._rotor = assembly.rotor_of(self.scenario, self.actuator)
+        self._rotor = assembly.rotor_of(self.scenario, self._files)
         self._stepped = self._rotor.start(_array(section.initial_rad), _array(section.initial_rad_s))
 
     def _build_controller(self) -> None:
@@ -336,9 +341,10 @@ class Session:
         scenario = self.scenario
         self.law = self._own_law or assembly.law_of(scenario, self.actuator)
         self._signals = assembly.signals_of(scenario, self.law)
-        self._columns, self._places = width(self._signals), assembly.columns_of(scenario, self.law)
-        magnetics = assembly.nominal_magnetics(scenario)
-        self._kept = assembly.kept_matrices(magnetics, assembly.true_magnetics(scenario))
+        self._columns = width(self._signals)
+        self._places = assembly.columns_of(self._signals, self.law)
+        magnetics = assembly.nominal_magnetics(scenario, self._files)
+        self._kept = assembly.kept_matrices(magnetics, torque_model(self.actuator))
         self._controller = assembly.controller_of(scenario, self.law, magnetics, self._kept[0])
         self._sensors = assembly.sensors_of(scenario)
         self._functions = _matching(self.law, ALLOCATIONS[scenario.allocation])
@@ -371,7 +377,11 @@ class Session:
                 self._own_law = None
             elif before and name.startswith("controller."):
                 raise InputError(f"session: expected no field of a shipped law, as {before.name} is not one")
+        if assembly.named_files(scenario) != assembly.named_files(self.scenario):
+            self._files = assembly.files_of(scenario)
         self._apply(self._resolved(scenario))
+        if own:
+            self._own_laws = {**self._own_laws, own.name: own}
 
     def _apply(self, scenario: Scenario) -> None:
         """Build anew what a scenario changes, and carry over what it is in the midst of."""
@@ -389,8 +399,7 @@ class Session:
 
     def _rebuild_rotor(self) -> None:
         """Rotor of the present scenario, in the same state."""
-        self.actuator = assembly.actuator_of(self.scenario.plant)
-        rotor = assembly.rotor_of(self.scenario, self.actuator)
+        rotor = assembly.rotor_of(self.scenario, self._files)
         stepped, state = rotor.start(self._stepped.q, self._stepped.qdot), self._rotor.state()
         if len(rotor.state()) == len(state):  # else a body has come or gone: pose and rates are what remains
             rotor.restore(state)
@@ -398,15 +407,20 @@ class Session:
 
     def _rebuild_controller(self) -> None:
         """Controller of the present scenario; a law that stays, if with other gains, keeps its memory."""
-        law, before = self.law, self._controller
+        law, before, step = self.law, self._controller, self.law.step
         self._build_controller()
-        if self.law.name == law.name and len(before.memory) == len(self._controller.memory):
-            self._controller.memory[:] = before.memory
         if self.law is law:  # one of the user's, which may have changed its parameters
             self._controller.parameters[:] = before.parameters
+        if self.law is law or (self._own_law is None and self.law.step is step):  # a shipped one, other gains
+            self._controller.memory[:] = before.memory
 
     def _restore(self, snapshot: Snapshot) -> None:
-        self.actuator = assembly.actuator_of(snapshot.scenario.plant)
+        if assembly.named_files(snapshot.scenario) != assembly.named_files(self.scenario):
+            self._files = assembly.files_of(snapshot.scenario)
+        if assembly.digest(self._files) != snapshot.files:
+            raise InputError(
+                "session: expected a snapshot of the same model and torque curves, received one of others"
+            )
         self.scenario, self.begun_as = snapshot.scenario, snapshot.begun_as
         self._build_rotor()
         self._build_controller()
@@ -434,8 +448,8 @@ class _Functions(NamedTuple):
 
 def _matching(law: Law, allocate: Callable[..., float]) -> _Functions:
     """The compiled loop for a law that can be compiled, the uncompiled one for a plain function."""
-    own = not law.step.__module__.startswith("spheretwin.")
-    if numba.config.DISABLE_JIT or (own and not isinstance(law.step, Dispatcher)):
+    own = not (law.step.__module__ or "").startswith("spheretwin.")
+    if not COMPILES or (own and not isinstance(law.step, Dispatcher)):
         return _Functions(uncompiled(loops.loop), uncompiled(law.step), allocate, ())
     try:
         stepping = compiled_callback(laws.SIGNATURE, law.step)
@@ -472,12 +486,14 @@ def _plain(value: Any) -> Any:
 
 
 def _check_rows(log: NDArray[np.float64], columns: int) -> None:
-    fits = log.shape[1:] == (columns,) and log.dtype == np.float64
-    if not (fits and log.flags.c_contiguous and log.flags.writeable):
-        raise InputError(
-            f"session: expected contiguous, writeable rows of {columns} float64,"
-            f" received {log.dtype} of shape {log.shape}"
-        )
+    if isinstance(log, np.ndarray):
+        fits = log.shape[1:] == (columns,) and log.dtype == np.float64
+        if fits and log.flags.c_contiguous and log.flags.writeable:
+            return
+    raise InputError(
+        f"session: expected contiguous, writeable rows of {columns} float64, received"
+        f" {getattr(log, 'dtype', type(log).__name__)} of shape {np.shape(log)}"
+    )
 
 
 def _fill(what: str, target: NDArray[np.float64], values: NDArray[np.float64]) -> None:

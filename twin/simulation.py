@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
-from spheretwin.models.errors import InputError
-from spheretwin.models.telemetry import Table, width
+from spheretwin.models.telemetry import Table, allocated, width
 from spheretwin.twin.scenario import Scenario
 from spheretwin.twin.session import RUNNING, Change, Session
 
@@ -78,7 +77,7 @@ def simulate(scenario: Scenario, law: Law | None = None, sinks: Sequence[Sink] =
         does not fit in memory.
     """
     with Session(scenario, law) as session:
-        log = _allocated(scenario.ticks, width(session.signals))
+        log = allocated(scenario.ticks, width(session.signals))
         status = follow(session, scenario.ticks, sinks, log=log)
         telemetry = Table(session.signals, log[: session.tick])
         return Run(session.begun_as, status, telemetry, session.loop_s)
@@ -123,19 +122,21 @@ def follow(
     InputError
         Reference or disturbance would be lost on the way; a change of the journal is none.
     """
-    session.check_horizon(ticks)
     sinks, waiting = list(sinks), list(journal)
+    session.check_horizon(_known_to(ticks, waiting))
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
     while session.tick < ticks and session.status == RUNNING and not stop_requested():
-        _make(session, waiting, sinks)
+        _make(session, ticks, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
         rows = _advance(session, last, log)
         for sink in sinks:
             sink.write(rows)
         if live:
             _sleep_until(started + session.t_s - first)
-    _make(session, waiting, sinks)  # those after the last tick belong to what the session says of itself
+    _make(
+        session, ticks, waiting, sinks
+    )  # those after the last tick belong to what the session says of itself
     status = session.status
     if status == RUNNING:
         status = COMPLETED if session.tick >= ticks else INTERRUPTED
@@ -144,13 +145,20 @@ def follow(
     return status
 
 
-def _make(session: Session, waiting: list[Change], sinks: Sequence[Sink]) -> None:
+def _known_to(ticks: int, waiting: Sequence[Change]) -> int:
+    """Tick up to which reference and disturbance are those of the present scenario."""
+    return min([ticks, *(change.tick for change in waiting)])
+
+
+def _make(session: Session, ticks: int, waiting: list[Change], sinks: Sequence[Sink]) -> None:
     """Make the changes whose tick has come, and wait for them no more."""
     while waiting and waiting[0].tick <= session.tick:
         change = waiting.pop(0)
         session.set(change.name, change.value)
         for sink in sinks:
             sink.note(session.t_s, f"{change.name} set to {change.value}")
+        if not waiting or waiting[0].tick > session.tick:
+            session.check_horizon(_known_to(ticks, waiting))
 
 
 def _advance(session: Session, last: int, log: NDArray[np.float64] | None) -> Table:
@@ -165,16 +173,6 @@ def _chunk_ticks(scenario: Scenario, live: bool) -> int:
     if live:
         return max(1, round(LIVE_CHUNK_S / scenario.controller.period_s))
     return max(1, CHUNK_STEPS // scenario.substeps)
-
-
-def _allocated(ticks: int, columns: int) -> NDArray[np.float64]:
-    try:
-        return np.empty((ticks, columns))
-    except (MemoryError, ValueError):  # the latter beyond what an index can hold
-        needed = ticks * columns * 8 / 2**30
-        raise InputError(
-            f"scenario: expected telemetry that fits in memory, received {needed:.1f} GiB"
-        ) from None
 
 
 def _sleep_until(moment: float) -> None:

@@ -38,6 +38,7 @@ class Engine(NamedTuple):
     qdot: NDArray[np.float64]  # (3,) rad/s
     torque_S: NDArray[np.float64]  # (3,) N·m on the rotor, stator frame
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
+    warnings: NDArray[np.int32]  # how often the engine has warned, of each kind
 
 
 class Rotor:
@@ -98,6 +99,7 @@ class Rotor:
             self.data.qvel,
             self.data.xfrc_applied[self._rotor, 3:],
             self.data.qfrc_applied,
+            self._counts,
         )
 
     def state(self) -> NDArray[np.float64]:
@@ -114,10 +116,6 @@ class Rotor:
         """Names of the warnings that MuJoCo has counted since the start."""
         kinds = mujoco.mjtWarning
         return [kinds(i).name for i in range(kinds.mjNWARNING) if self._counts[i] > 0]
-
-    def warned(self) -> bool:
-        """Whether there are any."""
-        return bool(self._counts.any())
 
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)

@@ -33,6 +33,7 @@ class Equations(NamedTuple):
     qdot: NDArray[np.float64]  # (3,) rad/s
     torque_S: NDArray[np.float64]  # (3,) N·m on the rotor, stator frame
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
+    warnings: NDArray[np.int32]  # none: whatever goes wrong shows in the state
 
 
 class LagrangianRotor:
@@ -85,7 +86,8 @@ class LagrangianRotor:
         pose, rates = np.array(q, dtype=np.float64), np.array(qdot, dtype=np.float64)
         torques = np.zeros((2, 3))
         self._state = pose, rates
-        return Equations(self._step_s, self.inertia, self.weight_moment, pose, rates, torques[0], torques[1])
+        none = np.zeros(1, np.int32)
+        return Equations(self._step_s, self.inertia, self.weight_moment, pose, rates, *torques, none)
 
     def state(self) -> NDArray[np.float64]:
         """Everything that the next steps depend on."""
@@ -94,14 +96,6 @@ class LagrangianRotor:
     def restore(self, state: NDArray[np.float64]) -> None:
         """Go on from a state; what `start` returned stays valid."""
         self._state[0][:], self._state[1][:] = state[:3], state[3:]
-
-    def warnings(self) -> list[str]:
-        """None: whatever goes wrong shows in the state, which the loop watches."""
-        return []
-
-    def warned(self) -> bool:
-        """Never."""
-        return False
 
 
 @allocation_free

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.compiled import allocation_free
+from spheretwin.models.copying import copy_into
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
 from spheretwin.twin.plant.drive import Drive, advance
 from spheretwin.twin.plant.friction import Friction, friction_torque
@@ -94,9 +95,9 @@ def plant_tick(
             for i in range(3):
                 torque_q[i] += friction_q[i]
         if substep == 0:
-            put(mean_current, delivered.current)
-            put(torque_S, delivered.torque_S)
-            put(friction_q, delivered.friction_q)
+            copy_into(delivered.current, 0, mean_current, mean_current.shape[0])
+            copy_into(delivered.torque_S, 0, torque_S, 3)
+            copy_into(delivered.friction_q, 0, friction_q, 3)
         step(rotor)
         for i in range(3):
             if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
@@ -104,11 +105,7 @@ def plant_tick(
         for i in range(3):  # at every step: beyond its range a hinge would meet a stop that is not computed
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
+    for kind in range(rotor.warnings.shape[0]):
+        if rotor.warnings[kind] > 0:
+            return DIVERGED
     return GOING
-
-
-@allocation_free
-def put(values: NDArray[np.float64], target: NDArray[np.float64]) -> None:
-    """Copy; a slice would be checked for overlap, at twice the time."""
-    for j in range(target.shape[0]):
-        target[j] = values[j]
