@@ -134,9 +134,7 @@ def follow(
             sink.write(rows)
         if live:
             _sleep_until(started + session.t_s - first)
-    _make(
-        session, ticks, waiting, sinks
-    )  # those after the last tick belong to what the session says of itself
+    _make(session, ticks, waiting, sinks)  # what came after the last tick is in the journal too
     status = session.status
     if status == RUNNING:
         status = COMPLETED if session.tick >= ticks else INTERRUPTED
@@ -157,7 +155,7 @@ def _make(session: Session, ticks: int, waiting: list[Change], sinks: Sequence[S
         session.set(change.name, change.value)
         for sink in sinks:
             sink.note(session.t_s, f"{change.name} set to {change.value}")
-        if not waiting or waiting[0].tick > session.tick:
+        if session.tick < _known_to(ticks, waiting):
             session.check_horizon(_known_to(ticks, waiting))
 
 
