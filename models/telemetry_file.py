@@ -1,14 +1,13 @@
 """Telemetry streamed to a Parquet file while a run goes on, in memory that does not grow with it.
 
-What has been flushed lies in a hidden folder beside the file, in parts that are whole Parquet files: a killed
-process leaves them, any Parquet reader opens them, and `join` makes one file of them.
+What has been flushed lies in a hidden folder beside the file, in parts that are Arrow streams: a killed
+process leaves them, any Arrow reader opens them, and `join` makes one file of them.
 """
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,17 +15,19 @@ import numpy as np
 
 from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.files import check_writable, whole_file
-from spheretwin.models.telemetry import PARQUET_FORMAT, Signal, Table, read_parquet, width
+from spheretwin.models.telemetry import PARQUET_FORMAT, Signal, Table, width
+from spheretwin.models.telemetry_parts import Parts, read_batches, read_schema
 
 if TYPE_CHECKING:
     import pyarrow as pa
     import pyarrow.parquet
 
-# Rows of a part: four seconds at 1 kHz, some 3 MB in memory.
+# Rows of a batch of a part: four seconds at 1 kHz, some 3 MB in memory.
 PART_ROWS = 4096
 
-# Parts of a row group of the file. Arrow keeps 50 kB of each group until the file is whole.
-GROUP_PARTS = 4
+# Batches of a row group of the file. The rows of one group are in memory at a time, and Arrow keeps 15 kB of
+# each until the file is whole: over two hours at 1 kHz, three or four batches need the least memory.
+GROUP_BATCHES = 4
 
 
 class TelemetryFile:
@@ -52,7 +53,7 @@ class TelemetryFile:
         self._path, self._facts = path, dict(facts)
         self._rows = Table(signals, np.empty((0, width(signals))))
         self._waiting: list[Table] = []
-        self._parts: list[Path] = []
+        self._parts = Parts(path, facts)
         self._fault: SpheretwinError | None = None
 
     def write(self, rows: Table) -> None:
@@ -66,7 +67,7 @@ class TelemetryFile:
             self._flush()
             self._rows = rows.rows(0, 0)
         self._waiting.append(rows)
-        # Parts of one length, whatever the chunks: the same rows give the same bytes.
+        # Batches of one length, whatever the chunks: the same rows give the same bytes.
         while not self._fault and sum(map(len, self._waiting)) >= PART_ROWS:
             self._flush(PART_ROWS)
 
@@ -93,52 +94,43 @@ class TelemetryFile:
         known = {**self._facts, **facts}
         if self._fault:
             raise self._fault
-        if not self._parts:
+        if not self._parts.rows:
             self._pending().write_parquet(self._path, known)
             return
         self._flush()
         if self._fault:
             raise self._fault
         try:
-            join(self._parts, self._path, known)
+            self._parts.close()
+            join(self._parts.paths, self._path, known)
+        except OSError as error:
+            raise self._unwritten(error) from None
         except SpheretwinError as error:
             raise SpheretwinError(f"{error}{self._kept()}") from None
-        shutil.rmtree(self._parts[0].parent, ignore_errors=True)
+        self._parts.remove()
 
     def _pending(self) -> Table:
         values = [self._rows.values, *(rows.values for rows in self._waiting)]
         return Table(self._rows.signals, np.concatenate(values))
 
     def _flush(self, most: int | None = None) -> None:
-        """Write the rows that wait into a part, or the first of them; the others wait on."""
+        """Append the rows that wait to the parts, or the first of them; the others wait on."""
         rows = self._pending()
         last = len(rows) if most is None else most
         self._waiting = [rows.rows(last, len(rows))] if last < len(rows) else []
         if not last:
             return
         try:
-            self._parts.append(self._written(rows.rows(0, last)))
-        except (OSError, SpheretwinError) as error:
-            self._fault = SpheretwinError(f"output: {self._path} could not be written, {error}{self._kept()}")
+            self._parts.append(rows.rows(0, last))
+        except OSError as error:
+            self._fault = self._unwritten(error)
             self._waiting = []
 
-    def _written(self, rows: Table) -> Path:
-        folder = self._parts[0].parent if self._parts else self._new_folder()
-        part = folder / f"{len(self._parts):06d}.parquet"
-        try:
-            rows.write_parquet(part, self._facts)
-        except SpheretwinError:
-            if not self._parts:
-                shutil.rmtree(folder, ignore_errors=True)
-            raise
-        return part
+    def _unwritten(self, error: OSError) -> SpheretwinError:
+        return SpheretwinError(f"output: {self._path} could not be written, {error}{self._kept()}")
 
     def _kept(self) -> str:
-        return f"; {len(self._parts)} parts are kept in {self._parts[0].parent}" if self._parts else ""
-
-    def _new_folder(self) -> Path:
-        target = self._path.resolve()
-        return Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.", suffix=".parts"))
+        return f"; {self._parts.rows} rows are kept in {self._parts.folder}" if self._parts.rows else ""
 
 
 def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = None) -> int:
@@ -147,7 +139,8 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
     Parameters
     ----------
     parts : sequence of Path
-        In their order. Where one lacks a column that another has (the law was changed), it is NaN there.
+        In their order. Where one lacks a column that another has (the law was changed), it is NaN there. The
+        last may be torn, as a killed process leaves it: its whole batches are taken.
     path : Path
         The file.
     facts : mapping, optional
@@ -161,7 +154,8 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
     Raises
     ------
     InputError
-        There is no part, one is no telemetry, or two have different columns of one name.
+        There is no part, one is no telemetry, one before the last is torn, none has a whole batch, or two
+        have different columns of one name.
     SpheretwinError
         Writing failed; what was there before is untouched.
     """
@@ -169,58 +163,89 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
 
     if not parts:
         raise InputError("telemetry: expected at least one part, received none")
-    signals = _all_signals(parts)
-    known = read_parquet(parts[0], rows=False)[1] if facts is None else facts
-    schema = Table(signals, np.empty((0, width(signals)))).arrow(known).schema
+    schema = _joint_schema(parts, facts)
+    batches = (_widened(batch, schema) for batch in _batches(parts))
+    rows = 0
     with (
         whole_file(path) as temporary,
         pyarrow.parquet.ParquetWriter(temporary, schema, **PARQUET_FORMAT) as writer,
     ):
-        return sum(_append(writer, group, signals) for group in _grouped(parts))
+        while written := _write_group(writer, batches):
+            rows += written
+        if not rows:
+            raise _empty(parts)
+    return rows
 
 
-def _append(writer: pyarrow.parquet.ParquetWriter, parts: Sequence[Path], signals: tuple[Signal, ...]) -> int:
-    """Write some parts as one row group; returns its rows."""
+def _write_group(writer: pyarrow.parquet.ParquetWriter, batches: Iterator[pa.RecordBatch]) -> int:
+    """Write the next batches as one row group; returns its rows, 0 at the end."""
     import pyarrow as pa
 
-    group = pa.concat_tables([_columns(part, signals) for part in parts])
-    group = group.replace_schema_metadata(writer.schema.metadata)
-    writer.write_table(group, row_group_size=max(1, group.num_rows))
-    pa.default_memory_pool().release_unused()  # else Arrow keeps what a hundred groups have needed
+    group = pa.Table.from_batches(islice(batches, GROUP_BATCHES), writer.schema)
+    if group.num_rows:
+        writer.write_table(group, row_group_size=group.num_rows)
+        pa.default_memory_pool().release_unused()  # else Arrow keeps what a hundred groups have needed
     return int(group.num_rows)
 
 
-def _columns(part: Path, signals: tuple[Signal, ...]) -> pa.Table:
-    """A part as Arrow has it, with all columns of the file."""
-    import pyarrow.parquet
-
-    with pyarrow.parquet.ParquetFile(part) as file:
-        found = tuple(file.schema_arrow.names)
-        if found == tuple(signal.name for signal in signals):
-            return file.read(use_threads=False)
-    return _widened(read_parquet(part)[0], signals).arrow({})
+def _batches(parts: Sequence[Path]) -> Iterator[pa.RecordBatch]:
+    """Whole batches of all parts."""
+    for place, part in enumerate(parts, 1):
+        torn = yield from read_batches(part)
+        if torn and place < len(parts):  # rows are missing, and not at the end
+            raise InputError(f"telemetry {part}: expected only the last part to be torn, received a torn one")
 
 
-def _grouped(parts: Sequence[Path]) -> Iterator[Sequence[Path]]:
-    return (parts[first : first + GROUP_PARTS] for first in range(0, len(parts), GROUP_PARTS))
-
-
-def _all_signals(parts: Iterable[Path]) -> tuple[Signal, ...]:
+def _joint_schema(parts: Sequence[Path], facts: Mapping[str, str] | None) -> pa.Schema:
     """Columns of all parts, each once, in the order in which they first appear."""
-    found: dict[str, Signal] = {}
+    import pyarrow as pa
+
+    found: dict[str, pa.Field] = {}
+    metadata = facts
     for part in parts:
-        for signal in read_parquet(part, rows=False)[0].signals:
-            known = found.setdefault(signal.name, signal)
-            if known != signal:
+        schema = read_schema(part)
+        if schema is None:
+            continue
+        metadata = schema.metadata if metadata is None else metadata
+        for field in schema:
+            known = found.setdefault(field.name, field)
+            if not known.equals(field, check_metadata=True):
                 raise InputError(
-                    f"telemetry {part}: expected {signal.name} as {known.size} numbers in {known.unit}"
-                    f" ({known.meaning}), received {signal.size} in {signal.unit} ({signal.meaning})"
+                    f"telemetry {part}: expected {field.name} as {_size(known)} numbers {_words(known)},"
+                    f" received {_size(field)} {_words(field)}"
                 )
-    return tuple(found.values())
+    if not found:
+        raise _empty(parts)
+    return pa.schema(found.values(), metadata=metadata)
 
 
-def _widened(table: Table, signals: tuple[Signal, ...]) -> Table:
-    wide = Table(signals, np.full((len(table), width(signals)), np.nan))
-    for signal in table.signals:
-        wide[signal.name][:] = table[signal.name]
-    return wide
+def _empty(parts: Sequence[Path]) -> InputError:
+    return InputError(f"telemetry {parts[0]}: expected a part with a whole batch of rows, received none")
+
+
+def _words(field: pa.Field) -> str:
+    described = {key.decode(): value.decode() for key, value in field.metadata.items()}
+    return f"in {described['unit']} ({described['meaning']})"
+
+
+def _size(field: pa.Field) -> int:
+    return getattr(field.type, "list_size", 1)
+
+
+def _widened(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    """A batch with all columns of the file."""
+    import pyarrow as pa
+
+    present = set(batch.schema.names)
+    columns = [
+        batch.column(field.name) if field.name in present else _nowhere(field, len(batch)) for field in schema
+    ]
+    return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _nowhere(field: pa.Field, rows: int) -> pa.Array:
+    """A column of NaN."""
+    import pyarrow as pa
+
+    flat = pa.array(np.full(rows * _size(field), np.nan))
+    return flat if pa.types.is_float64(field.type) else pa.FixedSizeListArray.from_arrays(flat, _size(field))

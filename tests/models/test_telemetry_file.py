@@ -1,5 +1,6 @@
 """Telemetry streamed to a file: the table of the run, whatever becomes of the process, the disk, the law."""
 
+import errno
 import os
 import resource
 import signal
@@ -9,12 +10,13 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet
 import pytest
 
-from spheretwin.models import telemetry_file
+from spheretwin.models import telemetry_file, telemetry_parts
 from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.telemetry import SIGNALS, Signal, Table, read_parquet, width
+from spheretwin.models.telemetry import PARQUET_FORMAT, SIGNALS, Signal, Table, read_parquet, width
 from spheretwin.models.telemetry_file import TelemetryFile, join
 
 PART_ROWS = 64
@@ -41,7 +43,7 @@ def streamed(path, whole, chunk, facts=FACTS):
 
 def parts_beside(path):
     (folder,) = path.parent.glob(f".{path.name}.*.parts")
-    return sorted(folder.glob("*.parquet"))
+    return sorted(folder.glob("*.arrows"))
 
 
 @pytest.mark.parametrize("rows", [0, 1, PART_ROWS - 1, PART_ROWS, PART_ROWS + 1, 5 * PART_ROWS, 333])
@@ -58,11 +60,29 @@ def test_the_file_is_the_table(rows, tmp_path):
     assert os.listdir(tmp_path) == ["run.parquet"]
 
 
-def test_row_groups_are_of_four_parts(tmp_path):
-    streamed(path := tmp_path / "run.parquet", table(333), 50).close({})
+def test_row_groups_are_of_some_batches(tmp_path):
+    group = telemetry_file.GROUP_BATCHES * PART_ROWS
+    streamed(path := tmp_path / "run.parquet", table(group + PART_ROWS + 13), 50).close({})
     described = pyarrow.parquet.ParquetFile(path).metadata
     groups = [described.row_group(i).num_rows for i in range(described.num_row_groups)]
-    assert groups == [4 * 64, 64 + 13]
+    assert groups == [group, PART_ROWS + 13]
+
+
+def test_a_run_with_parts_is_written_as_a_table_is(tmp_path):
+    whole = table(1000)
+    streamed(path := tmp_path / "run.parquet", whole, 50).close({"ticks": "1000"})
+    arrow, group = whole.arrow({**FACTS, "ticks": "1000"}), telemetry_file.GROUP_BATCHES * PART_ROWS
+    pyarrow.parquet.write_table(arrow, other := tmp_path / "other", row_group_size=group, **PARQUET_FORMAT)
+    assert path.read_bytes() == other.read_bytes()
+
+
+def test_parts_are_streams_that_any_arrow_reader_opens(tmp_path):
+    whole = table(200)
+    streamed(path := tmp_path / "run.parquet", whole, 50)
+    (part,) = parts_beside(path)
+    with pa.ipc.open_stream(part.read_bytes()) as stream:
+        found = stream.read_all()
+    assert found.equals(whole.rows(0, 192).arrow(FACTS), check_metadata=True)
 
 
 def test_chunks_do_not_move_a_byte_of_the_file(tmp_path):
@@ -120,9 +140,9 @@ def test_two_meanings_of_one_column_are_told_apart_and_the_parts_kept(tmp_path):
     with pytest.raises(SpheretwinError) as caught:
         file.close({})
     assert "expected gain as 2 numbers in 1 (a law's own), received 1 in N" in str(caught.value)
-    assert "2 parts are kept in" in str(caught.value)
+    assert "40 rows are kept in" in str(caught.value)
     assert not path.exists()
-    assert [len(read_parquet(part)[0]) for part in parts_beside(path)] == [20, 20]
+    assert [join([part], tmp_path / "one.parquet") for part in parts_beside(path)] == [20, 20]
 
 
 def test_parts_are_joined_under_the_first_one_s_facts(tmp_path):
@@ -139,13 +159,117 @@ def test_parts_are_joined_under_the_first_one_s_facts(tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["joined.parquet", "run.parquet"]
 
 
-def test_what_is_no_part_is_refused(tmp_path):
+def arrow_stream(path, arrow):
+    with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_stream(sink, arrow.schema) as stream:
+        stream.write_table(arrow)
+
+
+def columns(*values, kind=None, described=True):
+    words = {"unit": "m", "meaning": "a length", "labels": ""} if described else None
+    arrays = [pa.array(column, type=kind) for column in values]
+    return pa.table(arrays, schema=pa.schema([pa.field("x", array.type, metadata=words) for array in arrays]))
+
+
+FOREIGN = {
+    "text": lambda path: path.write_text("no stream"),
+    "like a stream": lambda path: path.write_bytes(b"\xff\xff\xff\xff\x08\0\0\0" + bytes(8)),
+    "parquet": lambda path: table(10).write_parquet(path, FACTS),
+    "missing": lambda path: None,
+    "folder": lambda path: path.mkdir(),
+    "no columns": lambda path: arrow_stream(path, pa.table({})),
+    "undescribed": lambda path: arrow_stream(path, columns([1.0], described=False)),
+    "whole numbers": lambda path: arrow_stream(path, columns([1])),
+    "texts": lambda path: arrow_stream(path, columns([["a"]], kind=pa.list_(pa.string(), 1))),
+    "vectors of any length": lambda path: arrow_stream(path, columns([[1.0], []])),
+    "two of a name": lambda path: arrow_stream(path, columns([1.0], [1.0])),
+}
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+@pytest.mark.parametrize("after_a_good_one", [False, True])
+def test_what_is_no_part_is_refused(kind, after_a_good_one, tmp_path):
+    foreign, good = tmp_path / "000001.arrows", tmp_path / "000000.arrows"
+    FOREIGN[kind](foreign)
+    arrow_stream(good, table(10).arrow(FACTS))
+    before = sorted(os.listdir(tmp_path))
+    with pytest.raises(InputError, match="expected an Arrow stream of a run") as caught:
+        join([good, foreign] if after_a_good_one else [foreign], tmp_path / "joined.parquet")
+    assert str(foreign) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_no_part_at_all_is_refused(tmp_path):
     with pytest.raises(InputError, match="at least one part"):
         join([], tmp_path / "joined.parquet")
-    (foreign := tmp_path / "000000.parquet").write_text("no parquet")
-    with pytest.raises(InputError, match="expected a Parquet file of a run"):
-        join([foreign], tmp_path / "joined.parquet")
-    assert os.listdir(tmp_path) == ["000000.parquet"]
+    assert os.listdir(tmp_path) == []
+
+
+# --- torn streams
+
+
+@pytest.fixture(scope="module")
+def stream(tmp_path_factory):
+    """A table, the part that has it in three batches, and where each message of the part ends."""
+    whole, ends = table(15, (*SIGNALS[:2], GAIN)), []
+    parts = telemetry_parts.Parts(tmp_path_factory.mktemp("stream") / "run.parquet", FACTS)
+    for first in (0, 5, 10):
+        parts.append(whole.rows(first, first + 5))
+        ends.append(parts.paths[0].stat().st_size)  # it has reached the operating system
+    parts.close()
+    content = parts.paths[0].read_bytes()
+    parts.remove()
+    return whole, content, [8 + int.from_bytes(content[4:8], "little"), *ends]
+
+
+def test_wherever_a_stream_is_torn_its_whole_batches_are_taken(stream, tmp_path):
+    whole, content, ends = stream
+    part, path = tmp_path / "000000.arrows", tmp_path / "joined.parquet"
+    for size in range(ends[1], len(content) + 1):
+        part.write_bytes(content[:size])
+        rows = 5 * sum(size >= end for end in ends[1:])
+        assert join([part], path) == rows
+        again, metadata = read_parquet(path)
+        assert again.values.tobytes() == whole.rows(0, rows).values.tobytes()
+        assert metadata == FACTS
+
+
+def test_a_stream_that_is_torn_before_it_has_a_whole_batch_is_refused(stream, tmp_path):
+    _, content, ends = stream
+    (part := tmp_path / "000000.arrows").touch()
+    for size in range(ends[1]):
+        part.write_bytes(content[:size])
+        with pytest.raises(InputError, match="expected a part with a whole batch of rows") as caught:
+            join([part], tmp_path / "joined.parquet")
+        assert str(part) in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert os.listdir(tmp_path) == ["000000.arrows"]
+
+
+def test_wherever_the_last_part_is_torn_those_before_it_are_taken(stream, tmp_path):
+    whole, content, ends = stream
+    first, last, path = tmp_path / "000000.arrows", tmp_path / "000001.arrows", tmp_path / "joined.parquet"
+    arrow_stream(first, (before := table(7)).arrow({"scenario": "the first"}))
+    for size in (0, 3, 4, 7, 8, ends[0] - 1, ends[0], ends[0] + 1, ends[1] - 1, ends[1], ends[2] + 9):
+        last.write_bytes(content[:size])
+        rows = 5 * sum(size >= end for end in ends[1:])
+        assert join([first, last], path) == 7 + rows
+        again, metadata = read_parquet(path)
+        assert metadata == {"scenario": "the first"}
+        assert again["q_rad"][:7].tobytes() == before["q_rad"].tobytes()
+        assert again["q_rad"][7:].tobytes() == whole["q_rad"][:rows].tobytes()
+        assert (GAIN in again.signals) == (size >= ends[0])
+
+
+def test_a_torn_part_before_the_last_is_refused(stream, tmp_path):
+    _, content, ends = stream
+    first, last = tmp_path / "000000.arrows", tmp_path / "000001.arrows"
+    last.write_bytes(content)
+    for size in (0, ends[0] - 1, ends[1] + 1):  # rows would be missing in the midst of the file
+        first.write_bytes(content[:size])
+        with pytest.raises(InputError, match=r"000000\.arrows: expected only the last part to be torn"):
+            join([first, last], tmp_path / "joined.parquet")
+    assert sorted(os.listdir(tmp_path)) == ["000000.arrows", "000001.arrows"]
 
 
 def test_where_no_file_can_be_made_is_found_out_at_once(tmp_path):
@@ -160,7 +284,7 @@ def test_a_link_stays_a_link_and_parts_lie_beside_the_file_itself(tmp_path):
     (link := tmp_path / "run.parquet").symlink_to("disk/real.parquet")
     whole = table(200)
     file = streamed(link, whole, 50)
-    assert len(parts_beside(elsewhere / "real.parquet")) == 3
+    assert len(parts_beside(elsewhere / "real.parquet")) == 1
     assert sorted(os.listdir(tmp_path)) == ["disk", "run.parquet"]
     file.close({})
     assert link.is_symlink()
@@ -203,31 +327,46 @@ def streaming(path, rows, seed=0, pause=False, **options):
     return subprocess.Popen(command, text=True, **pipes, **options)
 
 
-def test_a_killed_process_leaves_parts_that_join_to_the_first_rows(tmp_path):
-    path = tmp_path / "run.parquet"
-    process = streaming(path, 64 * 1500)
-    deadline = time.monotonic() + 60
-    while not (found := list(tmp_path.glob(".run.parquet.*.parts/00000[4-9].parquet"))):
-        assert time.monotonic() < deadline, "waited in vain"
-        assert process.poll() is None, process.stderr.read()
-        time.sleep(0.005)
+def kill(process):
     process.send_signal(signal.SIGKILL)
     process.communicate()
     assert process.returncode == -signal.SIGKILL
+
+
+def test_a_process_killed_while_it_writes_leaves_its_first_rows(tmp_path):
+    path = tmp_path / "run.parquet"
+    process = streaming(path, 64 * 1500)
+    deadline = time.monotonic() + 60
+    while sum(part.stat().st_size for part in tmp_path.glob(".run.parquet.*.parts/*")) < size_of(64 * 6):
+        assert time.monotonic() < deadline, "waited in vain"
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.001)
+    kill(process)
     assert not path.exists()
-    rows = join(parts := parts_beside(path), path)
-    assert len(parts) >= 5
-    assert found[0] in parts
-    assert rows == 64 * len(parts)
+    rows = join(parts_beside(path), path)
+    assert rows % 64 == 0
+    assert rows >= 64 * 5  # a sixth batch may be torn: the stream is longer than its rows
     assert read_parquet(path)[0].values.tobytes() == table(64 * 1500).rows(0, rows).values.tobytes()
+
+
+def test_a_killed_process_loses_only_the_rows_that_waited(tmp_path):
+    process = streaming(path := tmp_path / "run.parquet", 64 * 5 + 63, pause=True)
+    assert process.stdout.readline() == "written\n"
+    kill(process)
+    assert join(parts_beside(path), path) == 64 * 5
+    assert read_parquet(path)[0].values.tobytes() == table(64 * 5 + 63).rows(0, 64 * 5).values.tobytes()
 
 
 def limited_to(size):
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
-def part_size(rows):
-    return len(table(rows).values.tobytes())  # random numbers do not compress: at least this much
+def size_of(rows):
+    return table(rows).values.nbytes
+
+
+def full_disk(*_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def refusal(process):
@@ -238,45 +377,55 @@ def refusal(process):
     return line
 
 
-def test_a_disk_that_is_full_at_the_end_keeps_all_parts_and_says_so(tmp_path):
-    path = tmp_path / "run.parquet"
-    size = 3 * part_size(64)  # room for each part, not for the file
-    line = refusal(streaming(path, 640, preexec_fn=limited_to(size)))
-    parts = parts_beside(path)
-    assert len(parts) == 10
-    assert f"10 parts are kept in {parts[0].parent}" in line
-    assert not path.exists()
-    assert join(parts, path) == 640
+def test_a_disk_that_is_full_at_the_end_keeps_all_rows_and_says_so(tmp_path):
+    process = streaming(path := tmp_path / "run.parquet", 640, pause=True)
+    assert process.stdout.readline() == "written\n"
+    room = size_of(640) // 2  # random numbers do not compress by half
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (room, room))
+    line = refusal(process)
+    (part,) = parts_beside(path)
+    assert f"640 rows are kept in {part.parent}" in line
+    assert os.listdir(tmp_path) == [part.parent.name]
+    assert join([part], path) == 640
     assert read_parquet(path)[0].values.tobytes() == table(640).values.tobytes()
+
+
+def test_a_disk_that_is_full_in_the_midst_of_a_batch_keeps_those_before(tmp_path):
+    path = tmp_path / "run.parquet"
+    room = size_of(64 * 7 + 32)  # seven batches, the few kB that describe them, and some of the eighth
+    line = refusal(streaming(path, 640, preexec_fn=limited_to(room)))
+    (part,) = parts_beside(path)
+    assert part.stat().st_size == room
+    assert f"{64 * 7} rows are kept in {part.parent}" in line
+    assert not path.exists()
+    assert join([part], path) == 64 * 7
+    assert read_parquet(path)[0].values.tobytes() == table(640).rows(0, 64 * 7).values.tobytes()
 
 
 def test_a_disk_that_is_full_from_the_first_part_on_leaves_nothing_behind(tmp_path):
     (path := tmp_path / "run.parquet").write_text("what was there before")
-    line = refusal(streaming(path, 640, preexec_fn=limited_to(part_size(64) // 2)))
+    line = refusal(streaming(path, 640, preexec_fn=limited_to(size_of(64) // 2)))
     assert "could not be written" in line
     assert "kept" not in line
     assert os.listdir(tmp_path) == ["run.parquet"]
     assert path.read_text() == "what was there before"
 
 
-def test_a_disk_that_fills_on_the_way_keeps_what_it_has_and_the_run_goes_on(tmp_path, monkeypatch):
-    whole, writes = table(640), []
-
-    def write_parquet(rows, path, metadata):
-        if len(writes) == 3:
-            raise SpheretwinError("output: no space left on device")
-        writes.append(path)
-        original(rows, path, metadata)
-
-    original = Table.write_parquet
-    monkeypatch.setattr(Table, "write_parquet", write_parquet)
-    file = streamed(path := tmp_path / "run.parquet", whole, 10)
-    with pytest.raises(SpheretwinError, match=r"no space left on device; 3 parts are kept in"):
+@pytest.mark.parametrize("signals", [SIGNALS, (*SIGNALS, GAIN)], ids=["same", "new"])
+def test_a_disk_that_fills_on_the_way_keeps_what_it_has_and_the_run_goes_on(signals, tmp_path, monkeypatch):
+    file = streamed(path := tmp_path / "run.parquet", whole := table(3 * PART_ROWS), 10)
+    monkeypatch.setattr(pa.ipc.RecordBatchStreamWriter, "write_table", full_disk)
+    more = table(300, signals)
+    for first in range(0, len(more), 10):
+        file.write(more.rows(first, first + 10))
+    monkeypatch.undo()
+    with pytest.raises(SpheretwinError, match=r"No space left on device; 192 rows are kept in"):
         file.close({})
     assert not path.exists()
-    monkeypatch.undo()
-    assert join(parts_beside(path), path) == 3 * PART_ROWS
-    assert read_parquet(path)[0].values.tobytes() == whole.rows(0, 3 * PART_ROWS).values.tobytes()
+    (part,) = parts_beside(path)
+    assert os.listdir(part.parent) == [part.name]
+    assert join([part], path) == 192
+    assert read_parquet(path)[0].values.tobytes() == whole.values.tobytes()
 
 
 def test_two_processes_to_one_path_each_write_a_whole_file(tmp_path):
