@@ -38,17 +38,26 @@ class OutputFile:
     def __init__(self, target: Path) -> None:
         check_writable(target)
         self._target = _behind_links(target)
-        self.path = self._target.with_name(f".{self._target.name}.{secrets.token_hex(8)}.part")
+        self.path = _hidden(self._target)
         try:
             self.path.open("xb").close()  # unlike `tempfile`, with the permissions of any new file
         except OSError as error:
             raise InputError(f"output: expected a writable path, {error}") from None
 
     def keep(self) -> None:
-        """Put the file in its place, with the permissions of the file that it replaces."""
-        with suppress(FileNotFoundError):
-            shutil.copymode(self._target, self.path)
-        os.replace(self.path, self._target)
+        """Put the file in its place, with the permissions of the file that it replaces.
+
+        Raises
+        ------
+        SpheretwinError
+            It cannot be put there, as where a folder has come in between; it stays under its hidden name.
+        """
+        try:
+            with suppress(FileNotFoundError):
+                shutil.copymode(self._target, self.path)
+            os.replace(self.path, self._target)
+        except OSError as error:
+            raise SpheretwinError(f"output: {self._target} could not be written, {error.strerror}") from None
 
     def discard(self) -> None:
         """Remove the file, unless it was kept."""
@@ -65,14 +74,14 @@ def check_writable(path: Path) -> None:
         A folder or something else than a file is there, or its folder is missing or read-only.
     """
     target = _behind_links(path)
-    if target.is_dir():
-        raise InputError(f"output: expected a file name, received the folder {path}")
-    if target.exists() and not target.is_file():
-        raise InputError(f"output: expected a regular file, received {path}")
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        os.close(handle)
-        os.unlink(temporary)
+        if target.is_dir():
+            raise InputError(f"output: expected a file name, received the folder {path}")
+        if target.exists() and not target.is_file():
+            raise InputError(f"output: expected a regular file, received {path}")
+        probe = _hidden(target)
+        probe.open("xb").close()
+        probe.unlink()
         if target.exists():
             target.open("ab").close()
     except OSError as error:
@@ -116,6 +125,11 @@ def make_folder(path: Path) -> None:
             pass
     except OSError as error:
         raise InputError(f"output: expected a writable folder, {error}") from None
+
+
+def _hidden(target: Path) -> Path:
+    """A name beside a file that nobody else has; none that is made of the file's name elsewhere is longer."""
+    return target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
 
 
 def _behind_links(path: Path) -> Path:

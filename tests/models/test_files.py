@@ -3,10 +3,13 @@
 import os
 import stat
 
+import numpy as np
 import pytest
 
 from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.files import check_writable, whole_file
+from spheretwin.models.files import OutputFile, check_writable, whole_file
+from spheretwin.models.telemetry import SIGNALS, Table, width
+from spheretwin.models.telemetry_file import PART_ROWS, TelemetryFile
 
 
 def test_file_appears_when_the_block_ends(tmp_path):
@@ -109,3 +112,35 @@ def test_places_where_no_file_can_be_put(tmp_path):
             check_writable(path)
     check_writable(tmp_path / "out.txt")
     assert os.listdir(tmp_path) == ["pipe"]
+
+
+def test_a_folder_that_came_in_between_is_told_and_the_file_stays(tmp_path):
+    output = OutputFile(path := tmp_path / "out.txt")
+    output.path.write_text("new")
+    path.mkdir()
+    with pytest.raises(SpheretwinError, match=r"output: .*out\.txt could not be written") as told:
+        output.keep()
+    assert "\n" not in str(told.value)
+    assert output.path.read_text() == "new"
+
+
+# The longest hidden name has 23 bytes more than the file's: two dots, 16 digits, ".part".
+LONGEST = 255 - 23
+
+
+def test_a_name_too_long_to_be_hidden_is_found_before_work_begins(tmp_path):
+    for length in (LONGEST + 1, 300):
+        with pytest.raises(InputError, match="output: expected a writable path"):
+            check_writable(tmp_path / ("n" * length))
+    check_writable(tmp_path / ("n" * LONGEST))
+    with whole_file(tmp_path / ("n" * LONGEST)) as temporary:
+        temporary.write_text("new")
+    assert os.listdir(tmp_path) == ["n" * LONGEST]
+
+
+def test_the_longest_name_leaves_room_for_the_parts_of_a_run(tmp_path):
+    check_writable(path := tmp_path / ("n" * LONGEST))
+    file = TelemetryFile(path, SIGNALS, {})
+    file.write(Table(SIGNALS, np.zeros((PART_ROWS + 1, width(SIGNALS)))))
+    file.close({})
+    assert os.listdir(tmp_path) == ["n" * LONGEST]
