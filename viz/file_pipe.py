@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+from io import FileIO
 from pathlib import Path
 from threading import Thread
+
+PIPE_PATHS = Path("/dev/fd")
+"""Where a pipe has a path, by its number; there is none on Windows, where Rerun must write files itself."""
 
 _BLOCK_BYTES = 1 << 20
 
@@ -25,14 +29,24 @@ class FilePipe:
     path : Path
         Where to write to the pipe.
     error : OSError or None
-        Why the file could not be written; from then on what comes is dropped.
+        Why the file could not be written or closed; from then on what comes is dropped.
+
+    Raises
+    ------
+    OSError
+        The file or the pipe cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
-        reading, self._writing = os.pipe()
-        self.path = Path(f"/dev/fd/{self._writing}")
+        file = path.open("wb", buffering=0)
+        try:
+            reading, self._writing = os.pipe()
+        except OSError:
+            file.close()
+            raise
+        self.path = PIPE_PATHS / str(self._writing)
         self.error: OSError | None = None
-        self._thread = Thread(target=self._copy, args=(reading, path), name="recording file", daemon=True)
+        self._thread = Thread(target=self._copy, args=(reading, file), name="recording file", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
@@ -40,14 +54,19 @@ class FilePipe:
         os.close(self._writing)
         self._thread.join()
 
-    def _copy(self, reading: int, path: Path) -> None:
-        with open(reading, "rb", buffering=0) as pipe, path.open("wb", buffering=0) as file:
-            while block := pipe.read(_BLOCK_BYTES):
-                if self.error:
-                    continue
-                try:
-                    rest = memoryview(block)
-                    while rest:
-                        rest = rest[file.write(rest) :]
-                except OSError as error:
-                    self.error = error
+    def _copy(self, reading: int, file: FileIO) -> None:
+        with open(reading, "rb", buffering=0) as pipe:
+            try:
+                with file:
+                    while block := pipe.read(_BLOCK_BYTES):
+                        _write_all(file, block)
+            except OSError as error:
+                self.error = error
+                while pipe.read(_BLOCK_BYTES):  # else Rerun would wait for room in the pipe
+                    pass
+
+
+def _write_all(file: FileIO, block: bytes) -> None:
+    rest = memoryview(block)
+    while rest:
+        rest = rest[file.write(rest) :]

@@ -15,13 +15,13 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import MJCF_PATH, Actuator
-from spheretwin.models.errors import SpheretwinError
+from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.files import OutputFile
 from spheretwin.models.telemetry import SIGNALS, Signal, Table
 from spheretwin.models.wording import without_breaks
 from spheretwin.viz import blueprint, palette, scene
 from spheretwin.viz.events import Events
-from spheretwin.viz.file_pipe import FilePipe
+from spheretwin.viz.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.live import Viewer
 
 Index = list[rr.TimeColumn]
@@ -94,12 +94,13 @@ class Recorder:
         view = scenario["duration"], self._limit_A, own, live
         self._recording = rr.RecordingStream(blueprint.application(*view))
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
-        self.viewer = Viewer() if live else None
         self._output = OutputFile(path) if path else None
-        self._pipe = FilePipe(self._output.path) if self._output else None
+        self._pipe = _pipe_to(self._output) if self._output and PIPE_PATHS.is_dir() else None
+        self.viewer = Viewer() if live else None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
         self._room = Semaphore(PENDING_CHUNKS)
         self._fault: str | None = None
+        self._closed = False
         self._submit(self._connect, signals, scenario, view)
 
     def _connect(
@@ -110,8 +111,8 @@ class Recorder:
     ) -> None:
         """Open the sinks, log all that stays the same, then let a viewer in."""
         sinks: list[Any] = []
-        if self._pipe:
-            sinks.append(rr.FileSink(self._pipe.path))
+        if self._output:
+            sinks.append(rr.FileSink((self._pipe or self._output).path))
         if self.viewer:
             sinks.append(self.viewer.sink)
         self._recording.set_sinks(*sinks, default_blueprint=blueprint.layout(*view))
@@ -153,13 +154,16 @@ class Recorder:
         self._submit(lambda: self._log([self._events.end(status)]))
 
     def close(self) -> None:
-        """Complete the file and give it its name; end the live viewer.
+        """Complete the file and give it its name; end the live viewer. A second time does nothing.
 
         Raises
         ------
         SpheretwinError
             Some of the recording could not be made or written; what there is of it keeps ``.part``.
         """
+        if self._closed:
+            return
+        self._closed = True
         self._hand_over()
         self._submit(self._recording.flush)
         self._worker.shutdown()
@@ -169,7 +173,7 @@ class Recorder:
         if self.viewer:
             self.viewer.close()
         if self._pipe and self._pipe.error:
-            self._fault = self._pipe.error.strerror
+            self._fault = self._pipe.error.strerror or f"{self._pipe.error!r}"
         if self._fault and self._output:
             raise SpheretwinError(
                 f"recording: {self._path} could not be completed, {self._fault};"
@@ -178,7 +182,13 @@ class Recorder:
         if self._fault:
             raise SpheretwinError(f"recording: live view: {self._fault}")
         if self._output:
-            self._output.keep()
+            self._keep(self._output)
+
+    def _keep(self, output: OutputFile) -> None:
+        try:
+            output.keep()
+        except SpheretwinError as error:
+            raise SpheretwinError(f"{error}; the recording is in {output.path}") from None
 
     def _hand_over(self) -> None:
         """Give what is waiting to the worker as one chunk."""
@@ -251,6 +261,14 @@ class Recorder:
             t_s, level, text = zip(*events, strict=True)
             lines = rr.TextLog.columns(text=list(text), level=list(level))
             self._recording.send_columns(blueprint.EVENTS, _time_index(np.array(t_s)), lines)
+
+
+def _pipe_to(output: OutputFile) -> FilePipe:
+    try:
+        return FilePipe(output.path)
+    except OSError as error:
+        output.discard()
+        raise InputError(f"output: expected a writable path, {error}") from None
 
 
 def _scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:

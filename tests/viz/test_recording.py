@@ -22,7 +22,7 @@ from spheretwin.models.telemetry import SIGNALS, Table, width
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
-from spheretwin.viz import blueprint, palette, scene
+from spheretwin.viz import blueprint, palette, recording, scene
 from spheretwin.viz.recording import PENDING_CHUNKS, Recorder
 
 
@@ -203,6 +203,44 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
 def resolved_hold(**changes):
     session = Session(scenarios.load("hold", {"duration": 0.1, **changes}))
     return session, session.scenario.model_dump(mode="json")
+
+
+def test_a_folder_in_the_place_of_a_recording_is_told_with_where_the_recording_is(tmp_path):
+    session, resolved = resolved_hold()
+    recorder = Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+    follow(session, session.scenario.ticks, [recorder])
+    (tmp_path / "run.rrd").mkdir()
+    with pytest.raises(SpheretwinError, match=r"run\.rrd could not be written, ") as raised:
+        recorder.close()
+    (kept,) = tmp_path.glob(".run.rrd.*.part")
+    assert f"{raised.value}".endswith(f"; the recording is in {kept}")
+    assert len(rows_of(kept, blueprint.entity("q_rad"), "Scalars:scalars")[0]) == 100
+
+
+def test_closing_twice_is_closing_once(tmp_path):
+    session, resolved = resolved_hold()
+    with Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd") as recorder:
+        follow(session, session.scenario.ticks, [recorder])
+        recorder.close()
+    assert os.listdir(tmp_path) == ["run.rrd"]
+
+
+def test_where_a_pipe_has_no_path_rerun_writes_the_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording, "PIPE_PATHS", tmp_path / "none")
+    recorded(path := tmp_path / "run.rrd", "hold", duration=0.1)
+    assert len(rows_of(path, blueprint.entity("q_rad"), "Scalars:scalars")[0]) == 100
+    assert os.listdir(tmp_path) == ["run.rrd"]
+
+
+def test_a_file_that_cannot_be_opened_again_leaves_nothing(tmp_path, monkeypatch):
+    def out_of_handles():
+        raise OSError(24, "Too many open files")
+
+    session, resolved = resolved_hold()
+    monkeypatch.setattr(os, "pipe", out_of_handles)
+    with pytest.raises(InputError, match="Too many open files"):
+        Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+    assert os.listdir(tmp_path) == []
 
 
 def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
