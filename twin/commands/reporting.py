@@ -18,7 +18,7 @@ from spheretwin.twin.crosscheck.check import Check
 
 def print_json(figures: Mapping[str, Any]) -> None:
     """Print figures as JSON on stdout; what is not finite becomes null."""
-    print(json.dumps(_finite(figures), allow_nan=False))
+    print(json.dumps(_finite(figures), allow_nan=False), flush=True)
 
 
 def warn(lines: Iterable[str]) -> None:

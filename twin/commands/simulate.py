@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import signal
 import sys
 import time
@@ -20,6 +19,7 @@ from spheretwin.twin import flags, metrics, replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
 from spheretwin.twin.commands.outputs import Outputs
+from spheretwin.twin.commands.reporting import print_json
 from spheretwin.twin.metrics import Figures
 from spheretwin.twin.replay import Plan
 from spheretwin.twin.session import Session
@@ -110,7 +110,7 @@ def _report(session: Session, plan: Plan, status: str, figures: Figures, as_json
     scenario = session.begun_as
     summary = metrics.summary(scenario, status, figures, session.tick, session.loop_s, session.warnings())
     if as_json:
-        print(json.dumps(summary, allow_nan=False), flush=True)
+        print_json(summary)
     else:
         tables.print_run(scenario.name, scenario.controller.law, summary)
     if status != COMPLETED:
@@ -130,7 +130,9 @@ def _report_files(files: Outputs, faults: Sequence[SpheretwinError], as_json: bo
 def _interruptible() -> Iterator[Callable[[], bool]]:
     """Let Ctrl-C, or the end of the session, end the run at the next chunk: nothing computed is lost."""
     asked = []
-    before = {number: signal.signal(number, lambda *_: asked.append(True)) for number in _ENDINGS}
+    # What the parent has it ignore, as nohup a lost terminal, stays ignored.
+    heeded = [number for number in _ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, lambda *_: asked.append(True)) for number in heeded}
     try:
         yield lambda: bool(asked)
     finally:
