@@ -11,7 +11,7 @@ from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.errors import InputError
-from spheretwin.models.telemetry import SIGNALS, Signal, width
+from spheretwin.models.telemetry import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal, width
 from spheretwin.models.wording import shown
 
 _vector = types.float64[::1]
@@ -70,7 +70,8 @@ class Law:
                 f"law {self.name}: expected signals of at most {len(self.state)} numbers, the size of its"
                 f" state, received {shown(width(self.signals))}"
             )
-        names = [signal.name for signal in (*SIGNALS, *self.signals)]
+        taken = (*SIGNALS, *MEASURED_SIGNALS, *FRICTION_SIGNALS)  # the latter two by some runs only
+        names = [signal.name for signal in (*taken, *self.signals)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
 

@@ -238,7 +238,7 @@ def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str
     Raises
     ------
     InputError
-        The file is missing, or is no telemetry of this package.
+        The file is missing, is no telemetry of this package, or has two columns of one name.
     """
     import pyarrow as pa
     import pyarrow.parquet
@@ -251,6 +251,9 @@ def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str
         raise InputError(
             f"telemetry {path}: expected a Parquet file of a run, {without_breaks(error)}"
         ) from None
+    names = [signal.name for signal in signals]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(f"telemetry {path}: expected each column once, received {', '.join(twice)} twice")
     parts = [_flat(arrow[signal.name], signal.size) for signal in signals]
     metadata = {key.decode(): value.decode() for key, value in (arrow.schema.metadata or {}).items()}
     return Table(signals, np.concatenate(parts, axis=1)), metadata

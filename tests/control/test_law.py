@@ -7,7 +7,7 @@ import pytest
 
 from spheretwin.control.law import Law
 from spheretwin.models.errors import InputError
-from spheretwin.models.telemetry import Signal
+from spheretwin.models.telemetry import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal
 
 
 def step(t, reference, measurement, parameters, state, torque):
@@ -123,3 +123,11 @@ def test_what_is_no_signal_is_refused(changes, part):
 def test_labels_may_be_listed():
     assert signal(labels=["a", "b"]) == signal(labels=("a", "b"))
     assert hash(signal(labels=["a", "b"])) == hash(signal(labels=("a", "b")))
+
+
+@pytest.mark.parametrize(
+    "taken", [*SIGNALS, *MEASURED_SIGNALS, *FRICTION_SIGNALS], ids=lambda each: each.name
+)
+def test_names_of_any_run_s_own_columns_are_refused(taken):
+    message = refusal(law, signals=(Signal(taken.name, "1", 1, ""),))
+    assert f"expected new names of signals, received {taken.name}" in message

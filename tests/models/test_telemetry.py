@@ -78,3 +78,16 @@ def test_unwritable_place_and_foreign_file_are_bad_input(table, tmp_path):
     (foreign := tmp_path / "foreign.parquet").write_text("no parquet")
     with pytest.raises(InputError, match="expected a Parquet file"):
         read_parquet(foreign)
+
+
+def test_a_column_that_is_there_twice_is_bad_input(table, tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    arrow = table.arrow({})
+    again = pa.schema([*arrow.schema, arrow.schema.field("t_s")])
+    twice = pa.Table.from_arrays([*arrow.columns, arrow["t_s"]], schema=again)
+    pyarrow.parquet.write_table(twice, path := tmp_path / "twice.parquet")
+    for rows in (True, False):
+        with pytest.raises(InputError, match="expected each column once, received t_s twice"):
+            read_parquet(path, rows=rows)
