@@ -72,7 +72,7 @@ def read(path: Path) -> Mjcf:
     try:
         if not path.is_file():
             raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
-        key = (path.resolve(), _fingerprint(path))
+        key = (path.resolve(), fingerprint(path))
     except OSError as error:  # a name that no file can have, here or in the file
         raise InputError(f"model: expected an MJCF file, {error}") from None
     if key not in _KEPT:
@@ -232,7 +232,7 @@ _FOLDERS = re.compile(rb"""\b(?:meshdir|texturedir|assetdir)\s*=\s*["']([^"']+)[
 _OTHER_KINDS = (".obj", ".stl", ".msh", ".png", ".ktx", ".skn")
 
 
-def _fingerprint(path: Path) -> str:
+def fingerprint(path: Path) -> str:
     """Digest of a file and its includes, and of when the other files that it names were changed."""
     texts = {path.resolve(): path.read_bytes()}
     named = _named(path, texts)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.errors import InputError
+from spheretwin.models.mjcf import fingerprint
 from spheretwin.models.wording import without_breaks
 from spheretwin.viz import palette
 
@@ -34,7 +35,7 @@ class Drawn:
 
 
 def read_meshes(mjcf: Path) -> dict[str, rr.Mesh3D]:
-    """Read what is drawn of a model, which a run does without; once while the file is unchanged.
+    """Read what is drawn of a model, which a run does without; once while no file that it names has changed.
 
     Returns
     -------
@@ -47,7 +48,7 @@ def read_meshes(mjcf: Path) -> dict[str, rr.Mesh3D]:
     InputError
         A mesh is missing or broken.
     """
-    return _meshes(mjcf, mjcf.stat().st_mtime_ns)
+    return _meshes(mjcf, fingerprint(mjcf))
 
 
 def log_static(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, payload_kg: float) -> None:
@@ -83,7 +84,8 @@ def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]
 
 
 @lru_cache(maxsize=2)
-def _meshes(mjcf: Path, _: int) -> dict[str, rr.Mesh3D]:
+def _meshes(mjcf: Path, _: str) -> dict[str, rr.Mesh3D]:
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # it misses a mesh edited within a second
     try:
         model = mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as error:
