@@ -57,7 +57,9 @@ class OutputFile:
                 shutil.copymode(self._target, self.path)
             os.replace(self.path, self._target)
         except OSError as error:
-            raise SpheretwinError(f"output: {self._target} could not be written, {error.strerror}") from None
+            raise SpheretwinError(
+                f"output: {self._target} could not be written, {error.strerror or error}"
+            ) from None
 
     def discard(self) -> None:
         """Remove the file, unless it was kept."""
