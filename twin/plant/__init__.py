@@ -1,1 +1,1 @@
-"""The plant: engine, drive, disturbance."""
+"""The plant: two engines, drive, friction, disturbance."""

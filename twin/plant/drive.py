@@ -41,11 +41,11 @@ def advance(
     ----------
     drive : Drive
         Lag of the groups.
-    command : (18,) array, A
+    command : (n,) array, A
         Held over the step; the amplifiers follow it as far as their limit.
-    current : (18,) array, A
+    current : (n,) array, A
         At the start of the step; on return, at its end.
-    mean : (18,) array, A
+    mean : (n,) array, A
         Mean over the step, which is what acts on the rotor.
     """
     limit = drive.current_limit_A
