@@ -32,6 +32,9 @@ from spheretwin.twin.trajectory import Bounded, Trajectory, Triple
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 
+PATHS = ("plant.mjcf", "plant.torque_curve", "nominal.torque_curve")
+"""Fields that name a file."""
+
 FOLDER = resources.files("spheretwin.twin") / "scenarios"
 
 # A torque matrix of nothing asks for endless currents.
@@ -71,9 +74,11 @@ class Plant(_Section):
         "mujoco", description="what computes the motion: MuJoCo, or the equations of motion (faster)"
     )
     step_s: Annotated[float, Field(ge=1e-7, le=1)] = Field(5e-4, description="physics step, s")
-    integrator: Literal["RK4", "Euler", "implicitfast"] = Field("RK4", description="MuJoCo integrator")
+    integrator: Literal["RK4", "Euler", "implicitfast"] = Field(
+        "RK4", description="integrator of MuJoCo; the Lagrangian has RK4 alone"
+    )
     modelling_error: Annotated[float, Field(gt=-1, le=100)] = Field(
-        0.0, description="m: the rotor's inertia is (1 + m) times what the controller assumes"
+        0.0, description="m: the rotor's inertia is (1 + m) times the model file's"
     )
     modelling_torque_Nm: Triple = Field(
         (0.0, 0.0, 0.0), description="constant torque the controller does not know, N·m (paper: ΔG)"
@@ -213,7 +218,7 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     fields = _read(source)
     for dotted, value in (overrides or {}).items():
         _override(fields, dotted, value)
-    return _validated(_beside("", fields), source)
+    return _validated(beside("", fields), source)
 
 
 def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
@@ -234,7 +239,7 @@ def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
 
 
 def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
-    """Scenario with another value of one field, checked as a whole.
+    """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
 
     Raises
     ------
@@ -245,7 +250,22 @@ def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
     if isinstance(scenario.controller, OwnController):
         fields["controller"] = {"period_s": scenario.controller.period_s}
     _override(fields, dotted, value)
-    return _validated(fields, scenario.name)
+    return _validated(beside("", fields), scenario.name)
+
+
+def beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
+    """Take the paths that fields by section name from a folder, in place; a second time changes nothing."""
+    for dotted in PATHS:
+        section, name = dotted.split(".")
+        inside = fields.get(section)
+        if isinstance(inside, dict) and isinstance(inside.get(name), str) and inside[name]:
+            inside[name] = os.path.join(folder, _from_home(inside[name]))
+    return fields
+
+
+def as_plain(value: Any) -> Any:
+    """Arrays and NumPy's numbers as Python has them; anything else, as a date of a TOML file, as text."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 
 def explain(error: ValidationError) -> str:
@@ -316,16 +336,7 @@ def _read(source: str) -> dict[str, Any]:
         fields = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"scenario {source}: expected valid TOML, {error}") from None
-    return _beside(os.path.dirname(path), fields)
-
-
-def _beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
-    """Take the paths that a scenario names from a folder; a second time changes nothing."""
-    plant = fields.get("plant")
-    for name in ("mjcf", "torque_curve"):
-        if isinstance(plant, dict) and isinstance(plant.get(name), str) and plant[name]:
-            plant[name] = os.path.join(folder, _from_home(plant[name]))
-    return fields
+    return beside(os.path.dirname(path), fields)
 
 
 def _from_home(path: str) -> str:
@@ -349,16 +360,11 @@ def _override(fields: dict[str, Any], dotted: str, value: Any) -> None:
 def _as_json(source: str, fields: Mapping[str, Any]) -> bytes:
     """Fields as JSON, so that arrays become tuples while numbers stay strictly typed."""
     try:
-        return json.dumps(fields, default=_plain, ensure_ascii=False).encode()
+        return json.dumps(fields, default=as_plain, ensure_ascii=False).encode()
     except (TypeError, ValueError, RecursionError) as error:  # endless digits, bytes that are no text, depth
         raise InputError(
             f"scenario {source}: expected sections and values as TOML has them, {error}"
         ) from None
-
-
-def _plain(value: Any) -> Any:
-    """Arrays and NumPy's numbers as Python has them; a date of a TOML file as text."""
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 
 def _check_texts(source: str, scenario: Scenario) -> None:

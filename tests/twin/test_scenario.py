@@ -183,3 +183,26 @@ def test_a_long_seed_is_taken_and_an_endless_one_told():
 def test_an_overflow_is_told_as_it_was_given():
     with pytest.raises(InputError, match="received '1e999'"):
         scenarios.load("hold", flags.overrides(["--duration", "1e999"]))
+
+
+def test_every_field_that_names_a_file_is_known_as_one():
+    texts = {name for name in scenarios.fields_of(scenarios.Scenario) if name.endswith(("mjcf", "curve"))}
+    assert texts == set(scenarios.PATHS)
+
+
+def test_the_controller_s_torque_curve_is_taken_as_the_plant_s(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "s.toml").write_text(f'{HOLD}\n[nominal]\ntorque_curve = "b.csv"\n')
+    assert scenarios.load("~/s.toml").nominal.torque_curve == f"{tmp_path}/b.csv"
+    flags_ = {"nominal.torque_curve": "~/c.csv"}
+    assert scenarios.load("~/s.toml", flags_).nominal.torque_curve == f"{tmp_path}/c.csv"
+
+
+@pytest.mark.parametrize("name", scenarios.PATHS)
+def test_a_tilde_in_a_change_is_the_user_s_home(tmp_path, monkeypatch, name):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    section, field = name.split(".")
+    changed = scenarios.changed(scenarios.load("hold"), name, "~/a")
+    assert getattr(getattr(changed, section), field) == f"{tmp_path}/a"
+    again = scenarios.changed(changed, "disturbance.load", 1.0)
+    assert getattr(getattr(again, section), field) == f"{tmp_path}/a"
