@@ -1,13 +1,17 @@
-"""A run told by its own telemetry file: scenario at its start, command journal, ticks."""
+"""A run told by its own telemetry file: scenario at its start, command journal, ticks, model and curves."""
 
 from __future__ import annotations
 
+import copy
+import hashlib
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from spheretwin.control.laws import LAWS
+from spheretwin.models import mjcf
 from spheretwin.models.errors import InputError
 from spheretwin.models.telemetry import read_parquet
 from spheretwin.twin import metrics
@@ -24,12 +28,27 @@ class Plan(NamedTuple):
     journal: tuple[Change, ...]
 
 
-def facts(session: Session) -> dict[str, str]:
-    """What a run says of itself in its telemetry file: nothing that differs between two equal runs."""
+def facts(session: Session, before: Mapping[str, str] | None = None) -> dict[str, str]:
+    """What a run says of itself in its telemetry file: nothing that differs between two equal runs.
+
+    Parameters
+    ----------
+    session : Session
+        The run. Paths are told as they are from the root, so that it can be replayed from any folder.
+    before : mapping, optional
+        Facts of the same run when it began: what its files held then is what counts.
+    """
+    scenario = scenarios.beside(os.getcwd(), session.begun_as.model_dump(mode="json"))
+    journal = tuple(map(_from_root, session.journal))
+    digests = json.loads(before["files"]) if before else {}
+    for path, dotted in _files(scenario, journal):
+        if path not in digests:
+            digests[path] = _digest(dotted, path)
     return {
-        "scenario": json.dumps(session.begun_as.model_dump(mode="json")),
-        "journal": json.dumps(session.journal),
+        "scenario": json.dumps(scenario),
+        "journal": json.dumps(journal),
         "ticks": str(session.tick),
+        "files": json.dumps(digests),
         "versions": json.dumps(metrics.versions()),
     }
 
@@ -40,7 +59,8 @@ def read(path: Path) -> Plan:
     Raises
     ------
     InputError
-        The file is no telemetry of a run, or was made under a law that it does not hold.
+        The file is no telemetry of a run, was made under a law that it does not hold, or a model or curve
+        is no longer what it was.
     """
     _, metadata = read_parquet(path, rows=False)
     try:
@@ -66,4 +86,47 @@ def _plan(metadata: Mapping[str, str], source: str) -> Plan:
             f"replay {source}: expected a run of at least one tick, received {ticks};"
             " the parts of a run that was killed do not say how far it went"
         )
+    named = _files(scenario.model_dump(mode="json"), journal)
+    _check_files(named, json.loads(metadata.get("files", "{}")), source)
     return Plan(scenario, ticks, journal)
+
+
+def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | None], source: str) -> None:
+    for path, dotted in named:
+        if path in digests and _digest(dotted, path) != digests[path]:  # older files hold none
+            raise InputError(
+                f"replay {source}: expected {dotted} {path} as it was when the run was made,"
+                " received one that is missing or was changed since"
+            )
+
+
+def _from_root(change: Change) -> Change:
+    """A change whose paths, if it holds any, begin at the root."""
+    section, _, name = change.name.partition(".")
+    value = copy.deepcopy(change.value)  # a section is altered in place
+    fields = scenarios.beside(os.getcwd(), {section: {name: value} if name else value})
+    return change._replace(value=fields[section][name] if name else fields[section])
+
+
+def _files(scenario: Mapping[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:
+    """Files that a run names at its start or on its way, each with the dotted name of its field."""
+    for dotted in scenarios.PATHS:
+        section, name = dotted.split(".")
+        given = [scenario[section]]
+        for change in journal:
+            if change.name == dotted:
+                given.append({name: change.value})
+            elif change.name == section and isinstance(change.value, Mapping):
+                given.append(change.value)
+        for path in filter(None, (fields.get(name) for fields in given)):
+            yield path, dotted
+
+
+def _digest(dotted: str, path: str) -> str | None:
+    """What tells a file from another, for a model with all that it names; None where it cannot be read."""
+    try:
+        if dotted == "plant.mjcf":
+            return mjcf.fingerprint(Path(path))
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:  # a run that is over must not lose its telemetry by it
+        return None

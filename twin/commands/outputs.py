@@ -57,8 +57,9 @@ class Outputs:
     def __init__(self, session: Session, record: Path | None, telemetry: Path | None, live: bool) -> None:
         self._session = session
         self.record, self.telemetry = record, telemetry
+        self._facts = replay.facts(session) if telemetry else {}
         # The recorder last: it alone leaves something where it is made and another is refused.
-        self._file = TelemetryFile(telemetry, session.signals, replay.facts(session)) if telemetry else None
+        self._file = TelemetryFile(telemetry, session.signals, self._facts) if telemetry else None
         self._recorder = _recorder(session, record, live) if record or live else None
 
     @property
@@ -77,7 +78,7 @@ class Outputs:
                 self.record = None
         if self._file:
             try:
-                self._file.close(replay.facts(self._session))
+                self._file.close(replay.facts(self._session, self._facts))
             except SpheretwinError as error:
                 faults.append(error)
                 self.telemetry = None
