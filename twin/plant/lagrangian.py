@@ -84,10 +84,17 @@ class LagrangianRotor:
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Equations:
         """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""
         pose, rates = np.array(q, dtype=np.float64), np.array(qdot, dtype=np.float64)
-        torques = np.zeros((2, 3))
         self._state = pose, rates
-        none = np.zeros(1, np.int32)
-        return Equations(self._step_s, self.inertia, self.weight_moment, pose, rates, *torques, none)
+        return Equations(
+            step_s=self._step_s,
+            inertia=self.inertia,
+            weight_moment=self.weight_moment,
+            q=pose,
+            qdot=rates,
+            torque_S=np.zeros(3),
+            torque_q=np.zeros(3),
+            warnings=np.zeros(1, np.int32),
+        )
 
     def state(self) -> NDArray[np.float64]:
         """Everything that the next steps depend on."""
