@@ -234,11 +234,7 @@ _OTHER_KINDS = (".obj", ".stl", ".msh", ".png", ".ktx", ".skn")
 
 def fingerprint(path: Path) -> str:
     """Digest of a file and its includes, and of when the other files that it names were changed."""
-    texts = {path.resolve(): path.read_bytes()}
-    named = _named(path, texts)
-    while includes := {source.resolve() for source in named if _is_xml(source)} - texts.keys():
-        texts |= {source: source.read_bytes() for source in includes}
-        named = _named(path, texts)
+    texts, named = _texts_and_named(path)
     digest = hashlib.sha256()
     for source, text in sorted(texts.items()):
         digest.update(f"{source} {len(text)} ".encode(errors="surrogateescape") + text)
@@ -248,6 +244,24 @@ def fingerprint(path: Path) -> str:
         told = f"{source} {state.st_ino} {state.st_mtime_ns} {state.st_ctime_ns} {state.st_size} "
         digest.update(told.encode(errors="surrogateescape"))
     return digest.hexdigest()
+
+
+def contents_digest(path: Path) -> str:
+    """Digest of the contents of a file and of all that it names, wherever they lie and since when."""
+    texts, named = _texts_and_named(path)
+    contents = {hashlib.sha256(content).digest() for content in texts.values()}
+    contents |= {hashlib.sha256(source.read_bytes()).digest() for source in named}
+    return hashlib.sha256(b"".join(sorted(contents))).hexdigest()
+
+
+def _texts_and_named(path: Path) -> tuple[dict[Path, bytes], set[Path]]:
+    """A model's own text and those of its includes, and every file that they name."""
+    texts = {path.resolve(): path.read_bytes()}
+    named = _named(path, texts)
+    while includes := {source.resolve() for source in named if _is_xml(source)} - texts.keys():
+        texts |= {source: source.read_bytes() for source in includes}
+        named = _named(path, texts)
+    return texts, named
 
 
 def _named(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:

@@ -126,7 +126,7 @@ def _digest(dotted: str, path: str) -> str | None:
     """What tells a file from another, for a model with all that it names; None where it cannot be read."""
     try:
         if dotted == "plant.mjcf":
-            return mjcf.fingerprint(Path(path))
+            return mjcf.contents_digest(Path(path))
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError:  # a run that is over must not lose its telemetry by it
         return None

@@ -478,11 +478,7 @@ def _name_of_own(law: Law) -> str:
 
 def _recorded(value: Any) -> Any:
     """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
-    return json.loads(json.dumps(value, default=_plain))
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+    return json.loads(json.dumps(value, default=scenarios.as_plain))
 
 
 def _check_rows(log: NDArray[np.float64], columns: int) -> None:

@@ -7,6 +7,7 @@ import shutil
 import pytest
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
 from spheretwin.models.errors import InputError
 from spheretwin.models.telemetry import read_parquet
 from spheretwin.twin import cli, replay
@@ -109,3 +110,15 @@ def test_a_file_of_a_version_that_told_no_files_replays(folder):
     del known["files"]
     table.write_parquet(folder / "old.parquet", known)
     assert replay.read(folder / "old.parquet").ticks == 5
+
+
+def test_a_model_with_the_same_contents_is_the_same_model(tmp_path):
+    """A checkout or a restored copy has other inodes and times; an edited mesh has another content."""
+    text = '<mujoco><asset><mesh file="a.obj"/></asset></mujoco>'
+    digests = []
+    for name, mesh in (("one", "v 0 0 0"), ("copy", "v 0 0 0"), ("edited", "v 0 0 1")):
+        (folder := tmp_path / name).mkdir()
+        (folder / "m.xml").write_text(text)
+        (folder / "a.obj").write_text(mesh)
+        digests.append(mjcf.contents_digest(folder / "m.xml"))
+    assert digests[0] == digests[1] != digests[2]
