@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.cache import kept_array
-from spheretwin.models.compiled import allocation_free
+from spheretwin.models.compiled import allocation_free, part_of_its_caller
 from spheretwin.models.errors import InputError
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
@@ -172,7 +172,7 @@ def kept_matrix(model: TorqueModel) -> KeptMatrix:
     return KeptMatrix(np.full(3, np.nan), np.empty((3, model.group_axes.shape[1])), scratch_of(model))
 
 
-@allocation_free
+@part_of_its_caller
 def keep_torque_matrix(q: NDArray[np.float64], model: TorqueModel, kept: KeptMatrix) -> None:
     """Keep the torque matrix at a pose, filled anew only where the pose is another than the kept one."""
     if not (q[0] == kept.q[0] and q[1] == kept.q[1] and q[2] == kept.q[2]):

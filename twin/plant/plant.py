@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import allocation_free
+from spheretwin.models.compiled import part_of_its_caller
 from spheretwin.models.copying import copy_into
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
 from spheretwin.twin.plant.drive import Drive, advance
@@ -47,7 +47,7 @@ class Delivered(NamedTuple):
     friction_q: NDArray[np.float64]  # (3,) N·m
 
 
-@allocation_free
+@part_of_its_caller
 def plant_tick(
     plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: Delivered
 ) -> int:
