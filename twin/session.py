@@ -5,24 +5,20 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
-from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from spheretwin.control import allocations
-from spheretwin.control import law as laws
 from spheretwin.control.allocations import ALLOCATIONS
 from spheretwin.control.law import Law
 from spheretwin.control.laws import LAWS
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.compiled import COMPILES, compiled_callback, for_types_of, uncompiled
+from spheretwin.models.compiled import for_types_of
 from spheretwin.models.errors import InputError, SpheretwinError
 from spheretwin.models.magnetics import torque_model
 from spheretwin.models.telemetry import Signal, Table, allocated, width
@@ -31,6 +27,7 @@ from spheretwin.twin import assembly, trajectory
 from spheretwin.twin import loop as loops
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.exogenous import Exogenous
+from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.plant import DIVERGED, GOING, LEFT_WORKSPACE
 from spheretwin.twin.scenario import Scenario
 
@@ -347,7 +344,7 @@ class Session:
         self._kept = assembly.kept_matrices(magnetics, torque_model(self.actuator))
         self._controller = assembly.controller_of(scenario, self.law, magnetics, self._kept[0])
         self._sensors = assembly.sensors_of(scenario)
-        self._functions = _matching(self.law, ALLOCATIONS[scenario.allocation])
+        self._functions = matching(self.law, ALLOCATIONS[scenario.allocation])
 
     def _build_plant(self) -> None:
         self._plant = assembly.plant_of(self.scenario, self.actuator, self._stepped, self._kept[1])
@@ -434,32 +431,6 @@ class Session:
         self._exogenous = Exogenous(self.scenario)
         self._exogenous.restore(snapshot.exogenous)
         self._connect()
-
-
-class _Functions(NamedTuple):
-    """The loop, and the functions of its users as it takes them."""
-
-    loop: Callable[..., tuple[int, int]]
-    law: Any
-    allocate: Any
-    alive: tuple[Any, ...]
-    """Compiled code holds bare addresses: what they belong to must not go."""
-
-
-def _matching(law: Law, allocate: Callable[..., float]) -> _Functions:
-    """The compiled loop for a law that can be compiled, the uncompiled one for a plain function."""
-    own = not (law.step.__module__ or "").startswith("spheretwin.")
-    if not COMPILES or (own and not isinstance(law.step, Dispatcher)):
-        return _Functions(uncompiled(loops.loop), uncompiled(law.step), allocate, ())
-    try:
-        stepping = compiled_callback(laws.SIGNATURE, law.step)
-    except (NumbaError, TypeError) as error:
-        complaint = next(filter(None, map(str.strip, str(error).splitlines())), "")
-        raise InputError(
-            f"law {law.name}: expected a function that compiles as {laws.SIGNATURE}, received: {complaint}"
-        ) from error
-    allocating = compiled_callback(allocations.SIGNATURE, allocate)
-    return _Functions(loops.loop, stepping.address, allocating.address, (stepping, allocating))
 
 
 def _array(values: trajectory.Triple | None) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from spheretwin.twin import loop as loops
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin import session as sessions
 from spheretwin.twin import simulation as simulations
+from spheretwin.twin.matching import Functions
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
 
@@ -113,8 +114,8 @@ def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
     compiled = run("nutation", **overrides)
     monkeypatch.setattr(
         sessions,
-        "_matching",
-        lambda law, allocate: sessions._Functions(loops.loop.py_func, law.step, allocate, ()),
+        "matching",
+        lambda law, allocate: Functions(loops.loop.py_func, law.step, allocate, ()),
     )
     plain = run("nutation", **overrides)
     # Fused multiply-adds round once where Python rounds twice. Where sgn(s) first flips, a rounding may
