@@ -4,6 +4,7 @@ from numba import types
 
 from spheretwin.control.allocation import allocate
 from spheretwin.control.bounded_allocation import allocate_bounded
+from spheretwin.control.vectors import Array
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
@@ -12,12 +13,12 @@ SIGNATURE = types.float64(_matrix, _vector, types.float64, _vector, _matrix)
 """G (3, n), torque_S (3,), current limit, current (n,), scratch (5, n); the share given."""
 
 
-def least_norm(G, torque_S, limit, current, scratch):  # type: ignore[no-untyped-def]
+def least_norm(G: Array, torque_S: Array, limit: float, current: Array, scratch: Array) -> float:
     """Least-norm currents, scaled as a whole to respect the limit (16)."""
     return allocate(G, torque_S, limit, current)
 
 
-def bounded(G, torque_S, limit, current, scratch):  # type: ignore[no-untyped-def]
+def bounded(G: Array, torque_S: Array, limit: float, current: Array, scratch: Array) -> float:
     """All that the limit allows."""
     return allocate_bounded(G, torque_S, limit, current, scratch)
 

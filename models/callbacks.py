@@ -32,11 +32,11 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
     function_type = types.FunctionType(signature)
 
     @intrinsic
-    def from_address(typing_context, address):  # type: ignore[no-untyped-def]
+    def from_address(typing_context: Any, address: Any) -> Any:
         if not isinstance(address, types.Integer):
             return None
 
-        def build(context, builder, _, arguments):  # type: ignore[no-untyped-def]
+        def build(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
             function = cgutils.create_struct_proxy(function_type)(context, builder)
             function.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
             function.py_addr = function.jit_addr = ir.Constant(cgutils.voidptr_t, None)
@@ -48,9 +48,13 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
         return function
 
     @overload(at)
-    def _compiled_at(function):  # type: ignore[no-untyped-def]
-        if isinstance(function, types.Integer):
-            return lambda function: from_address(function)
-        return None
+    def _compiled_at(function: Any) -> Callable[[Any], Any] | None:
+        if not isinstance(function, types.Integer):
+            return None
+
+        def call(function: Any) -> Any:
+            return from_address(function)
+
+        return call
 
     return at

@@ -1,16 +1,18 @@
 """The closed loop, tick by tick: measure, control, move the plant, keep a row. Compiled, or in Python."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.controller import LOST, control_tick
+from spheretwin.control.controller import LOST, Controller, control_tick
 from spheretwin.models.compiled import allocation_free
 from spheretwin.models.copying import copy_into, copy_rows
 from spheretwin.models.telemetry import SIGNALS, offsets
-from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, plant_tick
-from spheretwin.twin.sensors import measure
+from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
+from spheretwin.twin.sensors import Sensors, measure
+
+Array = NDArray[np.float64]
 
 _OFFSETS = offsets(SIGNALS)
 TIME, ANGLE, RATE = _OFFSETS["t_s"], _OFFSETS["q_rad"], _OFFSETS["qdot_rad_s"]
@@ -44,7 +46,17 @@ class Scratch(NamedTuple):
 
 
 @allocation_free
-def loop(inputs, law, allocate, controller, sensors, plant, columns, scratch, log):  # type: ignore[no-untyped-def]
+def loop(
+    inputs: Inputs,
+    law: Any,
+    allocate: Any,
+    controller: Controller,
+    sensors: Sensors,
+    plant: Plant,
+    columns: Columns,
+    scratch: Scratch,
+    log: Array,
+) -> tuple[int, int]:
     """Run one control tick for each row of `log`.
 
     Parameters
@@ -95,7 +107,7 @@ def loop(inputs, law, allocate, controller, sensors, plant, columns, scratch, lo
 
 
 @allocation_free
-def write_motion(row, t, reference, q, qdot, disturbance):  # type: ignore[no-untyped-def]
+def write_motion(row: Array, t: float, reference: Array, q: Array, qdot: Array, disturbance: Array) -> None:
     """Write the part of a telemetry row that says where the rotor is and should be."""
     row[TIME] = t
     for i in range(3):
