@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control import allocations
 from spheretwin.control import law as laws
-from spheretwin.control.bounded_allocation import SCRATCH_ROWS
-from spheretwin.models.callbacks import function_at
-from spheretwin.models.compiled import compilable
+from spheretwin.control.allocation import registry as allocations
+from spheretwin.control.allocation.bounded import SCRATCH_ROWS
+from spheretwin.models.base.callbacks import function_at
+from spheretwin.models.base.compiled import compilable
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix
 

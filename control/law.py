@@ -10,9 +10,9 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.models.errors import InputError
-from spheretwin.models.telemetry import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal, width
-from spheretwin.models.wording import shown
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
+from spheretwin.models.telemetry.signals import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal, width
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import told_apart
 from spheretwin.models.mjcf import Mjcf, read
-from spheretwin.models.telemetry import GROUPS
+from spheretwin.models.telemetry.signals import GROUPS
 from spheretwin.models.torque_curve import TorqueCurve
-from spheretwin.models.wording import told_apart
 
 FOLDER = Path(__file__).resolve().parent
 MJCF_PATH = FOLDER / "actuator.xml"

@@ -9,7 +9,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import allocation_free, compiled
+from spheretwin.models.base.compiled import allocation_free, compiled
 
 Row = tuple[float, float, float]
 

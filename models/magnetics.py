@@ -1,15 +1,17 @@
 """Torque matrix: from 18 group currents to the torque on the rotor (12)-(15)."""
 
+from dataclasses import asdict
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator
-from spheretwin.models.cache import kept_array
-from spheretwin.models.compiled import allocation_free, part_of_its_caller
-from spheretwin.models.errors import InputError
+from spheretwin.models.actuator import Actuator, Coil, Magnet
+from spheretwin.models.base.cache import kept_array
+from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import one_line, told_apart
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
 
@@ -19,6 +21,10 @@ from spheretwin.models.torque_curve import TorqueCurve
 KNEE = 0.95
 WIDE_PER_UNIT = 200
 NARROW_PER_UNIT = 4000
+
+# The model's lengths come from sums and rotations, and keep 1e-15; a torque follows its numbers as a
+# small power. So this is equality, while the millionth part of a percent is told.
+SAME = 1e-9
 
 
 class TorqueModel(NamedTuple):
@@ -209,3 +215,34 @@ def _pole_lines(actuator: Actuator) -> tuple[NDArray[np.float64], NDArray[np.flo
             axes.append(axis)
             weights.append(polarity)
     return np.ascontiguousarray(axes), np.array(weights)
+
+
+def computed_from(magnet: Magnet, coil: Coil) -> dict[str, float]:
+    """Every number that a computed curve depends on, by part and name, such as ``coil turns``."""
+    parts = {"magnet": asdict(magnet), "coil": asdict(coil)}
+    return {f"{part} {name}": value for part, data in parts.items() for name, value in data.items()}
+
+
+def disagreements(actuator: Actuator) -> list[str]:
+    """Where the actuator differs from what its torque curve was computed for, one line a number.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        With the curve that its torque is taken from.
+
+    Returns
+    -------
+    list of str
+        Empty where both agree, and for a curve that does not say what it was computed for: measured, or
+        from another program.
+    """
+    curve = actuator.torque_curve
+    computed_for = curve.computed_for or {}
+    lines = []
+    for name, has in computed_from(actuator.magnet, actuator.coil).items():
+        had = computed_for.get(name, has)
+        if abs(had - has) > SAME * max(abs(had), abs(has)):
+            first, second = told_apart(had, has)
+            lines.append(one_line(f"{curve.name} was computed for {name} {first}, the model has {second}"))
+    return lines

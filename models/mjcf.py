@@ -21,9 +21,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from spheretwin.models.errors import InputError
-from spheretwin.models.mujoco_library import silence_warnings
-from spheretwin.models.wording import without_breaks
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.mujoco_library import silence_warnings
+from spheretwin.models.base.wording import without_breaks
 
 PAYLOAD = "payload"
 ROTOR = "rotor"

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.errors import InputError
-from spheretwin.models.wording import told_apart
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import told_apart
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

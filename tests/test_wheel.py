@@ -39,8 +39,8 @@ def test_only_top_level_name_is_spheretwin(names):
 def test_data_files_come_along(names):
     for name in (
         "models/actuator.xml", "models/scene.xml", "models/torque_curve.csv", "models/README.md",
-        "models/assets/coil.obj", "models/py.typed", "twin/scenarios/nutation.toml", "twin/plant/engine.py",
-        "twin/commands/simulate.py",
+        "models/assets/coil.obj", "models/py.typed", "twin/scenario/shipped/nutation.toml",
+        "twin/plant/engine.py", "twin/commands/simulate.py",
     ):  # fmt: skip
         assert f"spheretwin/{name}" in names
 

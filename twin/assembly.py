@@ -10,18 +10,18 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from spheretwin.control import laws
 from spheretwin.control.controller import Controller, controller
 from spheretwin.control.law import Law
+from spheretwin.control.laws import registry as laws
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import HINGES, Actuator
-from spheretwin.models.curve_origin import disagreements
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import told_apart
 from spheretwin.models.lagrangian import loaded_inertia
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, kept_matrix, torque_model
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, disagreements, kept_matrix, torque_model
 from spheretwin.models.mjcf import Mjcf
-from spheretwin.models.telemetry import (
+from spheretwin.models.telemetry.signals import (
     FRICTION_SIGNALS,
     MEASURED_SIGNALS,
     SIGNALS,
@@ -29,8 +29,6 @@ from spheretwin.models.telemetry import (
     offsets,
     width,
 )
-from spheretwin.models.wording import told_apart
-from spheretwin.twin import trajectory
 from spheretwin.twin.loop import Columns
 from spheretwin.twin.plant.drive import drive
 from spheretwin.twin.plant.engine import Rotor, integrator_name
@@ -38,9 +36,10 @@ from spheretwin.twin.plant.friction import Friction, friction
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
 from spheretwin.twin.plant.plant import Plant
 from spheretwin.twin.plant.stepping import Stepped
-from spheretwin.twin.scenario import DriveSection, OwnController, Scenario
-from spheretwin.twin.scenario import Plant as PlantSection
+from spheretwin.twin.scenario.sections import DriveSection, OwnController, Scenario
+from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.sensors import Sensors, sensors
+from spheretwin.twin.trajectories import shapes as trajectory
 
 # What the engine's compiler takes where a file says nothing.
 UNWRITTEN_STEP_s = 0.002

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from typing import NoReturn
 
-from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.wording import is_plain, one_line, shown
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.wording import is_plain, one_line, shown
 from spheretwin.twin.commands import crosscheck, magnetics, simulate
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2

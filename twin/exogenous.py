@@ -13,9 +13,9 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.errors import InputError
 from spheretwin.twin.loop import Inputs
-from spheretwin.twin.scenario import Scenario
+from spheretwin.twin.scenario.sections import Scenario
 
 BLOCK_TICKS = 1000
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.controller import LOST, Controller, control_tick
-from spheretwin.models.compiled import allocation_free
-from spheretwin.models.copying import copy_into, copy_rows
-from spheretwin.models.telemetry import SIGNALS, offsets
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.copying import copy_into, copy_rows
+from spheretwin.models.telemetry.signals import SIGNALS, offsets
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
 from spheretwin.twin.sensors import Sensors, measure
 

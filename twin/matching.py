@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
-from spheretwin.control import allocations
 from spheretwin.control import law as laws
+from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.law import Law
-from spheretwin.models.compiled import COMPILES, compiled_callback, uncompiled
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.compiled import COMPILES, compiled_callback, uncompiled
+from spheretwin.models.base.errors import InputError
 from spheretwin.twin import loop as loops
 
 

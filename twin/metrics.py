@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.telemetry import Table
-from spheretwin.twin.scenario import Scenario
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.simulation import Run
 
 PACKAGES = ("spheretwin", "mujoco", "numba", "numpy", "scipy", "pydantic", "pyarrow", "rerun-sdk")

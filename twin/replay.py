@@ -10,13 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.control.laws import LAWS
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models import mjcf
-from spheretwin.models.errors import InputError
-from spheretwin.models.telemetry import read_parquet
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import metrics
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario import Scenario
+from spheretwin.twin.scenario import reading
+from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.session import Change, Session
 
 
@@ -38,7 +39,7 @@ def facts(session: Session, before: Mapping[str, str] | None = None) -> dict[str
     before : mapping, optional
         Facts of the same run when it began: what its files held then is what counts.
     """
-    scenario = scenarios.beside(os.getcwd(), session.begun_as.model_dump(mode="json"))
+    scenario = reading.beside(os.getcwd(), session.begun_as.model_dump(mode="json"))
     journal = tuple(map(_from_root, session.journal))
     digests = json.loads(before["files"]) if before else {}
     for path, dotted in _files(scenario, journal):
@@ -104,13 +105,13 @@ def _from_root(change: Change) -> Change:
     """A change whose paths, if it holds any, begin at the root."""
     section, _, name = change.name.partition(".")
     value = copy.deepcopy(change.value)  # a section is altered in place
-    fields = scenarios.beside(os.getcwd(), {section: {name: value} if name else value})
+    fields = reading.beside(os.getcwd(), {section: {name: value} if name else value})
     return change._replace(value=fields[section][name] if name else fields[section])
 
 
 def _files(scenario: Mapping[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:
     """Files that a run names at its start or on its way, each with the dotted name of its field."""
-    for dotted in scenarios.PATHS:
+    for dotted in reading.PATHS:
         section, name = dotted.split(".")
         given = [scenario[section]]
         for change in journal:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free
 
 
 class Sensors(NamedTuple):

@@ -14,22 +14,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.allocations import ALLOCATIONS
+from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.law import Law
-from spheretwin.control.laws import LAWS
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.compiled import for_types_of
-from spheretwin.models.errors import InputError, SpheretwinError
+from spheretwin.models.base.compiled import for_types_of
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.wording import shown
 from spheretwin.models.magnetics import torque_model
-from spheretwin.models.telemetry import Signal, Table, allocated, width
-from spheretwin.models.wording import shown
-from spheretwin.twin import assembly, trajectory
+from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.table import Table, allocated
+from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.plant import DIVERGED, GOING, LEFT_WORKSPACE
-from spheretwin.twin.scenario import Scenario
+from spheretwin.twin.scenario.reading import as_plain
+from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.trajectories import shapes as trajectory
 
 RUNNING = "running"
 STATUS = {GOING: RUNNING, LEFT_WORKSPACE: "left_workspace", DIVERGED: "diverged"}
@@ -449,7 +452,7 @@ def _name_of_own(law: Law) -> str:
 
 def _recorded(value: Any) -> Any:
     """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
-    return json.loads(json.dumps(value, default=scenarios.as_plain))
+    return json.loads(json.dumps(value, default=as_plain))
 
 
 def _check_rows(log: NDArray[np.float64], columns: int) -> None:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
-from spheretwin.models.telemetry import Table, allocated, width
-from spheretwin.twin.scenario import Scenario
+from spheretwin.models.telemetry.signals import width
+from spheretwin.models.telemetry.table import Table, allocated
+from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.session import RUNNING, Change, Session
 
 COMPLETED = "completed"

@@ -20,16 +20,16 @@ import mujoco
 import numpy as np
 import plain
 
-from spheretwin.control.bounded_allocation import SCRATCH_ROWS, allocate_bounded
+from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.compiled import compiled
+from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
-from spheretwin.viz.recording import Recorder
+from spheretwin.viz.recording.recorder import Recorder
 
 SCENARIO = "nutation"
 PLAIN_TICKS = 500

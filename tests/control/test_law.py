@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from spheretwin.control.law import Law
-from spheretwin.models.errors import InputError
-from spheretwin.models.telemetry import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal
 
 
 def step(t, reference, measurement, parameters, state, torque):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from spheretwin.control import laws
-from spheretwin.control.gains import Gains
 from spheretwin.control.law import SIGNATURE
-from spheretwin.models.compiled import compiled_callback
+from spheretwin.control.laws import registry as laws
+from spheretwin.control.parts.gains import Gains
+from spheretwin.models.base.compiled import compiled_callback
 
 PERIOD = 1e-3
 CENTRES = np.array([-3, -1.5, 0, 1.5, 3])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.simulation import simulate
 

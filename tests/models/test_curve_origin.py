@@ -6,7 +6,7 @@ import pytest
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.actuator import Coil, Magnet
-from spheretwin.models.curve_origin import disagreements, numbers
+from spheretwin.models.magnetics import computed_from, disagreements
 
 TEXT = actuators.MJCF_PATH.read_text()
 
@@ -69,6 +69,6 @@ def test_a_file_s_name_cannot_break_the_line(actuator):
 
 
 def test_numbers_are_told_by_part_and_name(actuator):
-    named = numbers(actuator.magnet, actuator.coil)
+    named = computed_from(actuator.magnet, actuator.coil)
     assert named["coil turns"] == 320
     assert len(named) == len(fields(Magnet)) + len(fields(Coil))

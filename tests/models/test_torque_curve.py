@@ -10,10 +10,12 @@ from numpy.testing import assert_allclose
 from scipy.constants import mu_0
 from scipy.spatial.transform import Rotation
 
-from spheretwin.models import curve_origin, pole_torque, torque_curve
+from spheretwin.models import torque_curve
 from spheretwin.models.actuator import TORQUE_CURVE_PATH, Coil, Magnet, load
-from spheretwin.models.errors import InputError
-from spheretwin.models.pole_torque import Convergence, Mesh, compute_curve
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.design import pole_torque
+from spheretwin.models.design.pole_torque import Convergence, Mesh, compute_curve
+from spheretwin.models.magnetics import computed_from
 from spheretwin.models.torque_curve import TorqueCurve
 
 COARSE = Mesh(along=16, around=96, across=8)
@@ -222,7 +224,7 @@ def test_csv_round_trip(tmp_path, shipped):
 
 
 def test_head_is_read_back(tmp_path, magnet, coil, shipped):
-    geometry = curve_origin.numbers(replace(magnet, remanence_T=1.25), replace(coil, turns=123456.5))
+    geometry = computed_from(replace(magnet, remanence_T=1.25), replace(coil, turns=123456.5))
     path = tmp_path / "curve.csv"
     path.write_text(torque_curve.to_csv(shipped, ["Before", *torque_curve.head(geometry), "after"]))
     again = torque_curve.read(path)

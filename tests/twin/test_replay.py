@@ -8,8 +8,8 @@ import pytest
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.errors import InputError
-from spheretwin.models.telemetry import read_parquet
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import cli, replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands.outputs import Outputs

@@ -16,14 +16,15 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from spheretwin.control import laws
 from spheretwin.control.law import Law
+from spheretwin.control.laws import registry as laws
 from spheretwin.models import actuator as actuators
-from spheretwin.models import telemetry_file
-from spheretwin.models.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.models.telemetry import SIGNALS, Signal, Table, read_parquet
-from spheretwin.models.telemetry_file import TelemetryFile
+from spheretwin.models.telemetry import file as telemetry_file
+from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry.signals import SIGNALS, Signal
+from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.twin import cli, replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.exogenous import BLOCK_TICKS
@@ -896,7 +897,7 @@ NAME = "RecordingInfo:name"
 def test_a_recording_is_named_by_the_law_that_ran(tmp_path):
     from rerun.chunk import RrdReader  # slow to import
 
-    from spheretwin.viz.recording import Recorder
+    from spheretwin.viz.recording.recorder import Recorder
 
     live = session(compiled_law("cautious"), name="hold")
     described = live.begun_as.model_dump(mode="json")

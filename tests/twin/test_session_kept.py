@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.session import Change, Session
 from spheretwin.twin.simulation import follow

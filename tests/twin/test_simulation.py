@@ -4,12 +4,12 @@ import numba
 import numpy as np
 import pytest
 
-from spheretwin.control import laws
 from spheretwin.control.law import Law
-from spheretwin.models.errors import InputError
+from spheretwin.control.laws import registry as laws
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.models.telemetry import Signal
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.twin import loop as loops
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin import session as sessions

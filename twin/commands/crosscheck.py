@@ -18,12 +18,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.errors import InputError
 from spheretwin.twin import metrics
 from spheretwin.twin.crosscheck import STATES
 
 if TYPE_CHECKING:
-    from spheretwin.twin.crosscheck.check import Check
+    from spheretwin.models.base.check import Check
 
 MOST_STATES = 1_000_000  # some three minutes and a gigabyte
 WIDTH_WITHOUT_TERMINAL = 150

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
-from spheretwin.models.workspace import LARGEST_TILT_DEG
+from spheretwin.models.design.workspace import LARGEST_TILT_DEG
 
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
 

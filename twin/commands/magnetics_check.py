@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models import curve_fit, field_check
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.errors import InputError
-from spheretwin.models.field_check import Comparison, Errors
-from spheretwin.models.pole_torque import compute_curve
-from spheretwin.twin.commands import magnetics_warnings
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.design import curve_fit, field_check
+from spheretwin.models.design import warnings as magnetics_warnings
+from spheretwin.models.design.field_check import Comparison, Errors
+from spheretwin.models.design.pole_torque import compute_curve
 from spheretwin.twin.commands.reporting import kept, print_json, tracked, warn
-from spheretwin.twin.crosscheck.check import Check
-from spheretwin.viz import magnetic_tables
+from spheretwin.viz.terminal import magnetic_tables
 
 BANDS_DEG = (0.0, 12.0, 24.0, 36.0, 48.0, 57.0)
 

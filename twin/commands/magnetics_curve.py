@@ -10,15 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.models import curve_fit, pole_torque, torque_curve
+from spheretwin.models import torque_curve
 from spheretwin.models.actuator import MJCF_PATH, read_magnet_and_coil
-from spheretwin.models.errors import InputError
-from spheretwin.models.files import check_writable
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import check_writable
+from spheretwin.models.design import curve_fit, pole_torque
+from spheretwin.models.design import warnings as magnetics_warnings
 from spheretwin.models.torque_curve import TorqueCurve
-from spheretwin.twin.commands import magnetics_warnings
 from spheretwin.twin.commands.reporting import kept, print_json, tracked, warn, write_text
-from spheretwin.twin.crosscheck.check import Check
-from spheretwin.viz import magnetic_tables
+from spheretwin.viz.terminal import magnetic_tables
 
 MESH_BOUND = 5e-3
 LOOKUP_BOUND = 1e-6

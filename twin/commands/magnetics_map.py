@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models import workspace as workspaces
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.capability import Capability, capability
-from spheretwin.models.errors import InputError
-from spheretwin.models.files import make_folder
-from spheretwin.models.weakest import FIGURES, Found, local_minima, worst_by_tilt
-from spheretwin.models.workspace import Workspace
-from spheretwin.twin.commands import magnetics_warnings
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import make_folder
+from spheretwin.models.design import warnings as magnetics_warnings
+from spheretwin.models.design import workspace as workspaces
+from spheretwin.models.design.capability import Capability, capability
+from spheretwin.models.design.weakest import FIGURES, Found, local_minima, worst_by_tilt
+from spheretwin.models.design.workspace import Workspace
 from spheretwin.twin.commands.reporting import kept, print_json, tracked, warn
-from spheretwin.twin.crosscheck.check import Check
-from spheretwin.viz import magnetic_tables
+from spheretwin.viz.terminal import magnetic_tables
 
 TILT_STEP_DEG = 1.0
 
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
 
 def _plots() -> ModuleType:
     try:
-        return import_module("spheretwin.viz.magnetic_plots")
+        return import_module("spheretwin.viz.figures.magnetic_plots")
     except ModuleNotFoundError as error:
         raise InputError(
             "magnetics map: expected the extra `spheretwin[plots]` to draw figures,"

@@ -6,15 +6,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.files import check_writable
-from spheretwin.models.telemetry_file import TelemetryFile
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.files import check_writable
+from spheretwin.models.telemetry.file import TelemetryFile
 from spheretwin.twin import replay
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink
 
 if TYPE_CHECKING:
-    from spheretwin.viz.recording import Recorder
+    from spheretwin.viz.recording.recorder import Recorder
 
 
 def check(paths: list[Path]) -> None:
@@ -86,7 +86,7 @@ class Outputs:
 
 
 def _recorder(session: Session, path: Path | None, live: bool) -> Recorder:
-    from spheretwin.viz.recording import Recorder  # Rerun is slow to import
+    from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
     scenario = session.begun_as.model_dump(mode="json")
     recorder = Recorder(session.actuator, session.signals, scenario, path=path, live=live)

@@ -12,8 +12,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import track
 
-from spheretwin.models.files import whole_file
-from spheretwin.twin.crosscheck.check import Check
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.files import whole_file
 
 
 def print_json(figures: Mapping[str, Any]) -> None:

@@ -13,26 +13,28 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.models.errors import InputError, SpheretwinError
-from spheretwin.models.mujoco_library import timers_stopped
-from spheretwin.twin import flags, metrics, replay
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.twin import metrics, replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
 from spheretwin.twin.commands.outputs import Outputs
 from spheretwin.twin.commands.reporting import print_json
 from spheretwin.twin.metrics import Figures
 from spheretwin.twin.replay import Plan
+from spheretwin.twin.scenario import flags
+from spheretwin.twin.scenario.reading import shipped
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import COMPLETED, follow
-from spheretwin.viz import tables
-from spheretwin.viz.progress import Progress
+from spheretwin.viz.terminal import tables
+from spheretwin.viz.terminal.progress import Progress
 
 EXAMPLE = "nutation"
 
 
 def add_to(verbs: Any) -> None:
     """Add the verb to the command's parser."""
-    names = ", ".join(scenarios.shipped())
+    names = ", ".join(shipped())
     parser = verbs.add_parser(
         "simulate",
         help="run a scenario",
@@ -98,9 +100,7 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
             )
         return replay.read(options.replay)
     if options.scenario is None:
-        raise InputError(
-            f"command line: expected a scenario ({', '.join(scenarios.shipped())}), received none"
-        )
+        raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
     scenario = scenarios.load(options.scenario, flags.overrides(rest))
     return Plan(scenario, scenario.ticks, ())
 

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.telemetry import Table
+from spheretwin.models.base.check import Check
+from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.simulation import simulate
 
 Array = NDArray[np.float64]

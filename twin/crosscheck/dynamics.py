@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf import PAYLOAD, gravity, read
-from spheretwin.models.wording import without_breaks
-from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.check import Check
 from spheretwin.models.kinematics import rotation, rotor_rate_jacobian
 from spheretwin.models.mjcf import read
-from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant.engine import Rotor
 
 Array = NDArray[np.float64]

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.check import Check
 from spheretwin.models.kinematics import rotor_rate_jacobian
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques, inertia_matrix
-from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.crosscheck.dynamics import random_states
 
 Array = NDArray[np.float64]

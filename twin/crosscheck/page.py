@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from spheretwin.models.errors import InputError
-from spheretwin.models.files import make_folder, whole_file
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.twin.crosscheck import closed_loop, dynamics, free_rotor, trajectories
-from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.crosscheck.suite import Evidence
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path
     InputError
         A file cannot be written there.
     """
-    from spheretwin.viz import plots
+    from spheretwin.viz.figures import plots
 
     drawings = draw(evidence)
     for drawing in drawings:
@@ -120,7 +120,7 @@ def _cell(text: str) -> str:
 
 
 def _margins(evidence: Evidence) -> Drawing:
-    from spheretwin.viz import plots
+    from spheretwin.viz.figures import plots
 
     shares = {
         check.name: check.value / check.bound if np.isfinite(check.value) else np.inf
@@ -134,7 +134,7 @@ def _margins(evidence: Evidence) -> Drawing:
 
 
 def _dynamics(evidence: Evidence) -> Drawing:
-    from spheretwin.viz import plots
+    from spheretwin.viz.figures import plots
 
     bounds = {quantity.name: quantity.bound for quantity in dynamics.QUANTITIES}
     figure = plots.spreads(
@@ -145,7 +145,7 @@ def _dynamics(evidence: Evidence) -> Drawing:
 
 
 def _trajectory(evidence: Evidence) -> Drawing:
-    from spheretwin.viz import plots
+    from spheretwin.viz.figures import plots
 
     followed = evidence.trajectories
     figure = plots.motion(
@@ -161,7 +161,7 @@ def _trajectory(evidence: Evidence) -> Drawing:
 
 
 def _convergence(evidence: Evidence) -> Drawing:
-    from spheretwin.viz import plots
+    from spheretwin.viz.figures import plots
 
     slopes = {name: plots.Slope(*measured) for name, measured in evidence.trajectories.convergence.items()}
     figure = plots.convergence(slopes, "Order of convergence against DOP853")
@@ -169,7 +169,7 @@ def _convergence(evidence: Evidence) -> Drawing:
 
 
 def _free_rotor(evidence: Evidence) -> Drawing:
-    from spheretwin.viz import plots
+    from spheretwin.viz.figures import plots
 
     axis = {
         "energy": "energy, relative",
@@ -189,7 +189,7 @@ def _free_rotor(evidence: Evidence) -> Drawing:
 
 
 def _closed_loop(evidence: Evidence) -> Drawing:
-    from spheretwin.viz import plots
+    from spheretwin.viz.figures import plots
 
     pairs = evidence.closed_loop.pairs
     longest = max(pairs.values(), key=lambda pair: len(pair.mujoco))

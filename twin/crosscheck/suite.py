@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
 from spheretwin.twin.crosscheck import STATES, closed_loop, dynamics, free_rotor, identities, trajectories
-from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.crosscheck.closed_loop import ClosedLoop
 from spheretwin.twin.crosscheck.dynamics import Dynamics
 from spheretwin.twin.crosscheck.free_rotor import FreeRotor

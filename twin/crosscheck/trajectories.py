@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.errors import EngineError
+from spheretwin.models.base.check import Check
+from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration, coriolis_matrix, inertia_matrix
 from spheretwin.models.mjcf import read
-from spheretwin.twin.crosscheck.check import Check
 from spheretwin.twin.plant import lagrangian
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.trajectory import Nutation
+from spheretwin.twin.trajectories.shapes import Nutation
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import COMPILES, compiled
+from spheretwin.models.base.compiled import COMPILES, compiled
+from spheretwin.models.base.mujoco_library import library
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf, idle_stages
-from spheretwin.models.mujoco_library import library
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,

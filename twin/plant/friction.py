@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import allocation_free
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia, triple, turns
 
 # Far below any motion; its square is far above the smallest number, so that k(0) is one too.

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.compiled import allocation_free
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import (
     GRAVITY_m_s2,
     Triple,

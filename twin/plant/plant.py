@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.compiled import part_of_its_caller
-from spheretwin.models.copying import copy_into
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.copying import copy_into
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
 from spheretwin.twin.plant.drive import Drive, advance
 from spheretwin.twin.plant.friction import Friction, friction_torque

@@ -11,8 +11,8 @@ from numba.core.runtime import _nrt_python, rtsys
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.compiled import compiled
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.compiled import compiled
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix, loaded_inertia
 from spheretwin.twin.plant import lagrangian
 from spheretwin.twin.plant.friction import friction, friction_torque

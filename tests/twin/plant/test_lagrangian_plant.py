@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.compiled import compiled
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.compiled import compiled
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
 from spheretwin.models.lagrangian import (
     acceleration,
@@ -276,7 +276,8 @@ def test_only_runge_kutta_and_a_payload_on_the_axis_are_known(actuator):
 
 
 SECOND_PROCESS = """
-from spheretwin.twin import loop, scenario
+from spheretwin.twin import loop
+from spheretwin.twin import scenario
 from spheretwin.twin.simulation import simulate
 for engine in ("mujoco", "lagrangian"):
     simulate(scenario.load("hold", {"duration": 0.01, "plant.engine": engine}))

@@ -13,7 +13,7 @@ import pytest
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.models.errors import InputError
+from spheretwin.models.base.errors import InputError
 from spheretwin.twin import cli
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.plant.engine import Rotor, step

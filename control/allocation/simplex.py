@@ -1,0 +1,106 @@
+"""The most torque in a direction that bounded currents give, by a simplex method with bounds."""
+
+from math import copysign, inf
+
+from spheretwin.models.base.compiled import compiled
+from spheretwin.models.base.vectors import NONE, Array, Vector, column, cross, dot, length, plus
+
+# Share of the terms' size below which a rate or a gain is rounding.
+NOISE = 1e-12
+
+# Groups within this of their limits (in limits) are taken to meet them at once.
+TIE = 1e-12
+
+
+@compiled
+def climb(
+    G: Array, torque: Vector, end: float, share: float, most_steps: int, demand: Array
+) -> tuple[float, int]:
+    """Raise the share, by a simplex method with bounds, to `end` or to the largest there is.
+
+    Two groups and the share are basic: they balance what one other group at a time is changed by.
+
+    Parameters
+    ----------
+    G : (3, n) array
+    torque : tuple of three floats
+    end : float
+    share : float
+        What the demands give of the torque at the start.
+    most_steps : int
+    demand : (n,) array
+        Within ±1, changed in place.
+
+    Returns
+    -------
+    tuple of float and int
+        The share, and steps taken.
+    """
+    a, b = first_basis(G, torque)
+    steps = 0
+    while steps < most_steps and share < end:
+        steps += 1
+        g_a, g_b = column(G, a), column(G, b)
+        plane = cross(g_a, g_b)
+        c, growth = entering(G, demand, plane, torque, a, b)
+        if c < 0:
+            break
+        rate_c, growth = copysign(1.0, growth), abs(growth)
+        rest = plus(plus(NONE, growth, torque), -rate_c, column(G, c))  # for a and b to give
+        rate_a = dot(cross(rest, g_b), plane) / dot(plane, plane)
+        rate_b = dot(cross(g_a, rest), plane) / dot(plane, plane)
+        noise = NOISE * (growth * length(torque) + length(column(G, c)))
+        room_a = room(demand[a], rate_a, noise / length(g_a))
+        room_b = room(demand[b], rate_b, noise / length(g_b))
+        room_c = room(demand[c], rate_c, 0.0)
+        remaining = (end - share) / growth
+        stride = min(room_a, room_b, room_c, remaining)
+        demand[a] += stride * rate_a
+        demand[b] += stride * rate_b
+        demand[c] += stride * rate_c
+        share = end if stride == remaining else share + stride * growth
+        a_meets = (room_a - stride) * abs(rate_a) <= TIE
+        b_meets = (room_b - stride) * abs(rate_b) <= TIE
+        if stride == room_c:
+            demand[c] = rate_c
+        elif a_meets and (abs(rate_a) >= abs(rate_b) or not b_meets):  # the faster: the next basis is sounder
+            demand[a] = copysign(1.0, rate_a)
+            a = c
+        elif b_meets:
+            demand[b] = copysign(1.0, rate_b)
+            b = c
+    return share, steps
+
+
+@compiled
+def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
+    """Two groups whose columns and the torque are far from lying in one plane."""
+    a = b = 0
+    for j in range(G.shape[1]):
+        if length(cross(column(G, j), torque)) > length(cross(column(G, a), torque)):
+            a = j
+    plane = cross(column(G, a), torque)
+    for j in range(G.shape[1]):
+        if abs(dot(column(G, j), plane)) > abs(dot(column(G, b), plane)):
+            b = j
+    return a, b
+
+
+@compiled
+def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: int) -> tuple[int, float]:
+    """Group with the most to add to the share (-1 if none has), and the share's growth with its demand."""
+    best, found, found_growth, total = 0.0, -1, 0.0, 0.0
+    for j in range(G.shape[1]):
+        growth = dot(column(G, j), plane) / dot(torque, plane)
+        gain = abs(growth) - growth * demand[j]
+        total += abs(growth)
+        if gain > best and j != a and j != b:
+            best, found, found_growth = gain, j, growth
+    return (found if best > NOISE * total else -1), found_growth
+
+
+@compiled
+def room(demand: float, rate: float, noise: float) -> float:
+    """Steps of a rate until a demand meets its limit; at a rate of rounding's size it never does."""
+    left = 1.0 - demand if rate > 0.0 else 1.0 + demand
+    return max(left, 0.0) / abs(rate) if abs(rate) > noise else inf

@@ -1,0 +1,141 @@
+"""Output files: found writable before work begins, and written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from spheretwin.models.base.errors import InputError, SpheretwinError
+
+
+class OutputFile:
+    """A file that is written under a hidden name of its own beside the place where it is to appear.
+
+    Whoever else writes to the same place at the same time has another hidden name: each file is whole, and
+    the last to be kept stays. A link stays a link: the file it points to is replaced.
+
+    Parameters
+    ----------
+    target : Path
+        Where the file is to appear.
+
+    Attributes
+    ----------
+    path : Path
+        Where to write it; an empty file is there.
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    """
+
+    def __init__(self, target: Path) -> None:
+        check_writable(target)
+        self._target = _behind_links(target)
+        self.path = _hidden(self._target)
+        try:
+            self.path.open("xb").close()  # unlike `tempfile`, with the permissions of any new file
+        except OSError as error:
+            raise InputError(f"output: expected a writable path, {error}") from None
+
+    def keep(self) -> None:
+        """Put the file in its place, with the permissions of the file that it replaces.
+
+        Raises
+        ------
+        SpheretwinError
+            It cannot be put there, as where a folder has come in between; it stays under its hidden name.
+        """
+        try:
+            with suppress(FileNotFoundError):
+                shutil.copymode(self._target, self.path)
+            os.replace(self.path, self._target)
+        except OSError as error:
+            raise SpheretwinError(
+                f"output: {self._target} could not be written, {error.strerror or error}"
+            ) from None
+
+    def discard(self) -> None:
+        """Remove the file, unless it was kept."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+
+def check_writable(path: Path) -> None:
+    """Find out whether a file can be put at `path`, leaving no trace.
+
+    Raises
+    ------
+    InputError
+        A folder or something else than a file is there, or its folder is missing or read-only.
+    """
+    target = _behind_links(path)
+    try:
+        if target.is_dir():
+            raise InputError(f"output: expected a file name, received the folder {path}")
+        if target.exists() and not target.is_file():
+            raise InputError(f"output: expected a regular file, received {path}")
+        probe = _hidden(target)
+        probe.open("xb").close()
+        probe.unlink()
+        if target.exists():
+            target.open("ab").close()
+    except OSError as error:
+        raise InputError(f"output: expected a writable path, {error}") from None
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`; it takes the name `path` when the block ends well.
+
+    A link stays a link: the file it points to is replaced.
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    SpheretwinError
+        Writing failed, as on a full disk; what was at `path` before is untouched.
+    """
+    output = OutputFile(path)
+    try:
+        yield output.path
+        output.keep()
+    except OSError as error:
+        raise SpheretwinError(f"output: {path} could not be written, {error}") from None
+    finally:
+        output.discard()
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder for output files, unless it is there, and find out whether it takes them.
+
+    Raises
+    ------
+    InputError
+        It cannot be made or written to.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise InputError(f"output: expected a writable folder, {error}") from None
+
+
+def _hidden(target: Path) -> Path:
+    """A name beside a file that nobody else has; none that is made of the file's name elsewhere is longer."""
+    return target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
+
+
+def _behind_links(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):  # the latter until Python 3.13
+        raise InputError(f"output: expected a file name, received {path}, a link in a circle") from None

@@ -1,0 +1,122 @@
+"""How well the twin's torque curve stands for the samples it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Coil, Magnet
+from spheretwin.models.design.pole_torque import Mesh, compute_curve
+from spheretwin.models.magnetics import lookup_table, place
+from spheretwin.models.torque_curve import TorqueCurve
+
+Array = NDArray[np.float64]
+
+# Angles at which the look-up table is held against the spline: 64 or more in each of its intervals.
+LOOKUP_POINTS = 50_001
+
+# Samples compared with the geometry's own curve at most: each costs 16 ms.
+COMPARED = 181
+
+
+class Misfit(NamedTuple):
+    """Differences over all samples, in units of a peak."""
+
+    rms: float
+    worst: float
+    worst_deg: float
+    """Angle of the largest difference."""
+
+
+class Difference(NamedTuple):
+    """Samples against the curve computed from a geometry, in units of the computed peak."""
+
+    as_given: Misfit
+    scale: float
+    """Factor on the computed curve that brings it closest to the samples, by least squares."""
+    scaled: Misfit
+    """What is left after that: a difference in shape."""
+
+
+def leave_one_out(curve: TorqueCurve) -> Misfit:
+    """Leave out one inner sample at a time: how far the spline through the others misses it.
+
+    Noise shows, and samples that are too far apart. It overstates the error of the curve itself, whose
+    gaps are half as wide.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        Samples.
+
+    Returns
+    -------
+    Misfit
+        In units of the curve's peak.
+    """
+    inner = range(1, len(curve.phi_rad) - 1)
+    missed = np.array([_without(curve, i).spline(curve.phi_rad[i]) for i in inner])
+    return _misfit(missed - curve.torque_Nm_per_A[1:-1], curve.phi_rad[1:-1], curve.peak_Nm_per_A)
+
+
+def lookup_error(curve: TorqueCurve) -> float:
+    """Largest distance of the compiled look-up table from the spline, in units of the curve's peak.
+
+    The table holds a coil and its opposite together (see `models.magnetics`), and so does this figure.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        Samples.
+    """
+    phi = np.linspace(1e-6, np.pi - 1e-6, LOOKUP_POINTS)
+    table = lookup_table(curve)
+    row = np.array([place(cosine) for cosine in np.cos(phi)])
+    index = row.astype(np.int64)
+    h = np.polynomial.polynomial.polyval(row - index, table[index].T, tensor=False)
+    pair = curve.spline(phi) - curve.spline(np.pi - phi)
+    return float(np.max(np.abs(h * np.sin(phi) - pair)) / curve.peak_Nm_per_A)
+
+
+def difference(
+    curve: TorqueCurve,
+    magnet: Magnet,
+    coil: Coil,
+    mesh: Mesh | None = None,
+    track: Callable[[range], Iterable[int]] = iter,
+) -> Difference:
+    """Compare samples with the curve computed from a geometry, at the samples' own angles.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        Samples, measured or computed elsewhere.
+    magnet, coil, mesh, track
+        As in `pole_torque.compute_curve`.
+    """
+    chosen = np.unique(np.linspace(0, len(curve.phi_rad) - 1, COMPARED).round().astype(np.int64))
+    phi, sample = curve.phi_rad[chosen], curve.torque_Nm_per_A[chosen]
+    computed = compute_curve(magnet, coil, phi, mesh, track)
+    expected, peak = computed.torque_Nm_per_A, computed.peak_Nm_per_A
+    scale = float(sample @ expected / (expected @ expected))
+    return Difference(
+        as_given=_misfit(sample - expected, phi, peak),
+        scale=scale,
+        scaled=_misfit(sample - scale * expected, phi, peak),
+    )
+
+
+def _without(curve: TorqueCurve, index: int) -> TorqueCurve:
+    return TorqueCurve(np.delete(curve.phi_rad, index), np.delete(curve.torque_Nm_per_A, index))
+
+
+def _misfit(distance: Array, phi_rad: Array, peak: float) -> Misfit:
+    worst = int(np.argmax(np.abs(distance)))
+    return Misfit(
+        rms=float(np.sqrt(np.mean(distance**2)) / peak),
+        worst=float(np.abs(distance[worst]) / peak),
+        worst_deg=float(np.degrees(phi_rad[worst])),
+    )

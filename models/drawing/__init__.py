@@ -1,0 +1,1 @@
+"""The meshes of the actuator, made from its numbers."""

@@ -1,0 +1,218 @@
+"""Rows that a run has flushed: Arrow streams in a hidden folder beside its file, one for each set of columns.
+
+A stream grows by whole batches of rows, so that a killed process leaves all it had flushed: at worst the last
+batch of the last stream is torn, and is left out when they are read. Writing one takes little memory; that of
+a Parquet file grows with each group of rows.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.table import Table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+# What each message of a stream begins with; the length of its description follows, in as many bytes.
+_MESSAGE = b"\xff\xff\xff\xff"
+
+
+class Parts:
+    """Follows a run into streams of Arrow; nothing is there before its first rows.
+
+    Parameters
+    ----------
+    path : Path
+        The file that will be made of them.
+    facts : mapping
+        Metadata of each stream.
+
+    Attributes
+    ----------
+    paths : list of Path
+        The streams, in order; each holds a whole batch or more.
+    rows : int
+        Rows in all of them.
+    """
+
+    def __init__(self, path: Path, facts: Mapping[str, str]) -> None:
+        self._path, self._facts = path, dict(facts)
+        self.paths: list[Path] = []
+        self.rows = 0
+        self._signals: tuple[Signal, ...] = ()
+        self._sink: Any = None  # an `OSFile` and the stream's writer to it, once there are rows
+        self._writer: Any = None
+
+    @property
+    def folder(self) -> Path:
+        """Where the streams are, once there is one."""
+        return self.paths[0].parent
+
+    def append(self, rows: Table) -> None:
+        """Hand some rows, at least one, to the operating system as one batch.
+
+        Raises
+        ------
+        OSError
+            They could not be written. What was written before is kept, and nothing can be added to it.
+        """
+        try:
+            if rows.signals == self._signals:
+                self._write(rows)
+            else:
+                self.close()
+                self._begin(rows)
+        except OSError:
+            self._abandon()
+            raise
+        self.rows += len(rows)
+
+    def close(self) -> None:
+        """End the last stream.
+
+        Raises
+        ------
+        OSError
+            Its end could not be written; all its rows were.
+        """
+        if self._writer is not None:
+            self._writer.close()
+            self._sink.close()
+
+    def remove(self) -> None:
+        """Delete all of them; they must be closed."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _begin(self, rows: Table) -> None:
+        """Open a stream for rows of new columns, which are there with its first batch or not at all."""
+        import pyarrow as pa  # slow to import, and most runs write no file
+
+        folder = self.folder if self.paths else self._new_folder()
+        part = folder / f"{len(self.paths):06d}.arrows"
+        try:
+            self._sink = pa.OSFile(str(part), "wb")  # without a buffer of its own
+            self._writer = pa.ipc.new_stream(self._sink, _schema(rows.signals, self._facts))
+            self._write(rows)
+        except OSError:
+            part.unlink(missing_ok=True)
+            if not self.paths:
+                shutil.rmtree(folder, ignore_errors=True)
+            raise
+        self._signals = rows.signals
+        self.paths.append(part)
+
+    def _write(self, rows: Table) -> None:
+        self._writer.write_table(rows.arrow({}))
+        self._sink.flush()
+
+    def _abandon(self) -> None:
+        """Let go of a stream that can take no more, without an end: it is read up to its last whole batch."""
+        if self._sink is not None:
+            with suppress(OSError):
+                self._sink.close()
+        self._sink = self._writer = None
+
+    def _new_folder(self) -> Path:
+        target = self._path.resolve()
+        return Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}.", suffix=".parts"))
+
+
+def _schema(signals: tuple[Signal, ...], facts: Mapping[str, str]) -> pa.Schema:
+    return Table(signals, np.empty((0, width(signals)))).arrow(facts).schema
+
+
+def read_schema(part: Path) -> pa.Schema | None:
+    """Columns and metadata of a part; None where it was torn before it had any.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or is no telemetry of this package.
+    """
+    import pyarrow as pa
+
+    with _opened(part) as source:
+        try:
+            schema = pa.ipc.open_stream(source).schema
+        except (pa.ArrowException, OSError) as error:
+            if _is_torn_at_its_start(part):
+                return None
+            raise _foreign(part, without_breaks(error)) from None
+    if not _is_telemetry(schema):
+        raise _foreign(part, f"received one of {', '.join(schema.names) or 'nothing'}")
+    return schema
+
+
+def read_batches(part: Path) -> Generator[pa.RecordBatch, None, bool]:
+    """Whole batches of a part, one at a time, none of them copied; returns whether it was torn behind them.
+
+    Raises
+    ------
+    InputError
+        It cannot be read.
+    """
+    import pyarrow as pa
+
+    try:
+        with _opened(part) as source:
+            schema = pa.ipc.open_stream(source).schema
+            place = source.tell()
+        while True:
+            # A mapping for each batch: what was read of a mapped file is the process's memory while it lasts.
+            with _opened(part) as source:
+                source.seek(place)
+                batch = pa.ipc.read_record_batch(pa.ipc.read_message(source), schema)
+                place = source.tell()
+            yield batch
+            del batch
+    except EOFError:
+        return False
+    except (pa.ArrowException, OSError):
+        return True
+
+
+@contextmanager
+def _opened(part: Path) -> Iterator[pa.MemoryMappedFile]:
+    import pyarrow as pa
+
+    try:
+        source = pa.memory_map(str(part))
+    except OSError as error:
+        raise _foreign(part, without_breaks(error)) from None
+    with source:
+        yield source
+
+
+def _is_torn_at_its_start(part: Path) -> bool:
+    with part.open("rb") as file:
+        head = file.read(2 * len(_MESSAGE))
+    described = int.from_bytes(head[len(_MESSAGE) :], "little")
+    return _MESSAGE.startswith(head[: len(_MESSAGE)]) and part.stat().st_size < 2 * len(_MESSAGE) + described
+
+
+def _is_telemetry(schema: pa.Schema) -> bool:
+    return 0 < len(schema) == len(set(schema.names)) and all(map(_is_signal, schema))
+
+
+def _is_signal(field: pa.Field) -> bool:
+    import pyarrow as pa
+
+    of_vector = pa.types.is_fixed_size_list(field.type)
+    return {b"unit", b"meaning", b"labels"} <= set(field.metadata or {}) and pa.types.is_float64(
+        field.type.value_type if of_vector else field.type
+    )
+
+
+def _foreign(part: Path, why: str) -> InputError:
+    return InputError(f"telemetry {part}: expected an Arrow stream of a run, {why}")

@@ -1,0 +1,118 @@
+"""What a run says, column by column: named signals with units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import accumulate
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One column of telemetry.
+
+    Attributes
+    ----------
+    name : str
+        Name of the column.
+    unit : str
+        Unit of every entry.
+    size : int
+        Numbers a row, at least 1.
+    meaning : str
+        What it says, for tables and figures.
+    labels : tuple of str
+        A short name for each entry of a vector, without commas; or none.
+
+    Raises
+    ------
+    InputError
+        The name is no text or empty, the size no whole number above 0, or the labels do not fit it.
+    """
+
+    name: str
+    unit: str
+    size: int
+    meaning: str
+    labels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not _is_text(self.name) or not self.name:
+            raise InputError(f"signal: expected a name of printable characters, received {shown(self.name)}")
+        for field in ("unit", "meaning"):
+            if not _is_text(getattr(self, field)):
+                raise InputError(
+                    f"signal {self.name}: expected {field} as printable text,"
+                    f" received {shown(getattr(self, field))}"
+                )
+        # A size below 1 would let the loop write beside its rows.
+        if not isinstance(self.size, int) or isinstance(self.size, bool) or self.size < 1:
+            raise InputError(
+                f"signal {self.name}: expected size as a whole number above 0, received {shown(self.size)}"
+            )
+        if not isinstance(self.labels, tuple | list) or not all(map(_is_label, self.labels)):
+            raise InputError(
+                f"signal {self.name}: expected labels as texts without commas, received {shown(self.labels)}"
+            )
+        if len(self.labels) not in (0, self.size):
+            raise InputError(
+                f"signal {self.name}: expected {self.size} labels or none, received {len(self.labels)}"
+            )
+        object.__setattr__(self, "labels", tuple(self.labels))
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and value.isprintable()
+
+
+def _is_label(value: object) -> bool:
+    # A file keeps the labels in one text, parted by commas.
+    return isinstance(value, str) and value.isprintable() and value != "" and "," not in value
+
+
+ANGLES = ("α", "β", "γ")
+AXES = ("x", "y", "z")
+GROUPS = tuple(f"group {j}" for j in range(18))
+
+SIGNALS = (
+    Signal("t_s", "s", 1, "time of the control tick"),
+    Signal("q_rad", "rad", 3, "hinge angles", ANGLES),
+    Signal("qdot_rad_s", "rad/s", 3, "hinge rates", ANGLES),
+    Signal("q_ref_rad", "rad", 3, "desired hinge angles", ANGLES),
+    Signal("qdot_ref_rad_s", "rad/s", 3, "desired hinge rates", ANGLES),
+    Signal("error_rad", "rad", 3, "tracking error q - q_ref (28)", ANGLES),
+    Signal("torque_command_Nm", "N·m", 3, "generalised torque asked for by the law", ANGLES),
+    Signal("torque_Nm", "N·m", 3, "torque of the coils on the rotor, stator frame", AXES),
+    Signal("disturbance_Nm", "N·m", 3, "generalised load and random torque, subtracted in (1)", ANGLES),
+    Signal("current_command_A", "A", 18, "group currents asked of the amplifiers", GROUPS),
+    Signal("current_A", "A", 18, "group currents, mean over the physics step that begins now", GROUPS),
+    Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
+)
+"""Logged by every run, in this order."""
+
+MEASURED_SIGNALS = (
+    Signal("q_measured_rad", "rad", 3, "hinge angles as the controller has them", ANGLES),
+    Signal("qdot_estimated_rad_s", "rad/s", 3, "hinge rates as the controller has them", ANGLES),
+)
+"""Logged where the controller does not have the true state."""
+
+FRICTION_SIGNALS = (
+    Signal("friction_Nm", "N·m", 3, "friction on the hinges, over the physics step that begins now", ANGLES),
+)
+"""Logged where the hinges have friction."""
+
+
+@cache
+def offsets(signals: tuple[Signal, ...]) -> dict[str, int]:
+    """First column of each signal in a flat row; not to be changed."""
+    ends = accumulate((signal.size for signal in signals), initial=0)
+    return dict(zip((signal.name for signal in signals), ends, strict=False))
+
+
+@cache
+def width(signals: tuple[Signal, ...]) -> int:
+    """Numbers in one flat row."""
+    return sum(signal.size for signal in signals)

@@ -1,0 +1,163 @@
+"""The telemetry of a run as a table: one row a control tick."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import whole_file
+from spheretwin.models.base.wording import did_you_mean, without_breaks
+from spheretwin.models.telemetry.signals import Signal, offsets, width
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+# Numbers that change little from row to row: their bytes are split by significance, then compressed; that
+# takes less time and space than a dictionary of values, few of which occur twice.
+PARQUET_FORMAT: dict[str, Any] = {
+    "compression": "zstd",
+    "use_dictionary": False,
+    "use_byte_stream_split": True,
+}
+
+
+@cache
+def _places(signals: tuple[Signal, ...]) -> dict[str, tuple[int, int]]:
+    """First column and size of each signal."""
+    first = offsets(signals)
+    return {signal.name: (first[signal.name], signal.size) for signal in signals}
+
+
+def allocated(rows: int, columns: int) -> NDArray[np.float64]:
+    """Room for rows of telemetry.
+
+    Raises
+    ------
+    InputError
+        There is not so much memory.
+    """
+    try:
+        return np.empty((rows, columns))
+    except (MemoryError, ValueError):  # the latter beyond what an index can hold
+        needed = rows * columns * 8 / 2**30
+        raise InputError(
+            f"telemetry: expected rows that fit in memory, received {needed:.1f} GiB of them"
+        ) from None
+
+
+class Table:
+    """A run's telemetry: ``table["q_rad"]`` is an (n, 3) array, ``table["t_s"]`` an (n,) array.
+
+    Parameters
+    ----------
+    signals : tuple of Signal
+        The columns, in order.
+    values : (n, width) array
+        One flat row a tick; not copied.
+    """
+
+    def __init__(self, signals: tuple[Signal, ...], values: NDArray[np.float64]) -> None:
+        if values.ndim != 2 or values.shape[1] != width(signals):
+            raise InputError(
+                f"telemetry: expected rows of {width(signals)} numbers, received shape {values.shape}"
+            )
+        self.signals = signals
+        self.values = values
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        places = _places(self.signals)
+        if name not in places:
+            raise InputError(
+                f"telemetry: expected one of {', '.join(places)},"
+                f" received {name}{did_you_mean(str(name), places)}"
+            )
+        first, size = places[name]
+        return self.values[:, first] if size == 1 else self.values[:, first : first + size]
+
+    def rows(self, first: int, last: int) -> Table:
+        """Table of the rows from `first` up to, not including, `last` (a view)."""
+        return Table(self.signals, self.values[first:last])
+
+    def write_parquet(self, path: Path, metadata: Mapping[str, str]) -> None:
+        """Write all columns, their units, and `metadata`, whole or not at all.
+
+        Raises
+        ------
+        InputError
+            No file can be made there.
+        SpheretwinError
+            Writing failed; what was there before is untouched.
+        """
+        import pyarrow.parquet  # slow to import, and most runs write no file
+
+        with whole_file(path) as temporary:
+            pyarrow.parquet.write_table(self.arrow(metadata), temporary, **PARQUET_FORMAT)
+
+    def arrow(self, metadata: Mapping[str, str]) -> pa.Table:
+        """Arrow table of the same columns; units and words as metadata of the fields."""
+        import pyarrow as pa
+
+        fields, columns = [], []
+        for signal in self.signals:
+            flat = pa.array(np.ascontiguousarray(self[signal.name]).ravel())
+            column = flat if signal.size == 1 else pa.FixedSizeListArray.from_arrays(flat, signal.size)
+            described = {"unit": signal.unit, "meaning": signal.meaning, "labels": ",".join(signal.labels)}
+            fields.append(pa.field(signal.name, column.type, nullable=False, metadata=described))
+            columns.append(column)
+        return pa.table(columns, schema=pa.schema(fields, metadata=dict(metadata)))
+
+
+def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str]]:
+    """Read a table back, with the metadata of its file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    rows : bool
+        Without them the table is empty, and only the file's end is read.
+
+    Raises
+    ------
+    InputError
+        The file is missing, is no telemetry of this package, or has two columns of one name.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    try:
+        with pyarrow.parquet.ParquetFile(path) as file:  # `read_table` would import the datasets of Arrow
+            arrow = file.read(use_threads=False) if rows else file.schema_arrow.empty_table()
+        signals = tuple(_signal(field) for field in arrow.schema)
+    except (OSError, pa.ArrowException, KeyError) as error:
+        raise InputError(
+            f"telemetry {path}: expected a Parquet file of a run, {without_breaks(error)}"
+        ) from None
+    names = [signal.name for signal in signals]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(f"telemetry {path}: expected each column once, received {', '.join(twice)} twice")
+    parts = [_flat(arrow[signal.name], signal.size) for signal in signals]
+    metadata = {key.decode(): value.decode() for key, value in (arrow.schema.metadata or {}).items()}
+    return Table(signals, np.concatenate(parts, axis=1)), metadata
+
+
+def _signal(field) -> Signal:  # type: ignore[no-untyped-def]
+    described = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+    size = getattr(field.type, "list_size", 1)
+    labels = tuple(filter(None, described["labels"].split(",")))
+    return Signal(field.name, described["unit"], size, described["meaning"], labels)
+
+
+def _flat(column, size: int) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    chunk = column.combine_chunks()
+    return np.asarray(chunk.flatten() if size > 1 else chunk, dtype=np.float64).reshape(-1, size)

@@ -1,0 +1,272 @@
+"""The compile cache: kept between processes, and never stale."""
+
+import gc
+import hashlib
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import weakref
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from numba import types
+
+from spheretwin.models.base import cache, compiled
+
+SOURCE = Path(compiled.__file__).parent
+
+
+CALLER = """
+import numba
+from numba import types
+from spheretwin.models.callee import answer
+from spheretwin.models.base.compiled import compiled, compiled_callback
+
+@compiled
+def ask():
+    return answer()
+
+def callback():
+    return answer()
+
+if __name__ == "__main__":
+    before = numba.config.CACHE_DIR
+    import spheretwin.models.caller as caller
+    called_back = compiled_callback(types.int64(), caller.callback)
+    assert called_back.ctypes() == caller.ask()
+    assert numba.config.CACHE_DIR == before
+    print(caller.ask(), sum(caller.ask.stats.cache_hits.values()), called_back.cache_hits)
+"""
+
+
+LOADED = """
+import sys
+import numpy as np
+from numba import types
+from spheretwin.models.base.compiled import compiled, compiled_callback
+
+@compiled
+def through(function, x):
+    return function(np.full(3, x)[1:])
+
+def largest(values):
+    return np.exp(np.sort(values)[-1])
+
+@compiled
+def hashed(text):
+    return hash(text)
+
+if __name__ == "__main__":
+    import spheretwin.models.loaded as loaded
+    callback = compiled_callback(types.float64(types.float64[::1]), loaded.largest)
+    assert loaded.through(callback, 0.0) == 1.0
+    assert loaded.hashed("secret of this process") == hash("secret of this process")
+    print("scipy.linalg" in sys.modules)
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A small package under the same name, with the real decorator and two modules."""
+    models = tmp_path / "spheretwin" / "models"
+    models.mkdir(parents=True)
+    base = models / "base"
+    base.mkdir()
+    for folder in (models, base):
+        (folder / "__init__.py").write_text("")
+    for name in ("cache.py", "compiled.py", "errors.py", "wording.py", "files.py", "machine_code.py"):
+        shutil.copy(SOURCE / name, base)
+    (models / "callee.py").write_text(
+        "from spheretwin.models.base.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"
+    )
+    (models / "caller.py").write_text(CALLER)
+    (models / "loaded.py").write_text(LOADED)
+    return tmp_path
+
+
+# The package above must come before the installed one, whose folders an import hook may map.
+RUN = """
+import runpy, sys
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]
+runpy.run_module("spheretwin.models.caller", run_name="__main__")
+"""
+
+
+def python(code, **environment):
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+def ask(package):
+    cache = str(package / "cache")
+    printed = python(RUN, **{**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": cache})
+    answer, hits, callback_hits = map(int, printed.split())
+    assert hits == callback_hits  # the function and its callback come from entries of their own
+    return answer, hits
+
+
+def entries(package):
+    return sorted(path for path in (package / "cache").rglob("*") if path.is_file())
+
+
+def test_second_process_compiles_nothing(package):
+    assert ask(package) == (41, 0)
+    assert ask(package) == (41, 1)
+
+
+def test_edited_callee_in_another_file_is_seen(package):
+    assert ask(package) == (41, 0)
+    callee = package / "spheretwin" / "models" / "callee.py"
+    callee.write_text(callee.read_text().replace("41", "42"))
+    assert ask(package) == (42, 0)
+
+
+def test_machine_code_is_loaded_without_all_that_can_be_compiled(package):
+    """Memory, mathematics, hashes and callbacks work without the modules that compile them."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(package),
+        "SPHERETWIN_CACHE_DIR": str(package / "cache"),
+    }
+    run = RUN.replace("caller", "loaded")
+    assert python(run, **environment).strip() == "True"  # compiled, which needs them
+    assert python(run, **environment).strip() == "False"
+
+
+def truncate(content):
+    return content[: len(content) // 2]
+
+
+def overwrite(content):
+    middle = len(content) // 2
+    return content[:middle] + b"garbage in the midst of machine code" + content[middle + 36 :]
+
+
+@pytest.mark.parametrize("damage", [truncate, overwrite, lambda _: b"", lambda _: b"nonsense"])
+def test_damaged_entry_is_made_again(package, damage):
+    assert ask(package) == (41, 0)
+    kept = entries(package)
+    assert len(kept) == 3  # the caller, its callee, its callback
+    for path in kept:
+        path.write_bytes(damage(path.read_bytes()))
+    assert ask(package) == (41, 0)
+    assert ask(package) == (41, 1)
+    assert entries(package) == kept
+
+
+@pytest.mark.parametrize("content", [5, ("another signature", ()), ((), (1, 2, 3))])
+def test_whole_entry_that_cannot_be_used_is_made_again(package, content):
+    assert ask(package) == (41, 0)
+    for path in entries(package):
+        pickled = pickle.dumps(content)
+        path.write_bytes(hashlib.sha256(pickled).digest() + pickled)
+    assert ask(package) == (41, 0)
+    assert ask(package) == (41, 1)
+
+
+def test_file_in_place_of_the_folder_is_done_without(package):
+    assert ask(package) == (41, 0)
+    (folder,) = (package / "cache").iterdir()
+    shutil.rmtree(folder)
+    folder.write_text("no folder")
+    for _ in range(2):
+        assert ask(package) == (41, 0)
+    assert folder.read_text() == "no folder"
+
+
+def test_full_disk_is_done_without(package):
+    environment = {**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": str(package / "cache")}
+    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
+    assert python(full + RUN, **environment).split() == ["41", "0", "0"]
+    assert entries(package) == []
+
+
+def test_no_folder_at_all_is_done_without(package):
+    nowhere = {"SPHERETWIN_CACHE_DIR": "/proc", "XDG_CACHE_HOME": "/proc", "HOME": "/proc"}
+    environment = {**os.environ, **nowhere, "PYTHONPATH": str(package)}
+    assert python(RUN, **environment).split() == ["41", "0", "0"]
+
+
+def test_run_without_compilation(tmp_path):
+    """Everything a run calls works as plain Python, and to rounding says the same."""
+    code = (
+        "from spheretwin.twin import scenario; from spheretwin.twin.simulation import simulate\n"
+        "run = simulate(scenario.load('hold', {'duration': 0.02}))\n"
+        "print(*run.telemetry['q_rad'][-1], run.status)"
+    )
+    compiled_run, plain_run = (
+        python(code, **{**os.environ, "NUMBA_DISABLE_JIT": flag}).split() for flag in ("0", "1")
+    )
+    assert plain_run[-1] == compiled_run[-1] == "completed"
+    # Products and sums are not fused in Python; each of 20 ticks may differ by some ulp, hardly amplified.
+    np.testing.assert_allclose(
+        np.array(plain_run[:-1], float), np.array(compiled_run[:-1], float), rtol=1e-9, atol=0
+    )
+
+
+SIGNATURE = types.float64(types.float64)
+
+
+def test_callback_is_compiled_once_for_a_function_and_a_signature():
+    def double(x):
+        return 2 * x
+
+    callback = compiled.compiled_callback(SIGNATURE, double)
+    assert callback.ctypes(2.0) == 4.0
+    assert compiled.compiled_callback(SIGNATURE, double) is callback
+    assert compiled.compiled_callback(SIGNATURE, numba.njit(double)) is callback
+    other = compiled.compiled_callback(types.int64(types.int64), double)
+    assert other is not callback
+    assert other.ctypes(3) == 6
+
+
+def test_callback_lives_no_longer_than_its_function():
+    def double(x):
+        return 2 * x
+
+    compiled.compiled_callback(SIGNATURE, double)
+    alive = weakref.ref(double)
+    del double
+    gc.collect()
+    assert alive() is None
+
+
+def test_uncompiled_is_the_plain_function():
+    def double(x):
+        return 2 * x
+
+    assert compiled.uncompiled(numba.njit(double)) is double
+    assert compiled.uncompiled(double) is double
+
+
+def test_read_only_home_still_compiles():
+    named = ("XDG_CACHE_HOME", "SPHERETWIN_CACHE_DIR")
+    environment = {key: value for key, value in os.environ.items() if key not in named}
+    code = (
+        "import numpy as np; from spheretwin.models.kinematics import rotation;"
+        "print(rotation(np.zeros(3))[0, 0])"
+    )
+    assert float(python(code, **{**environment, "HOME": "/proc"})) == 1.0
+
+
+def test_kept_array_is_computed_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "_root", lambda: tmp_path)
+    made = []
+
+    def compute():
+        made.append(1)
+        return np.arange(3.0)
+
+    for _ in range(2):
+        np.testing.assert_array_equal(cache.kept_array(b"key", compute), [0, 1, 2])
+    assert len(made) == 1
+    cache.kept_array(b"other key", compute)
+    assert len(made) == 2
+    next(tmp_path.rglob("*.npy")).write_bytes(b"damaged")
+    cache.kept_array(b"key", compute)
+    cache.kept_array(b"other key", compute)
+    assert len(made) == 3

@@ -1,0 +1,147 @@
+"""Output files: whole or not at all."""
+
+import os
+import stat
+
+import numpy as np
+import pytest
+
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.files import OutputFile, check_writable, whole_file
+from spheretwin.models.telemetry.file import PART_ROWS, TelemetryFile
+from spheretwin.models.telemetry.signals import SIGNALS, width
+from spheretwin.models.telemetry.table import Table
+
+
+def test_file_appears_when_the_block_ends(tmp_path):
+    path = tmp_path / "out.txt"
+    with whole_file(path) as temporary:
+        temporary.write_text("new")
+        assert not path.exists()
+    assert path.read_text() == "new"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+@pytest.mark.parametrize(
+    ("raised", "seen"), [(OSError("disk full"), SpheretwinError), (KeyError("x"), KeyError)]
+)
+def test_failure_leaves_what_was_there(tmp_path, raised, seen):
+    (path := tmp_path / "out.txt").write_text("old")
+
+    def fail_halfway():
+        with whole_file(path) as temporary:
+            temporary.write_text("half")
+            raise raised
+
+    with pytest.raises(seen):
+        fail_halfway()
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_link_stays_a_link(tmp_path):
+    (tmp_path / "real.txt").write_text("old")
+    (link := tmp_path / "link.txt").symlink_to("real.txt")
+    with whole_file(link) as temporary:
+        temporary.write_text("new")
+    assert link.is_symlink()
+    assert (tmp_path / "real.txt").read_text() == "new"
+
+
+def test_link_to_a_file_that_is_not_there_yet_makes_it(tmp_path):
+    (tmp_path / "folder").mkdir()
+    (link := tmp_path / "link.txt").symlink_to("folder/real.txt")
+    with whole_file(link) as temporary:
+        temporary.write_text("new")
+    assert link.is_symlink()
+    assert os.listdir(tmp_path / "folder") == ["real.txt"]
+    assert link.read_text() == "new"
+
+
+def test_link_in_a_circle_is_bad_input(tmp_path):
+    (loop := tmp_path / "loop.txt").symlink_to("loop.txt")
+    with pytest.raises(InputError, match="circle"):
+        check_writable(loop)
+    assert loop.is_symlink()
+
+
+def test_two_writers_of_one_path_each_leave_a_whole_file(tmp_path):
+    path = tmp_path / "out.txt"
+    with whole_file(path) as first:
+        first.write_text("one")
+        with whole_file(path) as second:
+            second.write_text("two")
+            first.write_text("one, at length")
+        assert path.read_text() == "two"
+    assert path.read_text() == "one, at length"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_neighbours_whose_names_end_in_part_are_left_alone(tmp_path):
+    neighbours = ["out.txt.part", f".out.txt.{os.getpid()}.part"]
+    for name in neighbours:
+        (tmp_path / name).write_text("mine")
+    with whole_file(tmp_path / "out.txt") as temporary:
+        temporary.write_text("new")
+    assert sorted(os.listdir(tmp_path)) == sorted([*neighbours, "out.txt"])
+    assert {(tmp_path / name).read_text() for name in neighbours} == {"mine"}
+
+
+@pytest.mark.parametrize(("umask", "mode"), [(0o022, 0o644), (0o077, 0o600), (0o002, 0o664)])
+def test_permissions_are_those_of_any_new_file(tmp_path, umask, mode):
+    before = os.umask(umask)
+    try:
+        with whole_file(tmp_path / "out.txt") as temporary:
+            temporary.write_text("new")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "out.txt").stat().st_mode) == mode
+
+
+def test_permissions_of_a_replaced_file_stay(tmp_path):
+    (path := tmp_path / "out.txt").write_text("old")
+    path.chmod(0o640)
+    with whole_file(path) as temporary:
+        temporary.write_text("new")
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+def test_places_where_no_file_can_be_put(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path, tmp_path / "missing" / "out.txt", tmp_path / "pipe"):
+        with pytest.raises(InputError, match="output: expected"):
+            check_writable(path)
+    check_writable(tmp_path / "out.txt")
+    assert os.listdir(tmp_path) == ["pipe"]
+
+
+def test_a_folder_that_came_in_between_is_told_and_the_file_stays(tmp_path):
+    output = OutputFile(path := tmp_path / "out.txt")
+    output.path.write_text("new")
+    path.mkdir()
+    with pytest.raises(SpheretwinError, match=r"output: .*out\.txt could not be written") as told:
+        output.keep()
+    assert "\n" not in str(told.value)
+    assert output.path.read_text() == "new"
+
+
+# The longest hidden name has 23 bytes more than the file's: two dots, 16 digits, ".part".
+LONGEST = 255 - 23
+
+
+def test_a_name_too_long_to_be_hidden_is_found_before_work_begins(tmp_path):
+    for length in (LONGEST + 1, 300):
+        with pytest.raises(InputError, match="output: expected a writable path"):
+            check_writable(tmp_path / ("n" * length))
+    check_writable(tmp_path / ("n" * LONGEST))
+    with whole_file(tmp_path / ("n" * LONGEST)) as temporary:
+        temporary.write_text("new")
+    assert os.listdir(tmp_path) == ["n" * LONGEST]
+
+
+def test_the_longest_name_leaves_room_for_the_parts_of_a_run(tmp_path):
+    check_writable(path := tmp_path / ("n" * LONGEST))
+    file = TelemetryFile(path, SIGNALS, {})
+    file.write(Table(SIGNALS, np.zeros((PART_ROWS + 1, width(SIGNALS)))))
+    file.close({})
+    assert os.listdir(tmp_path) == ["n" * LONGEST]

@@ -1,0 +1,76 @@
+"""Overlap of equal cylinders about a centre: the closed form against points inside both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from spheretwin.models.design.clearance import air_gap_m, clearance, overlaps
+
+RADIUS, LENGTH, DISTANCE = 0.011, 0.025, 0.063
+
+
+def axes_apart(angle):
+    return np.array([[np.sin(angle / 2), 0, np.cos(angle / 2)], [-np.sin(angle / 2), 0, np.cos(angle / 2)]])
+
+
+def inside(points, axis):
+    along = points @ axis
+    across = np.linalg.norm(points - along[:, None] * axis, axis=1)
+    return (np.abs(along - DISTANCE) <= LENGTH / 2) & (across <= RADIUS)
+
+
+def some_point_is_in_both(angle):
+    first, second = axes_apart(angle)
+    # Two mirror images meet in the mirror x = 0, if at all: a fine net there.
+    z = np.linspace(0, DISTANCE + LENGTH, 1201)
+    y = np.linspace(-RADIUS, RADIUS, 41)
+    Y, Z = (grid.ravel() for grid in np.meshgrid(y, z))
+    points = np.column_stack([np.zeros(len(Y)), Y, Z])
+    return bool(np.any(inside(points, first) & inside(points, second)))
+
+
+@pytest.mark.parametrize("degrees", [5, 20, 24, 24.4, 24.7, 26, 40, 90, 180])
+def test_sign_tells_whether_they_share_a_point(degrees):
+    room = clearance(axes_apart(np.radians(degrees)), RADIUS, LENGTH, DISTANCE)[0, 1]
+    assert (room < 0) == some_point_is_in_both(np.radians(degrees))
+
+
+def test_touching_ones_have_no_room():
+    touching = 2 * np.arctan(RADIUS / (DISTANCE - LENGTH / 2))
+    assert_allclose(clearance(axes_apart(touching), RADIUS, LENGTH, DISTANCE)[0, 1], 0, atol=1e-15)
+
+
+def test_opposite_ones_have_the_hole_between_them():
+    room = clearance(axes_apart(np.pi), RADIUS, LENGTH, DISTANCE)[0, 1]
+    assert_allclose(room, 2 * DISTANCE - LENGTH, rtol=1e-12)
+
+
+def test_shipped_parts_fit(actuator):
+    assert overlaps(actuator) == []
+
+
+def test_coils_of_neighbouring_layers_overlap_first(actuator):
+    # The closest coils are neighbours of the upper layer, 26.4 degrees apart: 12 pairs, and 12 below.
+    wide = replace(actuator, coil=replace(actuator.coil, outer_radius_m=0.0120))
+    found = overlaps(wide)
+    assert len(found) == 24
+    assert {overlap.part for overlap in found} == {"coil"}
+    for overlap in found:
+        assert wide.coil_axes[overlap.first, 2] == pytest.approx(wide.coil_axes[overlap.second, 2])
+        assert overlap.first < overlap.second
+        assert 0 < overlap.depth_m < 1e-3
+
+
+def test_poles_overlap_deepest_first(actuator):
+    found = overlaps(replace(actuator, magnet=replace(actuator.magnet, radius_m=0.018)))
+    assert {overlap.part for overlap in found} == {"pole"}
+    depths = [overlap.depth_m for overlap in found]
+    assert np.all(np.diff(depths) < 1e-8)  # equal ones by their indices
+
+
+def test_air_gap_is_the_paper_s_half_millimetre(actuator):
+    assert air_gap_m(actuator) == pytest.approx(0.5e-3, abs=1e-12)
+    inward = replace(actuator, coil=replace(actuator.coil, distance_m=actuator.coil.distance_m - 8e-3))
+    assert air_gap_m(inward) == pytest.approx(-7.5e-3, abs=1e-12)

@@ -1,0 +1,94 @@
+"""The table of a run: names, views, and a Parquet file that is whole or not there."""
+
+import numpy as np
+import pytest
+
+from spheretwin.models.base import files
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.telemetry.signals import SIGNALS, offsets, width
+from spheretwin.models.telemetry.table import Table, read_parquet
+
+
+@pytest.fixture
+def table():
+    values = np.random.default_rng(0).normal(size=(20, width(SIGNALS)))
+    values[3, 5] = 5e-324  # the smallest number, and one that no decimal holds
+    values[4, 5] = 0.1 + 0.2
+    return Table(SIGNALS, values)
+
+
+def test_columns_are_views_by_name(table):
+    assert table["t_s"].shape == (20,)
+    assert table["current_A"].shape == (20, 18)
+    table["q_rad"][2] = 7.0
+    first = offsets(SIGNALS)["q_rad"]
+    np.testing.assert_array_equal(table.values[2, first : first + 3], 7.0)
+    np.testing.assert_array_equal(table.rows(2, 5)["q_rad"], table["q_rad"][2:5])
+
+
+def test_unknown_column_names_the_known_ones(table):
+    with pytest.raises(InputError, match=r"expected one of t_s, q_rad.* received colour"):
+        table["colour"]
+
+
+def test_misspelt_column_gets_a_suggestion(table):
+    with pytest.raises(InputError, match=r"received q_rads; did you mean q_rad\?"):
+        table["q_rads"]
+
+
+def test_rows_of_the_wrong_width_are_refused():
+    with pytest.raises(InputError, match="expected rows of"):
+        Table(SIGNALS, np.zeros((3, 4)))
+
+
+def test_parquet_keeps_every_bit_unit_and_word(table, tmp_path):
+    path = tmp_path / "run.parquet"
+    table.write_parquet(path, {"scenario": '{"a": 1}'})
+    again, metadata = read_parquet(path)
+    assert again.values.tobytes() == table.values.tobytes()
+    assert again.signals == SIGNALS
+    assert metadata["scenario"] == '{"a": 1}'
+
+
+def test_parquet_columns_are_what_pandas_and_polars_expect(table, tmp_path):
+    import pyarrow.parquet
+
+    table.write_parquet(path := tmp_path / "run.parquet", {})
+    schema = pyarrow.parquet.read_schema(path)
+    assert schema.names == [signal.name for signal in SIGNALS]
+    assert schema.field("current_A").type.list_size == 18
+    assert schema.field("current_A").metadata[b"unit"] == b"A"
+
+
+def test_failed_write_leaves_nothing(table, tmp_path, monkeypatch):
+    monkeypatch.setattr(files.os, "replace", _fail)
+    (old := tmp_path / "run.parquet").write_text("what was there before")
+    with pytest.raises(SpheretwinError, match="disk full"):
+        table.write_parquet(old, {})
+    assert [path.name for path in tmp_path.iterdir()] == ["run.parquet"]
+    assert old.read_text() == "what was there before"
+
+
+def _fail(*_):
+    raise OSError("disk full")
+
+
+def test_unwritable_place_and_foreign_file_are_bad_input(table, tmp_path):
+    with pytest.raises(InputError, match="writable"):
+        table.write_parquet(tmp_path / "missing" / "run.parquet", {})
+    (foreign := tmp_path / "foreign.parquet").write_text("no parquet")
+    with pytest.raises(InputError, match="expected a Parquet file"):
+        read_parquet(foreign)
+
+
+def test_a_column_that_is_there_twice_is_bad_input(table, tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    arrow = table.arrow({})
+    again = pa.schema([*arrow.schema, arrow.schema.field("t_s")])
+    twice = pa.Table.from_arrays([*arrow.columns, arrow["t_s"]], schema=again)
+    pyarrow.parquet.write_table(twice, path := tmp_path / "twice.parquet")
+    for rows in (True, False):
+        with pytest.raises(InputError, match="expected each column once, received t_s twice"):
+            read_parquet(path, rows=rows)

@@ -1,0 +1,255 @@
+"""The command as its users meet it: a process, its exit code, its two streams."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.telemetry.table import read_parquet
+
+COMMAND = [sys.executable, "-m", "spheretwin.twin.cli"]
+
+
+def spheretwin(*arguments, cwd=None):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
+
+
+def started(*arguments):
+    command = [*COMMAND, *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def one_line(stderr):
+    """The single line of a refused call."""
+    (line,) = stderr.splitlines()
+    assert line.startswith("spheretwin: ")
+    return line
+
+
+def test_run_prints_a_table_and_writes_its_files(tmp_path):
+    done = spheretwin(
+        "simulate", "nutation", "--duration", "0.5", "--telemetry", tmp_path / "n.parquet", "--record",
+        tmp_path / "n.rrd",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "nutation under afsm: completed" in done.stdout
+    assert "rerun" in done.stdout
+    table, metadata = read_parquet(tmp_path / "n.parquet")
+    assert len(table) == 500
+    assert json.loads(metadata["scenario"])["duration"] == 0.5
+    assert (tmp_path / "n.rrd").stat().st_size > 100_000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["n.parquet", "n.rrd"]
+
+
+def test_json_stands_alone_on_stdout():
+    done = spheretwin("simulate", "hold", "--json", "--controller.law", "pd", "--duration", "0.2")
+    assert done.returncode == 0
+    figures = json.loads(done.stdout)
+    assert figures["status"] == "completed"
+    assert figures["scenario"]["controller"]["law"] == "pd"
+    for name in ("max_abs_error_rad", "rms_error_rad", "tail_rms_error_rad"):
+        assert len(figures[name]) == 3
+    for name in ("max_abs_current_A", "saturated_fraction", "wall_s", "realtime_factor", "versions"):
+        assert name in figures
+
+
+def test_same_command_same_bytes_other_seed_other_bytes(tmp_path):
+    def written(name, *flags):
+        path = tmp_path / name
+        spheretwin("simulate", "nutation", "--duration", "0.3", "--telemetry", path, *flags)
+        return path.read_bytes()
+
+    first = written("a.parquet", "--seed", "1")
+    assert written("b.parquet", "--seed", "1") == first
+    assert written("c.parquet", "--seed", "2") != first
+
+
+def test_left_workspace_exits_1_and_keeps_the_run(tmp_path):
+    path = tmp_path / "run.parquet"
+    flags = ["--controller.law", "pd", "--disturbance.load", "5", "--telemetry", path, "--json"]
+    done = spheretwin("simulate", "sinusoid", *flags)
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["status"] == "left_workspace"
+    assert "left_workspace" in one_line(done.stderr)
+    assert len(read_parquet(path)[0]) > 100
+
+
+def test_ctrl_c_keeps_the_run(tmp_path):
+    telemetry, recording = tmp_path / "run.parquet", tmp_path / "run.rrd"
+    outputs = ["--telemetry", telemetry, "--record", recording, "--json"]
+    process = started("simulate", "hold", "--live", "--duration", "60", *outputs)
+    _wait_for_steady_growth(tmp_path)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert json.loads(stdout)["status"] == "interrupted"
+    assert "Traceback" not in stderr
+    assert 0 < len(read_parquet(telemetry)[0]) < 60_000
+    assert recording.exists()
+
+
+def _wait_for_steady_growth(folder):
+    """Wait until a recording grows again and again: the meshes come in one go, the run keeps on coming."""
+    grown, size = 0, 0
+    end = time.monotonic() + 60
+    while grown < 4:
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.5)
+        before, size = size, sum(path.stat().st_size for path in folder.glob(".run.rrd.*.part"))
+        grown = grown + 1 if size > before > 0 else 0
+
+
+def test_termination_keeps_the_run_too(tmp_path):
+    telemetry = tmp_path / "run.parquet"
+    process = started("simulate", "hold", "--live", "--duration", "60", "--telemetry", telemetry)
+    assert "watch" in process.stderr.readline()
+    time.sleep(3)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert len(read_parquet(telemetry)[0]) < 60_000
+
+
+def test_live_serves_on_this_machine_alone():
+    process = started("simulate", "hold", "--live", "--duration", "20")
+    try:
+        line = process.stderr.readline()
+        page = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
+        assert page, line
+        data = re.search(r"127\.0\.0\.1%3A(\d+)", line)
+        for port in (int(page[1]), int(data[1])):
+            _wait_for(lambda port=port: _answers("127.0.0.1", port))
+            assert _listening_hosts(port) == {"127.0.0.1"}
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+
+
+def _listening_hosts(port):
+    """Addresses on which some process listens at a port, from the kernel's table."""
+    hosts = set()
+    for table in ("tcp", "tcp6"):
+        for row in Path("/proc/net", table).read_text().splitlines()[1:]:
+            address, state = row.split()[1], row.split()[3]
+            host, hexadecimal = address.split(":")
+            if state == "0A" and int(hexadecimal, 16) == port:
+                hosts.add("127.0.0.1" if host == "0100007F" else host)
+    return hosts
+
+
+def _answers(host, port):
+    with socket.socket() as probe:
+        probe.settimeout(1)
+        return probe.connect_ex((host, port)) == 0
+
+
+def _wait_for(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["fly"], ["simulate", "magnetics", "fly"]),
+        ([], ["VERB"]),
+        (["simulate"], ["hold, nutation, sinusoid, tilt"]),
+        (["simulate", "spiral"], ["hold, nutation, sinusoid, tilt", "spiral"]),
+        (["simulate", "hold", "--controller.law", "pid"], ["'pd'", "'afsm'", "'pid'"]),
+        (["simulate", "hold", "--controler.law", "pd"], ["controller", "controler"]),
+        (["simulate", "hold", "--duration", "nan"], ["duration", "nan"]),
+        (["simulate", "hold", "--duration", "Infinity"], ["duration", "inf"]),
+        (["simulate", "hold", "--duration", "-2"], ["duration", "greater than 0", "-2"]),
+        (["simulate", "hold", "--duration"], ["value", "duration"]),
+        (["simulate", "hold", "7"], ["flag", "7"]),
+        (["simulate", "hold", "--controller.period-s", "0.0007"], ["whole multiple"]),
+        (["simulate", "hold", "--record", "missing/run.rrd"], ["writable", "missing"]),
+        (["simulate", "hold", "--telemetry", "."], ["file name", "folder"]),
+        (["simulate", "hold", "--plant.mjcf", "broken.xml"], ["broken.xml", "MJCF"]),
+        (["simulate", "hold", "--plant.mjcf", "empty.xml"], ["three degrees of freedom", "0"]),
+        (["simulate", "hold", "--plant.initial-rad", "0", "1.6", "0"], ["first pose", "1.6"]),
+        (["simulate", "hold", "--plant.step-s", "1e-12"], ["step_s", "1e-12"]),
+        (["simulate", "hold", "--trajectory.angle-rad", "1e200", "0", "0"], ["angle_rad", "1e+200"]),
+        (["simulate", "hold", "--record", "same", "--telemetry", "./same"], ["own", "twice"]),
+        (["simulate", "hold", "--seed", "9" * 5000], ["seed"]),
+        (["simulate", "hold", "--plant.mjcf", "missing.xml"], ["missing.xml"]),
+        (["simulate", "hold", "--plant.torque-curve", "broken.csv"], ["phi_deg", "broken.csv"]),
+        (["simulate", "hold", "--plant.torque-curve", "nan.csv"], ["finite", "nan.csv"]),
+        (["simulate", "scenario.toml"], ["trajectory"]),
+        (["magnetics"], ["PART"]),
+        (["magnetics", "curve", "--colour", "red"], ["--out", "--colour"]),
+    ],
+)
+def test_bad_input_is_one_line_exit_2_and_no_file(tmp_path, arguments, parts):
+    (tmp_path / "broken.xml").write_text("<mujoco><worldbody>")
+    (tmp_path / "empty.xml").write_text("<mujoco/>")
+    (tmp_path / "broken.csv").write_text("angle,torque\n0,0\n")
+    rows = "\n".join(f"{angle},nan" for angle in np.linspace(0, 180, 10))
+    (tmp_path / "nan.csv").write_text(f"phi_deg,torque_Nm_per_A\n{rows}\n")
+    (tmp_path / "scenario.toml").write_text("duration = 1\n")
+    before = sorted(os.listdir(tmp_path))
+    outputs = ["--record", "run.rrd", "--telemetry", "run.parquet"]
+    asks_for_files = arguments[:1] == ["simulate"] and not set(outputs[::2]) & set(arguments)
+    done = spheretwin(*arguments, *(outputs if asks_for_files and len(arguments) > 1 else []), cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    line = one_line(done.stderr)
+    for part in parts:
+        assert part in line
+    assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_help_lists_verbs_options_and_fields():
+    assert "simulate" in spheretwin("--help").stdout
+    assert "--out" in spheretwin("magnetics", "curve", "--help").stdout
+    fields = spheretwin("simulate", "tilt", "--help")
+    assert fields.returncode == 0
+    for flag in ("--record", "--controller.law", "--plant.modelling-error", "--trajectory.rate-rad-s"):
+        assert flag in fields.stdout
+
+
+def test_reader_that_leaves_is_no_error():
+    process = started("simulate", "hold", "--json", "--duration", "0.1")
+    with process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+
+
+def test_curve_is_the_shipped_one(tmp_path):
+    out = tmp_path / "curve.csv"
+    done = spheretwin("magnetics", "curve", "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    assert out.read_text() == actuators.TORQUE_CURVE_PATH.read_text()
+    figures = json.loads(done.stdout)
+    assert figures["peak_Nm_per_A"] == pytest.approx(0.0219, abs=1e-4)
+    assert figures["doubled_mesh_moves_peak"] < 5e-3
+
+
+def test_console_script_is_this_command():
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    assert project["scripts"] == {"spheretwin": "spheretwin.twin.cli:main"}
+
+
+def test_what_is_not_chosen_is_not_compiled(tmp_path):
+    """The bounded allocation alone would take longer to compile than all the rest."""
+    environment = {**os.environ, "SPHERETWIN_CACHE_DIR": str(tmp_path / "cache")}
+    command = [*COMMAND, "simulate", "hold", "--duration", "0.01"]
+    subprocess.run(command, env=environment, capture_output=True, check=True)
+    entries = [path.name for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    assert any("allocate" in name or "allocation" in name for name in entries)
+    assert any("engine" in name for name in entries)
+    for part in ("bounded", "simplex", "plant-lagrangian"):
+        assert not [name for name in entries if part in name], part

@@ -1,0 +1,320 @@
+"""The cross-check: it holds, it breaks where a model is wrong, and it says so to people and programs."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.base.check import Check
+from spheretwin.models.kinematics import rotation
+from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
+from spheretwin.twin import assembly
+from spheretwin.twin.crosscheck import (
+    closed_loop,
+    dynamics,
+    free_rotor,
+    identities,
+    page,
+    suite,
+    trajectories,
+)
+from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.plant.lagrangian import LagrangianRotor
+from spheretwin.twin.simulation import simulate
+
+FEW = 50
+QUANTITIES = [quantity.name for quantity in dynamics.QUANTITIES]
+ENGINES = ("MuJoCo", "Pinocchio")
+COMMAND = [sys.executable, "-m", "spheretwin.twin.cli", "crosscheck"]
+FIGURES = ("margins", "dynamics", "trajectory", "convergence", "torque_free", "closed_loop")
+
+
+def crosscheck(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True)
+
+
+def broken(checks):
+    return {check.name for check in checks if not check.ok}
+
+
+def of_both(*quantities):
+    return {f"{quantity}: {engine}" for quantity in quantities for engine in ENGINES}
+
+
+# What holds
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    """One run of the command, with its page."""
+    folder = tmp_path_factory.mktemp("crosscheck") / "page"
+    return crosscheck("--states", 200, "--json", "--out", folder), folder
+
+
+def test_every_bound_is_kept(told):
+    done, _ = told
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    rows = json.loads(done.stdout)["checks"]
+    assert all(row["ok"] for row in rows)
+    assert {f"{quantity}: {engine}" for quantity in QUANTITIES for engine in ENGINES} <= {
+        row["name"] for row in rows
+    }
+
+
+def test_every_row_says_what_it_compares_and_why(told):
+    rows = json.loads(told[0].stdout)["checks"]
+    assert len({row["name"] for row in rows}) == len(rows) >= 25
+    for row in rows:
+        assert set(row) == {
+            "name", "compares", "states", "value", "bound", "at_least", "unit", "ok", "why", "detail",
+        }  # fmt: skip
+        assert row["compares"]
+        assert row["why"]
+        assert row["states"] > 0
+        assert np.isfinite(row["value"])
+        if row["bound"] is not None:
+            assert row["value"] <= row["bound"]
+
+
+def test_random_states_are_counted_over_all_plants(told):
+    rows = {row["name"]: row for row in json.loads(told[0].stdout)["checks"]}
+    assert rows["inertia matrix M: MuJoCo"]["states"] == 4 * 200  # nominal, modelling error, payload, both
+    assert set(rows["inertia matrix M: MuJoCo"]["detail"]) == {case.name for case in dynamics.CASES}
+
+
+def test_page_has_every_row_and_every_figure(told):
+    done, folder = told
+    text = (folder / page.PAGE).read_text(encoding="utf-8")
+    for row in json.loads(done.stdout)["checks"]:
+        assert f"| {row['name']} |" in text
+    # Bars within a cell are escaped: every row has as many cells as the head.
+    table = [line.replace("\\|", "") for line in text.splitlines() if line.startswith("|")]
+    assert {line.count("|") for line in table} == {8}
+    for name in FIGURES:
+        assert f"({name}.png)" in text
+        pixels = imread(folder / f"{name}.png")
+        assert min(pixels.shape[:2]) > 400
+        assert pixels[:, :, :3].std() > 0.05
+
+
+# What breaks: each wrong model, and exactly the rows that have to tell
+
+
+def test_wrong_inertia_breaks_what_depends_on_it(actuator):
+    wrong = dataclasses.replace(actuator, inertia=actuator.inertia * [1, 1 + 1e-11, 1])
+    found = broken(dynamics.compare(actuators.MJCF_PATH, wrong, FEW).checks)
+    assert found == of_both(*QUANTITIES[1:])
+
+
+def test_wrong_orientation_breaks_its_row(monkeypatch, actuator):
+    monkeypatch.setattr(dynamics, "rotation", lambda q: rotation(q * [1, 1, 1 + 1e-13]))
+    found = broken(dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks)
+    assert found == of_both("orientation R")
+
+
+def test_wrong_gravity_is_seen_under_the_payload_alone(monkeypatch, actuator):
+    def elsewhere(*settings, gravity_m_s2):
+        assert gravity_m_s2 == 9.81  # the model's
+        return LagrangianRotor(*settings, gravity_m_s2=9.80665)
+
+    monkeypatch.setattr(dynamics, "LagrangianRotor", elsewhere)
+    checks = dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks
+    assert broken(checks) == of_both("bias C q̇ + G", "inverse dynamics", "forward dynamics")
+    for check in checks:
+        if not check.ok:
+            assert check.detail["payload 0.05 kg"] > check.bound >= check.detail["nominal"]
+
+
+def wrong_sign(q, qdot, inertia):
+    """One term with the wrong sign, as in the paper's printed appendix."""
+    C = coriolis_matrix(q, qdot, inertia)
+    C[1, 1] *= -1
+    return C
+
+
+def not_christoffel(q, qdot, inertia):
+    """Another matrix with the same C qdot: right in every motion, and yet not skew-symmetric with M."""
+    C = coriolis_matrix(q, qdot, inertia)
+    C[0] += 1e-6 * np.cross(qdot, [1.0, 2.0, 3.0])
+    return C
+
+
+def test_wrong_coriolis_term_breaks_bias_and_symmetry(monkeypatch, actuator):
+    for module in (dynamics, identities):
+        monkeypatch.setattr(module, "coriolis_matrix", wrong_sign)
+    found = broken(dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks)
+    assert found == of_both("bias C q̇ + G", "inverse dynamics", "forward dynamics")
+    assert "Ṁ - 2C is skew-symmetric" in broken(identities.check(actuator, FEW))
+
+
+def test_symmetry_tells_the_christoffel_form_from_others_of_the_same_torque(monkeypatch, actuator):
+    for module in (dynamics, identities):
+        monkeypatch.setattr(module, "coriolis_matrix", not_christoffel)
+    assert not broken(dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks)
+    assert broken(identities.check(actuator, FEW)) == {"Ṁ - 2C is skew-symmetric"}
+
+
+def test_wrong_coupling_term_breaks_its_row(monkeypatch, actuator):
+    flipped = np.array([[1, 1, 1], [1, -1, 1]])
+    monkeypatch.setattr(identities, "coupling_torques", lambda *state: flipped * coupling_torques(*state))
+    assert broken(identities.check(actuator, FEW)) == {"coupling torques (3)-(10)"}
+
+
+def test_wrong_inertia_breaks_the_trajectory(monkeypatch, actuator):
+    monkeypatch.setattr(trajectories, "STEPS_s", (1e-2, 5e-3))
+    right = trajectories.integrate
+    monkeypatch.setattr(
+        trajectories, "integrate", lambda pieces, inertia: right(pieces, inertia * (1 + 2e-8 * np.eye(3)[1]))
+    )
+    assert "trajectory: MuJoCo RK4" in broken(trajectories.compare(actuators.MJCF_PATH, actuator).checks)
+
+
+def test_a_method_of_another_order_breaks_its_row(monkeypatch, actuator):
+    monkeypatch.setattr(trajectories, "ORDERS", {"Euler": 4})
+    found = broken(trajectories.compare(actuators.MJCF_PATH, actuator).checks)
+    assert found == {"order of convergence: MuJoCo Euler"}
+
+
+def test_another_integrator_breaks_every_row_of_the_free_rotor(monkeypatch, actuator):
+    monkeypatch.setattr(free_rotor, "DURATION_s", 2.0)
+    monkeypatch.setattr(
+        free_rotor, "Rotor", lambda mjcf, step_s, _, *rest: Rotor(mjcf, step_s, "implicitfast", *rest)
+    )
+    checks = free_rotor.check(actuators.MJCF_PATH, actuator).checks
+    assert broken(checks) == {check.name for check in checks}
+    assert len(checks) == 6
+
+
+def test_a_rotor_that_is_not_axisymmetric_does_not_move_as_euler_found(monkeypatch, actuator):
+    monkeypatch.setattr(free_rotor, "DURATION_s", 2.0)
+    monkeypatch.setattr(free_rotor, "SPINS_rad_s", {"2π": 2 * np.pi})
+    fly = free_rotor.fly
+    nearly = np.array([1, 1 + 1e-7, 1])
+    monkeypatch.setattr(
+        free_rotor,
+        "fly",
+        lambda mjcf, inertia, spin: fly(mjcf, inertia * nearly, spin)._replace(inertia=inertia),
+    )
+    checks = free_rotor.check(actuators.MJCF_PATH, actuator).checks
+    assert "torque-free rotor at 2π rad/s: attitude" in broken(checks)
+
+
+@pytest.mark.parametrize(
+    ("error", "rows"),
+    [
+        (1e-8, {"closed loop under PD: trace"}),
+        (
+            0.1,
+            {f"closed loop under {what}" for what in ("PD: trace", "AFSM: rms error", "AFSM: largest error")},
+        ),
+    ],
+)
+def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
+    def heavier(actuator, step_s, integrator, modelling_error, payload_kg, **rest):
+        return LagrangianRotor(actuator, step_s, integrator, modelling_error + error, payload_kg, **rest)
+
+    monkeypatch.setattr(assembly, "LagrangianRotor", heavier)
+    assert broken(closed_loop.compare(actuators.MJCF_PATH).checks) == rows
+
+
+def test_runs_that_end_apart_break_their_rows(monkeypatch):
+    def ends_early(scenario):
+        finished = simulate(scenario)
+        cut = finished.telemetry.rows(0, 4000)
+        early = scenario.plant.engine == "lagrangian"
+        return dataclasses.replace(finished, status="left_workspace", telemetry=cut) if early else finished
+
+    monkeypatch.setattr(closed_loop, "simulate", ends_early)
+    checks = closed_loop.compare(actuators.MJCF_PATH).checks
+    assert len(broken(checks)) == 3
+    assert checks[0].row()["value"] is None
+    json.dumps([check.row() for check in checks], allow_nan=False)
+
+
+# What it says
+
+
+def check(value, bound=1.0, **more):
+    return Check("name", "this with that", 1, value, bound, "because", **more)
+
+
+def test_a_value_that_is_not_a_number_keeps_no_bound():
+    assert not check(np.nan).ok
+    assert not check(np.inf).ok
+    assert check(np.nan).row()["value"] is None
+    assert not check(np.nan).row()["ok"]
+
+
+def test_bounds_have_one_side_or_two_or_are_absent():
+    assert check(1.0).ok
+    assert not check(1.1).ok
+    assert not check(0.1, at_least=0.5).ok
+    assert check(7.0, bound=None).ok
+    assert check(0.7, at_least=0.5).bound_text() == "0.5 to 1"
+    assert check(7.0, bound=None).bound_text() == "reported"
+
+
+def test_without_pinocchio_its_rows_say_so(monkeypatch, actuator):
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    found = dynamics.compare(actuators.MJCF_PATH, actuator, FEW)
+    assert list(found.differences) == ["MuJoCo"]
+    absent = [check for check in found.checks if "Pinocchio" in check.name]
+    assert len(absent) == len(QUANTITIES)
+    for each in absent:
+        assert each.ok
+        assert each.value is None
+        assert "not installed" in each.why
+
+
+def test_parts_are_announced_as_they_begin(monkeypatch):
+    begun = []
+    for part in (dynamics, trajectories, closed_loop):
+        monkeypatch.setattr(part, "compare", lambda *_: None)
+    for part in (identities, free_rotor):
+        monkeypatch.setattr(part, "check", lambda *_: None)
+    suite.run(begun=begun.append)
+    assert tuple(begun) == suite.PARTS
+
+
+def test_a_model_the_lagrangian_does_not_have_exits_1_and_the_table_tells(tmp_path):
+    model = tmp_path / "heavy_rings.xml"
+    text = actuators.MJCF_PATH.read_text(encoding="utf-8")
+    # Gimbal rings of a millionth of the rotor's inertia; the Lagrangian has none.
+    model.write_text(text.replace("1.1e-15", "1.1e-9"), encoding="utf-8")
+    done = crosscheck("--mjcf", model, "--states", FEW)
+    assert done.returncode == 1
+    assert "BROKEN" in done.stdout
+    (line,) = done.stderr.splitlines()
+    for name in ("inertia matrix M: MuJoCo", "inertia matrix M: Pinocchio", "closed loop under PD: trace"):
+        assert name in line
+    for name in ("orientation", "skew", "coupling", "AFSM"):
+        assert name not in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--out", "taken"], ["writable folder", "taken"]),
+        (["--out", "/proc/page"], ["writable folder", "/proc/page"]),
+        (["--states", "0"], ["from 1 to", "0"]),
+        (["--states", "many"], ["--states", "many"]),
+        (["--colour", "red"], ["--out", "--colour"]),
+        (["--mjcf", "missing.xml", "--out", "page"], ["missing.xml"]),
+    ],
+)
+def test_bad_input_is_one_line_exit_2_and_no_folder(tmp_path, monkeypatch, arguments, parts):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("a file")
+    done = crosscheck(*arguments)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    for part in parts:
+        assert part in line
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]

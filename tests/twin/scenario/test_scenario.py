@@ -1,0 +1,209 @@
+"""Scenarios: shipped ones, files, overrides, and complaints in one line."""
+
+import pytest
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario import flags, reading
+from spheretwin.twin.scenario.fields import fields_of
+
+
+def test_shipped_scenarios_load_under_their_names():
+    assert reading.shipped() == ["hold", "nutation", "sinusoid", "tilt"]
+    for name in reading.shipped():
+        assert scenarios.load(name).name == name
+
+
+def test_nutation_is_the_paper_s_case():
+    scenario = scenarios.load("nutation")
+    assert (scenario.plant.modelling_error, scenario.disturbance.load) == (0.2, 2.0)
+    assert scenario.plant.modelling_torque_Nm == (0.002, 0.001, 0.001)
+    assert (scenario.duration, scenario.ticks, scenario.substeps) == (5.0, 5000, 2)
+
+
+def test_physics_step_is_the_one_the_model_file_opens_with():
+    assert mjcf.read(actuators.MJCF_PATH).described.opt.timestep == scenarios.load("hold").plant.step_s
+
+
+def test_file_and_overrides(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('duration = 2\n[trajectory]\nshape = "hold"\nangle_rad = [0, 0, 1]\n')
+    scenario = scenarios.load(str(path), {"controller.law": "pd", "seed": 3})
+    assert (scenario.duration, scenario.controller.law, scenario.seed) == (2.0, "pd", 3)
+    assert scenario.trajectory.angle_rad == (0.0, 0.0, 1.0)
+
+
+def test_flags_reach_every_field():
+    values = {
+        "drive.current-limit-A": "4", "plant.initial-rad": "0 0 0.1", "plant.mjcf": "7.xml", "name": "12",
+    }  # fmt: skip
+    tokens = [part for flag, value in values.items() for part in (f"--{flag}", *value.split())]
+    assert flags.overrides(tokens) == {
+        "drive.current_limit_A": 4, "plant.initial_rad": [0, 0, 0.1], "plant.mjcf": "7.xml", "name": "12",
+    }  # fmt: skip
+    listed = {flag for flag, *_ in flags.described(scenarios.load("nutation"))}
+    assert {f"--{flag}" for flag in values} < listed
+
+
+@pytest.mark.parametrize(
+    ("overrides", "parts"),
+    [
+        ({"controller.law": "pid"}, ["controller.law", "'pd'", "'afsm'", "'pid'"]),
+        ({"controler.law": "pd"}, ["controller", "plant", "controler"]),
+        ({"plant.colour": 1}, ["modelling_error", "plant", "colour"]),
+        ({"trajectory.colour": 1}, ["beta_growth_rad_s", "trajectory", "colour"]),
+        ({"trajectory.shape": "spiral"}, ["trajectory", "nutation", "spiral"]),
+        ({"duration": float("nan")}, ["duration", "finite", "nan"]),
+        ({"duration": float("inf")}, ["duration", "finite", "inf"]),
+        ({"duration": -1.0}, ["duration", "greater than 0", "-1"]),
+        ({"duration": 1e-9}, ["duration", "control period"]),
+        ({"duration": "long"}, ["duration", "number", "long"]),
+        ({"seed": 1.5}, ["seed", "integer", "1.5"]),
+        ({"seed": True}, ["seed", "integer", "True"]),
+        ({"plant.payload_kg": -0.1}, ["payload_kg", "0", "-0.1"]),
+        ({"plant.modelling_error": -1.0}, ["modelling_error", "-1"]),
+        ({"drive.current_limit_A": 0}, ["current_limit_A", "greater than 0", "0"]),
+        ({"controller.period_s": 7e-4}, ["whole multiple", "0.0007", "0.0005"]),
+        ({"controller.period_s": 1e-4}, ["whole multiple", "0.0001", "0.0005"]),
+        ({"plant.initial_rad": [1, 2]}, ["initial_rad"]),
+        ({"disturbance.load": 1e300}, ["load", "1000"]),
+        ({"seed.deep": 1}, ["seed.deep"]),
+        ({"controler.law": "pd"}, ["received controler; did you mean controller?"]),
+        ({"plant.modeling_error": 1}, ["received modeling_error; did you mean modelling_error?"]),
+        ({"law": "pd"}, ["received law; did you mean controller.law?"]),
+        ({"controller.law": "afms"}, ["received 'afms'; did you mean afsm?"]),
+        (
+            {"trajectory.shape": "sinus"},
+            ["trajectory.shape", "hold", "received 'sinus'; did you mean sinusoid?"],
+        ),
+        ({"trajectory": {}}, ["trajectory.shape: expected one of sinusoid", "received none"]),
+        ({"trajectory": 3}, ["trajectory", "3"]),
+        ({"controller.period_s": 1.0000001e-3}, ["received 0.0010000001 and 0.0005 s"]),
+        ({"seed": 10**5000}, ["digits"]),
+        ({"seed": "9" * 5000}, ["seed", "integer", "9…9"]),
+        ({"seed": None}, ["seed", "None"]),
+        ({"name": "a\x1b[31mb"}, ["name: expected text without control characters", r"a\x1b[31mb"]),
+        ({"name": "a\nb"}, ["name", r"a\nb"]),
+        ({"name": "\udcff"}, ["udcff"]),
+        ({"description": "\x07"}, ["description", r"\x07"]),
+        ({"plant.mjcf": "a\0b"}, ["plant.mjcf", r"a\x00b"]),
+        ({"plant.mjcf": "~\0/b"}, ["plant.mjcf", r"\x00"]),
+        ({"": 1}, ["a field such as controller.law, received ''"]),
+        ({"a..b": 1}, ["a field such as controller.law, received 'a..b'"]),
+        ({"controller.": 1}, ["a field such as controller.law"]),
+        ({3: 1}, ["a field such as controller.law, received 3"]),
+        ({".".join("a" * 5000): 1}, ["scenario nutation"]),
+        ({"plant": {("a", 1): 2}}, ["sections and values"]),
+        ({"a\x1b[2J": 1}, [r"received a\x1b[2J"]),
+    ],
+)
+def test_bad_input_is_told_in_one_line(overrides, parts):
+    with pytest.raises(InputError) as caught:
+        scenarios.load("nutation", {"seed": 0, **overrides})
+    message = str(caught.value)
+    assert message.isprintable()
+    assert len(message) < 1000
+    for part in parts:
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("source", "text", "part"),
+    [
+        ("spiral", None, "hold, nutation, sinusoid, tilt"),
+        ("missing.toml", None, "missing.toml"),
+        ("broken.toml", "duration = = 2", "TOML"),
+        ("empty.toml", "", "trajectory"),
+        ("nutatoin", None, "received 'nutatoin'; did you mean nutation?"),
+        ("", None, "received ''"),
+        ("a\x1b\nb", None, r"received 'a\\x1b\\nb'"),
+        (f"{'x' * 20_000}.toml", None, "too long"),
+        ("a\0b.toml", None, r"a\\x00b.toml: expected a readable"),
+        ("digits.toml", f"seed = {'9' * 5000}", "digits"),
+        ("deep.toml", f"{'a.' * 3000}a = 1", "deep.toml"),
+        ("lists.toml", f"seed = {'[' * 3000}{']' * 3000}", "lists.toml"),
+        ("zero.toml", "duration = 1\0", "TOML"),
+        ("date.toml", "seed = 1979-05-27\n[trajectory]\nshape = 'hold'", "seed"),
+        ("latin.toml", b"name = '\xff'", "readable TOML file"),
+    ],
+)
+def test_bad_source_is_told_in_one_line(tmp_path, monkeypatch, source, text, part):
+    monkeypatch.chdir(tmp_path)
+    if text is not None:
+        (tmp_path / source).write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError, match=part) as caught:
+        scenarios.load(source)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 1000
+
+
+HOLD = '[trajectory]\nshape = "hold"\n[plant]\n'
+
+
+def test_a_byte_order_mark_is_no_part_of_a_scenario(tmp_path):
+    (path := tmp_path / "mine.toml").write_text("\ufeffduration = 2\n" + HOLD, encoding="utf-8")
+    assert scenarios.load(str(path)).duration == 2.0
+
+
+def test_a_tilde_is_the_user_s_home_and_other_paths_stay_beside_the_file(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "mine").mkdir()
+    text = f'{HOLD}mjcf = "~/a.xml"\ntorque_curve = "curves/b.csv"\n'
+    (tmp_path / "mine" / "s.toml").write_text(text)
+    plant = scenarios.load("~/mine/s.toml").plant
+    assert (plant.mjcf, plant.torque_curve) == (f"{tmp_path}/a.xml", f"{tmp_path}/mine/curves/b.csv")
+    flags_ = {"plant.mjcf": "here.xml", "plant.torque_curve": "~/c.csv"}
+    plant = scenarios.load("~/mine/s.toml", flags_).plant
+    assert (plant.mjcf, plant.torque_curve) == ("here.xml", f"{tmp_path}/c.csv")
+    monkeypatch.chdir(tmp_path / "mine")
+    assert scenarios.load("s.toml").plant.torque_curve == "curves/b.csv"
+
+
+def test_a_folder_called_tilde_is_one(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", "/elsewhere")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "~").mkdir()
+    (tmp_path / "~" / "s.toml").write_text(f'{HOLD}mjcf = "a.xml"\n')
+    assert scenarios.load("./~/s.toml").plant.mjcf == "./~/a.xml"
+
+
+def test_a_description_may_have_several_lines(tmp_path):
+    (path := tmp_path / "mine.toml").write_text(f'description = """\na\n\tb"""\n{HOLD}')
+    assert scenarios.load(str(path)).description == "a\n\tb"
+
+
+def test_a_long_seed_is_taken_and_an_endless_one_told():
+    assert scenarios.load("hold", flags.overrides(["--seed", "9" * 4000])).seed == 10**4000 - 1
+    for digits in (4301, 100_000):
+        with pytest.raises(InputError, match=r"seed: expected a valid integer, received '9+…9+'"):
+            scenarios.load("hold", flags.overrides(["--seed", "9" * digits]))
+
+
+def test_an_overflow_is_told_as_it_was_given():
+    with pytest.raises(InputError, match="received '1e999'"):
+        scenarios.load("hold", flags.overrides(["--duration", "1e999"]))
+
+
+def test_every_field_that_names_a_file_is_known_as_one():
+    texts = {name for name in fields_of(scenarios.Scenario) if name.endswith(("mjcf", "curve"))}
+    assert texts == set(reading.PATHS)
+
+
+def test_the_controller_s_torque_curve_is_taken_as_the_plant_s(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "s.toml").write_text(f'{HOLD}\n[nominal]\ntorque_curve = "b.csv"\n')
+    assert scenarios.load("~/s.toml").nominal.torque_curve == f"{tmp_path}/b.csv"
+    flags_ = {"nominal.torque_curve": "~/c.csv"}
+    assert scenarios.load("~/s.toml", flags_).nominal.torque_curve == f"{tmp_path}/c.csv"
+
+
+@pytest.mark.parametrize("name", reading.PATHS)
+def test_a_tilde_in_a_change_is_the_user_s_home(tmp_path, monkeypatch, name):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    section, field = name.split(".")
+    changed = scenarios.changed(scenarios.load("hold"), name, "~/a")
+    assert getattr(getattr(changed, section), field) == f"{tmp_path}/a"
+    again = scenarios.changed(changed, "disturbance.load", 1.0)
+    assert getattr(getattr(again, section), field) == f"{tmp_path}/a"

@@ -1,0 +1,87 @@
+"""Poses of the drawn bodies against the kinematics; meshes as the model file places them."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.kinematics import rotation
+from spheretwin.viz import palette
+from spheretwin.viz.recording import scene
+
+poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
+
+
+@given(poses)
+def test_bodies_turn_hinge_by_hinge(q):
+    quaternions = scene.body_quaternions(q)
+    alone = {"outer_ring": [1, 0, 0], "inner_ring": [1, 1, 0], "rotor": [1, 1, 1]}
+    for body, hinges in alone.items():
+        matrix = Rotation.from_quat(quaternions[body][0]).as_matrix()
+        np.testing.assert_allclose(matrix, rotation(q[0] * hinges), atol=1e-14)
+
+
+@given(q=poses)
+def test_shaft_tip_is_the_model_s(actuator, q):
+    expected = rotation(q[0]) @ actuator.shaft_tip_m
+    np.testing.assert_allclose(scene.shaft_tip(q, actuator)[0], expected, atol=1e-15)
+
+
+def test_meshes_stand_where_the_model_puts_them(actuator):
+    meshes = scene.read_meshes(actuators.MJCF_PATH)
+    coils = np.array(meshes[scene.COILS].vertex_positions.as_arrow_array().to_pylist())
+    centres = coils.reshape(36, -1, 3).mean(axis=1)
+    directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
+    # Each coil's vertices are symmetric about its axis, to the rounding of the mesh files.
+    np.testing.assert_allclose(directions, actuator.coil_axes, atol=1e-4)
+
+
+def test_all_poles_are_drawn_in_the_colour_of_their_polarity(actuator):
+    meshes = scene.read_meshes(actuators.MJCF_PATH)
+    for polarity, name in ((1, "north"), (-1, "south")):
+        mesh = meshes[f"{scene.WORLD}/rotor/pole_upper_{name}0"]
+        vertices = np.array(mesh.vertex_positions.as_arrow_array().to_pylist())
+        centres = vertices.reshape(8, -1, 3).mean(axis=1)
+        directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
+        axes = actuator.pole_axes[actuator.pole_polarity == polarity]
+        # Each direction is one axis of this polarity, and each axis has its pole.
+        match = directions @ axes.T > 1 - 1e-6
+        np.testing.assert_array_equal(match.sum(axis=0), 1)
+        np.testing.assert_array_equal(match.sum(axis=1), 1)
+
+
+def test_current_colours_tell_sign_and_size():
+    idle, small, full, negative = palette.current_colours(np.array([0.0, 2.0, 8.0, -8.0]), 8.0).astype(int)
+    assert full[0] > small[0] > idle[0]
+    assert negative[2] > full[2]
+    np.testing.assert_array_equal(palette.current_colours(np.array([100.0]), 8.0)[0], full)
+
+
+def height(mjcf):
+    """Largest coordinate of all that is drawn but the coils, m."""
+    meshes = scene.read_meshes(mjcf)
+    drawn = [mesh.vertex_positions for name, mesh in meshes.items() if name != scene.COILS]
+    return max(np.max(positions.as_arrow_array().to_pylist()) for positions in drawn)
+
+
+def metre_up(line):
+    """A line of an OBJ file, higher where it is a vertex."""
+    if not line.startswith("v "):
+        return line
+    _, x, y, z = line.split()
+    return f"v {x} {y} {float(z) + 1.0}"
+
+
+def test_an_edited_mesh_is_drawn_as_it_is(tmp_path):
+    shutil.copytree(actuators.FOLDER / "assets", tmp_path / "assets")
+    mjcf = Path(shutil.copy(actuators.MJCF_PATH, tmp_path / "mine.xml"))
+    mesh = tmp_path / "assets" / "shaft.obj"
+    before = height(mjcf)
+    assert height(mjcf) == before
+    mesh.write_text("\n".join(map(metre_up, mesh.read_text().splitlines())))
+    # A metre up; the file's digits are cut to single precision.
+    np.testing.assert_allclose(height(mjcf), before + 1.0, atol=1e-6)

@@ -1,0 +1,1 @@
+"""What acts on the hinges beside the coils, one kind a file, and their names."""

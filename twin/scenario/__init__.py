@@ -1,0 +1,65 @@
+"""Scenarios: everything one run depends on, from TOML and flags, checked as one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from spheretwin.control.laws.registry import LAWS
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin.scenario.reading import beside, override, read, validated
+from spheretwin.twin.scenario.sections import OwnController, Scenario
+
+
+def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
+    """Read a scenario and override some of its fields.
+
+    Parameters
+    ----------
+    source : str
+        A shipped name, or the path of a TOML file; ``~`` is the user's home. Paths in the file are taken
+        from where the file is.
+    overrides : mapping, optional
+        Values by dotted name, such as ``{"controller.law": "pd"}``; paths are taken from the working folder.
+
+    Raises
+    ------
+    InputError
+        No such scenario, or a field that is unknown, of the wrong type or out of range.
+    """
+    fields = read(source)
+    for dotted, value in (overrides or {}).items():
+        override(fields, dotted, value)
+    return validated(beside("", fields), source)
+
+
+def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
+    """Scenario from what a run said of itself, the fields by section.
+
+    Raises
+    ------
+    InputError
+        It was run under a law of its user's, or by a version with other fields.
+    """
+    law = fields.get("controller", {}).get("law")
+    if law not in LAWS:
+        raise InputError(
+            f"scenario {source}: expected a run under {', '.join(LAWS)}, received one under {law},"
+            " a law that its file does not hold"
+        )
+    return validated(fields, source)
+
+
+def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
+    """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
+
+    Raises
+    ------
+    InputError
+        A field that is unknown, of the wrong type or out of range.
+    """
+    fields = scenario.model_dump(mode="json")
+    if isinstance(scenario.controller, OwnController):
+        fields["controller"] = {"period_s": scenario.controller.period_s}
+    override(fields, dotted, value)
+    return validated(beside("", fields), scenario.name)

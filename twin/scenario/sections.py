@@ -1,0 +1,170 @@
+"""Everything one run depends on: the sections of a scenario, each value with its range and meaning."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, field_validator, model_validator
+from pydantic_core import PydanticCustomError
+
+from spheretwin.control.parts.gains import Gains, NonNegative, Positive
+from spheretwin.twin.disturbances.load import Disturbance
+from spheretwin.twin.trajectories.shapes import Bounded, Trajectory, Triple
+
+NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
+
+# A torque matrix of nothing asks for endless currents.
+LEAST_SCALE = 1e-3
+
+# A tick must end before its user does: 10,000 physics steps take some 50 ms.
+MOST_SUBSTEPS = 10_000
+
+# Clock times are built from decimal fractions; a period and a step that fit do so to rounding only.
+WHOLE = 1e-9
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Controller(Gains):
+    """The law, its gains, and how often it runs."""
+
+    period_s: Annotated[float, Field(gt=0, le=10)] = Field(
+        1e-3, description="control period, s; a whole number of physics steps"
+    )
+
+
+class OwnController(_Section):
+    """What a run under a law of the user's says of it, in the place of `Controller`."""
+
+    law: str = Field(description="name of the law")
+    period_s: float = Field(description="control period, s")
+    parameters: tuple[float, ...] = Field(description="numbers handed to the law")
+
+
+class Plant(_Section):
+    """The rotor as it really is, and how its motion is integrated."""
+
+    engine: Literal["mujoco", "lagrangian"] = Field(
+        "mujoco", description="what computes the motion: MuJoCo, or the equations of motion (faster)"
+    )
+    step_s: Annotated[float, Field(ge=1e-7, le=1)] = Field(5e-4, description="physics step, s")
+    integrator: Literal["RK4", "Euler", "implicitfast"] = Field(
+        "RK4", description="integrator of MuJoCo; the Lagrangian has RK4 alone"
+    )
+    modelling_error: Annotated[float, Field(gt=-1, le=100)] = Field(
+        0.0, description="m: the rotor's inertia is (1 + m) times the model file's"
+    )
+    modelling_torque_Nm: Triple = Field(
+        (0.0, 0.0, 0.0), description="constant torque the controller does not know, N·m (paper: ΔG)"
+    )
+    gravity_m_s2: Annotated[float, Field(ge=0, le=100)] | None = Field(
+        None, description="gravity along -z, m/s²; the model's unless given"
+    )
+    coulomb_Nm: NonNegativeTriple = Field(
+        (0.0, 0.0, 0.0), description="Coulomb friction of each hinge, N·m, beside what the model has"
+    )
+    viscous_Nm_s: NonNegativeTriple = Field(
+        (0.0, 0.0, 0.0), description="viscous friction of each hinge, N·m·s, beside what the model has"
+    )
+    friction_smoothing_rad_s: Annotated[float, Field(ge=1e-9, le=1e3)] = Field(
+        0.01, description="rate over which Coulomb friction changes sign, rad/s"
+    )
+    group_gain: tuple[Bounded, ...] | None = Field(
+        None, description="torque an ampere of each group over that of the torque curve; 1 unless given"
+    )
+    payload_kg: NonNegative = Field(0.0, description="point mass on the shaft's payload mount, kg")
+    initial_rad: Triple | None = Field(
+        None, description="pose at the start, rad; the trajectory's first unless given"
+    )
+    initial_rad_s: Triple = Field((0.0, 0.0, 0.0), description="rates at the start, rad/s")
+    mjcf: Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="model file; the shipped one unless given"
+    )
+    torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="torque curve as CSV; the shipped one unless given"
+    )
+
+
+class Nominal(_Section):
+    """The model that the controller has; what is not given is as the plant is without modelling error."""
+
+    torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
+        None, description="torque curve as CSV; the plant's unless given"
+    )
+    torque_scale: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
+        1.0, description="torque matrix over that of the torque curve; below 0, its sign is wrong"
+    )
+    inertia_kg_m2: tuple[Positive, Positive, Positive] | None = Field(
+        None, description="principal inertias of the rotor, kg·m²; the model file's unless given"
+    )
+    current_limit_A: Positive | None = Field(
+        None, description="largest group current asked for, A; the drive's unless given"
+    )
+
+    @field_validator("torque_scale")
+    @classmethod
+    def _not_nothing(cls, scale: float) -> float:
+        if abs(scale) < LEAST_SCALE:
+            raise PydanticCustomError("scale", f"Input should be at least {LEAST_SCALE:g} in magnitude")
+        return scale
+
+
+class SensorsSection(_Section):
+    """How the controller sees the rotor."""
+
+    angle_offset_rad: Triple = Field((0.0, 0.0, 0.0), description="constant error of each angle, rad")
+
+
+class DriveSection(_Section):
+    """Amplifiers and coils; what is not given comes from the model file."""
+
+    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
+        None, description="current lag L/R, s; 0 for none"
+    )
+    current_limit_A: Positive | None = Field(None, description="largest group current of the amplifiers, A")
+
+
+class Scenario(_Section):
+    """Everything a run depends on."""
+
+    name: str = Field("unnamed", description="name of the scenario")
+    description: str = Field("", description="what it shows")
+    duration: Positive = Field(5.0, description="length of the run, s")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the random torque")
+    allocation: Literal["least_norm", "bounded"] = Field(
+        "least_norm",
+        description="currents for a torque: least-norm and scaled at the limit (16), or all the limit allows",
+    )
+    trajectory: Trajectory
+    controller: SerializeAsAny[Controller] = Controller()
+    nominal: Nominal = Nominal()
+    sensors: SensorsSection = SensorsSection()
+    plant: Plant = Plant()
+    drive: DriveSection = DriveSection()
+    disturbance: Disturbance = Disturbance()
+
+    @model_validator(mode="after")
+    def _clocks_fit(self) -> Scenario:
+        ratio = self.controller.period_s / self.plant.step_s
+        if round(ratio) < 1 or round(ratio) > MOST_SUBSTEPS or abs(ratio - round(ratio)) > WHOLE * ratio:
+            raise ValueError(
+                f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
+                f" received {self.controller.period_s!r} and {self.plant.step_s!r} s"
+            )
+        if self.ticks < 1:
+            raise ValueError(
+                f"expected a duration of at least one control period, received {self.duration!r} s"
+            )
+        return self
+
+    @property
+    def ticks(self) -> int:
+        """Control ticks of the run."""
+        return int(self.duration / self.controller.period_s * (1 + WHOLE))
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in a control period."""
+        return round(self.controller.period_s / self.plant.step_s)

@@ -1,0 +1,1 @@
+"""Reference trajectories, one shape a file, and their names."""

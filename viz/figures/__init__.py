@@ -1,0 +1,1 @@
+"""Figures of runs, checks and torque maps, drawn with Matplotlib."""

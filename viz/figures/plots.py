@@ -1,0 +1,270 @@
+"""Figures for a page: matplotlib without its global state, one function a figure.
+
+Axes have the colours of the recordings; every series is named, every axis has its unit, and a bound is
+drawn as a dashed line beside what it bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spheretwin.models.base.files import whole_file
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.palette import AXIS_COLOURS
+
+Array = NDArray[np.float64]
+
+AXES = tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in AXIS_COLOURS)
+# Okabe and Ito's: told apart by the colour-blind too.
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00")
+INK, FAINT, BROKEN = "#30343a", "#a4aab3", "#c8102e"
+
+WIDTH_in = 8.0
+DPI = 150
+LEAST_SHARE = 1e-14  # of a bound: less is drawn as this much
+NOTHING = 1e-18  # what a difference of exactly zero is drawn as, on a logarithmic axis
+
+
+class Slope(NamedTuple):
+    """A method's error at several steps, and the power of the step it goes with."""
+
+    steps_s: Array
+    errors: Array
+    order: float
+
+
+class Bounded(NamedTuple):
+    """A series that should stay below a bound; None for one without."""
+
+    values: Array
+    bound: float | None
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG; the same figure gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written there.
+    """
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
+
+
+def margins(values: Mapping[str, float], title: str) -> Figure:
+    """How much of its bound each figure takes up: a dot a figure, the bound a line.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Value over bound.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 0.8 + 0.26 * len(values)), layout="constrained")
+    axes = figure.subplots()
+    rows = np.arange(len(values))
+    shares = np.clip(list(values.values()), LEAST_SHARE, 1 / LEAST_SHARE)
+    for kept, colour, label in ((True, SERIES[0], "kept"), (False, BROKEN, "broken")):
+        chosen = (shares <= 1) == kept
+        if np.any(chosen):
+            axes.plot(shares[chosen], rows[chosen], "o", color=colour, markersize=6, label=label)
+            axes.hlines(rows[chosen], LEAST_SHARE, shares[chosen], color=colour, linewidth=1, alpha=0.5)
+    axes.axvline(1.0, color=INK, linestyle="--", linewidth=1.2, label="bound")
+    axes.set_xscale("log")
+    axes.set_xlim(LEAST_SHARE, 10 * max(1.0, *shares))
+    axes.set_yticks(rows, list(values))
+    axes.set_ylim(len(values) - 0.4, -0.6)
+    _finish(axes, "value over bound", "", title)
+    axes.grid(visible=False, axis="y")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def spreads(
+    differences: Mapping[str, Mapping[str, Array]], bounds: Mapping[str, float], title: str
+) -> Figure:
+    """Spread of relative differences: a row a quantity, a bar a source, a tick for the bound.
+
+    Parameters
+    ----------
+    differences : mapping of source to mapping of quantity to (n,) array
+        Relative differences.
+    bounds : mapping of quantity to float
+    title : str
+    """
+    quantities = list(bounds)
+    figure = Figure(figsize=(WIDTH_in, 1.3 + 0.62 * len(quantities)), layout="constrained")
+    axes = figure.subplots()
+    offsets = np.linspace(-0.16, 0.16, len(differences)) if len(differences) > 1 else np.zeros(1)
+    for colour, offset, (source, by_quantity) in zip(SERIES, offsets, differences.items(), strict=False):
+        for row, quantity in enumerate(quantities):
+            values = np.maximum(by_quantity[quantity], NOTHING)
+            low, middle, high = np.quantile(values, [0.01, 0.5, 0.99])
+            y, named = row + offset, f"{source}: 1 to 99 %" if row == 0 else None
+            axes.plot([low, high], [y, y], color=colour, linewidth=7, alpha=0.45, solid_capstyle="butt",
+                      label=named)  # fmt: skip
+            axes.plot(middle, y, "|", color=colour, markersize=11, markeredgewidth=2,
+                      label="median" if row == 0 else None)  # fmt: skip
+            axes.plot(values.max(), y, "o", color=colour, markersize=5, label="worst" if row == 0 else None)
+    for row, bound in enumerate(bounds.values()):
+        axes.plot([bound, bound], [row - 0.36, row + 0.36], color=INK, linewidth=1.6, linestyle="--",
+                  label="bound" if row == 0 else None)  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(quantities)), quantities)
+    axes.set_ylim(len(quantities) - 0.5, -0.5)
+    _finish(axes, "relative difference", "", title)
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=4)
+    return figure
+
+
+def motion(t_s: Array, q_rad: Array, difference_rad: Array, bound_rad: float, title: str) -> Figure:
+    """Hinge angles over time, and below them how far two ways of computing them are apart.
+
+    Parameters
+    ----------
+    t_s : (n,) array, s
+    q_rad, difference_rad : (n, 3) array, rad
+    bound_rad : float, rad
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
+    tilt, spin, apart = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 2])
+    for axis, (colour, name) in enumerate(zip(AXES, ANGLES, strict=True)):
+        where = spin if axis == 2 else tilt
+        where.plot(t_s, q_rad[:, axis], color=colour, label=name)
+        apart.plot(t_s, _positive(difference_rad[:, axis]), color=colour, linewidth=1, label=name)
+    apart.set_yscale("log")
+    _draw_bound(apart, bound_rad, "rad")
+    _finish(tilt, "", "tilt, rad", title)
+    _finish(spin, "", "spin, rad", "")
+    _finish(apart, "time, s", "|difference|, rad", "")
+    for axes in (tilt, spin, apart):
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def convergence(slopes: Mapping[str, Slope], title: str) -> Figure:
+    """Error against step, both logarithmic, with the fitted power of the step as a dashed line.
+
+    Parameters
+    ----------
+    slopes : mapping of method to Slope
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 4.6), layout="constrained")
+    axes = figure.subplots()
+    for colour, marker, size, (name, slope) in zip(
+        SERIES, "osDx^", (8, 9, 5, 6, 6), slopes.items(), strict=False
+    ):
+        factor = np.exp(np.mean(np.log(slope.errors / slope.steps_s**slope.order)))
+        ends = np.array([slope.steps_s.min(), slope.steps_s.max()])
+        hollow = "none" if marker in "os" else colour
+        axes.plot(slope.steps_s * 1e3, slope.errors, marker, color=colour, markersize=size,
+                  markerfacecolor=hollow, label=f"{name}: order {slope.order:.2f}")  # fmt: skip
+        axes.plot(ends * 1e3, factor * ends**slope.order, "--", color=colour, linewidth=1)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    steps_ms = 1e3 * np.unique(np.concatenate([slope.steps_s for slope in slopes.values()]))
+    axes.set_xticks(steps_ms, [f"{step:g}" for step in steps_ms])
+    axes.minorticks_off()
+    _finish(axes, "step, ms", "largest error of a hinge angle, rad", title)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) -> Figure:
+    """What should stay at zero, over time: a panel a quantity, each series with its own bound.
+
+    Parameters
+    ----------
+    t_s : (n,) array, s
+    panels : mapping of quantity (with its unit) to mapping of series to Bounded
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 2.1 * len(panels)), layout="constrained")
+    for axes, (quantity, series) in zip(_column(figure, len(panels)), panels.items(), strict=True):
+        for colour, (name, drift) in zip(SERIES, series.items(), strict=False):
+            axes.plot(t_s, _positive(drift.values), color=colour, linewidth=1, label=name)
+            _draw_bound(axes, drift.bound, "", colour)
+        axes.set_yscale("log")
+        _finish(axes, "", quantity, title)
+        title = ""
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axes.set_xlabel("time, s")
+    return figure
+
+
+def closed_loops(
+    t_s: Array,
+    errors: Mapping[str, tuple[Array, Array]],
+    apart: Mapping[str, Bounded],
+    sources: tuple[str, str],
+    title: str,
+) -> Figure:
+    """Tracking errors of the same run on two plants, a column a law, and below how far they are apart.
+
+    Parameters
+    ----------
+    t_s : (n,) array, s
+    errors : mapping of law to two (n, 3) arrays, rad
+        Tracking errors on either plant; a run that ended early has fewer rows.
+    apart : mapping of law to Bounded, rad
+        Largest difference of any hinge angle.
+    sources : two str
+        Names of the plants.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 4.8), layout="constrained")
+    above, below = figure.subplots(2, len(errors), sharex=True, squeeze=False)
+    for top, bottom, (law, pair) in zip(above, below, errors.items(), strict=True):
+        for axis, (colour, name) in enumerate(zip(AXES, ANGLES, strict=True)):
+            top.plot(t_s[: len(pair[0])], pair[0][:, axis], color=colour, label=f"{name}, {sources[0]}")
+            top.plot(t_s[: len(pair[1])], pair[1][:, axis], color=INK, linewidth=0.9, linestyle=(0, (4, 6)),
+                     label=sources[1] if axis == 2 else None)  # fmt: skip
+        values = _positive(apart[law].values)
+        bottom.plot(t_s[: len(values)], values, color=SERIES[0], linewidth=1, label="worst hinge")
+        bottom.set_yscale("log")
+        _draw_bound(bottom, apart[law].bound, "rad")
+        _finish(top, "", "tracking error, rad", law)
+        _finish(bottom, "time, s", "|difference|, rad", "")
+    named: dict[str, Artist] = {}
+    for axes in (above[0], below[0]):
+        handles, labels = axes.get_legend_handles_labels()
+        named |= dict(zip(labels, handles, strict=True))
+    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=4)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _positive(values: Array) -> Array:
+    """Sizes for a logarithmic axis, with gaps where they are zero."""
+    return np.where(values == 0, np.nan, np.abs(values))
+
+
+def _column(figure: Figure, count: int) -> Iterator[Axes]:
+    yield from figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+
+
+def _draw_bound(axes: Axes, bound: float | None, unit: str, colour: str = INK) -> None:
+    if bound is not None:
+        name = f"bound {bound:.1e} {unit}".strip()
+        axes.axhline(bound, color=colour, linestyle="--", linewidth=1.2, label=name)
+
+
+def _finish(axes: Axes, x: str, y: str, title: str) -> None:
+    """Labels, a faint grid behind, no box."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.set_title(title, fontsize="medium")
+    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)

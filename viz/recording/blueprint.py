@@ -1,0 +1,163 @@
+"""How a recording is laid out: the actuator and its currents beside the plots of a controller's day."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.viz import palette
+from spheretwin.viz.recording import scene
+
+TIMELINE = "sim_time"
+TELEMETRY = "telemetry"
+SCENARIO = "scenario"
+EVENTS = "events"
+
+TRAIL_S = 2.0
+
+
+def entity(signal: str) -> str:
+    """Entity that holds a signal, at the full rate of the control ticks."""
+    return f"{TELEMETRY}/{signal}"
+
+
+def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
+    """Log names with units and colours of every plotted signal."""
+    for signal in signals:
+        names = [
+            f"{_short(signal)} {label} [{signal.unit}]".replace("  ", " ") for label in signal.labels or ("",)
+        ]
+        style = rr.SeriesLines(names=names, colors=_colours(signal), widths=[1.5] * len(names))
+        recording.log(entity(signal.name), style, static=True)
+
+
+def application(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], live: bool) -> str:
+    """Application id of recordings with one layout, for the arguments of `layout`.
+
+    A viewer keeps one layout for each application: under a common id the second recording that it opens
+    would be shown in the first one's, with its length and its tabs. Of letters, digits and dashes only, else
+    the viewer changes it.
+    """
+    key = repr((duration_s, current_limit_A, [signal.name for signal in own], live))
+    return f"spheretwin-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
+
+
+@lru_cache(maxsize=4)
+def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], live: bool) -> rrb.Blueprint:
+    """Blueprint of a run's recording.
+
+    Parameters
+    ----------
+    duration_s : float, s
+        Length of the time axes.
+    current_limit_A : float, A
+        Range of the current axis.
+    own : tuple of Signal
+        Signals that not every run has, each in a tab; the sliding variable among the plots.
+    live : bool
+        Follow the run instead of playing from its start.
+    """
+    boundary = rrb.TimeRangeBoundary
+    whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=duration_s))
+    time = rrb.TimeAxis(view_range=whole)
+
+    def plot(name: str, *signals: str, legend: bool = True, **options: Any) -> rrb.TimeSeriesView:
+        contents = [f"/{entity(signal)}" for signal in signals]
+        corner = rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend)
+        return rrb.TimeSeriesView(
+            origin=f"/{TELEMETRY}", contents=contents, name=name, axis_x=time, plot_legend=corner, **options
+        )
+
+    def only(signals: tuple[str, ...], visible: list[bool]) -> dict[str, Any]:
+        series = rr.SeriesLines.from_fields(visible_series=visible)
+        return {f"/{entity(signal)}": series for signal in signals}
+
+    angles = ("q_ref_rad", "q_rad")
+    limits = rrb.ScalarAxis(range=(-1.05 * current_limit_A, 1.05 * current_limit_A))
+    currents = plot("currents of the 18 groups [A]", "current_A", legend=False, axis_y=limits)
+    tilt, spin = only(angles, [True, True, False]), only(angles, [False, False, True])
+    whole_share = rrb.ScalarAxis(range=(0, 1.05))
+    torques = plot("generalised torque [N·m]", "torque_command_Nm", "disturbance_Nm")
+    slides = "sliding_s" in {signal.name for signal in own}
+    demand = plot("sliding variable s [rad/s]", "sliding_s") if slides else torques
+    tabs = [
+        plot(f"{signal.name} [{signal.unit}]", signal.name) for signal in own if signal.name != "sliding_s"
+    ]
+    plots = rrb.Grid(
+        plot("tilt α red, β green, desired muted [rad]", *angles, legend=False, overrides=tilt),
+        plot("tracking error [rad]", "error_rad"),
+        plot("spin γ, desired muted [rad]", *angles, legend=False, overrides=spin),
+        demand,
+        plot("torque of the coils, stator frame [N·m]", "torque_Nm"),
+        plot("share of the commanded torque [1]", "allocation_scale", legend=False, axis_y=whole_share),
+        grid_columns=2,
+    )
+    texts = rrb.Tabs(
+        rrb.TextDocumentView(origin=f"/{SCENARIO}", name="scenario"),
+        rrb.TextLogView(origin=f"/{EVENTS}", name="events"),
+        *([torques] if slides else []),
+        *tabs,
+        active_tab="scenario",
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(_actuator_view(), currents, row_shares=[3, 1]),
+            rrb.Vertical(plots, texts, row_shares=[3, 1]),
+            column_shares=[4, 5],
+        ),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            play_state="following" if live else "playing",
+            loop_mode="off" if live else "all",
+        ),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _actuator_view() -> rrb.Spatial3DView:
+    boundary = rrb.TimeRangeBoundary
+
+    def trail(seconds: float) -> rrb.VisibleTimeRanges:
+        return rrb.VisibleTimeRanges(
+            timeline=TIMELINE,
+            start=boundary.cursor_relative(seconds=-seconds),
+            end=boundary.cursor_relative(),
+        )
+
+    return rrb.Spatial3DView(
+        origin=f"/{scene.WORLD}",
+        name="actuator",
+        background=list(palette.BACKGROUND),
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital,
+            position=[0.13, -0.13, 0.20],
+            look_target=[0, 0, 0.025],
+            eye_up=[0, 0, 1],
+        ),
+        overrides={f"/{scene.TIP}": trail(TRAIL_S), f"/{scene.TIP_DESIRED}": trail(TRAIL_S)},
+    )
+
+
+def _short(signal: Signal) -> str:
+    """Name without its unit, which stands in brackets behind it."""
+    for suffix in ("_rad_s", "_rad", "_Nm", "_A", "_s"):
+        if signal.name.endswith(suffix):
+            return signal.name.removesuffix(suffix)
+    return signal.name
+
+
+def _colours(signal: Signal) -> list[palette.Colour]:
+    if signal.size == 3:
+        desired = signal.name.endswith(("_ref_rad", "_ref_rad_s")) or signal.name == "disturbance_Nm"
+        return list(palette.DESIRED_COLOURS if desired else palette.AXIS_COLOURS)
+    return palette.group_colours(signal.size)

@@ -1,0 +1,183 @@
+"""The actuator's meshes in a recording, taken from the model file, and the poses that move them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.mjcf import fingerprint
+from spheretwin.viz import palette
+
+WORLD = "world"
+COILS = f"{WORLD}/coils"
+MOVING = ("outer_ring", "inner_ring", "rotor")
+TIP = f"{WORLD}/shaft_tip"
+TIP_DESIRED = f"{WORLD}/shaft_tip_desired"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A mesh with one normal a vertex, in the frame of its body."""
+
+    positions: NDArray[np.float32]  # (n, 3) m
+    normals: NDArray[np.float32]  # (n, 3)
+    triangles: NDArray[np.int64]  # (m, 3)
+
+
+def read_meshes(mjcf: Path) -> dict[str, rr.Mesh3D]:
+    """Read what is drawn of a model, which a run does without; once while no file that it names has changed.
+
+    Returns
+    -------
+    dict of Mesh3D
+        By entity, one for each body and colour, named after the first geom that it draws; and one for all
+        coils.
+
+    Raises
+    ------
+    InputError
+        A mesh is missing or broken.
+    """
+    return _meshes(mjcf, fingerprint(mjcf))
+
+
+def log_static(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, payload_kg: float) -> None:
+    """Log everything that keeps its shape: meshes by body and colour, coils as one mesh."""
+    recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    for entity, mesh in read_meshes(mjcf).items():
+        recording.log(entity, mesh, static=True)
+    if payload_kg > 0:
+        mount = [actuator.payload_mount_m]
+        weight = rr.Cylinders3D(lengths=[0.014], radii=[0.011], centers=mount, colors=[palette.TRACE])
+        recording.log(f"{WORLD}/rotor/payload", weight, static=True)
+    _style_traces(recording)
+
+
+def body_quaternions(q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Orientation of each moving body, as (n, 4) quaternions x, y, z, w.
+
+    Parameters
+    ----------
+    q : (n, 3) array, rad
+        Hinge angles.
+    """
+    about_x, about_y, about_z = (_about(axis, q[:, axis]) for axis in range(3))
+    inner = _product(about_x, about_y)
+    return {"outer_ring": about_x, "inner_ring": inner, "rotor": _product(inner, about_z)}
+
+
+def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
+    """Position of the shaft's tip, (n, 3) in m, for hinge angles (n, 3); the tip lies on the γ axis."""
+    length = np.linalg.norm(actuator.shaft_tip_m)
+    (ca, cb), (sa, sb) = np.cos(q[:, :2]).T, np.sin(q[:, :2]).T
+    return length * np.stack([sb, -sa * cb, ca * cb], axis=1)
+
+
+@lru_cache(maxsize=2)
+def _meshes(mjcf: Path, _: str) -> dict[str, rr.Mesh3D]:
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # it misses a mesh edited within a second
+    try:
+        model = mujoco.MjModel.from_xml_path(str(mjcf))
+    except ValueError as error:
+        raise InputError(
+            f"model {mjcf}: expected meshes that can be drawn, {without_breaks(error)}"
+        ) from None
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # 12 MB of meshes that nobody reads again
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    coils: list[Drawn] = []
+    others: dict[tuple[str, tuple[float, ...]], list[Drawn]] = defaultdict(list)
+    names: dict[tuple[str, tuple[float, ...]], str] = {}
+    for i in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).tolist():
+        drawn, geom = _in_body_frame(model, data, i), model.geom(i)
+        if geom.name.startswith("coil_"):
+            coils.append(drawn)
+            continue
+        key = (model.body(geom.bodyid[0]).name, tuple(geom.rgba.tolist()))
+        others[key].append(drawn)
+        names.setdefault(key, geom.name or f"geom{i}")
+    meshes = {COILS: _coil_mesh(coils)} if coils else {}
+    for (body, colour), parts in others.items():
+        drawn = _joined(parts)
+        meshes[f"{WORLD}/{body}/{names[body, colour]}"] = rr.Mesh3D(
+            vertex_positions=drawn.positions,
+            vertex_normals=drawn.normals,
+            triangle_indices=drawn.triangles,
+            albedo_factor=[round(255 * c) for c in colour[:3]],
+        )
+    return meshes
+
+
+def _in_body_frame(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Drawn:
+    """Mesh of a geom; MuJoCo moves meshes to their own centre, and the geom's pose moves them back."""
+    mesh = model.geom_dataid[geom]
+    vertex, normal, face = model.mesh_vertadr[mesh], model.mesh_normaladr[mesh], model.mesh_faceadr[mesh]
+    faces = slice(face, face + model.mesh_facenum[mesh])
+    corners = np.stack([model.mesh_face[faces].ravel(), model.mesh_facenormal[faces].ravel()], axis=1)
+    # A vertex on a sharp edge has a normal for each side, so it is drawn once for each.
+    code, triangles = np.unique(corners @ [1 << 32, 1], return_inverse=True)
+    body = model.geom_bodyid[geom]
+    R_SB, R_SG = data.xmat[body].reshape(3, 3), data.geom_xmat[geom].reshape(3, 3)
+    R_BG = R_SB.T @ R_SG
+    p_BG = R_SB.T @ (data.geom_xpos[geom] - data.xpos[body])
+    positions = model.mesh_vert[vertex + (code >> 32)] @ R_BG.T + p_BG
+    normals = model.mesh_normal[normal + (code & 0xFFFFFFFF)] @ R_BG.T
+    return Drawn(positions.astype(np.float32), normals.astype(np.float32), triangles.reshape(-1, 3))
+
+
+def _joined(drawn: list[Drawn]) -> Drawn:
+    first = np.cumsum([0] + [len(part.positions) for part in drawn[:-1]])
+    return Drawn(
+        np.concatenate([part.positions for part in drawn]),
+        np.concatenate([part.normals for part in drawn]),
+        np.concatenate([part.triangles + start for part, start in zip(drawn, first, strict=True)]),
+    )
+
+
+def _coil_mesh(coils: list[Drawn]) -> rr.Mesh3D:
+    """All coils as one mesh; each looks up its own pixel of a texture, whose bytes then change over time.
+
+    Of the ways to colour 36 coils at 60 Hz this is the cheapest that keeps their shape: a mesh entity for
+    each costs the viewer three times as long a frame.
+    """
+    count = len(coils)
+    pixel = np.repeat((np.arange(count) + 0.5) / count, [len(coil.positions) for coil in coils])
+    joined = _joined(coils)
+    return rr.Mesh3D.from_fields(
+        vertex_positions=joined.positions,
+        vertex_normals=joined.normals,
+        triangle_indices=joined.triangles,
+        vertex_texcoords=np.stack([pixel, np.full_like(pixel, 0.5)], axis=1),
+        albedo_texture_format=rr.components.ImageFormat(
+            width=count, height=1, color_model="RGB", channel_datatype="U8"
+        ),
+    )
+
+
+def _style_traces(recording: rr.RecordingStream) -> None:
+    for entity, colour, width in ((TIP, palette.TRACE, 2.0), (TIP_DESIRED, palette.DESIRED_TRACE, 1.0)):
+        style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width))
+        recording.log(entity, style, static=True)
+
+
+def _about(axis: int, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    quaternion = np.zeros((len(angle), 4))
+    quaternion[:, axis], quaternion[:, 3] = np.sin(angle / 2), np.cos(angle / 2)
+    return quaternion
+
+
+def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion product: first b, then a."""
+    vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + np.cross(a[:, :3], b[:, :3])
+    scalar = a[:, 3] * b[:, 3] - np.sum(a[:, :3] * b[:, :3], axis=1)
+    return np.concatenate([vector, scalar[:, None]], axis=1)
