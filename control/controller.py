@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from spheretwin.control import law as laws
 from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
+from spheretwin.control.belief import Belief, believe
 from spheretwin.models.base.callbacks import function_at
 from spheretwin.models.base.compiled import compilable
 from spheretwin.models.kinematics import cartesian_torque
@@ -38,10 +39,16 @@ class Controller(NamedTuple):
     torque_S: NDArray[np.float64]  # (3,) N·m, the same in the stator frame
     pose: NDArray[np.float64]  # (3,) rad, as measured
     scratch: NDArray[np.float64]  # of the allocation
+    belief: Belief
 
 
 def controller(
-    law: laws.Law, magnetics: TorqueModel, kept: KeptMatrix, current_limit_A: float, logged: int
+    law: laws.Law,
+    magnetics: TorqueModel,
+    kept: KeptMatrix,
+    current_limit_A: float,
+    logged: int,
+    belief: Belief,
 ) -> Controller:
     """Controller at the start of a run.
 
@@ -57,6 +64,8 @@ def controller(
         Largest group current the controller asks for.
     logged : int
         Numbers of the law's state that the telemetry logs.
+    belief : Belief
+        Of the torque that the law's commands led to.
     """
     groups = magnetics.group_axes.shape[1]
     return Controller(
@@ -70,6 +79,7 @@ def controller(
         torque_S=np.zeros(3),
         pose=np.zeros(3),
         scratch=np.empty((SCRATCH_ROWS, groups)),
+        belief=belief,
     )
 
 
@@ -95,8 +105,8 @@ def control_tick(
         Time of the tick.
     reference : (3, 3) array
         Desired angle, rate and acceleration as rows; the law may write into it.
-    measurement : (2, 3) array
-        Measured angle (rad) and rate (rad/s); the law may write into it.
+    measurement : (3, 3) array
+        Measured angle (rad) and rate (rad/s); the third row is filled in. The law may write into it.
     command : (n,) array, A
         Result: group currents asked of the amplifiers.
 
@@ -110,6 +120,7 @@ def control_tick(
     for i in range(3):
         torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         pose[i] = measurement[0, i]
+        measurement[2, i] = controller.belief.torque_q[i]
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
     for i in range(3):
         if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
@@ -119,6 +130,9 @@ def control_tick(
             return LOST
     cartesian_torque(pose, torque_q, controller.torque_S)
     keep_torque_matrix(pose, controller.magnetics, controller.kept)
-    return allocation_at(allocate)(
+    share = allocation_at(allocate)(
         controller.kept.G, controller.torque_S, controller.current_limit_A, command, controller.scratch
     )
+    if controller.belief.asked:
+        believe(controller.belief, pose, controller.kept.G, command)
+    return share

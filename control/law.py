@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -12,13 +12,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
-from spheretwin.models.telemetry.signals import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal, width
+from spheretwin.models.telemetry.signals import RESERVED_NAMES, Signal, width
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
 
 SIGNATURE = types.void(types.float64, _matrix, _matrix, _vector, _vector, _vector)
-"""Compiled signature: t, reference (3, 3), measurement (2, 3), parameters, state, torque (3,)."""
+"""Compiled signature: t, reference (3, 3), measurement (3, 3), parameters, state, torque (3,)."""
+
+
+class Known(NamedTuple):
+    """What a law is told when it is built: the nominal model, never the plant itself.
+
+    Compiled functions of the equations of motion, for use inside a law: `inertia_matrix`, `coriolis_matrix`
+    and `gravity_torque` of `models.lagrangian`, `rate_jacobian` and `cartesian_torque` of
+    `models.kinematics`.
+    """
+
+    period_s: float
+    """Control period."""
+    delay_s: float
+    """From a measurement to the currents that answer it, as the controller reckons with it."""
+    inertia: NDArray[np.float64]
+    """Principal inertias, (3,) in kg·m²."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +48,8 @@ class Law:
     step : callable
         ``step(t, reference, measurement, parameters, state, torque)`` writes the generalised torque
         (N·m) on (alpha, beta, gamma) into `torque` and returns nothing. `reference` holds the desired
-        angle, rate and acceleration as rows (rad, rad/s, rad/s²), `measurement` angle and rate.
+        angle, rate and acceleration as rows (rad, rad/s, rad/s²), `measurement` angle, rate, and the
+        generalised torque (N·m) of the coils over the last period, as the controller believes it.
         `state` is the law's memory, changed in place. A plain Python function works; one that numba
         compiles runs at the speed of the shipped laws. It must write all three torques at every call:
         one that is left out, or is no number, ends the run as ``diverged``. So does an exception in
@@ -43,6 +60,9 @@ class Law:
         Memory at the start of a run, copied too; the run works on a copy of its own.
     signals : tuple of Signal
         Names of the leading entries of the state, which the loop logs after every call.
+    asks_torque : bool
+        Whether the third row of `measurement` is wanted. What is not asked for is not computed: the row
+        holds no numbers then.
 
     Raises
     ------
@@ -56,6 +76,7 @@ class Law:
     parameters: NDArray[np.float64]
     state: NDArray[np.float64]
     signals: tuple[Signal, ...] = ()
+    asks_torque: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -70,8 +91,7 @@ class Law:
                 f"law {self.name}: expected signals of at most {len(self.state)} numbers, the size of its"
                 f" state, received {shown(width(self.signals))}"
             )
-        taken = (*SIGNALS, *MEASURED_SIGNALS, *FRICTION_SIGNALS)  # the latter two by some runs only
-        names = [signal.name for signal in (*taken, *self.signals)]
+        names = [*RESERVED_NAMES, *(signal.name for signal in self.signals)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
 

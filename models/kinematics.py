@@ -121,3 +121,25 @@ def cartesian_torque(
     torque_S[0] = torque_q[0]
     torque_S[1] = ca * torque_q[1] - sa * in_plane
     torque_S[2] = sa * torque_q[1] + ca * in_plane
+
+
+@allocation_free
+def generalised_torque(
+    q: NDArray[np.float64], torque_S: NDArray[np.float64], torque_q: NDArray[np.float64]
+) -> None:
+    """Effect of a Cartesian torque on the hinges: ``torque_q = E^T torque_S``.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose.
+    torque_S : (3,) array, N·m
+        On the rotor, stator frame.
+    torque_q : (3,) array, N·m
+        Result, on (alpha, beta, gamma).
+    """
+    ca, sa = cos(q[0]), sin(q[0])
+    cb, sb = cos(q[1]), sin(q[1])
+    torque_q[0] = torque_S[0]
+    torque_q[1] = ca * torque_S[1] + sa * torque_S[2]
+    torque_q[2] = sb * torque_S[0] + cb * (ca * torque_S[2] - sa * torque_S[1])

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
+from spheretwin.control.belief import belief
 from spheretwin.control.controller import Controller, controller
-from spheretwin.control.law import Law
-from spheretwin.control.laws import registry as laws
+from spheretwin.control.law import Known, Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import HINGES, Actuator
@@ -24,8 +24,8 @@ from spheretwin.models.mjcf import Mjcf
 from spheretwin.models.telemetry.signals import (
     FRICTION_SIGNALS,
     MEASURED_SIGNALS,
-    SIGNALS,
     Signal,
+    common_signals,
     offsets,
     width,
 )
@@ -104,6 +104,11 @@ def resolved(scenario: Scenario, files: Files, law: Law | None) -> Scenario:
             update={
                 "inertia_kg_m2": nominal.inertia_kg_m2 or tuple(actuator.inertia.tolist()),
                 "current_limit_A": nominal.current_limit_A or drive_section.current_limit_A,
+                "time_constant_s": (
+                    drive_section.time_constant_s
+                    if nominal.time_constant_s is None
+                    else nominal.time_constant_s
+                ),
             }
         ),
         "plant": section.model_copy(
@@ -124,15 +129,16 @@ def resolved(scenario: Scenario, files: Files, law: Law | None) -> Scenario:
     return made
 
 
-def law_of(scenario: Scenario, actuator: Actuator) -> Law:
-    """Law that a resolved scenario names, for its nominal inertia."""
+def law_of(scenario: Scenario) -> Law:
+    """Law that a resolved scenario names, for its nominal model."""
     section = scenario.controller
-    return laws.build(section, np.array(scenario.nominal.inertia_kg_m2), section.period_s)
+    known = Known(section.period_s, scenario.nominal.delay_s, np.array(scenario.nominal.inertia_kg_m2))
+    return section.build(known)
 
 
-def signals_of(scenario: Scenario, law: Law) -> tuple[Signal, ...]:
+def signals_of(scenario: Scenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
     """Columns of a run's telemetry: common ones, those of its stages, then the law's own."""
-    found: tuple[Signal, ...] = SIGNALS
+    found = common_signals(len(actuator.groups))
     if any(scenario.sensors.angle_offset_rad):
         found += MEASURED_SIGNALS
     if any(scenario.plant.coulomb_Nm) or any(scenario.plant.viscous_Nm_s):
@@ -188,8 +194,10 @@ def nominal_magnetics(scenario: Scenario, files: Files) -> TorqueModel:
 
 def controller_of(scenario: Scenario, law: Law, magnetics: TorqueModel, kept: KeptMatrix) -> Controller:
     """Controller of a resolved scenario, at the start of a run."""
-    limit_A = scenario.nominal.current_limit_A or 0.0
-    return controller(law, magnetics, kept, limit_A, width(law.signals))
+    nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
+    limit_A, lag_s = nominal.current_limit_A or 0.0, nominal.time_constant_s or 0.0
+    believed = belief(law.asks_torque, groups, scenario.controller.period_s, nominal.delay_s, lag_s)
+    return controller(law, magnetics, kept, limit_A, width(law.signals), believed)
 
 
 def plant_of(scenario: Scenario, actuator: Actuator, stepped: Stepped, kept: KeptMatrix) -> Plant:

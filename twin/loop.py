@@ -8,18 +8,17 @@ from numpy.typing import NDArray
 from spheretwin.control.controller import LOST, Controller, control_tick
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.copying import copy_into, copy_rows
-from spheretwin.models.telemetry.signals import SIGNALS, offsets
+from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
 from spheretwin.twin.sensors import Sensors, measure
 
 Array = NDArray[np.float64]
 
-_OFFSETS = offsets(SIGNALS)
+_OFFSETS = offsets(MOTION_SIGNALS)
 TIME, ANGLE, RATE = _OFFSETS["t_s"], _OFFSETS["q_rad"], _OFFSETS["qdot_rad_s"]
 ANGLE_REF, RATE_REF, ERROR = _OFFSETS["q_ref_rad"], _OFFSETS["qdot_ref_rad_s"], _OFFSETS["error_rad"]
 TORQUE_COMMAND, TORQUE = _OFFSETS["torque_command_Nm"], _OFFSETS["torque_Nm"]
-DISTURBANCE, SCALE = _OFFSETS["disturbance_Nm"], _OFFSETS["allocation_scale"]
-CURRENT_COMMAND, CURRENT = _OFFSETS["current_command_A"], _OFFSETS["current_A"]
+DISTURBANCE, CURRENT_COMMAND = _OFFSETS["disturbance_Nm"], width(MOTION_SIGNALS)
 
 
 class Inputs(NamedTuple):
@@ -42,7 +41,7 @@ class Scratch(NamedTuple):
     """Working space."""
 
     reference: NDArray[np.float64]  # (3, 3), what the law is handed
-    measurement: NDArray[np.float64]  # (2, 3)
+    measurement: NDArray[np.float64]  # (3, 3)
 
 
 @allocation_free
@@ -82,6 +81,7 @@ def loop(
     """
     reference, measurement = scratch.reference, scratch.measurement
     groups = plant.current.shape[0]
+    first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 2 * groups
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
         measure(sensors, plant.rotor.q, plant.rotor.qdot, measurement)
@@ -91,15 +91,15 @@ def loop(
         if columns.measured >= 0:
             copy_into(row, columns.measured, measurement[0], 3)
             copy_into(row, columns.measured + 3, measurement[1], 3)
-        command = row[CURRENT_COMMAND : CURRENT_COMMAND + groups]
+        command = row[CURRENT_COMMAND:first_current]
         share = control_tick(controller, law, allocate, t, reference, measurement, command)
         if share == LOST:
             return tick, DIVERGED
-        row[SCALE] = share
+        row[scale] = share
         copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
         copy_into(row, columns.of_the_law, controller.memory, controller.logged)
         friction = row[columns.friction : columns.friction + 3] if columns.friction >= 0 else plant.friction_q
-        delivered = Delivered(row[CURRENT : CURRENT + groups], row[TORQUE : TORQUE + 3], friction)
+        delivered = Delivered(row[first_current:scale], row[TORQUE : TORQUE + 3], friction)
         status = plant_tick(plant, command, disturbance, delivered)
         if status != GOING:
             return tick + 1, status

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
 import json
 import os
@@ -10,9 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.laws.registry import NAMES
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import metrics
 from spheretwin.twin import scenario as scenarios
@@ -76,9 +76,9 @@ def _plan(metadata: Mapping[str, str], source: str) -> Plan:
         Change(int(tick), str(name), value) for tick, name, value in json.loads(metadata["journal"])
     )
     for change in journal:
-        if change.name == "controller.law" and change.value not in LAWS:
+        if change.name == "controller.law" and change.value not in NAMES and not is_reference(change.value):
             raise InputError(
-                f"replay {source}: expected changes to {', '.join(LAWS)}, received one to {change.value}"
+                f"replay {source}: expected changes to {', '.join(NAMES)}, received one to {change.value}"
                 f" at tick {change.tick}, a law that the file does not hold"
             )
     ticks = int(metadata["ticks"])
@@ -103,24 +103,14 @@ def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | N
 
 def _from_root(change: Change) -> Change:
     """A change whose paths, if it holds any, begin at the root."""
-    section, _, name = change.name.partition(".")
-    value = copy.deepcopy(change.value)  # a section is altered in place
-    fields = reading.beside(os.getcwd(), {section: {name: value} if name else value})
-    return change._replace(value=fields[section][name] if name else fields[section])
+    return change._replace(value=reading.value_beside(os.getcwd(), change.name, change.value))
 
 
-def _files(scenario: Mapping[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:
+def _files(scenario: dict[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:
     """Files that a run names at its start or on its way, each with the dotted name of its field."""
-    for dotted in reading.PATHS:
-        section, name = dotted.split(".")
-        given = [scenario[section]]
-        for change in journal:
-            if change.name == dotted:
-                given.append({name: change.value})
-            elif change.name == section and isinstance(change.value, Mapping):
-                given.append(change.value)
-        for path in filter(None, (fields.get(name) for fields in given)):
-            yield path, dotted
+    yield from reading.named_files(scenario)
+    for change in journal:
+        yield from reading.named_files(reading.alone(change.name, change.value))
 
 
 def _digest(dotted: str, path: str) -> str | None:

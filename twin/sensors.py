@@ -27,7 +27,7 @@ def measure(
     qdot: NDArray[np.float64],
     measurement: NDArray[np.float64],
 ) -> None:
-    """Write measured angle (rad) and rate (rad/s) into the rows of `measurement` (2, 3)."""
+    """Write measured angle (rad) and rate (rad/s) into the first rows of `measurement` (3, 3)."""
     for i in range(3):
         measurement[0, i], measurement[1, i] = q[i], qdot[i]
     if not sensors.ideal:

@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.control import belief as beliefs
 from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.law import Law
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.laws.registry import NAMES
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError, SpheretwinError
@@ -26,30 +27,16 @@ from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
-from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.plant import DIVERGED, GOING, LEFT_WORKSPACE
+from spheretwin.twin.scenario.changing import changed, is_fixed
 from spheretwin.twin.scenario.reading import as_plain
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories import shapes as trajectory
 
 RUNNING = "running"
 STATUS = {GOING: RUNNING, LEFT_WORKSPACE: "left_workspace", DIVERGED: "diverged"}
-
-# What a run is begun with cannot be changed on its way.
-FIXED = (
-    "name",
-    "description",
-    "duration",
-    "seed",
-    "controller.period_s",
-    "plant.step_s",
-    "plant.engine",
-    "plant.mjcf",
-    "plant.initial_rad",
-    "plant.initial_rad_s",
-)
 
 
 class Change(NamedTuple):
@@ -76,6 +63,7 @@ class Snapshot:
     current: NDArray[np.float64]
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
+    belief: NDArray[np.float64]
     exogenous: dict[str, Any]
     journal: tuple[Change, ...]
 
@@ -120,7 +108,7 @@ class Session:
     def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
         self._busy = threading.Lock()
         self._closed = False
-        self._scratch = loops.Scratch(np.empty((3, 3)), np.empty((2, 3)))
+        self._scratch = loops.Scratch(np.empty((3, 3)), np.empty((3, 3)))
         self._own_law = law
         self._own_laws = {law.name: law} if law else {}
         self.tick, self.loop_s = 0, 0.0
@@ -219,7 +207,7 @@ class Session:
             A field that is unknown, fixed for the run, or a value out of range; nothing has changed then.
         """
         with self._alone():
-            if _is_fixed(name):
+            if is_fixed(name):
                 raise InputError(f"session: expected a field that may change during a run, received {name}")
             own = value if isinstance(value, Law) else None
             if own and name != "controller.law":
@@ -243,6 +231,7 @@ class Session:
                 self._plant.current.copy(),
                 self._controller.parameters.copy(),
                 self._controller.memory.copy(),
+                beliefs.state_of(self._controller.belief),
                 self._exogenous.state(),
                 self.journal,
             )
@@ -257,7 +246,7 @@ class Session:
         """
         with self._alone(), self._all_or_nothing():
             if snapshot.own_law is not None and snapshot.own_law not in self._own_laws:
-                known = ", ".join([*LAWS, *self._own_laws])
+                known = ", ".join([*NAMES, *self._own_laws])
                 raise InputError(
                     f"session: expected a snapshot under one of the laws {known},"
                     f" received one under {snapshot.own_law}"
@@ -339,8 +328,8 @@ class Session:
     def _build_controller(self) -> None:
         """Law, allocation and what they know; the plant shares what both have the same of."""
         scenario = self.scenario
-        self.law = self._own_law or assembly.law_of(scenario, self.actuator)
-        self._signals = assembly.signals_of(scenario, self.law)
+        self.law = self._own_law or assembly.law_of(scenario)
+        self._signals = assembly.signals_of(scenario, self.actuator, self.law)
         self._columns = width(self._signals)
         self._places = assembly.columns_of(self._signals, self.law)
         magnetics = assembly.nominal_magnetics(scenario, self._files)
@@ -372,7 +361,7 @@ class Session:
         if own:
             self._own_law, scenario = own, self.scenario
         else:
-            scenario = scenarios.changed(self.scenario, name, value)
+            scenario = changed(self.scenario, name, value)
             if name == "controller.law":
                 self._own_law = None
             elif before and name.startswith("controller."):
@@ -413,6 +402,9 @@ class Session:
             self._controller.parameters[:] = before.parameters
         if self.law is law or (self._own_law is None and self.law.step is step):  # a shipped one, other gains
             self._controller.memory[:] = before.memory
+        believed = beliefs.state_of(before.belief)
+        if before.belief.asked and len(believed) == len(beliefs.state_of(self._controller.belief)):
+            beliefs.restore(self._controller.belief, believed)
 
     def _restore(self, snapshot: Snapshot) -> None:
         if assembly.named_files(snapshot.scenario) != assembly.named_files(self.scenario):
@@ -430,6 +422,8 @@ class Session:
         _fill("currents", self._plant.current, snapshot.current)
         _fill("the law's parameters", self._controller.parameters, snapshot.parameters)
         _fill("the law's memory", self._controller.memory, snapshot.memory)
+        _check_length("belief", snapshot.belief, beliefs.state_of(self._controller.belief))
+        beliefs.restore(self._controller.belief, snapshot.belief)
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
         self._exogenous = Exogenous(self.scenario)
         self._exogenous.restore(snapshot.exogenous)
@@ -440,14 +434,9 @@ def _array(values: trajectory.Triple | None) -> NDArray[np.float64]:
     return np.array(values or (0.0, 0.0, 0.0))
 
 
-def _is_fixed(name: str) -> bool:
-    """Whether a name is that of a fixed field, or of a section that holds one."""
-    return any(f"{field}.".startswith(f"{name}.") for field in FIXED)
-
-
 def _name_of_own(law: Law) -> str:
     """Name of a user's law in the journal, where it must not be taken for a shipped one."""
-    return f"{law.name} of the user's" if law.name in LAWS else law.name
+    return f"{law.name} of the user's" if law.name in NAMES else law.name
 
 
 def _recorded(value: Any) -> Any:

@@ -5,20 +5,20 @@
 zeta only ever grow.
 """
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Literal
 
-from spheretwin.control.law import Law
+import numpy as np
+from pydantic import Field
+
+from spheretwin.control.law import Known, Law
 from spheretwin.control.parts.fuzzy import CONSEQUENTS, approximate_and_adapt
-from spheretwin.control.parts.gains import (
-    BOUND_RATE,
-    FUZZY_RATE,
-    INERTIA,
-    PERIOD,
-    REACHING_GAIN,
-    SURFACE_SLOPE,
-    SWITCHING_RATE,
-    Gains,
+from spheretwin.control.parts.parameters import (
+    LawParameters,
+    Level,
+    NonNegativeEach,
+    PositiveEach,
+    each,
+    torque_factor,
 )
 from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
 from spheretwin.models.telemetry.signals import ANGLES, Signal
@@ -30,7 +30,28 @@ SIGNALS = (
     Signal("switching_gain", "1", 3, "estimate ξ̂ of the approximation error's bound", ANGLES),
     Signal("bound_gain", "1", 3, "estimate ζ̂ of the coupling's bound", ANGLES),
 )
+# Layout of the parameters.
+SURFACE_SLOPE, REACHING_GAIN, FUZZY_RATE, SWITCHING_RATE, BOUND_RATE, FACTOR, PERIOD = 0, 3, 6, 9, 12, 15, 18
 SLIDING, FUZZY, SWITCHING, XI, ZETA, THETA = 0, 3, 6, 9, 12, 15  # layout of the state
+
+
+class AFSM(LawParameters):
+    """Adaptive fuzzy sliding mode, with the gains of (58)."""
+
+    law: Literal["afsm"] = "afsm"
+    level: Level = "acceleration"
+    surface_slope: PositiveEach = Field(each(50.0), description="λ of s = λe + ė, 1/s")
+    reaching_gain: NonNegativeEach = Field(each(20.0), description="K of the reaching term K s, 1/s")
+    fuzzy_rate: NonNegativeEach = Field(each(10.0), description="η, adaptation rate of the fuzzy consequents")
+    switching_rate: NonNegativeEach = Field(each(10.0), description="σ, growth rate of the switching gain ξ̂")
+    bound_rate: NonNegativeEach = Field(each(10.0), description="ς, growth rate of the coupling bound ζ̂")
+
+    def build(self, known: Known) -> Law:
+        """Law whose estimates all start at 0."""
+        gains = [*self.surface_slope, *self.reaching_gain, *self.fuzzy_rate]
+        rates = [*self.switching_rate, *self.bound_rate]
+        parameters = np.array([*gains, *rates, *torque_factor(self.level, known), known.period_s])
+        return Law(self.law, step, parameters, np.zeros(THETA + 3 * CONSEQUENTS), SIGNALS)
 
 
 def step(t, reference, measurement, parameters, state, torque):  # type: ignore[no-untyped-def]  # noqa: D103
@@ -38,22 +59,16 @@ def step(t, reference, measurement, parameters, state, torque):  # type: ignore[
     for axis in range(3):
         angle, rate = measurement[0, axis], measurement[1, axis]
         error, error_rate = angle - reference[0, axis], rate - reference[1, axis]
-        s = sliding_surface(error, error_rate, parameters[SURFACE_SLOPE])
+        s = sliding_surface(error, error_rate, parameters[SURFACE_SLOPE + axis])
         coupling = 1.0 + abs(s) + s * s
         first = THETA + CONSEQUENTS * axis
-        drive = -parameters[FUZZY_RATE] * s * period
+        drive = -parameters[FUZZY_RATE + axis] * s * period
         fuzzy = approximate_and_adapt(rate, angle, drive, state[first : first + CONSEQUENTS])
         switching = -np.sign(s) * (state[XI + axis] + state[ZETA + axis] * coupling)
-        factor = parameters[INERTIA + axis]
-        torque[axis] = factor * (fuzzy + switching - parameters[REACHING_GAIN] * s)
+        factor = parameters[FACTOR + axis]
+        torque[axis] = factor * (fuzzy + switching - parameters[REACHING_GAIN + axis] * s)
         state[SLIDING + axis] = s
         state[FUZZY + axis] = factor * fuzzy
         state[SWITCHING + axis] = factor * switching
-        state[XI + axis] += parameters[SWITCHING_RATE] * abs(s) * period
-        state[ZETA + axis] += parameters[BOUND_RATE] * abs(s) * coupling * period
-
-
-def afsm(gains: Gains, inertia: NDArray[np.float64], period: float) -> Law:
-    """AFSM law; every estimate starts at 0."""
-    parameters = gains.pack(period, inertia)
-    return Law("afsm", step, parameters, np.zeros(THETA + 3 * CONSEQUENTS), SIGNALS)
+        state[XI + axis] += parameters[SWITCHING_RATE + axis] * abs(s) * period
+        state[ZETA + axis] += parameters[BOUND_RATE + axis] * abs(s) * coupling * period

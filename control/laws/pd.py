@@ -1,20 +1,40 @@
-"""Proportional-derivative law, the paper's baseline: ``v = -lambda e - K edot``."""
+"""Proportional-derivative law, the paper's baseline: ``v = -stiffness e - damping edot``."""
+
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field
 
-from spheretwin.control.law import Law
-from spheretwin.control.parts.gains import INERTIA, REACHING_GAIN, SURFACE_SLOPE, Gains
+from spheretwin.control.law import Known, Law
+from spheretwin.control.parts.parameters import (
+    LawParameters,
+    Level,
+    NonNegativeEach,
+    PositiveEach,
+    each,
+    torque_factor,
+)
+
+STIFFNESS, DAMPING, FACTOR = 0, 3, 6  # layout of the parameters
+
+
+class PD(LawParameters):
+    """Proportional-derivative."""
+
+    law: Literal["pd"] = "pd"
+    level: Level = "acceleration"
+    stiffness: PositiveEach = Field(each(50.0), description="torque or acceleration a unit of error, 1/s²")
+    damping: NonNegativeEach = Field(each(20.0), description="the same a unit of its rate, 1/s")
+
+    def build(self, known: Known) -> Law:
+        """Law without memory."""
+        factor = torque_factor(self.level, known)
+        return Law(self.law, step, np.array([*self.stiffness, *self.damping, *factor]), np.zeros(0))
 
 
 def step(t, reference, measurement, parameters, state, torque):  # type: ignore[no-untyped-def]  # noqa: D103
-    stiffness, damping = parameters[SURFACE_SLOPE], parameters[REACHING_GAIN]
     for axis in range(3):
         error = measurement[0, axis] - reference[0, axis]
         error_rate = measurement[1, axis] - reference[1, axis]
-        torque[axis] = -parameters[INERTIA + axis] * (stiffness * error + damping * error_rate)
-
-
-def pd(gains: Gains, inertia: NDArray[np.float64], period: float) -> Law:
-    """PD law with stiffness `surface_slope` (1/s²) and damping `reaching_gain` (1/s)."""
-    return Law("pd", step, gains.pack(period, inertia), np.zeros(0))
+        stiffness, damping = parameters[STIFFNESS + axis], parameters[DAMPING + axis]
+        torque[axis] = -parameters[FACTOR + axis] * (stiffness * error + damping * error_rate)

@@ -1,17 +1,25 @@
-"""The shipped laws by name."""
+"""The shipped laws: one row each."""
 
-import numpy as np
-from numpy.typing import NDArray
+from __future__ import annotations
 
-from spheretwin.control.law import Law
-from spheretwin.control.laws.adaptive_fuzzy import adaptive_fuzzy
-from spheretwin.control.laws.afsm import afsm
-from spheretwin.control.laws.pd import pd
-from spheretwin.control.parts.gains import Gains
+from typing import TYPE_CHECKING, Annotated, Union
 
-LAWS = {"pd": pd, "adaptive_fuzzy": adaptive_fuzzy, "afsm": afsm}
+from pydantic import Field
 
+from spheretwin.control.laws.adaptive_fuzzy import AdaptiveFuzzy
+from spheretwin.control.laws.afsm import AFSM
+from spheretwin.control.laws.pd import PD
+from spheretwin.control.parts.parameters import LawParameters
 
-def build(gains: Gains, inertia: NDArray[np.float64], period: float) -> Law:
-    """Law that `gains` names, for nominal principal inertias (kg·m²) and a control period (s)."""
-    return LAWS[gains.law](gains, inertia, period)
+LAWS: tuple[type[LawParameters], ...] = (
+    PD,
+    AdaptiveFuzzy,
+    AFSM,
+)
+
+NAMES: tuple[str, ...] = tuple(law.model_fields["law"].default for law in LAWS)
+
+if TYPE_CHECKING:
+    AnyLaw = LawParameters
+else:
+    AnyLaw = Annotated[Union[LAWS], Field(discriminator="law")]  # noqa: UP007

@@ -75,9 +75,8 @@ def _is_label(value: object) -> bool:
 
 ANGLES = ("α", "β", "γ")
 AXES = ("x", "y", "z")
-GROUPS = tuple(f"group {j}" for j in range(18))
 
-SIGNALS = (
+MOTION_SIGNALS = (
     Signal("t_s", "s", 1, "time of the control tick"),
     Signal("q_rad", "rad", 3, "hinge angles", ANGLES),
     Signal("qdot_rad_s", "rad/s", 3, "hinge rates", ANGLES),
@@ -87,11 +86,22 @@ SIGNALS = (
     Signal("torque_command_Nm", "N·m", 3, "generalised torque asked for by the law", ANGLES),
     Signal("torque_Nm", "N·m", 3, "torque of the coils on the rotor, stator frame", AXES),
     Signal("disturbance_Nm", "N·m", 3, "generalised load and random torque, subtracted in (1)", ANGLES),
-    Signal("current_command_A", "A", 18, "group currents asked of the amplifiers", GROUPS),
-    Signal("current_A", "A", 18, "group currents, mean over the physics step that begins now", GROUPS),
-    Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
 )
-"""Logged by every run, in this order."""
+"""Logged by every run, first and in this order, whatever the actuator."""
+
+
+@cache
+def common_signals(groups: int) -> tuple[Signal, ...]:
+    """Signals of every run, in this order, for an actuator with a number of coil groups."""
+    each = tuple(f"group {j}" for j in range(groups))
+    mean = "group currents, mean over the physics step that begins now"
+    return (
+        *MOTION_SIGNALS,
+        Signal("current_command_A", "A", groups, "group currents asked of the amplifiers", each),
+        Signal("current_A", "A", groups, mean, each),
+        Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
+    )
+
 
 MEASURED_SIGNALS = (
     Signal("q_measured_rad", "rad", 3, "hinge angles as the controller has them", ANGLES),
@@ -103,6 +113,12 @@ FRICTION_SIGNALS = (
     Signal("friction_Nm", "N·m", 3, "friction on the hinges, over the physics step that begins now", ANGLES),
 )
 """Logged where the hinges have friction."""
+
+COMMON_NAMES = frozenset(signal.name for signal in common_signals(1))
+"""Names of what every run logs."""
+
+RESERVED_NAMES = COMMON_NAMES | {signal.name for signal in (*MEASURED_SIGNALS, *FRICTION_SIGNALS)}
+"""Names that no law can give to a signal of its own."""
 
 
 @cache

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.check import Check
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario.changing import changed
 from spheretwin.twin.simulation import simulate
 
 Array = NDArray[np.float64]
@@ -62,7 +63,7 @@ def compare(mjcf: Path) -> ClosedLoop:
 def _run(mjcf: Path, overrides: dict[str, Any]) -> Pair:
     scenario = scenarios.load(SCENARIO, {**overrides, "plant.mjcf": str(mjcf)})
     on_mujoco = simulate(scenario)
-    on_lagrangian = simulate(scenarios.changed(scenario, "plant.engine", "lagrangian"))
+    on_lagrangian = simulate(changed(scenario, "plant.engine", "lagrangian"))
     tables = on_mujoco.telemetry, on_lagrangian.telemetry
     same_end = on_mujoco.status == on_lagrangian.status and len(tables[0]) == len(tables[1])
     return Pair(*tables, same_end)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.laws.registry import NAMES
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.user_code import is_reference
+from spheretwin.twin.scenario.changing import check_events
 from spheretwin.twin.scenario.reading import beside, override, read, validated
-from spheretwin.twin.scenario.sections import OwnController, Scenario
+from spheretwin.twin.scenario.sections import Scenario
 
 
 def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -30,7 +32,7 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     fields = read(source)
     for dotted, value in (overrides or {}).items():
         override(fields, dotted, value)
-    return validated(beside("", fields), source)
+    return check_events(validated(beside("", fields), source), source)
 
 
 def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
@@ -39,27 +41,12 @@ def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
     Raises
     ------
     InputError
-        It was run under a law of its user's, or by a version with other fields.
+        It was run under a law of its user's that is in no file, or by a version with other fields.
     """
     law = fields.get("controller", {}).get("law")
-    if law not in LAWS:
+    if law not in NAMES and not is_reference(law):
         raise InputError(
-            f"scenario {source}: expected a run under {', '.join(LAWS)}, received one under {law},"
+            f"scenario {source}: expected a run under {', '.join(NAMES)}, received one under {law},"
             " a law that its file does not hold"
         )
     return validated(fields, source)
-
-
-def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
-    """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
-
-    Raises
-    ------
-    InputError
-        A field that is unknown, of the wrong type or out of range.
-    """
-    fields = scenario.model_dump(mode="json")
-    if isinstance(scenario.controller, OwnController):
-        fields["controller"] = {"period_s": scenario.controller.period_s}
-    override(fields, dotted, value)
-    return validated(beside("", fields), scenario.name)

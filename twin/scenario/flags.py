@@ -2,11 +2,14 @@
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from typing import Any, get_args
 
+from pydantic import BaseModel
+
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.scenario.fields import fields_of
+from spheretwin.twin.scenario.fields import INDEX, every_field, fields_of
 from spheretwin.twin.scenario.sections import Scenario
 
 
@@ -14,6 +17,7 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
     """Read ``--section.field value…`` pairs into values by dotted name.
 
     Numbers, ``true``, ``false`` and ``null`` are read as such, several values as a list; all else is text.
+    A place in a list of tables is a number: ``--event.0.t-s 1``.
 
     Raises
     ------
@@ -32,15 +36,18 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
 
 def described(scenario: Scenario) -> list[tuple[str, str, str]]:
     """Flag, value in force and meaning of every field of a scenario."""
-    rows = []
-    for dotted, field in fields_of(scenario).items():
-        value: Any = scenario
-        for part in dotted.split("."):
-            value = getattr(value, part)
-        shown = " ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else str(value)
-        shown = "" if value is None else shown
-        rows.append(("--" + dotted.replace("_", "-"), shown, field.description or ""))
-    return rows
+    return [
+        ("--" + dotted.replace("_", "-"), _shown(value), field.description or "")
+        for dotted, value, field in fields_of(scenario)
+    ]
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, tuple):
+        return " ".join(map(_shown, value))
+    if isinstance(value, float):
+        return f"{value:g}"
+    return "" if value is None else str(value)
 
 
 def _grouped(tokens: Sequence[str]) -> list[tuple[str, list[str]]]:
@@ -57,7 +64,7 @@ def _grouped(tokens: Sequence[str]) -> list[tuple[str, list[str]]]:
 
 
 def _value(name: str, text: str) -> Any:
-    if name in _TEXT_FIELDS:
+    if re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", name) in _TEXT_FIELDS:
         return text
     for read in (json.loads, float):
         try:
@@ -73,4 +80,8 @@ def _is_text(annotation: Any) -> bool:
     return annotation is str or any(map(_is_text, get_args(annotation)))
 
 
-_TEXT_FIELDS = {name for name, field in fields_of(Scenario).items() if _is_text(field.annotation)}
+def _text_fields(section: type[BaseModel]) -> set[str]:
+    return {name for name, field in every_field(section) if _is_text(field.annotation)}
+
+
+_TEXT_FIELDS = _text_fields(Scenario)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,12 @@ import numpy as np
 from pydantic import ValidationError
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.user_code import file_of, is_reference
 from spheretwin.models.base.wording import did_you_mean, is_plain, shown
 from spheretwin.twin.scenario.explaining import explain
-from spheretwin.twin.scenario.fields import fields_of
+from spheretwin.twin.scenario.fields import fields_of, files_in, section_kind
+from spheretwin.twin.scenario.own_law import scenario_with
 from spheretwin.twin.scenario.sections import Scenario
-
-PATHS = ("plant.mjcf", "plant.torque_curve", "nominal.torque_curve")
-"""Fields that name a file."""
 
 FOLDER = resources.files("spheretwin.twin") / "scenario" / "shipped"
 
@@ -28,37 +28,6 @@ FOLDER = resources.files("spheretwin.twin") / "scenario" / "shipped"
 def shipped() -> list[str]:
     """Names of the scenarios that come with the package."""
     return sorted(path.name.removesuffix(".toml") for path in FOLDER.iterdir() if path.name.endswith(".toml"))
-
-
-def beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
-    """Take the paths that fields by section name from a folder, in place; a second time changes nothing."""
-    for dotted in PATHS:
-        section, name = dotted.split(".")
-        inside = fields.get(section)
-        if isinstance(inside, dict) and isinstance(inside.get(name), str) and inside[name]:
-            inside[name] = os.path.join(folder, _from_home(inside[name]))
-    return fields
-
-
-def as_plain(value: Any) -> Any:
-    """Arrays and NumPy's numbers as Python has them; anything else, as a date of a TOML file, as text."""
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
-
-
-def validated(fields: Mapping[str, Any], source: str) -> Scenario:
-    """Scenario of fields by section.
-
-    Raises
-    ------
-    InputError
-        A field that is unknown, of the wrong type or out of range.
-    """
-    try:
-        scenario = Scenario.model_validate_json(_as_json(source, fields))
-    except ValidationError as error:
-        raise InputError(f"scenario {source}: {explain(error)}") from None
-    _check_texts(source, scenario)
-    return scenario
 
 
 def read(source: str) -> dict[str, Any]:
@@ -89,29 +58,128 @@ def read(source: str) -> dict[str, Any]:
     return beside(os.path.dirname(path), fields)
 
 
+def is_dotted(name: object) -> bool:
+    """Whether a name can be that of a field."""
+    return isinstance(name, str) and all(name.split(".")) and not name[0].isdecimal()
+
+
+def override(fields: dict[str, Any], dotted: str, value: Any) -> None:
+    """Put a value into fields by section, in place; a number is a place in a list of tables.
+
+    Raises
+    ------
+    InputError
+        The name is none of a field, or a place beyond the end of its list.
+    """
+    if not is_dotted(dotted):
+        raise InputError(f"scenario: expected a field such as controller.law, received {shown(dotted)}")
+    *sections, name = dotted.split(".")
+    inside: Any = fields
+    for section, below in zip(sections, [*sections[1:], name], strict=False):
+        inside = _entered(inside, section, [] if below.isdecimal() else {}, dotted)
+    if isinstance(inside, list):
+        _entered(inside, name, value, dotted)
+        inside[int(name)] = value
+    else:
+        inside[name] = value
+
+
+def _entered(inside: Any, part: str, empty: Any, dotted: str) -> Any:
+    """What is in a section or a list under a name or at a place; made where it is not there yet."""
+    if isinstance(inside, dict):
+        found = inside.setdefault(part, empty)
+    else:
+        place = int(part) if part.isdecimal() and len(part) < 6 else len(inside) + 1
+        if place > len(inside):
+            raise InputError(
+                f"scenario: expected a place from 0 to {len(inside)} in a list, received {dotted}"
+            )
+        if place == len(inside):
+            inside.append(empty)
+        found = inside[place]
+    if not isinstance(found, dict | list) and found is not empty:
+        raise InputError(f"scenario: expected a section before the dot, received {dotted}")
+    return found
+
+
+def beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
+    """Take the paths that fields by section name from a folder, in place; a second time changes nothing."""
+    for named in files_in(fields, section_kind(Scenario)):
+        named.fields[named.name] = os.path.join(folder, _from_home(named.fields[named.name]))
+    for event in _events(fields):
+        event["value"] = value_beside(folder, event["set"], event["value"])
+    return fields
+
+
+def value_beside(folder: str, dotted: str, value: Any) -> Any:
+    """Value of one field, the paths in it taken from a folder."""
+    inside: Any = beside(folder, alone(dotted, copy.deepcopy(value)))
+    for part in dotted.split("."):
+        inside = inside[0] if isinstance(inside, list) else inside[part]
+    return inside
+
+
+def alone(dotted: str, value: Any) -> dict[str, Any]:
+    """Fields by section that hold one value; a list of tables has it in its first place."""
+    fields: dict[str, Any] = {}
+    override(fields, ".".join("0" if part.isdecimal() else part for part in dotted.split(".")), value)
+    return fields
+
+
+def named_files(fields: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Every file that fields by section name, now and by their events: its path, and the field's name."""
+    for named in files_in(fields, section_kind(Scenario)):
+        path = named.fields[named.name]
+        yield file_of(path) if is_reference(path) else path, named.dotted
+    for event in _events(fields):
+        yield from named_files(alone(event["set"], event["value"]))
+
+
+def _events(fields: dict[str, Any]) -> list[dict[str, Any]]:
+    """Events that are whole enough to look into; what else there is will be refused."""
+    listed = fields.get("event")
+    tables = [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
+    return [each for each in tables if is_dotted(each.get("set")) and "value" in each]
+
+
+def as_plain(value: Any) -> Any:
+    """Arrays and NumPy's numbers as Python has them; anything else, as a date of a TOML file, as text."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
+
+
+def validated(fields: Mapping[str, Any], source: str, kind: type[Scenario] | None = None) -> Scenario:
+    """Scenario of fields by section.
+
+    Parameters
+    ----------
+    fields : mapping
+        As JSON and TOML have them.
+    source : str
+        Where they come from, for complaints.
+    kind : type, optional
+        Class of the scenario; the one that has the law that the fields name unless given.
+
+    Raises
+    ------
+    InputError
+        A field that is unknown, of the wrong type or out of range.
+    """
+    if kind is None:
+        controller = fields.get("controller")
+        kind = scenario_with(controller.get("law") if isinstance(controller, Mapping) else None)
+    try:
+        scenario = kind.model_validate_json(_as_json(source, fields))
+    except ValidationError as error:
+        raise InputError(f"scenario {source}: {explain(error, kind)}") from None
+    _check_texts(source, scenario)
+    return scenario
+
+
 def _from_home(path: str) -> str:
     try:
         return os.path.expanduser(path)
     except ValueError:  # a zero in the name of a user; it is refused where the path is used
         return path
-
-
-def override(fields: dict[str, Any], dotted: str, value: Any) -> None:
-    """Put a value into fields by section, in place.
-
-    Raises
-    ------
-    InputError
-        The name is none of a field.
-    """
-    if not isinstance(dotted, str) or not all(dotted.split(".")):
-        raise InputError(f"scenario: expected a field such as controller.law, received {shown(dotted)}")
-    *sections, name = dotted.split(".")
-    for section in sections:
-        fields = fields.setdefault(section, {})
-        if not isinstance(fields, dict):
-            raise InputError(f"scenario: expected a section before the dot, received {dotted}")
-    fields[name] = value
 
 
 def _as_json(source: str, fields: Mapping[str, Any]) -> bytes:
@@ -126,10 +194,7 @@ def _as_json(source: str, fields: Mapping[str, Any]) -> bytes:
 
 def _check_texts(source: str, scenario: Scenario) -> None:
     """Names and paths end up in terminals, in file names and in other programs' files."""
-    for dotted in fields_of(scenario):
-        text: Any = scenario
-        for part in dotted.split("."):
-            text = getattr(text, part)
+    for dotted, text, _ in fields_of(scenario):
         breaks = "\n\t" if dotted == "description" else ""
         if isinstance(text, str) and not is_plain("".join(each for each in text if each not in breaks)):
             raise InputError(

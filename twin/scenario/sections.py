@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializeAsAny, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from spheretwin.control.parts.gains import Gains, NonNegative, Positive
+from spheretwin.control.laws.afsm import AFSM
+from spheretwin.control.laws.registry import AnyLaw
+from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
 from spheretwin.twin.disturbances.load import Disturbance
 from spheretwin.twin.trajectories.shapes import Bounded, Trajectory, Triple
 
@@ -27,20 +29,20 @@ class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class Controller(Gains):
-    """The law, its gains, and how often it runs."""
+class OwnController(LawParameters):
+    """What a run under a law that its user made in Python says of it, in the place of a law's parameters."""
 
-    period_s: Annotated[float, Field(gt=0, le=10)] = Field(
-        1e-3, description="control period, s; a whole number of physics steps"
-    )
-
-
-class OwnController(_Section):
-    """What a run under a law of the user's says of it, in the place of `Controller`."""
-
-    law: str = Field(description="name of the law")
-    period_s: float = Field(description="control period, s")
     parameters: tuple[float, ...] = Field(description="numbers handed to the law")
+
+
+class Event(_Section):
+    """A change that the run makes of itself on its way."""
+
+    t_s: Annotated[float, Field(ge=0, le=LARGEST)] = Field(
+        description="time from which the change is in force, s; at the first control tick from then on"
+    )
+    set: Annotated[str, Field(min_length=1)] = Field(description="field, such as disturbance.load")
+    value: JsonValue = Field(description="its new value")
 
 
 class Plant(_Section):
@@ -80,10 +82,12 @@ class Plant(_Section):
     )
     initial_rad_s: Triple = Field((0.0, 0.0, 0.0), description="rates at the start, rad/s")
     mjcf: Annotated[str, Field(min_length=1)] | None = Field(
-        None, description="model file; the shipped one unless given"
+        None, description="model file; the shipped one unless given", json_schema_extra={"path": True}
     )
     torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
-        None, description="torque curve as CSV; the shipped one unless given"
+        None,
+        description="torque curve as CSV; the shipped one unless given",
+        json_schema_extra={"path": True},
     )
 
 
@@ -91,7 +95,7 @@ class Nominal(_Section):
     """The model that the controller has; what is not given is as the plant is without modelling error."""
 
     torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
-        None, description="torque curve as CSV; the plant's unless given"
+        None, description="torque curve as CSV; the plant's unless given", json_schema_extra={"path": True}
     )
     torque_scale: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
         1.0, description="torque matrix over that of the torque curve; below 0, its sign is wrong"
@@ -101,6 +105,12 @@ class Nominal(_Section):
     )
     current_limit_A: Positive | None = Field(
         None, description="largest group current asked for, A; the drive's unless given"
+    )
+    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
+        None, description="current lag that the controller reckons with, s; the drive's unless given"
+    )
+    delay_s: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0, description="delay from measurement to currents that the controller reckons with, s"
     )
 
     @field_validator("torque_scale")
@@ -137,13 +147,14 @@ class Scenario(_Section):
         "least_norm",
         description="currents for a torque: least-norm and scaled at the limit (16), or all the limit allows",
     )
-    trajectory: Trajectory
-    controller: SerializeAsAny[Controller] = Controller()
+    trajectory: SerializeAsAny[Trajectory]
+    controller: SerializeAsAny[AnyLaw] = AFSM()
     nominal: Nominal = Nominal()
     sensors: SensorsSection = SensorsSection()
     plant: Plant = Plant()
     drive: DriveSection = DriveSection()
     disturbance: Disturbance = Disturbance()
+    event: tuple[Event, ...] = Field((), description="changes on the way, [[event]] each")
 
     @model_validator(mode="after")
     def _clocks_fit(self) -> Scenario:

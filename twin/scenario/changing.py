@@ -1,0 +1,90 @@
+"""What may change of a scenario while it runs, and how: by hand, or by an event that it plans itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin.scenario.fields import Kind, kind_of, section_kind
+from spheretwin.twin.scenario.own_law import scenario_with
+from spheretwin.twin.scenario.reading import beside, override, validated
+from spheretwin.twin.scenario.sections import OwnController, Scenario
+
+# What a run is begun with cannot be changed on its way.
+FIXED = (
+    "name",
+    "description",
+    "duration",
+    "seed",
+    "event",
+    "controller.period_s",
+    "plant.step_s",
+    "plant.engine",
+    "plant.mjcf",
+    "plant.initial_rad",
+    "plant.initial_rad_s",
+)
+
+
+def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
+    """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
+
+    Another member of a family, as another law, keeps the fields that it has too; its own have their defaults.
+
+    Raises
+    ------
+    InputError
+        A field that is unknown, of the wrong type or out of range.
+    """
+    fields = scenario.model_dump(mode="json")
+    if isinstance(scenario.controller, OwnController):
+        fields["controller"] = {"period_s": scenario.controller.period_s}
+    # A user's law stays the one that was read, whatever has become of its file.
+    kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
+    _keep_common(fields, dotted, value, kind)
+    override(fields, dotted, value)
+    return validated(beside("", fields), scenario.name, None if dotted == "controller" else kind)
+
+
+def is_fixed(dotted: str) -> bool:
+    """Whether a name is that of a fixed field, or of a section that holds one."""
+    return any(f"{field}.".startswith(f"{dotted}.") for field in FIXED)
+
+
+def check_events(scenario: Scenario, source: str) -> Scenario:
+    """Find out before a run what an event would only be refused for on its way.
+
+    Raises
+    ------
+    InputError
+        An event sets what cannot be set, or to what it cannot be.
+    """
+    planned = sorted(enumerate(scenario.event), key=lambda event: event[1].t_s)
+    after = scenario
+    for place, event in planned:
+        if is_fixed(event.set):
+            raise InputError(
+                f"scenario {source}: event.{place}.set: expected a field that may change during a run,"
+                f" received {event.set}"
+            )
+        try:
+            after = changed(after, event.set, event.value)
+        except InputError as error:
+            raise InputError(f"{error}, as event.{place} sets it") from None
+    return scenario
+
+
+def _keep_common(fields: dict[str, Any], dotted: str, value: Any, scenario: type[Scenario]) -> None:
+    """Where a family's member is exchanged, drop what the new one does not have."""
+    *sections, name = dotted.split(".") if isinstance(dotted, str) else [""]
+    kind: Kind | None = section_kind(scenario)
+    inside: Any = fields
+    for section in sections:
+        if kind is None or not isinstance(inside, dict) or section not in inside:
+            return
+        member = kind.chosen(inside)[0]
+        inside = inside[section]
+        kind = kind_of(member.model_fields[section]) if section in member.model_fields else None
+    if kind and kind.told_apart_by == name and isinstance(value, str) and value in kind.members:
+        for field in [each for each in inside if each not in kind.members[value].model_fields]:
+            del inside[field]

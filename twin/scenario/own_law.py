@@ -1,0 +1,45 @@
+"""A scenario whose controller may also be a law from a file of its user's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Annotated, Any, Union
+
+from pydantic import Field, SerializeAsAny
+
+from spheretwin.control.laws.own import parameters_of
+from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.parts.parameters import LawParameters
+from spheretwin.models.base.user_code import is_reference
+from spheretwin.twin.scenario.sections import Scenario
+
+
+def scenario_with(law: Any) -> type[Scenario]:
+    """Class of scenarios with a law: the common one, or one whose laws are those shipped and a user's.
+
+    Raises
+    ------
+    InputError
+        The law is one in a file, and cannot be had.
+    """
+    return _extended(parameters_of(law)) if is_reference(law) else Scenario
+
+
+@lru_cache(maxsize=32)
+def _extended(own: type[LawParameters]) -> type[Scenario]:
+    laws: Any = Annotated[Union[(*LAWS, own)], Field(discriminator="law")]
+
+    class Extended(Scenario):
+        controller: SerializeAsAny[laws] = Scenario.model_fields["controller"].default  # type: ignore[valid-type]
+
+        def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+            """A class made for a file is made anew where it is unpickled."""
+            return _again, (own.model_fields["law"].default, self.model_dump_json())
+
+    Extended.__name__ = Extended.__qualname__ = Scenario.__name__
+    return Extended
+
+
+def _again(law: str, fields: str) -> Scenario:
+    return scenario_with(law).model_validate_json(fields)
