@@ -17,8 +17,9 @@ from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import metrics
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.scenario import reading
+from spheretwin.twin.scenario.planned import Change
 from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.session import Change, Session
+from spheretwin.twin.session import Session
 
 
 class Plan(NamedTuple):

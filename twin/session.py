@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,21 +31,13 @@ from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.plant import DIVERGED, GOING, LEFT_WORKSPACE
 from spheretwin.twin.scenario.changing import changed, is_fixed
+from spheretwin.twin.scenario.planned import Change, planned
 from spheretwin.twin.scenario.reading import as_plain
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories import shapes as trajectory
 
 RUNNING = "running"
 STATUS = {GOING: RUNNING, LEFT_WORKSPACE: "left_workspace", DIVERGED: "diverged"}
-
-
-class Change(NamedTuple):
-    """One entry of the command journal."""
-
-    tick: int
-    """First tick that it is in force."""
-    name: str
-    value: Any
 
 
 @dataclass(frozen=True)
@@ -66,6 +58,7 @@ class Snapshot:
     belief: NDArray[np.float64]
     exogenous: dict[str, Any]
     journal: tuple[Change, ...]
+    events: tuple[Change, ...]
 
 
 class Session:
@@ -90,6 +83,8 @@ class Session:
         Columns of the telemetry; a change of law, friction or sensors may change them.
     journal : tuple of Change
         What `set` did.
+    events : tuple of Change
+        What the events of the scenario did so far.
     tick : int
         Control ticks done.
     loop_s : float
@@ -113,6 +108,7 @@ class Session:
         self._own_laws = {law.name: law} if law else {}
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
+        self.events: tuple[Change, ...] = ()
         self._status = RUNNING
         self._files = assembly.files_of(scenario)
         self.scenario = self.begun_as = self._resolved(scenario)
@@ -121,6 +117,7 @@ class Session:
         self._build_controller()
         self._build_plant()
         self._connect()
+        self._make_planned()
 
     @property
     def actuator(self) -> Actuator:
@@ -153,7 +150,8 @@ class Session:
         Parameters
         ----------
         ticks : int
-            How many at most; fewer are run where the status becomes other than ``running``.
+            How many at most; fewer are run where the status becomes other than ``running``, or where an event
+            of the scenario changes the columns.
 
         Returns
         -------
@@ -163,6 +161,7 @@ class Session:
         if not isinstance(ticks, int | np.integer) or ticks < 0:
             raise InputError(f"session: expected a number of ticks from 0 on, received {shown(ticks)}")
         with self._alone():
+            self._make_planned()
             log = allocated(int(ticks), self._columns)
             return Table(self._signals, log[: self._advance(log)])
 
@@ -175,18 +174,20 @@ class Session:
             Its rows are not those of the telemetry: compiled code would write beside them.
         """
         with self._alone():
+            self._make_planned()
             _check_rows(log, self._columns)
             return self._advance(log)
 
     def check_horizon(self, ticks: int) -> None:
-        """Find out whether reference and disturbance are numbers up to a tick to come.
+        """Find out whether reference and disturbance are numbers up to a tick to come, or to an event.
 
         Raises
         ------
         InputError
             They are not.
         """
-        self._exogenous.check_horizon(max(ticks - 1, self.tick))
+        waiting = [change.tick for change in self._waiting()[:1]]
+        self._exogenous.check_horizon(max(min([ticks, *waiting]) - 1, self.tick))
 
     def set(self, name: str, value: Any) -> None:
         """Change a field of the scenario from the next tick on, or the law itself.
@@ -234,6 +235,7 @@ class Session:
                 beliefs.state_of(self._controller.belief),
                 self._exogenous.state(),
                 self.journal,
+                self.events,
             )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -297,13 +299,36 @@ class Session:
         done = 0
         while done < len(log) and self._status == RUNNING:
             try:
-                inputs = self._exogenous.rows(self.tick, len(log) - done)
+                inputs = self._exogenous.rows(self.tick, self._most(len(log) - done))
             except InputError:
                 if done:  # first hand over what there is; the next call will say it
                     break
                 raise
             done += self._run(inputs, log[done : done + len(inputs.t)])
+            before = self._signals
+            try:
+                self._make_planned()
+            except SpheretwinError:  # the next call makes it again, and says it
+                break
+            if self._signals != before:
+                break
         return done
+
+    def _waiting(self) -> tuple[Change, ...]:
+        return planned(self.begun_as)[len(self.events) :]
+
+    def _most(self, ticks: int) -> int:
+        """Ticks that can be run at once: an event ends them."""
+        return min([ticks, *(change.tick - self.tick for change in self._waiting()[:1])])
+
+    def _make_planned(self) -> None:
+        """Make the changes of all events whose tick has come."""
+        for change in self._waiting():
+            if change.tick > self.tick or self._status != RUNNING:
+                break
+            with self._all_or_nothing():
+                self._change(change.name, change.value, None)
+                self.events += (change,)
 
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> int:
         started = time.perf_counter()
@@ -361,11 +386,11 @@ class Session:
         if own:
             self._own_law, scenario = own, self.scenario
         else:
-            scenario = changed(self.scenario, name, value)
             if name == "controller.law":
                 self._own_law = None
             elif before and name.startswith("controller."):
                 raise InputError(f"session: expected no field of a shipped law, as {before.name} is not one")
+            scenario = changed(self.scenario, name, value)
         if assembly.named_files(scenario) != assembly.named_files(self.scenario):
             self._files = assembly.files_of(scenario)
         self._apply(self._resolved(scenario))
@@ -425,6 +450,7 @@ class Session:
         _check_length("belief", snapshot.belief, beliefs.state_of(self._controller.belief))
         beliefs.restore(self._controller.belief, snapshot.belief)
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
+        self.events = snapshot.events
         self._exogenous = Exogenous(self.scenario)
         self._exogenous.restore(snapshot.exogenous)
         self._connect()

@@ -5,16 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
 from spheretwin.models.telemetry.signals import width
-from spheretwin.models.telemetry.table import Table, allocated
+from spheretwin.models.telemetry.table import Table, allocated, joined
+from spheretwin.twin.scenario.planned import Change
 from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.session import RUNNING, Change, Session
+from spheretwin.twin.session import RUNNING, Session
 
 COMPLETED = "completed"
 INTERRUPTED = "interrupted"
@@ -78,10 +79,30 @@ def simulate(scenario: Scenario, law: Law | None = None, sinks: Sequence[Sink] =
         does not fit in memory.
     """
     with Session(scenario, law) as session:
-        log = allocated(scenario.ticks, width(session.signals))
-        status = follow(session, scenario.ticks, sinks, log=log)
-        telemetry = Table(session.signals, log[: session.tick])
+        if scenario.event:  # which may change the columns
+            kept = _Kept([])
+            status = follow(session, scenario.ticks, [kept, *sinks])
+            telemetry = joined(kept.tables or [session.advance(0)])
+        else:
+            log = allocated(scenario.ticks, width(session.signals))
+            status = follow(session, scenario.ticks, sinks, log=log)
+            telemetry = Table(session.signals, log[: session.tick])
         return Run(session.begun_as, status, telemetry, session.loop_s)
+
+
+class _Kept(NamedTuple):
+    """Keeps the tables of a run as they come."""
+
+    tables: list[Table]
+
+    def write(self, rows: Table) -> None:
+        self.tables.append(rows)
+
+    def note(self, t_s: float, text: str) -> None:
+        pass
+
+    def finish(self, status: str) -> None:
+        pass
 
 
 def follow(
@@ -127,12 +148,14 @@ def follow(
     session.check_horizon(_known_to(ticks, waiting))
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
+    noted = _note_events(session, 0, sinks)
     while session.tick < ticks and session.status == RUNNING and not stop_requested():
         _make(session, ticks, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
         rows = _advance(session, last, log)
         for sink in sinks:
             sink.write(rows)
+        noted = _note_events(session, noted, sinks)
         if live:
             _sleep_until(started + session.t_s - first)
     _make(session, ticks, waiting, sinks)  # what came after the last tick is in the journal too
@@ -142,6 +165,18 @@ def follow(
     for sink in sinks:
         sink.finish(status)
     return status
+
+
+def _note_events(session: Session, noted: int, sinks: Sequence[Sink]) -> int:
+    """Tell of the events made since then; returns how many there have been."""
+    for change in session.events[noted:]:
+        for sink in sinks:
+            sink.note(change.tick * session.scenario.controller.period_s, _told(change))
+    return len(session.events)
+
+
+def _told(change: Change) -> str:
+    return f"{change.name} set to {change.value}"
 
 
 def _known_to(ticks: int, waiting: Sequence[Change]) -> int:
@@ -155,7 +190,7 @@ def _make(session: Session, ticks: int, waiting: list[Change], sinks: Sequence[S
         change = waiting.pop(0)
         session.set(change.name, change.value)
         for sink in sinks:
-            sink.note(session.t_s, f"{change.name} set to {change.value}")
+            sink.note(session.t_s, _told(change))
         if session.tick < _known_to(ticks, waiting):
             session.check_horizon(_known_to(ticks, waiting))
 

@@ -13,6 +13,7 @@ from spheretwin.control.parts.parameters import (
     NonNegativeEach,
     PositiveEach,
     each,
+    named,
     torque_factor,
 )
 from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
@@ -29,7 +30,7 @@ SLIDING, FUZZY, THETA = 0, 3, 6  # layout of the state
 class AdaptiveFuzzy(LawParameters):
     """Adaptive fuzzy, with the gains of (58)."""
 
-    law: Literal["adaptive_fuzzy"] = "adaptive_fuzzy"
+    law: Literal["adaptive_fuzzy"] = named("adaptive_fuzzy")
     level: Level = "acceleration"
     surface_slope: PositiveEach = Field(each(50.0), description="λ of s = λe + ė, 1/s")
     reaching_gain: NonNegativeEach = Field(each(20.0), description="K of the reaching term K s, 1/s")

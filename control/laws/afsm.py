@@ -18,6 +18,7 @@ from spheretwin.control.parts.parameters import (
     NonNegativeEach,
     PositiveEach,
     each,
+    named,
     torque_factor,
 )
 from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
@@ -38,7 +39,7 @@ SLIDING, FUZZY, SWITCHING, XI, ZETA, THETA = 0, 3, 6, 9, 12, 15  # layout of the
 class AFSM(LawParameters):
     """Adaptive fuzzy sliding mode, with the gains of (58)."""
 
-    law: Literal["afsm"] = "afsm"
+    law: Literal["afsm"] = named("afsm")
     level: Level = "acceleration"
     surface_slope: PositiveEach = Field(each(50.0), description="λ of s = λe + ė, 1/s")
     reaching_gain: NonNegativeEach = Field(each(20.0), description="K of the reaching term K s, 1/s")

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.parameters import LawParameters
+from spheretwin.control.parts.parameters import LawParameters, named
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import load_named
 from spheretwin.models.base.wording import shown
@@ -49,7 +49,7 @@ def _named(reference: str, found: Any) -> type[LawParameters]:
             f"law {reference}: expected a subclass of LawParameters, a Law, or a function,"
             f" received {shown(found)}"
         )
-    fields: Any = {"law": (Literal[reference], base.model_fields["law"]._copy())}
+    fields: Any = {"law": (Literal[reference], named(reference))}
     return create_model(base.__name__, __base__=base, __module__=base.__module__, **fields)
 
 

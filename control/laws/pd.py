@@ -12,6 +12,7 @@ from spheretwin.control.parts.parameters import (
     NonNegativeEach,
     PositiveEach,
     each,
+    named,
     torque_factor,
 )
 
@@ -21,7 +22,7 @@ STIFFNESS, DAMPING, FACTOR = 0, 3, 6  # layout of the parameters
 class PD(LawParameters):
     """Proportional-derivative."""
 
-    law: Literal["pd"] = "pd"
+    law: Literal["pd"] = named("pd")
     level: Level = "acceleration"
     stiffness: PositiveEach = Field(each(50.0), description="torque or acceleration a unit of error, 1/s²")
     damping: NonNegativeEach = Field(each(20.0), description="the same a unit of its rate, 1/s")

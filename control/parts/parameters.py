@@ -33,18 +33,22 @@ Level = Annotated[
 ]
 
 
+def named(law: str) -> Any:
+    """Field of a law's name."""
+    meaning = "control law; FILE.py:NAME for one of your own"
+    return Field(law, description=meaning, json_schema_extra={"path": "code"})
+
+
 class LawParameters(BaseModel):
     """Parameters that every law has; each law's own add to them, each with its range and meaning.
 
-    A subclass names itself in `law` and makes the law in `build`. That is all that a law is, here or in a
-    file of its user's.
+    A subclass makes the law in `build`, and a shipped one names itself in `law`. That is all that a law is,
+    here or in a file of its user's.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    law: str = Field(
-        description="control law; FILE.py:NAME for one of your own", json_schema_extra={"path": "code"}
-    )
+    law: str
     period_s: Annotated[float, Field(gt=0, le=10)] = Field(
         1e-3, description="control period, s; a whole number of physics steps"
     )

@@ -7,7 +7,9 @@ import pytest
 
 from spheretwin.control.law import Law
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.signals import FRICTION_SIGNALS, MEASURED_SIGNALS, SIGNALS, Signal
+from spheretwin.models.telemetry.signals import FRICTION_SIGNALS, MEASURED_SIGNALS, Signal, common_signals
+
+SIGNALS = common_signals(18)
 
 
 def step(t, reference, measurement, parameters, state, torque):

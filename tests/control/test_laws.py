@@ -3,13 +3,23 @@
 import numpy as np
 import pytest
 
-from spheretwin.control.law import SIGNATURE
-from spheretwin.control.laws import registry as laws
-from spheretwin.control.parts.gains import Gains
+from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.control.laws.registry import AFSM, LAWS, AdaptiveFuzzy
 from spheretwin.models.base.compiled import compiled_callback
 
 PERIOD = 1e-3
 CENTRES = np.array([-3, -1.5, 0, 1.5, 3])
+
+
+def known(actuator):
+    return Known(PERIOD, 0.0, actuator.inertia)
+
+
+def each_axis(kind):
+    """Gains of a law, all of which are given per axis."""
+    return [
+        (name, field.default) for name, field in kind.model_fields.items() if isinstance(field.default, tuple)
+    ]
 
 
 class SlowLaw:
@@ -25,8 +35,8 @@ class SlowLaw:
         g = self.gains
         e, e_rate = measurement[0] - reference[0], measurement[1] - reference[1]
         if g.law == "pd":
-            return self.factor * (-g.surface_slope * e - g.reaching_gain * e_rate)
-        s = g.surface_slope * e + e_rate
+            return self.factor * (-np.array(g.stiffness) * e - g.damping * e_rate)
+        s = np.array(g.surface_slope) * e + e_rate
         bound = 1 + np.abs(s) + s**2
         v = np.empty(3)
         for i in range(3):
@@ -35,20 +45,22 @@ class SlowLaw:
             products = np.outer(gaussians[0], gaussians[1]).ravel()
             psi = products / products.sum()
             regressor = np.concatenate([psi, psi * rate, psi * angle])
-            v[i] = self.theta[i] @ regressor - g.reaching_gain * s[i]
-            self.theta[i] -= g.fuzzy_rate * s[i] * regressor * PERIOD
+            v[i] = self.theta[i] @ regressor - g.reaching_gain[i] * s[i]
+            self.theta[i] -= g.fuzzy_rate[i] * s[i] * regressor * PERIOD
         if g.law == "afsm":
             v -= np.sign(s) * (self.xi + self.zeta * bound)
-            self.xi += g.switching_rate * np.abs(s) * PERIOD
-            self.zeta += g.bound_rate * np.abs(s) * bound * PERIOD
+            self.xi += np.array(g.switching_rate) * np.abs(s) * PERIOD
+            self.zeta += np.array(g.bound_rate) * np.abs(s) * bound * PERIOD
         return self.factor * v
 
 
 @pytest.mark.parametrize("level", ["acceleration", "torque"])
-@pytest.mark.parametrize("name", ["pd", "adaptive_fuzzy", "afsm"])
-def test_law_follows_the_paper(actuator, name, level):
-    gains = Gains(law=name, level=level)
-    law, slow = laws.build(gains, actuator.inertia, PERIOD), SlowLaw(gains, actuator.inertia)
+@pytest.mark.parametrize("kind", LAWS)
+def test_law_follows_the_paper(actuator, kind, level):
+    gains = kind(
+        level=level, **{name: (value[0], 2 * value[1], value[2] / 3) for name, value in each_axis(kind)}
+    )
+    law, slow = gains.build(known(actuator)), SlowLaw(gains, actuator.inertia)
     compiled = compiled_callback(SIGNATURE, law.step)
     generator = np.random.default_rng(0)
     state, torque = law.state.copy(), np.empty(3)
@@ -61,7 +73,7 @@ def test_law_follows_the_paper(actuator, name, level):
 
 
 def test_estimates_are_logged_as_they_are(actuator):
-    law = laws.build(Gains(law="afsm"), actuator.inertia, PERIOD)
+    law = AFSM().build(known(actuator))
     state, torque = law.state.copy(), np.empty(3)
     measurement = np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
     law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, state, torque)
@@ -74,8 +86,8 @@ def test_estimates_are_logged_as_they_are(actuator):
 
 
 def test_without_its_rates_afsm_is_the_adaptive_fuzzy_law(actuator):
-    still = laws.build(Gains(law="afsm", switching_rate=0.0, bound_rate=0.0), actuator.inertia, PERIOD)
-    fuzzy = laws.build(Gains(law="adaptive_fuzzy"), actuator.inertia, PERIOD)
+    still = AFSM(switching_rate=0.0, bound_rate=0.0).build(known(actuator))
+    fuzzy = AdaptiveFuzzy().build(known(actuator))
     states = [still.state.copy(), fuzzy.state.copy()]
     generator = np.random.default_rng(1)
     for _ in range(20):
@@ -87,7 +99,7 @@ def test_without_its_rates_afsm_is_the_adaptive_fuzzy_law(actuator):
 
 def test_no_error_asks_for_no_switching(actuator):
     # sgn(0) = 0: on the surface the law must not push to either side.
-    law = laws.build(Gains(law="afsm"), actuator.inertia, PERIOD)
+    law = AFSM().build(known(actuator))
     state, torque = law.state.copy(), np.empty(3)
     state[9:15] = 5.0  # grown estimates
     law.step(0.0, np.zeros((3, 3)), np.zeros((2, 3)), law.parameters, state, torque)

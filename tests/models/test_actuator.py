@@ -80,7 +80,6 @@ def test_shipped_actuator_is_read_once():
         ('name="shaft_tip"', 'name="tip"', '"shaft_tip"'),
         ('pos="0 0 0.12"', 'pos="0 0 nan"', "finite numbers"),
         ('<inertial pos="0 0 0" mass="1.6"', '<inertial pos="0 0 0.01" mass="1.6"', "centre of mass"),
-        (RING + SITE, RING_OF_EIGHT + SITE, "18 groups of two coils, received 16"),
         ('<frame euler="0 28 0">', '<frame euler="0 29 0">', "one coil opposite coil_upper00"),
     ],
 )  # fmt: skip
@@ -91,6 +90,19 @@ def test_a_model_that_is_no_such_actuator_is_told_in_one_line(tmp_path, old, new
     with pytest.raises(InputError, match=re.escape(part)) as caught:
         actuators.load(path)
     assert "\n" not in str(caught.value)
+
+
+def test_groups_are_as_many_as_the_file_has(tmp_path):
+    (path := tmp_path / "mine.xml").write_text(TEXT.replace(RING + SITE, RING_OF_EIGHT + SITE))
+    assert actuators.load(path).groups.shape == (16, 2)
+
+
+def test_two_groups_cannot_give_three_torques(tmp_path):
+    tilted = re.compile(r"(?s)<replicate count=.12. euler=.0 0 30.>\s*<frame.*?</replicate>")
+    text = tilted.sub("", TEXT).replace(RING + SITE, '<replicate count="4" euler="0 0 90">' + SITE)
+    (path := tmp_path / "mine.xml").write_text(text)
+    with pytest.raises(InputError, match="at least 3 groups of two coils, received 2"):
+        actuators.load(path)
 
 
 def test_an_edited_file_is_read_again(tmp_path):

@@ -4,8 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from spheretwin.control.law import Law
-from spheretwin.control.laws import registry as laws
+from spheretwin.control.law import Known, Law
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
@@ -155,7 +154,7 @@ def test_a_plain_python_law_runs_as_a_compiled_one_does():
 
 def test_the_law_s_state_is_not_shared_between_runs(actuator):
     scenario = scenarios.load("hold", {"duration": 0.1})
-    law = laws.build(scenario.controller, actuator.inertia, 1e-3)
+    law = scenario.controller.build(Known(1e-3, 0.0, actuator.inertia))
     first, again = simulate(scenario, law), simulate(scenario, law)
     np.testing.assert_array_equal(first.telemetry.values, again.telemetry.values)
     np.testing.assert_array_equal(law.state, 0)

@@ -65,7 +65,7 @@ def test_a_scale_that_is_no_power_of_two_divides_to_rounding():
 
 def test_a_scale_and_a_stiffness_are_the_same_to_a_pd_law():
     # The plant gets 1/k of the torque asked for, so PD with k times its gains is as PD without.
-    changes = {"controller.surface_slope": 100.0, "controller.reaching_gain": 40.0}
+    changes = {"controller.stiffness": 100.0, "controller.damping": 40.0}
     true, assumed = table(2000, changes=PD), table(2000, changes=PD | changes | {"nominal.torque_scale": 2.0})
     np.testing.assert_array_equal(assumed["allocation_scale"], 1)
     np.testing.assert_array_equal(assumed["q_rad"], true["q_rad"])
@@ -203,7 +203,7 @@ ASKEW = {"sensors.angle_offset_rad": OFFSET.tolist()}
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_rotor_rests_where_the_sensors_see_no_error(engine):
-    stiff = {"controller.surface_slope": 900.0, "controller.reaching_gain": 60.0, "plant.engine": engine}
+    stiff = {"controller.stiffness": 900.0, "controller.damping": 60.0, "plant.engine": engine}
     run = table(3000, "hold", PD | ASKEW | stiff)
     # Critically damped at 30 1/s: after 3 s the start is gone to exp(-90) of 0.3 rad.
     np.testing.assert_allclose(run["error_rad"][-1], -OFFSET, rtol=0, atol=1e-14)
@@ -283,7 +283,7 @@ def test_a_payload_falls_as_a_pendulum(engine, gravity, actuator):
 
 
 def test_without_gravity_a_payload_does_not_sag(actuator):
-    loaded = {"plant.payload_kg": PAYLOAD_KG, "controller.surface_slope": 400.0}
+    loaded = {"plant.payload_kg": PAYLOAD_KG, "controller.stiffness": 400.0}
     floating = table(4000, "hold", PD | loaded | {"plant.gravity_m_s2": 0.0})
     # The slower of the two poles, without the payload's 20 % of inertia, is some 10 1/s.
     np.testing.assert_allclose(floating["error_rad"][-1], 0, atol=1e-12)

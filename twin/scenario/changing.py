@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from spheretwin.control.laws.registry import NAMES
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.scenario.fields import Kind, kind_of, section_kind
 from spheretwin.twin.scenario.own_law import scenario_with
@@ -38,7 +39,7 @@ def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
     """
     fields = scenario.model_dump(mode="json")
     if isinstance(scenario.controller, OwnController):
-        fields["controller"] = {"period_s": scenario.controller.period_s}
+        fields["controller"] = {"law": NAMES[0], "period_s": scenario.controller.period_s}
     # A user's law stays the one that was read, whatever has become of its file.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
     _keep_common(fields, dotted, value, kind)

@@ -49,7 +49,12 @@ def _unknown(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
     place = place_of(scenario, tuple(above))
     members = place.kind.members.values() if place.kind else ()
     valid = list(dict.fromkeys(field for member in members for field in member.model_fields))
-    everywhere = (dotted for dotted, _ in every_field(scenario) if INDEX not in dotted)
+    here = f"{place.dotted}." if place.dotted else ""
+    everywhere = (
+        dotted
+        for dotted, _ in every_field(scenario)
+        if INDEX not in dotted and not (here and dotted.startswith(here))
+    )
     elsewhere = next((f"; did you mean {d}?" for d in everywhere if d.endswith(f".{name}")), "")
     return (
         f"expected one of {', '.join(valid)} in {place.dotted or 'the scenario'},"

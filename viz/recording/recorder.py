@@ -18,7 +18,7 @@ from spheretwin.models.actuator import MJCF_PATH, Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile
 from spheretwin.models.base.wording import without_breaks
-from spheretwin.models.telemetry.signals import SIGNALS, Signal
+from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import palette
 from spheretwin.viz.recording import blueprint, scene
@@ -39,8 +39,6 @@ PENDING_CHUNKS = 3
 MOST_ROWS = 12_288
 
 _SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
-
-_COMMON = {signal.name for signal in SIGNALS}
 
 
 class Recorder:
@@ -92,7 +90,7 @@ class Recorder:
         self._next_frame = self._handed_over = 0
         self._waiting: list[Table] = []
         self._last_tips: dict[str, NDArray[np.float64]] = {}
-        own = tuple(signal for signal in signals if signal.name not in _COMMON)
+        own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
         view = scenario["duration"], self._limit_A, own, live
         self._recording = rr.RecordingStream(blueprint.application(*view))
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything

@@ -9,8 +9,10 @@ import pytest
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile, check_writable, whole_file
 from spheretwin.models.telemetry.file import PART_ROWS, TelemetryFile
-from spheretwin.models.telemetry.signals import SIGNALS, width
+from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
+
+SIGNALS = common_signals(18)
 
 
 def test_file_appears_when_the_block_ends(tmp_path):

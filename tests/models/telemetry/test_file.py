@@ -18,8 +18,10 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry import file as telemetry_file
 from spheretwin.models.telemetry import parts as telemetry_parts
 from spheretwin.models.telemetry.file import TelemetryFile, join
-from spheretwin.models.telemetry.signals import SIGNALS, Signal, width
+from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table, read_parquet
+
+SIGNALS = common_signals(18)
 
 PART_ROWS = 64
 GAIN, SLIP = Signal("gain", "1", 2, "a law's own"), Signal("slip", "m", 1, "another law's own")
@@ -309,8 +311,10 @@ import sys
 import numpy as np
 from pathlib import Path
 from spheretwin.models.telemetry import file as telemetry_file
-from spheretwin.models.telemetry.signals import SIGNALS, width
+from spheretwin.models.telemetry.signals import width, common_signals
 from spheretwin.models.telemetry.table import Table
+
+SIGNALS = common_signals(18)
 telemetry_file.PART_ROWS = 64
 path, rows, seed, pause = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4] == "pause"
 whole = Table(SIGNALS, np.random.default_rng(seed).normal(size=(rows, width(SIGNALS))))

@@ -5,8 +5,10 @@ import pytest
 
 from spheretwin.models.base import files
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.telemetry.signals import SIGNALS, offsets, width
+from spheretwin.models.telemetry.signals import common_signals, offsets, width
 from spheretwin.models.telemetry.table import Table, read_parquet
+
+SIGNALS = common_signals(18)
 
 
 @pytest.fixture

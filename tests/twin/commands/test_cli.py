@@ -168,7 +168,7 @@ def _wait_for(condition, seconds=60):
         ([], ["VERB"]),
         (["simulate"], ["hold, nutation, sinusoid, tilt"]),
         (["simulate", "spiral"], ["hold, nutation, sinusoid, tilt", "spiral"]),
-        (["simulate", "hold", "--controller.law", "pid"], ["'pd'", "'afsm'", "'pid'"]),
+        (["simulate", "hold", "--controller.law", "pid"], ["pd, adaptive_fuzzy, afsm", "'pid'"]),
         (["simulate", "hold", "--controler.law", "pd"], ["controller", "controler"]),
         (["simulate", "hold", "--duration", "nan"], ["duration", "nan"]),
         (["simulate", "hold", "--duration", "Infinity"], ["duration", "inf"]),

@@ -7,7 +7,11 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.scenario import flags, reading
-from spheretwin.twin.scenario.fields import fields_of
+from spheretwin.twin.scenario.changing import changed as changed_in
+from spheretwin.twin.scenario.fields import every_field
+from spheretwin.twin.scenario.sections import Scenario
+
+PATHS = ("plant.mjcf", "plant.torque_curve", "nominal.torque_curve")
 
 
 def test_shipped_scenarios_load_under_their_names():
@@ -50,7 +54,10 @@ def test_flags_reach_every_field():
 @pytest.mark.parametrize(
     ("overrides", "parts"),
     [
-        ({"controller.law": "pid"}, ["controller.law", "'pd'", "'afsm'", "'pid'"]),
+        (
+            {"controller.law": "pid"},
+            ["controller.law", "pd, adaptive_fuzzy, afsm", "'pid'", "did you mean pd?"],
+        ),
         ({"controler.law": "pd"}, ["controller", "plant", "controler"]),
         ({"plant.colour": 1}, ["modelling_error", "plant", "colour"]),
         ({"trajectory.colour": 1}, ["beta_growth_rad_s", "trajectory", "colour"]),
@@ -187,8 +194,10 @@ def test_an_overflow_is_told_as_it_was_given():
 
 
 def test_every_field_that_names_a_file_is_known_as_one():
-    texts = {name for name in fields_of(scenarios.Scenario) if name.endswith(("mjcf", "curve"))}
-    assert texts == set(reading.PATHS)
+    names = {name for name, _ in every_field(Scenario) if name.endswith(("mjcf", "curve", "file"))}
+    marked = {name for name, field in every_field(Scenario) if (field.json_schema_extra or {}).get("path")}
+    assert names == marked - {"controller.law"}
+    assert set(PATHS) <= names
 
 
 def test_the_controller_s_torque_curve_is_taken_as_the_plant_s(tmp_path, monkeypatch):
@@ -199,11 +208,11 @@ def test_the_controller_s_torque_curve_is_taken_as_the_plant_s(tmp_path, monkeyp
     assert scenarios.load("~/s.toml", flags_).nominal.torque_curve == f"{tmp_path}/c.csv"
 
 
-@pytest.mark.parametrize("name", reading.PATHS)
+@pytest.mark.parametrize("name", PATHS)
 def test_a_tilde_in_a_change_is_the_user_s_home(tmp_path, monkeypatch, name):
     monkeypatch.setenv("HOME", str(tmp_path))
     section, field = name.split(".")
-    changed = scenarios.changed(scenarios.load("hold"), name, "~/a")
+    changed = changed_in(scenarios.load("hold"), name, "~/a")
     assert getattr(getattr(changed, section), field) == f"{tmp_path}/a"
-    again = scenarios.changed(changed, "disturbance.load", 1.0)
+    again = changed_in(changed, "disturbance.load", 1.0)
     assert getattr(getattr(again, section), field) == f"{tmp_path}/a"

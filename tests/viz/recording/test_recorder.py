@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.kinematics import rotation
-from spheretwin.models.telemetry.signals import SIGNALS, width
+from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.session import Session
@@ -26,6 +26,8 @@ from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz import palette
 from spheretwin.viz.recording import recorder as recording
 from spheretwin.viz.recording.recorder import PENDING_CHUNKS, Recorder, blueprint, scene
+
+SIGNALS = common_signals(18)
 
 
 def recorded(path, name="nutation", **changes):

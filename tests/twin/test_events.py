@@ -1,0 +1,167 @@
+"""Changes that a scenario plans itself: the same as made by hand, in TOML, by flag, in replay."""
+
+import numpy as np
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import cli
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario import flags
+from spheretwin.twin.scenario.planned import Change
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import simulate
+
+EVENTS = """
+[[event]]
+t_s = 0.15
+set = "disturbance.load"
+value = 2.0
+
+[[event]]
+t_s = 0.05
+set = "controller.law"
+value = "pd"
+
+[[event]]
+t_s = 0.1
+set = "sensors.angle_offset_rad"
+value = [0.01, 0.0, 0.0]
+"""
+HOLD = 'duration = 0.3\n[trajectory]\nshape = "hold"\nangle_rad = [0.1, 0.0, 0.0]\n'
+
+
+@pytest.fixture
+def planned(tmp_path):
+    (path := tmp_path / "planned.toml").write_text(HOLD + EVENTS)
+    return scenarios.load(str(path))
+
+
+@pytest.fixture
+def by_hand(tmp_path):
+    (path := tmp_path / "by_hand.toml").write_text(HOLD)
+    with Session(scenarios.load(str(path))) as session:
+        tables = [session.advance(50)]
+        session.set("controller.law", "pd")
+        tables.append(session.advance(50))
+        session.set("sensors.angle_offset_rad", [0.01, 0.0, 0.0])
+        tables.append(session.advance(50))
+        session.set("disturbance.load", 2.0)
+        tables.append(session.advance(150))
+        return tables
+
+
+def chunks(session, length):
+    tables = []
+    while session.tick < 300:
+        tables.append(session.advance(min(length, 300 - session.tick)))
+    return tables
+
+
+def common(tables):
+    names = ("t_s", "q_rad", "qdot_rad_s", "torque_command_Nm", "current_A", "disturbance_Nm")
+    return {name: np.concatenate([table[name] for table in tables]).tobytes() for name in names}
+
+
+@pytest.mark.parametrize("length", [1, 7, 50, 300])
+def test_an_event_is_a_change_made_by_hand_whatever_the_chunks(planned, by_hand, length):
+    with Session(planned) as session:
+        assert common(chunks(session, length)) == common(by_hand)
+        assert session.journal == ()
+        assert [change.tick for change in session.events] == [50, 100, 150]
+
+
+def test_columns_are_right_before_the_rows_that_have_them(planned):
+    with Session(planned) as session:
+        assert len(session.advance(300)) == 50  # a law without a sliding surface ends the columns
+        assert "sliding_s" not in [signal.name for signal in session.signals]
+        assert len(session.advance(300)) == 50  # then there is a measurement beside the truth
+        assert len(session.advance(200)) == 200  # a load changes no column
+
+
+def test_an_event_at_the_start_is_in_force_at_the_first_tick(planned):
+    event = {"event": [{"t_s": 0, "set": "disturbance.load", "value": 1.0}]}
+    early = simulate(scenarios.load("hold", {**event, "disturbance.load": 0.0, "duration": 0.05}))
+    plain = simulate(scenarios.load("hold", {"disturbance.load": 1.0, "duration": 0.05}))
+    np.testing.assert_array_equal(early.telemetry.values, plain.telemetry.values)
+
+
+@pytest.mark.parametrize("at", [30, 50, 120, 160])
+def test_a_snapshot_goes_on_with_the_events_to_come(planned, at):
+    with Session(planned) as session, Session(planned) as other:
+        while session.tick < at:
+            session.advance(at - session.tick)
+        other.restore(session.snapshot())
+        assert common(chunks(other, 40)) == common(chunks(session, 300))
+
+
+def test_flags_write_the_same_list(planned):
+    tokens = ["--event.0.t-s", "0.15", "--event.0.set", "disturbance.load", "--event.0.value", "2.0"]
+    scenario = scenarios.load("hold", flags.overrides(tokens))
+    assert scenario.event == planned.event[:1]
+    changed = scenarios.load("hold", flags.overrides([*tokens, "--event.0.value", "3.0"]))
+    assert changed.event[0].value == 3.0
+    rows = {flag: value for flag, value, _ in flags.described(scenario)}
+    assert rows["--event.0.set"] == "disturbance.load"
+    assert "--event" in {flag for flag, *_ in flags.described(scenarios.load("hold"))}
+
+
+@pytest.mark.parametrize(
+    ("tokens", "part"),
+    [
+        ("--event.1.t-s 0.1", "expected a place from 0 to 0 in a list, received event.1.t_s"),
+        ("--event.0.t-s 0.1", "event.0.set: expected a value, received none"),
+        ("--event.0.t-s -1 --event.0.set seed --event.0.value 1", "event.0.t_s: expected greater than"),
+        ("--event.0.t-s 0 --event.0.set seed --event.0.value 1", "event.0.set: expected a field that may"),
+        ("--event.0.t-s 0 --event.0.set controller.law --event.0.value pid", "as event.0 sets it"),
+        ("--event.0.t-s 0 --event.0.set disturbance.lod --event.0.value 1", "did you mean load"),
+        ("--event.0.t-s 0 --event.0.set seed --event.0.value 1 --event.0.at 0", "in event.0, received at"),
+        ("--event 3", "event: expected"),
+    ],
+)  # fmt: skip
+def test_an_event_that_is_none_is_refused_before_the_run(tokens, part):
+    with pytest.raises(InputError) as caught:
+        scenarios.load("hold", flags.overrides(tokens.split()))
+    assert part in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_replay_makes_them_again_and_nothing_twice(planned, tmp_path):
+    (source := tmp_path / "again.toml").write_text(HOLD + EVENTS)
+    first, again = tmp_path / "first.parquet", tmp_path / "second.parquet"
+    assert cli.main(["simulate", str(source), "--telemetry", str(first)]) == 0
+    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
+    assert first.read_bytes() == again.read_bytes()
+
+
+def test_every_follower_is_told(planned):
+    class Follower:
+        def __init__(self):
+            self.noted = []
+
+        def write(self, rows):
+            pass
+
+        def note(self, t_s, text):
+            self.noted.append((round(t_s, 9), text))
+
+        def finish(self, status):
+            pass
+
+    simulate(planned, sinks=[follower := Follower()])
+    assert follower.noted == [
+        (0.05, "controller.law set to pd"),
+        (0.1, "sensors.angle_offset_rad set to [0.01, 0.0, 0.0]"),
+        (0.15, "disturbance.load set to 2.0"),
+    ]
+
+
+def test_a_file_that_an_event_names_is_taken_from_where_it_is_written(tmp_path):
+    event = '\n[[event]]\nt_s = 0.1\nset = "plant.torque_curve"\nvalue = "weak.csv"\n'
+    (tmp_path / "s.toml").write_text(HOLD + event)
+    from spheretwin.models.actuator import TORQUE_CURVE_PATH
+
+    (tmp_path / "weak.csv").write_bytes(TORQUE_CURVE_PATH.read_bytes())
+    scenario = scenarios.load(str(tmp_path / "s.toml"))
+    assert scenario.event[0].value == f"{tmp_path}/weak.csv"
+    assert Change(100, "plant.torque_curve", f"{tmp_path}/weak.csv").value == scenario.event[0].value
+    assert simulate(scenario).status == "completed"

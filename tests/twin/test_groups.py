@@ -1,0 +1,85 @@
+"""Actuators of another number of coil groups: signals, allocation, files and recording follow the model."""
+
+import re
+
+import numpy as np
+import pytest
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin import cli
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.simulation import simulate
+
+MIDDLE_RING = re.compile(
+    r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>'
+)
+
+
+@pytest.fixture(params=[12, 24])
+def groups(request):
+    return request.param
+
+
+@pytest.fixture
+def model(tmp_path, groups):
+    """The shipped actuator without its middle ring of coils, or with twice as many in it."""
+    text = actuators.MJCF_PATH.read_text()
+    assert MIDDLE_RING.search(text)
+    ring = MIDDLE_RING.search(text)[0].replace('count="12" euler="0 0 30"', 'count="24" euler="0 0 15"')
+    text = MIDDLE_RING.sub(ring if groups == 24 else "", text)
+    path = tmp_path / f"groups_{groups}.xml"
+    path.write_text(text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"'))
+    return path
+
+
+def test_the_matrix_has_a_column_for_each_group(model, groups):
+    actuator = actuators.load(model)
+    assert len(actuator.groups) == groups
+    G = torque_matrix(np.array([0.3, -0.2, 0.7]), actuator)
+    assert G.shape == (3, groups)
+    # The coils that both have pull alike, whatever stands between them.
+    shipped = actuators.load()
+    whole = torque_matrix(np.array([0.3, -0.2, 0.7]), shipped)
+    for axis, column in zip(actuator.group_axes, G.T, strict=True):
+        same = np.abs(shipped.group_axes @ axis) > 1 - 1e-12
+        if same.any():
+            sign = np.sign(shipped.group_axes[same][0] @ axis)
+            # The same sum over pole lines, rounded alike but for the sign.
+            np.testing.assert_allclose(column, sign * whole[:, same][:, 0], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
+@pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
+def test_a_run_tracks_with_the_groups_there_are(model, groups, engine, allocation):
+    changes = {"plant.mjcf": str(model), "duration": 0.4, "plant.engine": engine, "allocation": allocation}
+    run = simulate(scenarios.load("hold", changes))
+    table = run.telemetry
+    assert run.status == "completed"
+    assert table["current_A"].shape == table["current_command_A"].shape == (400, groups)
+    signal = next(each for each in table.signals if each.name == "current_A")
+    assert signal.labels[-1] == f"group {groups - 1}"
+    actuator = actuators.load(model)
+    for row in (1, 200, 399):  # what is logged is what the currents give, G_t(q) I (15)
+        G = torque_matrix(table["q_rad"][row], actuator)
+        # A product of 3 x 24 numbers, summed in another order.
+        np.testing.assert_allclose(G @ table["current_A"][row], table["torque_Nm"][row], rtol=0, atol=1e-13)
+    assert np.abs(table["error_rad"][-1]).max() < 0.5 * np.abs(table["error_rad"][0]).max()
+
+
+def test_a_run_is_written_recorded_and_replayed(model, groups, tmp_path, capsys):
+    first, again = tmp_path / "run.parquet", tmp_path / "again.parquet"
+    flags = ["--plant.mjcf", str(model), "--duration", "0.1"]
+    record = ["--record", str(tmp_path / "run.rrd")]
+    assert cli.main(["simulate", "nutation", *flags, "--telemetry", str(first), *record]) == 0
+    assert (tmp_path / "run.rrd").stat().st_size > 0
+    assert read_parquet(first)[0]["current_A"].shape == (100, groups)
+    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
+    assert first.read_bytes() == again.read_bytes()
+    assert capsys.readouterr().err == ""
+
+
+def test_gains_of_groups_are_as_many(model, groups):
+    changes = {"plant.mjcf": str(model), "duration": 0.01, "plant.group_gain": [1.0] * groups}
+    assert simulate(scenarios.load("hold", changes)).status == "completed"
