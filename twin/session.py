@@ -23,21 +23,19 @@ from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown
 from spheretwin.models.magnetics import torque_model
+from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
 from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.matching import matching
-from spheretwin.twin.plant.plant import DIVERGED, GOING, LEFT_WORKSPACE
 from spheretwin.twin.scenario.changing import changed, is_fixed
-from spheretwin.twin.scenario.planned import Change, planned
+from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories import shapes as trajectory
-
-RUNNING = "running"
-STATUS = {GOING: RUNNING, LEFT_WORKSPACE: "left_workspace", DIVERGED: "diverged"}
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Snapshot:
     files: str
     """Digest of model and torque curves."""
     tick: int
-    status: str
+    status: Status
     rotor: NDArray[np.float64]
     current: NDArray[np.float64]
     parameters: NDArray[np.float64]
@@ -109,7 +107,7 @@ class Session:
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
         self.events: tuple[Change, ...] = ()
-        self._status = RUNNING
+        self._status = Status.RUNNING
         self._files = assembly.files_of(scenario)
         self.scenario = self.begun_as = self._resolved(scenario)
         self._exogenous = Exogenous(self.scenario)
@@ -125,8 +123,8 @@ class Session:
         return self._files.actuator
 
     @property
-    def status(self) -> str:
-        """``running``, ``left_workspace`` or ``diverged``."""
+    def status(self) -> Status:
+        """``running``, or why the run can go on no further, as ``left_workspace`` or ``diverged``."""
         return self._status
 
     @property
@@ -297,7 +295,7 @@ class Session:
 
     def _advance(self, log: NDArray[np.float64]) -> int:
         done = 0
-        while done < len(log) and self._status == RUNNING:
+        while done < len(log) and self._status == Status.RUNNING:
             try:
                 inputs = self._exogenous.rows(self.tick, self._most(len(log) - done))
             except InputError:
@@ -324,7 +322,7 @@ class Session:
     def _make_planned(self) -> None:
         """Make the changes of all events whose tick has come."""
         for change in self._waiting():
-            if change.tick > self.tick or self._status != RUNNING:
+            if change.tick > self.tick or self._status != Status.RUNNING:
                 break
             with self._all_or_nothing():
                 self._change(change.name, change.value, None)
@@ -335,11 +333,11 @@ class Session:
         try:
             ticks, code = self._loop(inputs, *self._parts, log)
         except BaseException:  # a law in plain Python: the state is somewhere within a tick
-            self._status = STATUS[DIVERGED]
+            self._status = Status.DIVERGED
             raise
         self.loop_s += time.perf_counter() - started
         self.tick += ticks
-        self._status = STATUS[code]
+        self._status = BY_CODE[code]
         return ticks
 
     def _resolved(self, scenario: Scenario) -> Scenario:

@@ -5,20 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.telemetry.kept import KeptTelemetry
+from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import width
-from spheretwin.models.telemetry.table import Table, allocated, joined
-from spheretwin.twin.scenario.planned import Change
+from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.session import RUNNING, Session
-
-COMPLETED = "completed"
-INTERRUPTED = "interrupted"
+from spheretwin.twin.session import Session
 
 # Long enough to make the calls between chunks cheap, short enough for a progress bar and for Ctrl-C.
 CHUNK_STEPS = 2000
@@ -34,7 +34,7 @@ class Sink(Protocol):
     def note(self, t_s: float, text: str) -> None:
         """Take note of what happened before the tick at `t_s`."""
 
-    def finish(self, status: str) -> None:
+    def finish(self, status: Status) -> None:
         """Take note of how the run ended."""
 
 
@@ -46,18 +46,21 @@ class Run:
     ----------
     scenario : Scenario
         Resolved: what was left open is filled in from the model and the trajectory.
-    status : str
-        ``completed``, ``left_workspace``, ``diverged`` or ``interrupted``.
+    status : Status
+        ``completed``, or why it ended before.
     telemetry : Table
         One row a control tick, up to where the run ended.
     wall_s : float
         Wall time of the simulated loop alone, s.
+    actuator : Actuator
+        What was simulated.
     """
 
     scenario: Scenario
-    status: str
+    status: Status
     telemetry: Table
     wall_s: float
+    actuator: Actuator
 
 
 def simulate(scenario: Scenario, law: Law | None = None, sinks: Sequence[Sink] = ()) -> Run:
@@ -80,29 +83,14 @@ def simulate(scenario: Scenario, law: Law | None = None, sinks: Sequence[Sink] =
     """
     with Session(scenario, law) as session:
         if scenario.event:  # which may change the columns
-            kept = _Kept([])
+            kept = KeptTelemetry(session.signals, scenario.ticks)
             status = follow(session, scenario.ticks, [kept, *sinks])
-            telemetry = joined(kept.tables or [session.advance(0)])
+            telemetry = kept.table
         else:
             log = allocated(scenario.ticks, width(session.signals))
             status = follow(session, scenario.ticks, sinks, log=log)
             telemetry = Table(session.signals, log[: session.tick])
-        return Run(session.begun_as, status, telemetry, session.loop_s)
-
-
-class _Kept(NamedTuple):
-    """Keeps the tables of a run as they come."""
-
-    tables: list[Table]
-
-    def write(self, rows: Table) -> None:
-        self.tables.append(rows)
-
-    def note(self, t_s: float, text: str) -> None:
-        pass
-
-    def finish(self, status: str) -> None:
-        pass
+        return Run(session.begun_as, status, telemetry, session.loop_s, session.actuator)
 
 
 def follow(
@@ -114,7 +102,7 @@ def follow(
     journal: Sequence[Change] = (),
     live: bool = False,
     stop_requested: Callable[[], bool] = lambda: False,
-) -> str:
+) -> Status:
     """Advance a session to a tick, and hand every chunk on.
 
     Parameters
@@ -136,7 +124,7 @@ def follow(
 
     Returns
     -------
-    str
+    Status
         How the run ended.
 
     Raises
@@ -149,7 +137,7 @@ def follow(
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
     noted = _note_events(session, 0, sinks)
-    while session.tick < ticks and session.status == RUNNING and not stop_requested():
+    while session.tick < ticks and session.status == Status.RUNNING and not stop_requested():
         _make(session, ticks, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
         rows = _advance(session, last, log)
@@ -160,8 +148,8 @@ def follow(
             _sleep_until(started + session.t_s - first)
     _make(session, ticks, waiting, sinks)  # what came after the last tick is in the journal too
     status = session.status
-    if status == RUNNING:
-        status = COMPLETED if session.tick >= ticks else INTERRUPTED
+    if status == Status.RUNNING:
+        status = Status.COMPLETED if session.tick >= ticks else Status.INTERRUPTED
     for sink in sinks:
         sink.finish(status)
     return status

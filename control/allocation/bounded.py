@@ -27,8 +27,8 @@ from math import copysign, inf, isfinite
 
 from spheretwin.control.allocation.least_norm import allocate
 from spheretwin.control.allocation.simplex import NOISE, TIE, climb
+from spheretwin.control.allocation.vectors import NONE, Array, Vector, column, dot, length, off, plus, unit
 from spheretwin.models.base.compiled import compiled
-from spheretwin.models.base.vectors import NONE, Array, Vector, column, dot, length, off, plus, unit
 
 # Demands (currents wanted of each group, in limits; past ±1 where it is held at its limit), their rates along
 # the line, the limit that holds each group (-1, 1, or 0 where it is free), lengths of the columns, and steps.

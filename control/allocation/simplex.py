@@ -2,8 +2,8 @@
 
 from math import copysign, inf
 
+from spheretwin.control.allocation.vectors import NONE, Array, Vector, column, cross, dot, length, plus
 from spheretwin.models.base.compiled import compiled
-from spheretwin.models.base.vectors import NONE, Array, Vector, column, cross, dot, length, plus
 
 # Share of the terms' size below which a rate or a gain is rounding.
 NOISE = 1e-12

@@ -1,4 +1,4 @@
-"""Python of the user's: an object in a file, named ``FILE.py:NAME``."""
+"""Python of the user's: an object in a file, named ``FILE.py:NAME`` on a command line or in a scenario."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import hashlib
 import os
 import re
 import sys
+import traceback
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -27,50 +29,79 @@ def file_of(reference: str) -> str:
     return reference.rpartition(":")[0]
 
 
-def load_named(reference: str, what: str) -> Any:
-    """Object that a reference names; its file is run once for what it holds.
-
-    Parameters
-    ----------
-    reference : str
-        ``FILE.py:NAME``; ``~`` is the user's home.
-    what : str
-        What it is for, to begin a complaint with.
+def load_function(reference: str, what: str) -> Callable[..., Any]:
+    """Function that a reference names, as `load_named` finds it.
 
     Raises
     ------
     InputError
-        The reference is none, its file cannot be read or run, or holds no such name.
+        There is none, or it is no function.
+    """
+    function = load_named(reference, what)
+    if not callable(function):
+        raise InputError(f"{what}: expected a function, received {reference}, {shown(function)}")
+    return function
+
+
+def load_named(reference: str, what: str) -> Any:
+    """Object that a reference names.
+
+    Parameters
+    ----------
+    reference : str
+        ``FILE.py:NAME``; ``~`` is the user's home. The file is run once for what it holds: an edit is seen
+        by the next call.
+    what : str
+        What the object is to be, as the first words of a complaint.
+
+    Raises
+    ------
+    InputError
+        It is no reference, the file cannot be read or does not run, or holds no such name.
     """
     match = _REFERENCE.fullmatch(reference)
     if match is None:
-        raise InputError(f"{what}: expected FILE.py:NAME, received {shown(reference)}")
+        raise InputError(f"{what}: expected path/to/file.py:name, received {shown(reference)}")
     path, name = Path(os.path.expanduser(match["file"])), match["name"]
     try:
         source = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
-        raise InputError(f"{what} {reference}: expected a readable Python file, {error}") from None
-    module = _module(path.resolve(), source, f"{what} {reference}")
-    if name not in vars(module):
-        own = [each for each in vars(module) if not each.startswith("_")]
-        raise InputError(
-            f"{what} {reference}: expected a name that the file defines, received {name}"
-            f"{did_you_mean(name, own)}"
-        )
-    return vars(module)[name]
+        raise InputError(f"{what}: expected a readable file of Python, {error}") from None
+    defined = vars(_module(path, source, what))
+    if name not in defined:
+        known = [key for key, value in defined.items() if callable(value) and not key.startswith("__")]
+        expected = f"one of {', '.join(known)}" if known else "a function"
+        raise InputError(f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, known)}")
+    return defined[name]
 
 
 @lru_cache(maxsize=32)
-def _module(path: Path, source: bytes, complaint: str) -> ModuleType:
-    """Module of a file, run once as long as its content stays the same: an edit is seen by the next load."""
+def _module(path: Path, source: bytes, what: str) -> ModuleType:
+    """Module of a file, run once as long as its content stays the same.
+
+    Compiled from that content: the import system would take an older `.pyc` for a file that was edited
+    within the second, and leave a folder beside it.
+    """
     digest = hashlib.sha256(source).hexdigest()[:12]
-    module = ModuleType(f"{path.stem}_{digest}")
+    module = ModuleType(f"spheretwin_user_{path.stem}_{digest}")
     module.__file__ = str(path)
-    sys.modules[module.__name__] = module  # where classes and compiled functions look for their globals
+    sys.modules[module.__name__] = module  # dataclasses and pickles look their module up by its name
     try:
-        exec(compile(source, str(path), "exec"), module.__dict__)
-    except Exception as error:  # whatever a user's file may raise
+        exec(compile(source, str(path), "exec"), vars(module))
+    except (Exception, SystemExit) as error:
         del sys.modules[module.__name__]
-        told = without_breaks(error) or type(error).__name__
-        raise InputError(f"{complaint}: expected a file that runs, {type(error).__name__}: {told}") from None
+        raise InputError(
+            f"{what}: expected a file of Python that runs, received {path}: {_told(error, path)}"
+        ) from None
     return module
+
+
+def _told(error: BaseException, path: Path) -> str:
+    """What went wrong, and in which line of the file."""
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        return f"{type(error).__name__} in line {error.lineno}: {error.msg}"
+    lines = [
+        frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)
+    ]
+    place = f" in line {lines[-1]}" if lines else ""
+    return f"{type(error).__name__}{place}: {without_breaks(error)}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,26 +33,6 @@ def _places(signals: tuple[Signal, ...]) -> dict[str, tuple[int, int]]:
     """First column and size of each signal."""
     first = offsets(signals)
     return {signal.name: (first[signal.name], signal.size) for signal in signals}
-
-
-def joined(tables: Sequence[Table]) -> Table:
-    """One table of several, one after the other; what one does not have is no number there.
-
-    Parameters
-    ----------
-    tables : sequence of Table
-        At least one; signals of the same name are the same.
-    """
-    signals = tuple({signal.name: signal for table in tables for signal in table.signals}.values())
-    values = np.full((sum(map(len, tables)), width(signals)), np.nan)
-    places, first = offsets(signals), 0
-    for table in tables:
-        rows = values[first : first + len(table)]
-        for signal in table.signals:
-            place = places[signal.name]
-            rows[:, place : place + signal.size] = table[signal.name].reshape(len(table), signal.size)
-        first += len(table)
-    return Table(signals, values)
 
 
 def allocated(rows: int, columns: int) -> NDArray[np.float64]:

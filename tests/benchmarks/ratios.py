@@ -26,6 +26,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.facts import facts_of
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
@@ -173,8 +174,8 @@ def run_seconds(folder: Path | None) -> Callable[[], float]:
             if folder is None:
                 follow(session, scenario.ticks, [])
                 return
-            path, resolved = folder / f"run{next(names)}.rrd", session.begun_as.model_dump(mode="json")
-            with Recorder(session.actuator, session.signals, resolved, path=path) as recorder:
+            path, facts = folder / f"run{next(names)}.rrd", facts_of(session.begun_as)
+            with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
                 follow(session, scenario.ticks, [recorder])
 
     return lambda: seconds_of(work)

@@ -182,9 +182,9 @@ def test_its_telemetry_names_the_law_and_its_file(file, tmp_path):
     [
         (FILE, "ComputedTork", "did you mean ComputedTorque"),
         (FILE, "number", "a subclass of LawParameters, a Law, or a function, received 3"),
-        ("import nothing_of_that_name", "mine", "expected a file that runs, ModuleNotFoundError"),
-        ("1 +", "mine", "expected a file that runs, SyntaxError"),
-        (None, "mine", "expected a readable Python file"),
+        ("import nothing_of_that_name", "mine", "expected a file of Python that runs"),
+        ("1 +", "mine", "SyntaxError in line 1"),
+        (None, "mine", "expected a readable file of Python"),
         (FILE, "ComputedTorque", None),
     ],
 )

@@ -13,6 +13,7 @@ from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import cli, replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands.outputs import Outputs
+from spheretwin.twin.facts import record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow
 
@@ -106,10 +107,18 @@ def test_a_file_that_changes_under_a_run_is_told_as_the_run_had_it(folder, edit)
 
 def test_a_file_of_a_version_that_told_no_files_replays(folder):
     run = Session(scenarios.load("hold", {"controller.law": "pd", **PATHS}))
-    table, known = run.advance(5), replay.facts(run)
+    table, known = run.advance(5), record_of(run).metadata()
     del known["files"]
     table.write_parquet(folder / "old.parquet", known)
     assert replay.read(folder / "old.parquet").ticks == 5
+
+
+def test_a_file_whose_end_is_none_is_refused_by_its_name(folder):
+    run = Session(scenarios.load("hold", {"controller.law": "pd", **PATHS}))
+    table = run.advance(5)
+    table.write_parquet(path := folder / "odd.parquet", {**record_of(run).metadata(), "status": "flying"})
+    with pytest.raises(InputError, match=r"replay .*odd\.parquet: status: expected one of .*'flying'"):
+        replay.read(path)
 
 
 def test_a_model_with_the_same_contents_is_the_same_model(tmp_path):

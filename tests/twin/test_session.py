@@ -27,6 +27,7 @@ from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.twin import cli, replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.exogenous import BLOCK_TICKS
+from spheretwin.twin.facts import facts_of, record_of
 from spheretwin.twin.session import Change, Session
 from spheretwin.twin.simulation import follow, simulate
 
@@ -677,7 +678,7 @@ def test_the_actuator_follows_a_change_of_its_torque_curve(actuator, tmp_path):
 def recorded(path, changes=(), law=None, ticks=600, **overrides):
     """A run of a session with changes at their ticks, as its user would write it to a file."""
     live = session(law, **overrides)
-    file = TelemetryFile(path, live.signals, replay.facts(live))
+    file = TelemetryFile(path, live.signals, record_of(live).metadata())
     parts = []
     for tick, name, value in [*changes, (ticks, None, None)]:
         parts.append(live.advance(tick - live.tick))
@@ -685,7 +686,7 @@ def recorded(path, changes=(), law=None, ticks=600, **overrides):
         if name:
             live.set(name, value)
     file.finish("completed" if live.status == "running" else live.status)
-    file.close(replay.facts(live))
+    file.close(record_of(live).metadata())
     return live, parts
 
 
@@ -706,9 +707,9 @@ def test_a_file_replays_to_the_same_bytes(engine, changes, tmp_path):
     _, parts = recorded(first := tmp_path / "a.parquet", changes, **{"plant.engine": engine})
     plan = replay.read(first)
     again = Session(plan.scenario)
-    file = TelemetryFile(second := tmp_path / "b.parquet", again.signals, replay.facts(again))
+    file = TelemetryFile(second := tmp_path / "b.parquet", again.signals, record_of(again).metadata())
     assert follow(again, plan.ticks, [file], journal=plan.journal) == "completed"
-    file.close(replay.facts(again))
+    file.close(record_of(again).metadata())
     assert second.read_bytes() == first.read_bytes()
     assert read_parquet(second)[0].values.tobytes() == b"".join(map(rows, parts))
     assert again.journal == plan.journal
@@ -777,7 +778,7 @@ def test_what_holds_no_run_is_refused_on_one_line(tmp_path, capsys):
     run = session().advance(10)
     run.write_parquet(bare := tmp_path / "bare.parquet", {})
     assert "expected scenario, journal and ticks" in refused(bare, capsys)
-    known = replay.facts(Session(scenario()))
+    known = record_of(Session(scenario())).metadata()
     run.write_parquet(path := tmp_path / "none.parquet", known)
     assert "at least one tick, received 0" in refused(path, capsys)
     for name, text in [
@@ -900,9 +901,8 @@ def test_a_recording_is_named_by_the_law_that_ran(tmp_path):
     from spheretwin.viz.recording.recorder import Recorder
 
     live = session(compiled_law("cautious"), name="hold")
-    described = live.begun_as.model_dump(mode="json")
     path = tmp_path / "run.rrd"
-    with Recorder(live.actuator, live.signals, described, path=path) as sink:
+    with Recorder(live.actuator, live.signals, facts_of(live.begun_as), path=path) as sink:
         follow(live, 20, [sink])
     batches = [chunk.to_record_batch() for chunk in RrdReader(path).stream()]
     names = [batch.column(NAME).to_pylist() for batch in batches if NAME in batch.schema.names]

@@ -19,7 +19,7 @@ from rich.table import Table
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import metrics
+from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.crosscheck import STATES
 
 if TYPE_CHECKING:
@@ -70,11 +70,11 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     with _progress(len(suite.PARTS)) as begun:
         evidence = suite.run(options.mjcf, options.states, begun)
     wall_s = time.perf_counter() - started
-    checks, versions = evidence.checks, metrics.versions()
-    written = page.write(options.out, evidence, versions) if options.out else None
+    checks = evidence.checks
+    written = page.write(options.out, evidence, versions()) if options.out else None
     if options.json:
         rows = [check.row() for check in checks]
-        print(json.dumps({"checks": rows, "wall_s": wall_s, "versions": versions}, allow_nan=False))
+        print(json.dumps({"checks": rows, "wall_s": wall_s, "versions": versions()}, allow_nan=False))
     else:
         _print(checks, wall_s, written)
     broken = [check.name for check in checks if not check.ok]

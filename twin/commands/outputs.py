@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.file import TelemetryFile
-from spheretwin.twin import replay
+from spheretwin.twin.facts import facts_of, record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink
 
@@ -57,9 +57,11 @@ class Outputs:
     def __init__(self, session: Session, record: Path | None, telemetry: Path | None, live: bool) -> None:
         self._session = session
         self.record, self.telemetry = record, telemetry
-        self._facts = replay.facts(session) if telemetry else {}
+        self._file: TelemetryFile | None = None
+        if telemetry:
+            self._begun = record_of(session)
+            self._file = TelemetryFile(telemetry, session.signals, self._begun.metadata())
         # The recorder last: it alone leaves something where it is made and another is refused.
-        self._file = TelemetryFile(telemetry, session.signals, self._facts) if telemetry else None
         self._recorder = _recorder(session, record, live) if record or live else None
 
     @property
@@ -78,7 +80,7 @@ class Outputs:
                 self.record = None
         if self._file:
             try:
-                self._file.close(replay.facts(self._session, self._facts))
+                self._file.close(record_of(self._session, self._begun).metadata())
             except SpheretwinError as error:
                 faults.append(error)
                 self.telemetry = None
@@ -88,8 +90,8 @@ class Outputs:
 def _recorder(session: Session, path: Path | None, live: bool) -> Recorder:
     from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
-    scenario = session.begun_as.model_dump(mode="json")
-    recorder = Recorder(session.actuator, session.signals, scenario, path=path, live=live)
+    facts = facts_of(session.begun_as)
+    recorder = Recorder(session.actuator, session.signals, facts, path=path, live=live)
     if recorder.viewer:
         print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
     return recorder

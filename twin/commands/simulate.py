@@ -15,17 +15,20 @@ import numpy as np
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
-from spheretwin.twin import metrics, replay
+from spheretwin.models.telemetry.status import Status
+from spheretwin.twin import replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
 from spheretwin.twin.commands.outputs import Outputs
+from spheretwin.twin.commands.own_metrics import OwnMetrics
 from spheretwin.twin.commands.reporting import print_json
-from spheretwin.twin.metrics import Figures
+from spheretwin.twin.metrics.metric import Planned
 from spheretwin.twin.replay import Plan
 from spheretwin.twin.scenario import flags
 from spheretwin.twin.scenario.reading import shipped
 from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import COMPLETED, follow
+from spheretwin.twin.simulation import Sink, follow
+from spheretwin.twin.summary import Figures, summary
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.progress import Progress
 
@@ -52,6 +55,14 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--replay", type=Path, metavar="RUN.parquet", help="run again what a telemetry file says of itself"
     )
+    parser.add_argument(
+        "--metric",
+        action="append",
+        default=[],
+        metavar="FILE.py:NAME",
+        help="one more figure: a function of the whole run (`spheretwin.twin.simulation.Run`) to what JSON"
+        " holds; may be given again; the telemetry is kept in memory for it",
+    )
     parser.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
     parser.add_argument("-h", "--help", action="store_true", help="show this help and the scenario's fields")
     parser.set_defaults(run=run, parser=parser)
@@ -65,21 +76,27 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         tables.print_fields(scenario.name, flags.described(scenario))
         return True
     plan = _planned(options, rest)
+    own = OwnMetrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
     with _interruptible() as stop_requested, Session(plan.scenario) as session:
-        figures, progress = Figures(plan.ticks), Progress(plan.scenario.name, plan.ticks)
+        figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
+        progress = Progress(plan.scenario.name, plan.ticks)
+        sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
         files = Outputs(session, options.record, options.telemetry, options.live)
         try:
             with progress, timers_stopped():
                 status = follow(
                     session,
                     plan.ticks,
-                    [progress, figures, *files.sinks],
+                    [*sinks, *files.sinks],
                     journal=plan.journal,
                     live=options.live,
                     stop_requested=stop_requested,
                 )
-            _report(session, plan, status, figures, options.json)
+            values = own.values(session, status)
+            warnings = [*session.warnings(), *figures.warnings(), *own.faults]
+            told = summary(session, status, {**figures.values(), **values}, warnings)
+            _report(session, plan, status, told, tuple(values), options.json)
             if options.live and sys.stderr.isatty():
                 print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
                 while not stop_requested():
@@ -87,7 +104,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         finally:
             faults = files.close()
             _report_files(files, faults, options.json)
-    return status == COMPLETED and not faults
+    return status == Status.COMPLETED and not faults and not own.faults
 
 
 def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
@@ -105,15 +122,16 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
     return Plan(scenario, scenario.ticks, ())
 
 
-def _report(session: Session, plan: Plan, status: str, figures: Figures, as_json: bool) -> None:
+def _report(
+    session: Session, plan: Plan, status: Status, told: dict[str, Any], own: Sequence[str], as_json: bool
+) -> None:
     """Print the figures, and how the run ended where it did not complete."""
     scenario = session.begun_as
-    summary = metrics.summary(scenario, status, figures, session.tick, session.loop_s, session.warnings())
     if as_json:
-        print_json(summary)
+        print_json(told)
     else:
-        tables.print_run(scenario.name, scenario.controller.law, summary)
-    if status != COMPLETED:
+        tables.print_run(scenario.name, scenario.controller.law, told, own)
+    if status != Status.COMPLETED:
         planned_s = plan.ticks * scenario.controller.period_s
         print(f"spheretwin: {_ending(session, status, planned_s)}", file=sys.stderr, flush=True)
 

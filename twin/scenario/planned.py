@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from math import ceil
-from typing import Any, NamedTuple
 
+from spheretwin.models.telemetry.record import Change
 from spheretwin.twin.scenario.sections import Scenario
 
 # Times and periods are decimal fractions: a tick that falls on an event does so to rounding only.
 WHOLE = 1e-9
-
-
-class Change(NamedTuple):
-    """One change of a field."""
-
-    tick: int
-    """First tick that it is in force."""
-    name: str
-    value: Any
 
 
 def planned(scenario: Scenario) -> tuple[Change, ...]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
 from spheretwin.viz import palette
 from spheretwin.viz.recording import scene
 
@@ -36,34 +36,38 @@ def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> No
         recording.log(entity(signal.name), style, static=True)
 
 
-def application(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], live: bool) -> str:
-    """Application id of recordings with one layout, for the arguments of `layout`.
+class View(NamedTuple):
+    """What the layout of a run's recording is made for."""
+
+    duration_s: float
+    """Length of the time axes."""
+    current_limit_A: float
+    """Range of the current axis."""
+    groups: int
+    """Coil groups, each with a current."""
+    own: tuple[Signal, ...]
+    """Signals that not every run has, each in a tab; the sliding variable among the plots."""
+    live: bool
+    """Follow the run instead of playing from its start."""
+
+
+def application(view: View) -> str:
+    """Application id of recordings with one layout.
 
     A viewer keeps one layout for each application: under a common id the second recording that it opens
     would be shown in the first one's, with its length and its tabs. Of letters, digits and dashes only, else
     the viewer changes it.
     """
-    key = repr((duration_s, current_limit_A, [signal.name for signal in own], live))
+    names = [signal.name for signal in view.own]
+    key = repr((view.duration_s, view.current_limit_A, view.groups, names, view.live))
     return f"spheretwin-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
 
 
 @lru_cache(maxsize=4)
-def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], live: bool) -> rrb.Blueprint:
-    """Blueprint of a run's recording.
-
-    Parameters
-    ----------
-    duration_s : float, s
-        Length of the time axes.
-    current_limit_A : float, A
-        Range of the current axis.
-    own : tuple of Signal
-        Signals that not every run has, each in a tab; the sliding variable among the plots.
-    live : bool
-        Follow the run instead of playing from its start.
-    """
+def layout(view: View) -> rrb.Blueprint:
+    """Blueprint of a run's recording."""
     boundary = rrb.TimeRangeBoundary
-    whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=duration_s))
+    whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=view.duration_s))
     time = rrb.TimeAxis(view_range=whole)
 
     def plot(name: str, *signals: str, legend: bool = True, **options: Any) -> rrb.TimeSeriesView:
@@ -78,15 +82,19 @@ def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], l
         return {f"/{entity(signal)}": series for signal in signals}
 
     angles = ("q_ref_rad", "q_rad")
-    limits = rrb.ScalarAxis(range=(-1.05 * current_limit_A, 1.05 * current_limit_A))
-    currents = plot("currents of the 18 groups [A]", "current_A", legend=False, axis_y=limits)
+    limit_A = 1.05 * view.current_limit_A
+    limits = rrb.ScalarAxis(range=(-limit_A, limit_A))
+    title = f"currents of the {view.groups} groups [A]"
+    currents = plot(title, "current_A", legend=False, axis_y=limits)
     tilt, spin = only(angles, [True, True, False]), only(angles, [False, False, True])
     whole_share = rrb.ScalarAxis(range=(0, 1.05))
     torques = plot("generalised torque [N·m]", "torque_command_Nm", "disturbance_Nm")
-    slides = "sliding_s" in {signal.name for signal in own}
+    slides = "sliding_s" in {signal.name for signal in view.own}
     demand = plot("sliding variable s [rad/s]", "sliding_s") if slides else torques
     tabs = [
-        plot(f"{signal.name} [{signal.unit}]", signal.name) for signal in own if signal.name != "sliding_s"
+        plot(f"{signal.name} [{signal.unit}]", signal.name)
+        for signal in view.own
+        if signal.name != "sliding_s"
     ]
     plots = rrb.Grid(
         plot("tilt α red, β green, desired muted [rad]", *angles, legend=False, overrides=tilt),
@@ -113,8 +121,8 @@ def layout(duration_s: float, current_limit_A: float, own: tuple[Signal, ...], l
         rrb.TimePanel(
             state="collapsed",
             timeline=TIMELINE,
-            play_state="following" if live else "playing",
-            loop_mode="off" if live else "all",
+            play_state="following" if view.live else "playing",
+            loop_mode="off" if view.live else "all",
         ),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
@@ -157,7 +165,7 @@ def _short(signal: Signal) -> str:
 
 
 def _colours(signal: Signal) -> list[palette.Colour]:
-    if signal.size == 3:
+    if signal.size == 3 and signal.labels in ((), ANGLES, AXES):
         desired = signal.name.endswith(("_ref_rad", "_ref_rad_s")) or signal.name == "disturbance_Nm"
         return list(palette.DESIRED_COLOURS if desired else palette.AXIS_COLOURS)
     return palette.group_colours(signal.size)

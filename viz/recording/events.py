@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
 
-Event = tuple[float, str, str]
+Event = tuple[float, Level, str]
 """Simulated time in s, level, text."""
 
 # Chattering currents touch the limit for single ticks; pauses shorter than this are one event.
 QUIET_S = 0.1
-
-ENDINGS = {
-    "completed": ("INFO", "the run is complete"),
-    "left_workspace": ("ERROR", "a hinge reached the end of its range: the run ends here"),
-    "diverged": ("ERROR", "a torque or the motion lost its number or its bounds: the run ends here"),
-    "interrupted": ("WARN", "the run was interrupted"),
-}
 
 
 class Events:
@@ -34,11 +28,11 @@ class Events:
         for i in np.flatnonzero(scale < 1):
             if t[i] - self._last_saturated_s > QUIET_S:
                 text = f"current limit reached: {100 * scale[i]:.0f} % of the commanded torque"
-                events.append((float(t[i]), "WARN", text))
+                events.append((float(t[i]), Level.WARN, text))
             self._last_saturated_s = t[i]
         self._now_s = float(t[-1])
         return events
 
-    def end(self, status: str) -> Event:
+    def end(self, status: Status) -> Event:
         """Event of the run's end."""
-        return self._now_s, *ENDINGS[status]
+        return self._now_s, status.level, status.told

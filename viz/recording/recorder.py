@@ -14,15 +14,18 @@ import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import MJCF_PATH, Actuator
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile
 from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
+from spheretwin.models.telemetry.status import Level, Status, named
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import palette
 from spheretwin.viz.recording import blueprint, scene
-from spheretwin.viz.recording.events import Events
+from spheretwin.viz.recording.blueprint import View
+from spheretwin.viz.recording.events import Event, Events
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.live import Viewer
 
@@ -55,11 +58,11 @@ class Recorder:
     Parameters
     ----------
     actuator : Actuator
-        Drawn, and source of the current limit.
+        Drawn; has as many groups as the telemetry has currents.
     signals : tuple of Signal
         Columns of the telemetry.
-    scenario : dict
-        Resolved scenario, for the text panel and the axes.
+    facts : RunFacts
+        For the text panel, the axes and the drawing.
     path : Path, optional
         Recording to write.
     live : bool
@@ -75,24 +78,22 @@ class Recorder:
         self,
         actuator: Actuator,
         signals: tuple[Signal, ...],
-        scenario: dict[str, Any],
+        facts: RunFacts,
         *,
         path: Path | None = None,
         live: bool = False,
     ) -> None:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
-        self._actuator = actuator
-        self._limit_A = scenario["drive"]["current_limit_A"]
-        self._mjcf = Path(scenario["plant"]["mjcf"] or MJCF_PATH)
-        scene.read_meshes(self._mjcf)  # a run needs no mesh, and would find out only now that one is missing
+        self._actuator, self._facts = actuator, facts
+        scene.read_meshes(facts.mjcf)  # a run needs no mesh, and would find out only now that one is missing
         self._path = path
         self._events = Events()
         self._next_frame = self._handed_over = 0
         self._waiting: list[Table] = []
         self._last_tips: dict[str, NDArray[np.float64]] = {}
         own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
-        view = scenario["duration"], self._limit_A, own, live
-        self._recording = rr.RecordingStream(blueprint.application(*view))
+        view = View(facts.duration_s, facts.current_limit_A, len(actuator.groups), own, live)
+        self._recording = rr.RecordingStream(blueprint.application(view))
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self._output = OutputFile(path) if path else None
         self._pipe = _pipe_to(self._output) if self._output and PIPE_PATHS.is_dir() else None
@@ -101,25 +102,21 @@ class Recorder:
         self._room = Semaphore(PENDING_CHUNKS)
         self._fault: str | None = None
         self._closed = False
-        self._submit(self._connect, signals, scenario, view)
+        self._submit(self._connect, signals, view)
 
-    def _connect(
-        self,
-        signals: tuple[Signal, ...],
-        scenario: dict[str, Any],
-        view: tuple[float, float, tuple[Signal, ...], bool],
-    ) -> None:
+    def _connect(self, signals: tuple[Signal, ...], view: View) -> None:
         """Open the sinks, log all that stays the same, then let a viewer in."""
+        facts = self._facts
         sinks: list[Any] = []
         if self._output:
             sinks.append(rr.FileSink((self._pipe or self._output).path))
         if self.viewer:
             sinks.append(self.viewer.sink)
-        self._recording.set_sinks(*sinks, default_blueprint=blueprint.layout(*view))
-        self._recording.send_recording_name(f"{scenario['name']}, {scenario['controller']['law']}")
-        scene.log_static(self._recording, self._actuator, self._mjcf, scenario["plant"]["payload_kg"])
+        self._recording.set_sinks(*sinks, default_blueprint=blueprint.layout(view))
+        self._recording.send_recording_name(f"{facts.name}, {facts.law}")
+        scene.log_static(self._recording, self._actuator, facts.mjcf, facts.payload_kg)
         blueprint.log_styles(self._recording, signals)
-        text = rr.TextDocument(_as_markdown(scenario), media_type=rr.MediaType.MARKDOWN)
+        text = rr.TextDocument(_as_markdown(facts), media_type=rr.MediaType.MARKDOWN)
         self._recording.log(blueprint.SCENARIO, text, static=True)
         if self.viewer:
             self.viewer.start()
@@ -146,12 +143,13 @@ class Recorder:
     def note(self, t_s: float, text: str) -> None:
         """Record what happened before the tick at `t_s`."""
         self._hand_over()
-        self._submit(lambda: self._log([(t_s, "INFO", text)]))
+        self._submit(lambda: self._log([(t_s, Level.INFO, text)]))
 
-    def finish(self, status: str) -> None:
+    def finish(self, status: Status) -> None:
         """Record how the run ended."""
+        ending = named(status)  # a name that is none is told here, not in the recorder's thread
         self._hand_over()
-        self._submit(lambda: self._log([self._events.end(status)]))
+        self._submit(lambda: self._log([self._events.end(ending)]))
 
     def close(self) -> None:
         """Complete the file and give it its name; end the live viewer. A second time does nothing.
@@ -242,7 +240,7 @@ class Recorder:
         self._send_trace(scene.TIP_DESIRED, index, rows["q_ref_rad"][new])
 
     def _coil_colours(self, current_A: NDArray[np.float64]) -> rr.ComponentColumnList:
-        colours = palette.current_colours(current_A, self._limit_A)  # (n, 18, 3)
+        colours = palette.current_colours(current_A, self._facts.current_limit_A)  # (n, groups, 3)
         coils = np.empty((len(current_A), len(self._actuator.coil_axes), 3), dtype=np.uint8)
         for side in range(2):  # both coils of a group carry its current
             coils[:, self._actuator.groups[:, side]] = colours
@@ -256,7 +254,7 @@ class Recorder:
         segments = np.stack([before, tips], axis=1)  # (n, 2, 3)
         self._recording.send_columns(entity, index, rr.LineStrips3D.columns(strips=_strips(segments)))
 
-    def _log(self, events: list[tuple[float, str, str]]) -> None:
+    def _log(self, events: list[Event]) -> None:
         if events:
             t_s, level, text = zip(*events, strict=True)
             lines = rr.TextLog.columns(text=list(text), level=list(level))
@@ -292,14 +290,11 @@ def _time_index(t_s: NDArray[np.float64]) -> Index:
     return [rr.TimeColumn(blueprint.TIMELINE, duration=nanoseconds)]
 
 
-def _as_markdown(scenario: dict[str, Any]) -> str:
-    """Resolved scenario as a table for each section."""
-    lines = [f"# {scenario['name']}", "", scenario["description"], ""]
-    top = {key: value for key, value in scenario.items() if not isinstance(value, dict)}
-    sections = {key: value for key, value in scenario.items() if isinstance(value, dict)}
-    for title, fields in {"run": top, **sections}.items():
-        shown = {key: value for key, value in fields.items() if key not in ("name", "description")}
+def _as_markdown(facts: RunFacts) -> str:
+    """All that the run depends on, as a table for each section."""
+    lines = [f"# {facts.name}", "", facts.description, ""]
+    for title, fields in facts.sections.items():
         lines += [f"## {title}", "", "| field | value |", "|---|---|"]
-        lines += [f"| {key} | {'' if value is None else value} |" for key, value in shown.items()]
+        lines += [f"| {key} | {'' if value is None else value} |" for key, value in fields.items()]
         lines.append("")
     return "\n".join(lines)

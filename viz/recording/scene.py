@@ -77,10 +77,13 @@ def body_quaternions(q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
 
 
 def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
-    """Position of the shaft's tip, (n, 3) in m, for hinge angles (n, 3); the tip lies on the γ axis."""
-    length = np.linalg.norm(actuator.shaft_tip_m)
-    (ca, cb), (sa, sb) = np.cos(q[:, :2]).T, np.sin(q[:, :2]).T
-    return length * np.stack([sb, -sa * cb, ca * cb], axis=1)
+    """Position of the shaft's tip, wherever in the rotor it is: (n, 3) in m, for hinge angles (n, 3)."""
+    (ca, cb, cg), (sa, sb, sg) = np.cos(q).T, np.sin(q).T
+    x, y, z = actuator.shaft_tip_m
+    x, y = cg * x - sg * y, sg * x + cg * y  # about z, then y, then x
+    x, z = cb * x + sb * z, cb * z - sb * x
+    y, z = ca * y - sa * z, sa * y + ca * z
+    return np.stack([x, y, z], axis=1)
 
 
 @lru_cache(maxsize=2)
@@ -95,18 +98,18 @@ def _meshes(mjcf: Path, _: str) -> dict[str, rr.Mesh3D]:
     mujoco.mj_clearCache(mujoco.mj_getCache())  # 12 MB of meshes that nobody reads again
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    coils: list[Drawn] = []
+    coils: list[tuple[int, Drawn]] = []
     others: dict[tuple[str, tuple[float, ...]], list[Drawn]] = defaultdict(list)
     names: dict[tuple[str, tuple[float, ...]], str] = {}
     for i in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).tolist():
         drawn, geom = _in_body_frame(model, data, i), model.geom(i)
         if geom.name.startswith("coil_"):
-            coils.append(drawn)
+            coils.append((_coil_at(model, data, data.geom_xpos[i]), drawn))
             continue
         key = (model.body(geom.bodyid[0]).name, tuple(geom.rgba.tolist()))
         others[key].append(drawn)
         names.setdefault(key, geom.name or f"geom{i}")
-    meshes = {COILS: _coil_mesh(coils)} if coils else {}
+    meshes = {COILS: _coil_mesh(coils, len(_coil_sites(model)))} if coils else {}
     for (body, colour), parts in others.items():
         drawn = _joined(parts)
         meshes[f"{WORLD}/{body}/{names[body, colour]}"] = rr.Mesh3D(
@@ -144,15 +147,33 @@ def _joined(drawn: list[Drawn]) -> Drawn:
     )
 
 
-def _coil_mesh(coils: list[Drawn]) -> rr.Mesh3D:
+def _coil_sites(model: mujoco.MjModel) -> list[int]:
+    """Sites of the coils, in the order of the actuator's."""
+    return [i for i in range(model.nsite) if model.site(i).name.startswith("coil_")]
+
+
+def _coil_at(model: mujoco.MjModel, data: mujoco.MjData, position: NDArray[np.float64]) -> int:
+    """The actuator's coil at a position: a model may draw its coils in any order, or not all of them."""
+    distances = np.linalg.norm(data.site_xpos[_coil_sites(model)] - position, axis=1)
+    return int(np.argmin(distances))
+
+
+def _coil_mesh(coils: list[tuple[int, Drawn]], count: int) -> rr.Mesh3D:
     """All coils as one mesh; each looks up its own pixel of a texture, whose bytes then change over time.
 
-    Of the ways to colour 36 coils at 60 Hz this is the cheapest that keeps their shape: a mesh entity for
-    each costs the viewer three times as long a frame.
+    Of the ways to colour dozens of coils at 60 Hz this is the cheapest that keeps their shape: a mesh entity
+    for each costs the viewer three times as long a frame.
+
+    Parameters
+    ----------
+    coils : list of (int, Drawn)
+        Each with its place among the actuator's.
+    count : int
+        How many the actuator has.
     """
-    count = len(coils)
-    pixel = np.repeat((np.arange(count) + 0.5) / count, [len(coil.positions) for coil in coils])
-    joined = _joined(coils)
+    places, drawn = zip(*coils, strict=True)
+    pixel = np.repeat((np.array(places) + 0.5) / count, [len(coil.positions) for coil in drawn])
+    joined = _joined(list(drawn))
     return rr.Mesh3D.from_fields(
         vertex_positions=joined.positions,
         vertex_normals=joined.normals,

@@ -13,8 +13,8 @@ from rich.table import Table
 from spheretwin.models.telemetry.signals import ANGLES
 
 
-def print_run(scenario: str, law: str, summary: dict[str, Any]) -> None:
-    """Print the figures of one run: errors per axis, then currents and speed."""
+def print_run(scenario: str, law: str, summary: dict[str, Any], own: Sequence[str] = ()) -> None:
+    """Print the figures of one run: errors per axis, currents and speed, then those of the user's own."""
     console = Console()
     errors = Table(title=escape(f"{scenario} under {law}: {summary['status']}"), title_justify="left")
     errors.add_column("tracking error, rad")
@@ -27,12 +27,22 @@ def print_run(scenario: str, law: str, summary: dict[str, Any]) -> None:
     }
     for label, key in rows.items():
         errors.add_row(label, *(f"{value:.4f}" for value in summary[key] or ()))
+    settled = summary["settling_time_s"] or ()
+    errors.add_row("settled after", *("never" if t is None else f"{t:.3f} s" for t in settled))
     console.print(errors)
     if summary["max_abs_current_A"] is not None:
         console.print(
             f"largest current {summary['max_abs_current_A']:.2f} A,"
             f" the limit cut the torque at {100 * summary['saturated_fraction']:.1f} % of the ticks"
         )
+    if summary["rms_torque_Nm"] is not None:
+        console.print(
+            f"rms torque {summary['rms_torque_Nm']:.4f} N·m, copper {summary['copper_loss_J']:.2f} J"
+        )
+    if summary["current_variation_A_s"] is not None:
+        console.print(f"commands vary by {summary['current_variation_A_s']:.1f} A/s a group")
+    for name in own:
+        console.print(f"{name} {escape(str(summary[name]))}", soft_wrap=True)
     if summary["realtime_factor"] is not None:
         console.print(
             f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.3f} s:"

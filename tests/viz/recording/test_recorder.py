@@ -21,6 +21,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz import palette
@@ -33,8 +34,8 @@ SIGNALS = common_signals(18)
 def recorded(path, name="nutation", **changes):
     scenario = scenarios.load(name, {"duration": 2.3, **changes})
     session = Session(scenario)
-    resolved = session.scenario.model_dump(mode="json")
-    with Recorder(session.actuator, session.signals, resolved, path=path) as recorder:
+    facts = facts_of(session.scenario)
+    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
         return session, simulate(scenario, sinks=[recorder])
 
 
@@ -171,10 +172,10 @@ def test_payload_is_drawn_where_it_is_mounted(tmp_path):
 def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
     path = tmp_path / "run.rrd"
     session = Session(scenarios.load("hold", {"duration": 0.1}))
-    resolved = session.scenario.model_dump(mode="json")
+    facts = facts_of(session.scenario)
 
     def interrupted():
-        with Recorder(session.actuator, session.signals, resolved, path=path) as recorder:
+        with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
             follow(session, session.scenario.ticks, [recorder])
             raise KeyboardInterrupt
 
@@ -185,16 +186,15 @@ def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
 
 
 def test_unwritable_path_is_bad_input(tmp_path, actuator):
-    resolved = json.loads(scenarios.load("hold").model_dump_json())
-    resolved["drive"]["current_limit_A"] = 8.0
+    facts = facts_of(scenarios.load("hold", {"drive.current_limit_A": 8.0}))
     with pytest.raises(InputError, match="writable"):
-        Recorder(actuator, SIGNALS, resolved, path=tmp_path / "missing" / "run.rrd")
+        Recorder(actuator, SIGNALS, facts, path=tmp_path / "missing" / "run.rrd")
 
 
 def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
     session = Session(scenarios.load("hold", {"duration": 0.1}))
-    resolved = session.scenario.model_dump(mode="json")
-    recorder = Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+    facts = facts_of(session.scenario)
+    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
     backwards.values[:, 0] = np.nan
     recorder.write(backwards)
@@ -204,14 +204,14 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
     assert f"{raised.value}".endswith(kept)
 
 
-def resolved_hold(**changes):
+def hold_facts(**changes):
     session = Session(scenarios.load("hold", {"duration": 0.1, **changes}))
-    return session, session.scenario.model_dump(mode="json")
+    return session, facts_of(session.scenario)
 
 
 def test_a_folder_in_the_place_of_a_recording_is_told_with_where_the_recording_is(tmp_path):
-    session, resolved = resolved_hold()
-    recorder = Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+    session, facts = hold_facts()
+    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     follow(session, session.scenario.ticks, [recorder])
     (tmp_path / "run.rrd").mkdir()
     with pytest.raises(SpheretwinError, match=r"run\.rrd could not be written, ") as raised:
@@ -222,8 +222,8 @@ def test_a_folder_in_the_place_of_a_recording_is_told_with_where_the_recording_i
 
 
 def test_closing_twice_is_closing_once(tmp_path):
-    session, resolved = resolved_hold()
-    with Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd") as recorder:
+    session, facts = hold_facts()
+    with Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd") as recorder:
         follow(session, session.scenario.ticks, [recorder])
         recorder.close()
     assert os.listdir(tmp_path) == ["run.rrd"]
@@ -240,19 +240,19 @@ def test_a_file_that_cannot_be_opened_again_leaves_nothing(tmp_path, monkeypatch
     def out_of_handles():
         raise OSError(24, "Too many open files")
 
-    session, resolved = resolved_hold()
+    session, facts = hold_facts()
     monkeypatch.setattr(os, "pipe", out_of_handles)
     with pytest.raises(InputError, match="Too many open files"):
-        Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+        Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     assert os.listdir(tmp_path) == []
 
 
 def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
     path = tmp_path / "run.rrd"
     (mine := tmp_path / "run.rrd.part").write_text("mine")
-    session, resolved = resolved_hold()
-    _, longer = resolved_hold(duration=0.2)
-    with Recorder(session.actuator, session.signals, resolved, path=path) as first:
+    session, facts = hold_facts()
+    _, longer = hold_facts(duration=0.2)
+    with Recorder(session.actuator, session.signals, facts, path=path) as first:
         with Recorder(session.actuator, session.signals, longer, path=path) as second:
             simulate(scenarios.load("hold", {"duration": 0.2}), sinks=[second])
             assert not path.exists()
@@ -288,9 +288,9 @@ def broken_model(folder, content):
 @pytest.mark.parametrize("content", [None, "no mesh"], ids=["missing", "garbage"])
 def test_mesh_that_cannot_be_read_is_bad_input_before_the_run(tmp_path, content):
     (folder := tmp_path / "model").mkdir()
-    session, resolved = resolved_hold(**{"plant.mjcf": str(broken_model(folder, content))})
+    session, facts = hold_facts(**{"plant.mjcf": str(broken_model(folder, content))})
     with pytest.raises(InputError, match=r"model .*broken\.xml: .*stator") as raised:
-        Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+        Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     assert "\n" not in f"{raised.value}"
     assert os.listdir(tmp_path) == ["model"]
 
@@ -334,9 +334,9 @@ def busy(recorder):
 
 
 def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
-    session, resolved = resolved_hold()
+    session, facts = hold_facts()
     rows = Table(session.signals, np.zeros((1, width(session.signals))))
-    with Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd") as recorder:
+    with Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd") as recorder:
         done, written = busy(recorder), []
 
         def write_all():
@@ -358,8 +358,8 @@ def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
 
 
 def test_recorder_that_has_failed_keeps_no_run_waiting(tmp_path):
-    session, resolved = resolved_hold()
-    recorder = Recorder(session.actuator, session.signals, resolved, path=tmp_path / "run.rrd")
+    session, facts = hold_facts()
+    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     bad = Table(session.signals, np.full((2, width(session.signals)), np.nan))
     for _ in range(3 * PENDING_CHUNKS):
         recorder.write(bad)

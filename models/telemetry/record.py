@@ -1,0 +1,79 @@
+"""What a telemetry file says of its run beside the rows: enough to run it again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from spheretwin.models.telemetry.status import Status, named
+
+
+class Change(NamedTuple):
+    """One entry of the command journal."""
+
+    tick: int
+    """First tick that it is in force."""
+    name: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Typed form of a telemetry file's metadata; nothing in it differs between two equal runs.
+
+    Attributes
+    ----------
+    scenario : mapping
+        In force at tick 0, by section, as JSON has it.
+    journal : tuple of Change
+        What was changed on the way.
+    ticks : int
+        Control ticks done.
+    files : mapping of str
+        Digest of each model and curve by its path; None for one that could not be read.
+    versions : mapping of str
+        Of Python and of every package that a figure may depend on.
+    status : Status, optional
+        How the run ended; None while it goes on, and in what a killed run leaves.
+    """
+
+    scenario: Mapping[str, Any]
+    journal: tuple[Change, ...]
+    ticks: int
+    files: Mapping[str, str | None]
+    versions: Mapping[str, str]
+    status: Status | None = None
+
+    def metadata(self) -> dict[str, str]:
+        """The record as texts by name, as a file keeps them."""
+        texts = {
+            "scenario": json.dumps(self.scenario),
+            "journal": json.dumps(self.journal),
+            "ticks": str(self.ticks),
+            "files": json.dumps(self.files),
+            "versions": json.dumps(self.versions),
+        }
+        return texts if self.status is None else {**texts, "status": str(self.status)}
+
+    @classmethod
+    def from_metadata(cls, texts: Mapping[str, str]) -> RunRecord:
+        """Record of the texts that a file keeps; those of older versions lack files or versions.
+
+        Raises
+        ------
+        InputError
+            The status is none.
+        KeyError, TypeError, ValueError, OverflowError, RecursionError
+            Scenario, journal or ticks are missing, or a text is not what this package writes.
+        """
+        journal = json.loads(texts["journal"])
+        return cls(
+            scenario=json.loads(texts["scenario"]),
+            journal=tuple(Change(int(tick), str(name), value) for tick, name, value in journal),
+            ticks=int(texts["ticks"]),
+            files=json.loads(texts.get("files", "{}")),
+            versions=json.loads(texts.get("versions", "{}")),
+            status=named(texts["status"]) if "status" in texts else None,
+        )

@@ -1,0 +1,77 @@
+"""Functions out of a file of the user's: loaded as the file is now, or refused on one line that says why."""
+
+import os
+import time
+
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.user_code import load_function
+
+
+@pytest.fixture
+def file(tmp_path):
+    (path := tmp_path / "mine.py").write_text("LIMIT = 2\n\n\ndef double(x):\n    return LIMIT * x\n")
+    return path
+
+
+def test_a_function_works_with_all_that_its_file_defines(file):
+    assert load_function(f"{file}:double", "law")(4) == 8
+
+
+def test_a_path_from_home_is_found(file, monkeypatch):
+    monkeypatch.setenv("HOME", str(file.parent))
+    monkeypatch.setenv("USERPROFILE", str(file.parent))
+    assert load_function("~/mine.py:double", "law")(1) == 2
+
+
+def test_an_edit_within_the_second_is_seen_and_nothing_is_left_beside_the_file(file):
+    load_function(f"{file}:double", "law")
+    moment = time.time()
+    file.write_text(file.read_text().replace("2", "3"))  # as long as before
+    os.utime(file, (moment, moment))
+    assert load_function(f"{file}:double", "law")(4) == 12
+    assert os.listdir(file.parent) == ["mine.py"]
+
+
+def test_a_dataclass_of_the_file_finds_its_module(tmp_path):
+    text = "from __future__ import annotations\nfrom dataclasses import dataclass\n"
+    text += "@dataclass\nclass Pair:\n    a: int\n    b: int = 2\n"
+    (path := tmp_path / "pairs.py").write_text(text)
+    assert load_function(f"{path}:Pair", "law")(1).b == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "spec", "told"),
+    [
+        (None, "gone.py:f", "law: expected a readable file of Python, [Errno 2] No such file"),
+        ("", "mine.py", "law: expected path/to/file.py:name, received "),
+        ("", "mine.txt:f", "law: expected path/to/file.py:name, received "),
+        ("", "mine.py:", "law: expected path/to/file.py:name, received "),
+        ("", "mine.py:a b", "law: expected path/to/file.py:name, received "),
+        ("", "mine.py:f", "law: expected a function in "),
+        ("def double(x): pass\ndef half(x): pass", "mine.py:duble", "received duble; did you mean double?"),
+        ("def double(x): pass\ndef half(x): pass", "mine.py:x", "expected one of double, half in "),
+        ("f = 3", "mine.py:f", "mine.py:f, 3"),
+        ("\nx = (", "mine.py:f", "SyntaxError in line 2: '(' was never closed"),
+        ("\n\nx = 1 / 0", "mine.py:f", "ZeroDivisionError in line 3: division by zero"),
+        ("import no_such_module", "mine.py:f", "ModuleNotFoundError in line 1: No module named"),
+        ("raise SystemExit(3)", "mine.py:f", "SystemExit in line 1: 3"),
+        ("raise ValueError('a\\nb')", "mine.py:f", "ValueError in line 1: a b"),
+        ("x = '\0'", "mine.py:f", "SyntaxError"),
+        (b"x = '\xff'", "mine.py:f", "SyntaxError"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_on_one_line(tmp_path, text, spec, told):
+    if text is not None:
+        (tmp_path / "mine.py").write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError) as refused:
+        load_function(str(tmp_path / spec), "law")
+    assert told in f"{refused.value}"
+    assert "\n" not in f"{refused.value}"
+
+
+def test_ctrl_c_is_not_taken_for_a_fault_of_the_file(tmp_path):
+    (path := tmp_path / "mine.py").write_text("raise KeyboardInterrupt")
+    with pytest.raises(KeyboardInterrupt):
+        load_function(f"{path}:f", "law")

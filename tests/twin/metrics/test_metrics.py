@@ -1,0 +1,203 @@
+"""Every metric against its plain definition over the whole run, whatever the chunks that it comes in."""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from spheretwin.models.telemetry.signals import width
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.metrics.metric import Planned
+from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.metrics.rms_error import PIECE_TICKS
+from spheretwin.twin.metrics.settling_time import BAND_rad
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import simulate
+from spheretwin.twin.summary import figures_of
+
+UNITS = {"_A_s": "A/s", "_rad": "rad", "_Nm": "N·m", "_A": "A", "_J": "J", "_s": "s", "_fraction": "0 to 1"}
+
+
+def plain_settling(run):
+    error, t_s = np.abs(run.telemetry["error_rad"]), run.telemetry["t_s"]
+    for axis in range(3):
+        inside = [k for k in range(len(error)) if np.all(error[k:, axis] <= BAND_rad)]
+        yield t_s[inside[0]] if inside else None
+
+
+def plain_variation(run):
+    command, t_s = run.telemetry["current_command_A"], run.telemetry["t_s"]
+    up_and_down = [np.sum(np.abs(np.diff(command[:, group]))) for group in range(command.shape[1])]
+    return np.sum(up_and_down) / len(up_and_down) / (t_s[-1] - t_s[0])
+
+
+PLAIN = {
+    "max_abs_error_rad": lambda run: np.abs(run.telemetry["error_rad"]).max(axis=0),
+    "rms_error_rad": lambda run: np.sqrt(np.mean(run.telemetry["error_rad"] ** 2, axis=0)),
+    "tail_rms_error_rad": lambda run: np.sqrt(
+        np.mean(run.telemetry["error_rad"][run.scenario.ticks // 2 :] ** 2, axis=0)
+    ),
+    "settling_time_s": lambda run: list(plain_settling(run)),
+    "max_abs_current_A": lambda run: np.abs(run.telemetry["current_A"]).max(),
+    "saturated_fraction": lambda run: np.mean(run.telemetry["allocation_scale"] < 1),
+    "rms_torque_Nm": lambda run: np.sqrt(np.mean(np.linalg.norm(run.telemetry["torque_Nm"], axis=1) ** 2)),
+    "current_variation_A_s": plain_variation,
+    "copper_loss_J": lambda run: (
+        np.sum(run.telemetry["current_A"] ** 2)
+        * run.actuator.group.resistance_ohm
+        * run.scenario.controller.period_s
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """One that meets the current limit, one of an odd length at another rate, one that holds still."""
+    fast = {"duration": 0.7777, "controller.period_s": 5e-4, "controller.law": "pd"}
+    return [
+        simulate(scenarios.load("nutation", {"duration": 1.3})),
+        simulate(scenarios.load("sinusoid", fast)),
+        simulate(scenarios.load("hold", {"duration": 0.3})),
+    ]
+
+
+@pytest.fixture(scope="module")
+def ended_early():
+    return simulate(scenarios.load("sinusoid", {"controller.law": "pd", "disturbance.load": 5.0}))
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_each_is_its_plain_definition(runs, name):
+    for run in runs:
+        expected = np.asarray(PLAIN[name](run), dtype=float)  # None as NaN
+        received = np.asarray(figures_of(run)[name], dtype=float)
+        # Sums of some thousand squares in another order.
+        np.testing.assert_allclose(received, expected, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_each_says_what_it_is_and_in_which_unit(name):
+    unit = next(unit for suffix, unit in UNITS.items() if name.endswith(suffix))
+    told = METRICS[name].__doc__.splitlines()[0]
+    assert told.endswith(".")
+    assert unit in " ".join(METRICS[name].__doc__.split())
+    assert METRICS[name].value.__doc__
+
+
+def planned_for(run):
+    return Planned(run.scenario, run.actuator, run.scenario.ticks)
+
+
+def in_chunks(run, name, ends):
+    metric = METRICS[name](planned_for(run))
+    table = run.telemetry
+    for first, last in zip([0, *ends], [*ends, len(table)], strict=True):
+        if last > first:
+            metric.write(table.rows(first, last))
+    return metric.value()
+
+
+@pytest.mark.parametrize("name", METRICS)
+@settings(max_examples=25)
+@given(data=st.data())
+def test_chunks_change_no_bit(runs, ended_early, name, data):
+    run = data.draw(st.sampled_from([*runs, ended_early]))
+    ends = sorted(data.draw(st.lists(st.integers(0, len(run.telemetry)), max_size=8)))
+    assert in_chunks(run, name, ends) == in_chunks(run, name, [])
+
+
+@pytest.mark.parametrize("name", ["rms_error_rad", "rms_torque_Nm", "copper_loss_J", "current_variation_A_s"])
+def test_not_even_ticks_handed_over_one_by_one_change_a_bit(runs, name):
+    run = runs[2]
+    assert in_chunks(run, name, list(range(len(run.telemetry)))) == in_chunks(run, name, [])
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_a_run_without_a_row_has_none(runs, name):
+    assert METRICS[name](planned_for(runs[0])).value() is None
+    assert METRICS[name](planned_for(runs[0])).warnings() == []
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_memory_does_not_hold_the_rows(runs, name):
+    """A kilobyte for 10,000 ticks at most, where the rows take 600."""
+    planned = planned_for(runs[0])
+    metric = METRICS[name](Planned(planned.scenario, planned.actuator, 40_000))
+    sizes = []
+    signals = runs[0].telemetry.signals
+    for _ in range(3):
+        metric.write(Table(signals, np.random.default_rng(0).normal(size=(10_000, width(signals)))))
+        state = {key: value for key, value in vars(metric).items() if key != "planned"}
+        sizes.append(len(pickle.dumps(state)))
+    # 40 pieces of three sums, and the bytes by which longer counts are written.
+    assert max(np.diff(sizes)) <= 1000
+
+
+def test_the_tail_of_a_run_that_ended_early_begins_within_a_piece_before_its_half(ended_early):
+    error = ended_early.telemetry["error_rad"]
+    half = len(error) // 2
+    tails = [np.sqrt(np.mean(error[first:] ** 2, axis=0)) for first in range(half - PIECE_TICKS, half + 1)]
+    received = figures_of(ended_early)["tail_rms_error_rad"]
+    assert any(np.allclose(received, expected, rtol=1e-12, atol=0) for expected in tails)
+
+
+@pytest.fixture
+def still():
+    """One second of rows in which nothing happens, and what is planned."""
+    session = Session(scenarios.load("hold", {"duration": 1.0}))
+    table = Table(session.signals, np.zeros((1000, width(session.signals))))
+    table["t_s"][:] = np.arange(1000) * 1e-3
+    table["allocation_scale"][:] = 1.0
+    return Planned(session.scenario, session.actuator, 1000), table
+
+
+def value(name, planned, table):
+    metric = METRICS[name](planned)
+    metric.write(table)
+    return metric.value()
+
+
+def test_the_length_of_the_torque_counts_and_not_its_parts(still):
+    planned, table = still
+    table["torque_Nm"][:] = [3.0, -4.0, 12.0]
+    assert value("rms_torque_Nm", planned, table) == pytest.approx(13.0, rel=1e-14)
+
+
+def test_a_group_that_chatters_varies_by_its_jumps(still):
+    planned, table = still
+    groups = table["current_command_A"].shape[1]
+    table["current_command_A"][::2, 0] = 0.5  # 0.5 A up or down at each of the thousand ticks a second
+    received = value("current_variation_A_s", planned, table)
+    assert received == pytest.approx(500.0 / groups, rel=1e-12)
+    assert value("current_variation_A_s", planned, table.rows(0, 1)) is None
+
+
+def test_copper_takes_r_i_squared(still):
+    planned, table = still
+    table["current_A"][:] = -2.0
+    groups, resistance_ohm = table["current_A"].shape[1], planned.actuator.group.resistance_ohm
+    assert value("copper_loss_J", planned, table) == pytest.approx(groups * resistance_ohm * 4.0, rel=1e-12)
+
+
+def test_settled_is_settled_for_good(still):
+    planned, table = still
+    table["error_rad"][:400, 0] = 2 * BAND_rad
+    table["error_rad"][:400, 1] = BAND_rad  # on the border is inside
+    table["error_rad"][[100, 700], 1] = -1.1 * BAND_rad
+    table["error_rad"][-1, 2] = 2 * BAND_rad
+    assert value("settling_time_s", planned, table) == [pytest.approx(0.4), pytest.approx(0.701), None]
+    table["error_rad"][:] = 0
+    assert value("settling_time_s", planned, table) == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("share", "lines"), [(0.05, 0), (0.051, 1)])
+def test_a_run_at_the_limit_warns(still, share, lines):
+    planned, table = still
+    table["allocation_scale"][: round(1000 * share)] = 0.9
+    metric = METRICS["saturated_fraction"](planned)
+    metric.write(table)
+    assert metric.value() == share
+    assert len(metric.warnings()) == lines

@@ -1,0 +1,74 @@
+"""A run as JSON: the metrics of every run, and functions of the user's own among them."""
+
+import json
+
+import numpy as np
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.metrics.metric import Planned
+from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow, simulate
+from spheretwin.twin.summary import BESIDE, Figures, figures_of, summary
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(scenarios.load("hold", {"duration": 0.2}))
+
+
+def followed(ticks):
+    """Summary of a session that was followed for some ticks."""
+    with Session(scenarios.load("hold", {"duration": 0.2})) as session:
+        figures = Figures(Planned(session.begun_as, session.actuator, 200))
+        status = follow(session, ticks, [figures])
+        return summary(session, status, figures.values(), figures.warnings())
+
+
+def test_a_summary_has_the_metrics_and_what_stands_beside_them(run):
+    told = followed(200)
+    assert set(told) == {*METRICS, *BESIDE}
+    assert (told["status"], told["simulated_s"]) == ("completed", 0.2)
+    figures = figures_of(run)
+    assert {name: told[name] for name in METRICS} == figures  # followed or kept, it is one run
+    assert json.loads(json.dumps(told)) == told | {"scenario": json.loads(json.dumps(told["scenario"]))}
+
+
+def test_a_run_without_a_row_has_no_figures():
+    told = followed(0)
+    assert [told[name] for name in METRICS] == [None] * len(METRICS)
+    assert told["realtime_factor"] is None
+    assert told["warnings"] == []
+
+
+def test_a_function_of_the_user_s_is_one_more_figure(run):
+    own = {
+        "overshoot_rad": lambda run: run.telemetry["error_rad"].max(axis=0),
+        "groups": lambda run: np.int64(len(run.actuator.groups)),
+        "ended": lambda run: {"status": run.status, "at_s": run.telemetry["t_s"][-1]},
+    }
+    figures = figures_of(run, own)
+    assert figures["overshoot_rad"] == run.telemetry["error_rad"].max(axis=0).tolist()
+    assert figures["groups"] == len(run.actuator.groups)
+    assert figures["ended"] == {"status": "completed", "at_s": pytest.approx(0.199)}
+    assert list(figures) == [*METRICS, *own]
+
+
+@pytest.mark.parametrize("name", ["rms_torque_Nm", "status"])
+def test_a_figure_of_the_user_s_takes_no_other_s_place(run, name):
+    with pytest.raises(InputError, match=f"metric: expected another name than .*, received {name}"):
+        figures_of(run, {name: lambda run: 1.0})
+
+
+def test_what_fails_or_is_no_json_is_told_with_its_name(run):
+    def failing(run):
+        raise ValueError("line one\nline two")
+
+    with pytest.raises(
+        InputError, match="metric mine: expected a figure, it raised ValueError: line one line"
+    ):
+        figures_of(run, {"mine": failing})
+    with pytest.raises(InputError, match="metric mine: expected what JSON holds, received <function"):
+        figures_of(run, {"mine": lambda run: failing})

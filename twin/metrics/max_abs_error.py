@@ -1,0 +1,24 @@
+"""The largest tracking error of each axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.metrics.metric import Metric, Planned
+
+
+class MaxAbsError(Metric):
+    """Largest ``|error_rad|`` of each hinge over the whole run, its start included, [3] in rad."""
+
+    def __init__(self, planned: Planned) -> None:
+        super().__init__(planned)
+        self._largest = np.full(3, -np.inf)
+
+    def write(self, rows: Table) -> None:
+        """Take the rows of one chunk, at least one."""
+        self._largest = np.maximum(self._largest, np.abs(rows["error_rad"]).max(axis=0))
+
+    def value(self) -> list[float] | None:
+        """[3] in rad; None without a row."""
+        return self._largest.tolist() if self._largest[0] >= 0 else None

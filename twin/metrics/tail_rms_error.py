@@ -1,0 +1,29 @@
+"""The root mean square of the tracking error once the start is over: in the second half of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.rms_error import SquaresByPiece
+
+
+class TailRmsError(Metric):
+    """Root mean square of ``error_rad`` of each hinge over the second half of the run, [3] in rad.
+
+    The second half begins at exactly half of the planned ticks, and in a run that ended early within 256
+    ticks before its half.
+    """
+
+    def __init__(self, planned: Planned) -> None:
+        super().__init__(planned)
+        self._squares = SquaresByPiece(planned.ticks)
+
+    def write(self, rows: Table) -> None:
+        """Take the rows of one chunk, at least one."""
+        self._squares.add(rows["error_rad"])
+
+    def value(self) -> list[float] | None:
+        """[3] in rad; None without a row."""
+        return self._squares.rms(int(self._squares.piece(np.array(self._squares.rows // 2))))
