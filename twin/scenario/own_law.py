@@ -31,7 +31,7 @@ def _extended(own: type[LawParameters]) -> type[Scenario]:
     laws: Any = Annotated[Union[(*LAWS, own)], Field(discriminator="law")]
 
     class Extended(Scenario):
-        controller: SerializeAsAny[laws] = Scenario.model_fields["controller"].default  # type: ignore[valid-type]
+        controller: SerializeAsAny[laws] = Scenario.model_fields["controller"].default
 
         def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
             """A class made for a file is made anew where it is unpickled."""
