@@ -39,7 +39,7 @@ from spheretwin.twin.plant.stepping import Stepped
 from spheretwin.twin.scenario.sections import DriveSection, OwnController, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.sensors import Sensors, sensors
-from spheretwin.twin.trajectories import shapes as trajectory
+from spheretwin.twin.trajectories import trajectory
 
 # What the engine's compiler takes where a file says nothing.
 UNWRITTEN_STEP_s = 0.002

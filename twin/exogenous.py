@@ -1,7 +1,7 @@
 """What comes from outside a loop: reference and disturbance, made block by block for as long as it runs.
 
 Blocks have a fixed length and begin at its multiples, whatever the chunks in which a session advances, and
-each tick has its own draw of the random stream: neither chunks nor changes on the way move a single bit of
+each tick has its own draw of each random stream: neither chunks nor changes on the way move a single bit of
 what they do not concern.
 """
 
@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.twin.disturbances.draws import Draws, term_draws
 from spheretwin.twin.loop import Inputs
 from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.trajectories.trajectory import Sampled, checked
 
 BLOCK_TICKS = 1000
 
@@ -27,9 +29,17 @@ class Exogenous:
     ----------
     scenario : Scenario
         Trajectory, disturbance, control period and seed.
+    trajectory : Sampled, optional
+        Followed instead of the trajectory that the scenario names, whatever scenario is in force.
+
+    Raises
+    ------
+    InputError
+        The trajectory has no ``sample(t)``, or what that gives at the start is no finite motion.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, trajectory: Sampled | None = None) -> None:
+        self._own = None if trajectory is None else checked(trajectory)
         self._generator = np.random.default_rng(scenario.seed)
         self._before: Mapping[str, Any] = self._generator.bit_generator.state
         self._first = -BLOCK_TICKS  # tick at which the present block begins
@@ -54,7 +64,8 @@ class Exogenous:
         ------
         InputError
             Reference or disturbance is beyond what a number can hold at that very tick: what comes before
-            does not depend on how many rows are asked for.
+            does not depend on how many rows are asked for. Or a trajectory of the user's failed somewhere in
+            the block.
         """
         while tick >= self._first + BLOCK_TICKS:
             self._before = self._generator.bit_generator.state
@@ -63,7 +74,7 @@ class Exogenous:
             self._block = None
         if self._block is None:
             ticks = np.arange(self._first, self._first + BLOCK_TICKS, dtype=np.float64)
-            self._block = self._sampled(ticks, self._draws)
+            self._block = self._sampled(ticks, Draws(self._draws, self._draws_of_term))
             self._numbers = (
                 BLOCK_TICKS if _finite(self._block).all() else int(np.argmin(_finite(self._block)))
             )
@@ -84,7 +95,7 @@ class Exogenous:
         InputError
             Reference or disturbance is beyond what a number can hold at a tick to come.
         """
-        end = self._sampled(np.array([tick], dtype=np.float64), np.ones(1))
+        end = self._sampled(np.array([tick], dtype=np.float64), Draws(np.ones(1), lambda _: np.ones(1)))
         if not _finite(end).all():
             self._refuse(end, 0)
 
@@ -100,10 +111,15 @@ class Exogenous:
             self._draws = self._generator.random(BLOCK_TICKS)
         self._block = None
 
-    def _sampled(self, ticks: NDArray[np.float64], draws: NDArray[np.float64]) -> Inputs:
+    def _draws_of_term(self, place: int) -> NDArray[np.float64]:
+        """Draws of a term of the disturbance in the present block."""
+        return term_draws(self._scenario.seed, self._first, BLOCK_TICKS, place)
+
+    def _sampled(self, ticks: NDArray[np.float64], draws: Draws) -> Inputs:
         scenario = self._scenario
         t = scenario.controller.period_s * ticks
-        reference = np.ascontiguousarray(scenario.trajectory.sample(t))
+        followed: Sampled = scenario.trajectory if self._own is None else self._own
+        reference = np.ascontiguousarray(followed.sample(t))
         return Inputs(t, reference, scenario.disturbance.sample(t, draws))
 
     def _refuse(self, rows: Inputs, row: int) -> NoReturn:

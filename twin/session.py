@@ -35,7 +35,7 @@ from spheretwin.twin.scenario.changing import changed, is_fixed
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain
 from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.trajectories import shapes as trajectory
+from spheretwin.twin.trajectories import trajectory
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""What a run says of itself: signals, tables, and the file they are streamed to."""
+"""What a run says of itself, and series of the user's: signals, tables, and the files they are kept in."""

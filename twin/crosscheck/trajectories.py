@@ -25,7 +25,7 @@ from spheretwin.models.mjcf import read
 from spheretwin.twin.plant import lagrangian
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.trajectories.shapes import Nutation
+from spheretwin.twin.trajectories.nutation import Nutation
 
 Array = NDArray[np.float64]
 

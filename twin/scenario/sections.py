@@ -10,8 +10,10 @@ from pydantic_core import PydanticCustomError
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
-from spheretwin.twin.disturbances.load import Disturbance
-from spheretwin.twin.trajectories.shapes import Bounded, Trajectory, Triple
+from spheretwin.control.parts.gains import Gains, NonNegative, Positive
+from spheretwin.twin.disturbances.disturbance import Disturbance
+from spheretwin.twin.trajectories.registry import Trajectory
+from spheretwin.twin.trajectories.trajectory import Bounded, Triple
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 

@@ -1,0 +1,31 @@
+"""The shapes of trajectories: a new one is a file and a row."""
+
+from typing import Annotated, get_args
+
+from pydantic import Field
+
+from spheretwin.twin.trajectories.chirp import Chirp
+from spheretwin.twin.trajectories.hold import Hold
+from spheretwin.twin.trajectories.multisine import Multisine
+from spheretwin.twin.trajectories.nutation import Nutation
+from spheretwin.twin.trajectories.sinusoid import Sinusoid
+from spheretwin.twin.trajectories.steps import Steps
+from spheretwin.twin.trajectories.tilt import Tilt
+from spheretwin.twin.trajectories.trajectory import Shape
+from spheretwin.twin.trajectories.waypoints import Waypoints
+
+Trajectory = Annotated[
+    Sinusoid  # one row each
+    | Nutation
+    | Tilt
+    | Hold
+    | Chirp
+    | Multisine
+    | Steps
+    | Waypoints,
+    Field(discriminator="shape"),
+]
+
+SHAPES: dict[str, type[Shape]] = {
+    kind.model_fields["shape"].default: kind for kind in get_args(get_args(Trajectory)[0])
+}

@@ -1,0 +1,161 @@
+"""What a trajectory is: angles, rates and accelerations of the three hinges as a function of time alone."""
+
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown, without_breaks
+from spheretwin.models.telemetry.series import LONGEST_s
+from spheretwin.twin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded, told
+
+CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+# Far beyond any motion of the actuator, and far from where squares of numbers overflow.
+LARGEST = 1e4
+
+Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Triple = tuple[Bounded, Bounded, Bounded]
+Time = Annotated[float, Field(ge=0, le=LONGEST_s)]
+Samples = NDArray[np.float64]
+
+ZERO: Triple = (0.0, 0.0, 0.0)
+
+
+class Sampled(Protocol):
+    """What a loop needs of a trajectory; a user's own is any object that has it."""
+
+    def sample(self, t: NDArray[np.float64]) -> Samples:
+        """Desired motion at times `t` (s), for any times from 0 on and the same for the same times.
+
+        Returns
+        -------
+        (n, 3, 3) array
+            Angle (rad), rate (rad/s) and acceleration (rad/s²) as rows, for each time.
+        """
+        ...
+
+
+class Shape(BaseModel):
+    """A shape that a scenario can name: its parameters, and the motion that they make.
+
+    A subclass says its motion in `sharp`, and in `corners` where that jumps.
+    """
+
+    model_config = CONFIG
+
+    rounding_rad_s2: Annotated[float, Field(ge=1e-6, le=1e9)] | None = Field(
+        None,
+        description="acceleration that rounds corners (start from rest, jumps), rad/s²; sharp unless given",
+    )
+
+    def sample(self, t: NDArray[np.float64]) -> Samples:
+        """Desired motion at times `t` (s).
+
+        Returns
+        -------
+        (n, 3, 3) array
+            Angle (rad), rate (rad/s) and acceleration (rad/s²) as rows, for each time.
+        """
+        samples = self.sharp(t)
+        if self.rounding_rad_s2 is None:
+            return samples
+        return rounded(samples, t, self._start(), self.corners(), self.rounding_rad_s2)
+
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Desired motion as `sample` has it, its corners as they are."""
+        raise NotImplementedError
+
+    def corners(self) -> Corners:
+        """Where angle or rate jump after the start, which no shape needs to tell."""
+        return no_corners()
+
+    def _start(self) -> NDArray[np.float64]:
+        """Rates (3,) with which it begins, where the rotor is at rest."""
+        return self.sharp(np.zeros(1))[0, 1]
+
+    def _check(self) -> None:
+        """Refuse what the fields cannot refuse one by one."""
+
+    @model_validator(mode="after")
+    def _usable(self) -> "Shape":
+        self._check()
+        if self.rounding_rad_s2 is not None:
+            least = least_acceleration(self._start(), self.corners())
+            if self.rounding_rad_s2 < least:
+                raise ValueError(
+                    f"expected rounding_rad_s2 of at least {told(least)} rad/s², so that no corner runs into"
+                    f" the next, received {self.rounding_rad_s2:.10g}"
+                )
+        return self
+
+
+class OwnTrajectory:
+    """A trajectory of the user's, each of its samples checked.
+
+    Parameters
+    ----------
+    own : Sampled
+        Any object with ``sample(t)``.
+
+    Raises
+    ------
+    InputError
+        It has no such method, or what that gives at the start is no finite motion.
+    """
+
+    def __init__(self, own: Sampled) -> None:
+        if isinstance(own, type) or not callable(getattr(own, "sample", None)):
+            raise InputError(f"trajectory: expected an object with sample(t), received {shown(own)}")
+        self._own = own
+        start = self.sample(np.zeros(1))
+        if not np.isfinite(start).all():
+            raise InputError(f"trajectory: expected finite numbers at 0 s, received {start[0].tolist()}")
+
+    def sample(self, t: NDArray[np.float64]) -> Samples:
+        """Desired motion at times `t` (s): a copy, as its maker may use the array again.
+
+        Raises
+        ------
+        InputError
+            The user's method failed, or gave something else than float64 of shape (n, 3, 3).
+        """
+        try:
+            samples = self._own.sample(t.copy())
+        except Exception as error:  # whatever a user's code may raise
+            raise InputError(
+                f"trajectory: expected samples from {t[0]:g} to {t[-1]:g} s,"
+                f" received {type(error).__name__}: {without_breaks(error)}"
+            ) from error
+        shape = (len(t), 3, 3)
+        if (
+            not isinstance(samples, np.ndarray)
+            or samples.shape != shape
+            or samples.dtype.newbyteorder("=") != np.float64
+        ):
+            received = getattr(samples, "dtype", type(samples).__name__)
+            raise InputError(
+                f"trajectory: expected float64 of shape {shape} (angle, rate, acceleration by axis),"
+                f" received {received} of shape {_shape_of(samples)}"
+            )
+        return np.array(samples, dtype=np.float64, order="C")
+
+
+def checked(own: Sampled) -> OwnTrajectory:
+    """A trajectory of the user's, found usable; one that is checked already stays as it is.
+
+    Raises
+    ------
+    InputError
+        It has no ``sample(t)``, or what that gives at the start is no finite motion.
+    """
+    return own if isinstance(own, OwnTrajectory) else OwnTrajectory(own)
+
+
+def _shape_of(samples: Any) -> object:
+    try:
+        return np.shape(samples)
+    except ValueError:  # lists of different lengths
+        return "none"
