@@ -124,9 +124,10 @@ class Exogenous:
 
     def _refuse(self, rows: Inputs, row: int) -> NoReturn:
         name = "disturbance" if np.isfinite(rows.reference[row]).all() else "trajectory"
+        lost = np.isnan(rows.reference[row]).any() or np.isnan(rows.disturbance[row]).any()
         raise InputError(
             f"scenario {self._scenario.name}: expected a finite {name},"
-            f" received infinity at {rows.t[row]:g} s"
+            f" received {'NaN' if lost else 'infinity'} at {rows.t[row]:g} s"
         )
 
 

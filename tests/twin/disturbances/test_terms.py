@@ -1,0 +1,197 @@
+"""Terms: each kind of the registry held to what a term is, and each to its exact torque."""
+
+import pickle
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin.disturbances.constant import Constant
+from spheretwin.twin.disturbances.draws import term_draws
+from spheretwin.twin.disturbances.random import Random
+from spheretwin.twin.disturbances.registry import KINDS, AnyDisturbance
+from spheretwin.twin.disturbances.sinusoidal import Sinusoidal
+from spheretwin.twin.disturbances.steps import Steps
+from spheretwin.twin.disturbances.table import Table
+
+TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0.5,0.1,0,0\n1.5,0.3,-0.2,0\n2.0,0,0,0.4\n"
+PERIOD = 1e-3
+
+# Beside every kind as it is when nothing is said of it.
+OTHERS = [
+    ("constant", {"torque_Nm": (0.1, -0.2, 0.3)}),
+    ("steps", {"times_s": (0.5, 2.0), "torques_Nm": ((0.1, 0.0, 0.2), (0.0, -0.3, 0.0))}),
+    (
+        "sinusoidal",
+        {"amplitude_Nm": (0.1, 0.2, 0.3), "frequency_Hz": (1.0, 0.0, 9.0), "phase_rad": (0.0, 1.0, 2.0)},
+    ),
+    ("table", {"between": "held"}),
+    ("random", {"gamma_envelope": "growing", "bound_Nm": (0.1, 0.0, 1e-3)}),
+]
+
+
+@pytest.fixture
+def torques(tmp_path):
+    path = tmp_path / "torques.csv"
+    path.write_text(TORQUES)
+    return str(path)
+
+
+@pytest.fixture(
+    params=[*((name, {}) for name in KINDS), *OTHERS], ids=lambda case: "-".join([case[0], *case[1]])
+)
+def term(request, torques):
+    name, fields = request.param
+    kind = KINDS[name]
+    return kind(**({"file": torques} if "file" in kind.model_fields else {}), **fields)
+
+
+def sampled(term, first, ticks, seed=3, place=2):
+    t = PERIOD * np.arange(first, first + ticks, dtype=np.float64)
+    return term.sample(t, lambda: term_draws(seed, first, ticks, place))
+
+
+def test_samples_are_finite_and_as_many_as_asked_for(term):
+    for first, ticks in ((0, 1), (0, 1000), (5000, 7)):
+        torque = sampled(term, first, ticks)
+        assert torque.shape == (ticks, 3)
+        assert torque.dtype == np.float64
+        assert np.isfinite(torque).all()
+
+
+def test_is_a_function_of_the_tick_alone(term):
+    whole = sampled(term, 0, 4000)
+    for first, last in ((3999, 4000), (0, 1), (1, 8), (1000, 2000), (1003, 3999)):
+        assert sampled(term, first, last - first).tobytes() == whole[first:last].tobytes()
+
+
+def test_is_known_by_what_is_said_of_it(term):
+    again = TypeAdapter(AnyDisturbance).validate_json(term.model_dump_json())
+    for other in (again, term.model_copy(), pickle.loads(pickle.dumps(term))):
+        assert other == term
+        assert hash(other) == hash(term)
+        assert sampled(other, 0, 100).tobytes() == sampled(term, 0, 100).tobytes()
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_field_says_what_it_is(name):
+    assert KINDS[name].model_fields["kind"].default == name
+    assert all(field.description for field in KINDS[name].model_fields.values())
+
+
+def test_kinds_are_named():
+    assert list(KINDS) == ["constant", "steps", "sinusoidal", "table", "random"]
+
+
+# --- exact torques
+
+
+def test_constant_and_steps_hold_on_each_axis_by_itself():
+    np.testing.assert_array_equal(sampled(Constant(torque_Nm=(1.0, 2.0, 3.0)), 7, 3), [[1, 2, 3]] * 3)
+    steps = Steps(times_s=(0.002, 0.004), torques_Nm=((1.0, 0.0, -1.0), (0.0, 5.0, 0.0)))
+    expected = [[0, 0, 0], [0, 0, 0], [1, 0, -1], [1, 0, -1], [0, 5, 0], [0, 5, 0]]
+    np.testing.assert_array_equal(sampled(steps, 0, 6), expected)
+
+
+def test_sinusoidal_swings_on_each_axis_by_itself():
+    term = Sinusoidal(
+        amplitude_Nm=(0.1, 0.2, 0.3), frequency_Hz=(1.0, 2.0, 0.0), phase_rad=(0.0, np.pi / 2, np.pi / 6)
+    )
+    quarters = term.sample(np.array([0.0, 0.25, 0.5, 0.75, 1.0]), None)
+    expected = [[0, 0.2, 0.15], [0.1, -0.2, 0.15], [0, 0.2, 0.15], [-0.1, -0.2, 0.15], [0, 0.2, 0.15]]
+    np.testing.assert_allclose(quarters, expected, atol=1e-15)
+
+
+def test_table_goes_by_its_rows(torques):
+    t = np.array([0.0, 0.5, 1.0, 1.5, 1.75, 2.0, 50.0])
+    linear = Table(file=torques).sample(t, None)
+    expected = [
+        [0.1, 0, 0],
+        [0.1, 0, 0],
+        [0.2, -0.1, 0],
+        [0.3, -0.2, 0],
+        [0.15, -0.1, 0.2],
+        [0, 0, 0.4],
+        [0, 0, 0.4],
+    ]
+    np.testing.assert_allclose(linear, expected, atol=1e-16)
+    held = Table(file=torques, between="held").sample(t, None)
+    rows = [[0.1, 0, 0], [0.3, -0.2, 0], [0, 0, 0.4]]
+    np.testing.assert_array_equal(held, np.array(rows)[[0, 0, 0, 1, 1, 2, 2]])
+
+
+def test_an_edit_of_the_file_changes_no_table_that_is_made(tmp_path, torques):
+    term = Table(file=torques)
+    before = sampled(term, 0, 100).tobytes()
+    (tmp_path / "torques.csv").write_text(TORQUES.replace("0.1", "0.2"))
+    assert sampled(term, 0, 100).tobytes() == before
+    assert Table(file=torques) != term
+    assert Table.model_fields["file"].json_schema_extra == {"path": True}
+
+
+def test_random_is_uniform_within_its_bounds():
+    ticks, bound = 100_000, np.array([0.05, 0.02, 0.01])
+    torque = sampled(Random(bound_Nm=tuple(bound.tolist())), 0, ticks)
+    t = PERIOD * np.arange(ticks)
+    envelope = np.stack([np.cos(np.pi * t), -np.sin(np.pi * t), np.exp(-np.pi * t)], axis=1)
+    assert np.all(np.abs(torque) <= bound * np.abs(envelope) + 1e-15)
+    known = np.abs(envelope) > 0.01
+    for axis in range(3):
+        share = (torque[:, axis] / bound[axis])[known[:, axis]] / envelope[known[:, axis], axis]
+        count = len(share)
+        # Mean 0 with variance 1/3, and its estimate with variance (1/5 - 1/9) / n: four standard deviations.
+        assert abs(share.mean()) < 4 * np.sqrt(1 / 3 / count)
+        assert abs(share.var() - 1 / 3) < 4 * np.sqrt((1 / 5 - 1 / 9) / count)
+        assert abs(np.corrcoef(share[1:], share[:-1])[0, 1]) < 4 / np.sqrt(count)
+    first = np.flatnonzero(known.all(axis=1))
+    shares = (torque[first] / bound) / envelope[first]
+    np.testing.assert_allclose(shares, shares[:, :1] * np.ones(3), atol=1e-13)  # one factor for all axes
+
+
+def test_draws_count_by_tick_for_any_seed():
+    far = 10**15
+    for seed in (0, 2**200):
+        whole = term_draws(seed, far, 20, 0)
+        assert whole[7:9].tobytes() == term_draws(seed, far + 7, 2, 0).tobytes()
+        assert not np.any(whole == term_draws(seed, far, 20, 1))
+        assert len(np.unique(whole)) == 20
+
+
+# --- refusals
+
+
+@pytest.mark.parametrize(
+    ("name", "fields", "complaint"),
+    [
+        ("constant", {"torque_Nm": (1e4, 0.0, 0.0)}, "torque_Nm"),
+        ("constant", {"torque_Nm": (1.0, 0.0)}, "torque_Nm"),
+        ("constant", {"torque": (1.0, 0.0, 0.0)}, "torque"),
+        ("steps", {"times_s": (1.0, 2.0)}, "as many torques_Nm as times_s, received 1 for 2 times"),
+        (
+            "steps",
+            {"times_s": (2.0, 1.0), "torques_Nm": ((0.0, 0.0, 0.0),) * 2},
+            "rising times, received 2 then 1 s",
+        ),
+        ("sinusoidal", {"frequency_Hz": (-1.0, 0.0, 0.0)}, "frequency_Hz"),
+        ("sinusoidal", {"phase_rad": (np.inf, 0.0, 0.0)}, "phase_rad"),
+        ("random", {"bound_Nm": (-0.1, 0.0, 0.0)}, "bound_Nm"),
+        ("random", {"gamma_envelope": "flat"}, "gamma_envelope"),
+        ("table", {"file": ""}, "file"),
+        ("table", {}, "file"),
+    ],
+)
+def test_parameters_out_of_range_are_refused_by_name(name, fields, complaint):
+    with pytest.raises(ValidationError) as refusal:
+        KINDS[name](**fields)
+    assert complaint in str(refusal.value)
+
+
+def test_bad_table_is_refused_on_one_line(tmp_path, torques):
+    (tmp_path / "torques.csv").write_text(TORQUES.replace("0.3", "2000"))
+    with pytest.raises(InputError) as refusal:
+        Table(file=torques)
+    expected = (
+        f"disturbance {torques}: line 3: expected a number from -1000 to 1000 as alpha_Nm, received '2000'"
+    )
+    assert str(refusal.value) == expected

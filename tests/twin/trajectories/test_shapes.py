@@ -1,0 +1,306 @@
+"""Shapes: each one of the registry held to what a trajectory is, and each to its exact solution."""
+
+import pickle
+import typing
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from scipy import signal
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.simulation import simulate
+from spheretwin.twin.trajectories.chirp import Chirp
+from spheretwin.twin.trajectories.hold import Hold
+from spheretwin.twin.trajectories.multisine import Component, Multisine
+from spheretwin.twin.trajectories.nutation import Nutation
+from spheretwin.twin.trajectories.registry import SHAPES, Trajectory
+from spheretwin.twin.trajectories.sinusoid import Sinusoid
+from spheretwin.twin.trajectories.steps import Steps
+from spheretwin.twin.trajectories.tilt import Tilt
+
+STEP = 1e-5
+POSES = "t_s,alpha_rad,beta_rad,gamma_rad\n0.5,0,0,0\n1.25,0.2,-0.1,1\n3,0.1,0.3,-1\n4.5,0,0,0.5\n"
+
+# Beside every shape as it is when nothing is said of it.
+OTHERS = {
+    "chirp": {"sweep": "exponential", "sweep_s": 3.3, "amplitude_rad": (0.1, -0.2, 0.05)},
+    "multisine": {
+        "offset_rad": (0.1, 0.0, -0.2),
+        "components": (
+            Component(
+                amplitude_rad=(0.1, 0.0, 0.02), frequency_Hz=(0.5, 0.0, 3.0), phase_rad=(0.0, 1.0, 2.0)
+            ),
+            Component(amplitude_rad=(0.0, 0.3, 0.02), frequency_Hz=(0.0, 0.25, 1.5)),
+        ),
+    },
+    "waypoints": {"between": "cubic"},
+}
+ROUNDED = {"rounding_rad_s2": 40.0}
+CASES = [
+    *((name, {}) for name in SHAPES),
+    *OTHERS.items(),
+    *((name, ROUNDED) for name in SHAPES),
+    *((name, {**fields, **ROUNDED}) for name, fields in OTHERS.items()),
+]
+
+
+@pytest.fixture(scope="module")
+def poses(tmp_path_factory):
+    path = tmp_path_factory.mktemp("poses") / "poses.csv"
+    path.write_text(POSES)
+    return str(path)
+
+
+@pytest.fixture(params=CASES, ids=lambda case: "-".join([case[0], *case[1]]))
+def shape(request, poses):
+    name, fields = request.param
+    kind = SHAPES[name]
+    return kind(**({"file": poses} if "file" in kind.model_fields else {}), **fields)
+
+
+def test_samples_are_finite_wherever_and_as_many_as_asked_for(shape):
+    for t in (np.empty(0), np.zeros(1), np.linspace(0, 10, 1001), np.array([1e6])):
+        samples = shape.sample(t)
+        assert samples.shape == (len(t), 3, 3)
+        assert samples.dtype == np.float64
+        assert np.isfinite(samples).all()
+
+
+def test_rates_and_accelerations_are_derivatives(shape):
+    t = np.linspace(0.1, 4.9, 50)  # no corner and no end of a window within a step of any
+    before, now, after = (shape.sample(t + h) for h in (-STEP, 0, STEP))
+    # Central differences: h² times a third derivative below 2000, and rounding of 31 rad over h.
+    np.testing.assert_allclose(now[:, 1], (after - before)[:, 0] / (2 * STEP), atol=2e-7)
+    np.testing.assert_allclose(now[:, 2], (after - before)[:, 1] / (2 * STEP), atol=2e-7)
+
+
+def test_is_a_function_of_time_alone(shape):
+    t = 1e-3 * np.arange(6000.0)
+    whole = shape.sample(t)
+    cut = [shape.sample(part) for part in np.split(t, [1, 2, 7, 1000, 1003, 5999])]
+    assert np.concatenate(cut).tobytes() == whole.tobytes()
+    shuffled = np.random.default_rng(0).permutation(len(t))
+    assert shape.sample(t[shuffled]).tobytes() == whole[shuffled].tobytes()
+
+
+def test_is_known_by_what_is_said_of_it(shape):
+    t = np.linspace(0, 5, 101)
+    again = TypeAdapter(Trajectory).validate_json(shape.model_dump_json())
+    assert again == shape
+    for other in (again, shape.model_copy(), pickle.loads(pickle.dumps(shape))):
+        assert other == shape
+        assert hash(other) == hash(shape)
+        assert other.sample(t).tobytes() == shape.sample(t).tobytes()
+    assert shape != Hold(angle_rad=(9.0, 9.0, 9.0))
+
+
+def test_rounding_begins_at_rest_and_sharp_is_what_it_is(shape):
+    t = np.linspace(0, 5, 101)
+    if shape.rounding_rad_s2 is None:
+        assert shape.sample(t).tobytes() == shape.sharp(t).tobytes()
+    else:
+        np.testing.assert_array_equal(shape.sample(np.zeros(1))[0, 1], 0.0)
+
+
+def nested(kind):
+    yield kind
+    for field in kind.model_fields.values():
+        for inner in typing.get_args(field.annotation):
+            if isinstance(inner, type) and issubclass(inner, BaseModel):
+                yield from nested(inner)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_field_says_what_it_is(name):
+    assert SHAPES[name].model_fields["shape"].default == name
+    for model in nested(SHAPES[name]):
+        assert all(field.description for field in model.model_fields.values())
+        assert model.__doc__
+
+
+def test_shapes_are_named():
+    assert list(SHAPES) == [
+        "sinusoid", "nutation", "tilt", "hold", "chirp", "multisine", "steps", "waypoints"
+    ]  # fmt: skip
+    assert Component in set(nested(Multisine))
+
+
+# --- exact solutions
+
+
+def test_nutation_is_equation_59():
+    t = np.array([0.0, 1.25, 5.0])
+    expected = np.stack([0.2 * np.sin(np.pi * t), 0.2 * t * np.cos(np.pi * t), 2 * np.pi * t], axis=1)
+    np.testing.assert_allclose(Nutation().sample(t)[:, 0], expected, atol=1e-15)
+    assert abs(Nutation().sample(np.array([5.0]))[0, 0, 1]) == pytest.approx(1.0)  # beta ends at 1 rad
+
+
+def test_tilt_is_equation_60():
+    t = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+    expected = np.pi / 30 * np.array([0, 1, 2, 2, 2, 1, 0, 0])
+    samples = Tilt().sample(t)
+    np.testing.assert_allclose(samples[:, 0, 0], expected, atol=1e-15)
+    np.testing.assert_allclose(samples[:, 1, 0], np.pi / 30 * np.array([1, 1, 0, 0, -1, -1, 0, 0]))
+    np.testing.assert_array_equal(samples[:, :, 1:], 0)
+
+
+SWEEPS = st.builds(
+    Chirp,
+    start_frequency_Hz=st.floats(0.01, 20),
+    end_frequency_Hz=st.floats(0.01, 20),
+    sweep_s=st.floats(0.1, 20),
+    sweep=st.sampled_from(["linear", "exponential"]),
+)
+
+
+@given(SWEEPS)
+def test_chirp_is_scipy_s_within_its_sweep(chirp):
+    t = np.linspace(0, chirp.sweep_s, 200)[:-1]
+    method = {"linear": "linear", "exponential": "logarithmic"}[chirp.sweep]
+    first, last = chirp.start_frequency_Hz, chirp.end_frequency_Hz
+    expected = 0.1 * signal.chirp(t, first, chirp.sweep_s, last, method=method, phi=-90)
+    # The phase is below 2,600 rad and known to a few units in its last place; scipy's formula for equal
+    # ratios divides by their logarithm, which loses what ratio and 1 have in common.
+    lost = 1e-11 if chirp.sweep == "linear" else 1e-11 / min(1.0, abs(np.log(last / first)) + 1e-12)
+    np.testing.assert_allclose(chirp.sample(t)[:, 0, 0], expected, atol=lost)
+
+
+@given(SWEEPS)
+def test_chirp_goes_on_where_its_sweep_ends(chirp):
+    end, w = chirp.sweep_s, 2 * np.pi * chirp.end_frequency_Hz
+    before, after = chirp.sample(np.array([end * (1 - 1e-9), end]))
+    # Angle and rate change by at most rate and acceleration in a billionth of the sweep, 20 ns: below
+    # 13 rad/s and, with the sweep of 20 Hz in 0.1 s, below 1.6e3 + 8e2 rad/s².
+    np.testing.assert_allclose(before[:2], after[:2], atol=5e-5 * 1.1)
+    t = end + np.linspace(0, 3, 50)
+    beyond = chirp.sample(t)[:, :, 0]
+    # A plain sine from there on, told from angle and rate at its start.
+    phase = w * (t - end)
+    expected = after[0, 0] * np.cos(phase) + after[1, 0] / w * np.sin(phase)
+    np.testing.assert_allclose(beyond[:, 0], expected, atol=1e-11)  # phases below 3,000 rad
+    np.testing.assert_allclose(beyond[:, 2], -(w**2) * expected, atol=1e-11 * w**2)
+
+
+def test_exponential_chirp_passes_octaves_in_equal_times():
+    chirp = Chirp(start_frequency_Hz=1.0, end_frequency_Hz=8.0, sweep_s=3.0, sweep="exponential")
+    # Turns done after each octave: 1 / ln 2 times 1, 2, 4, all of them shares of a whole.
+    for octave, turns in enumerate(np.cumsum([0.0, 1.0, 2.0, 4.0]) / np.log(2)):
+        angle, rate, _ = chirp.sample(np.array([float(octave)]))[0, :, 0]
+        assert angle == pytest.approx(0.1 * np.sin(2 * np.pi * turns), abs=1e-14)
+        assert rate == pytest.approx(0.2 * np.pi * 2**octave * np.cos(2 * np.pi * turns), abs=1e-12)
+
+
+def test_multisine_of_one_is_a_sinusoid_about_its_offset():
+    t = np.linspace(0, 10, 1001)
+    one = Multisine(
+        offset_rad=(0.1, 0.2, 0.3),
+        components=(Component(amplitude_rad=(0.2, 0.2, 0.2), frequency_Hz=(0.5, 0.5, 0.5)),),
+    )
+    about = Hold(angle_rad=(0.1, 0.2, 0.3))
+    expected = Sinusoid().sample(t) + about.sample(t)
+    np.testing.assert_allclose(one.sample(t), expected, atol=4e-15)  # products in another order, w² = 10
+
+
+def test_multisine_s_sines_add_with_a_phase_each():
+    first = Component(amplitude_rad=(0.1, 0.2, 0.3), frequency_Hz=(1.0, 2.0, 3.0), phase_rad=(0.0, 1.0, -1.0))
+    second = Component(amplitude_rad=(0.3, 0.1, 0.2), frequency_Hz=(5.0, 0.0, 0.5), phase_rad=(2.0, 0.5, 0.0))
+    t = np.linspace(0, 3, 301)
+    both, *alone = (
+        Multisine(components=components).sample(t) for components in ((first, second), (first,), (second,))
+    )
+    np.testing.assert_allclose(both, sum(alone), atol=1e-13)  # accelerations up to 300 rad/s²
+    np.testing.assert_allclose(alone[1][:, 0, 1], 0.1 * np.sin(0.5), atol=1e-16)  # no frequency: a constant
+
+
+def test_steps_hold_each_pose_from_its_time_on():
+    steps = Steps(
+        start_rad=(0.5, 0.0, 0.0), times_s=(1.0, 2.5), angles_rad=((0.1, 0.2, 0.3), (0.0, 0.0, 0.0))
+    )
+    samples = steps.sample(np.array([0.0, 0.999, 1.0, 2.499, 2.5, 100.0]))
+    expected = [[0.5, 0, 0], [0.5, 0, 0], [0.1, 0.2, 0.3], [0.1, 0.2, 0.3], [0, 0, 0], [0, 0, 0]]
+    np.testing.assert_array_equal(samples[:, 0], expected)
+    np.testing.assert_array_equal(samples[:, 1:], 0.0)
+
+
+def test_a_step_at_0_is_there_from_the_first_tick():
+    assert Steps(times_s=(0.0,), angles_rad=((0.1, 0.2, 0.3),)).sample(np.zeros(1))[0, 0, 2] == 0.3
+
+
+# Periods and ticks whose product falls short of the decimal fraction by its rounding.
+@pytest.mark.parametrize(("period", "tick", "time"), [(7e-4, 17, 0.0119), (7e-4, 25, 0.0175)])
+def test_a_tick_whose_time_is_rounded_down_still_reaches_the_step(period, tick, time):
+    t = period * np.array([tick - 1.0, tick])
+    assert t[1] < time
+    steps = Steps(times_s=(time,), angles_rad=((1.0, 1.0, 1.0),))
+    np.testing.assert_array_equal(steps.sample(t)[:, 0, 0], [0.0, 1.0])
+
+
+# --- refusals
+
+
+@pytest.mark.parametrize(
+    ("name", "fields", "complaint"),
+    [
+        ("sinusoid", {"frequency_Hz": 0.0}, "frequency_Hz"),
+        ("chirp", {"start_frequency_Hz": 0.0}, "start_frequency_Hz"),
+        ("chirp", {"sweep_s": -1.0}, "sweep_s"),
+        ("chirp", {"sweep": "quadratic"}, "sweep"),
+        ("chirp", {"amplitude_rad": (1e5, 0.0, 0.0)}, "amplitude_rad"),
+        ("multisine", {"components": ()}, "components"),
+        ("multisine", {"components": ({"frequency_Hz": (-1.0, 0.0, 0.0)},)}, "frequency_Hz"),
+        ("multisine", {"components": ({"frequency": 1.0},)}, "frequency"),
+        ("steps", {"times_s": (1.0, 2.0)}, "as many angles_rad as times_s, received 1 for 2 times"),
+        (
+            "steps",
+            {"times_s": (1.0, 1.0), "angles_rad": ((0.0, 0.0, 0.0),) * 2},
+            "rising times, received 1 then 1",
+        ),
+        ("steps", {"times_s": (-1.0,)}, "times_s"),
+        ("steps", {"times_s": (), "angles_rad": ()}, "times_s"),
+        ("steps", {"times_s": (float("nan"),)}, "times_s"),
+        ("hold", {"rounding_rad_s2": 0.0}, "rounding_rad_s2"),
+        ("hold", {"rounding_rad_s2": -1.0}, "rounding_rad_s2"),
+        ("tilt", {"rounding_rad_s2": 0.01}, "rounding_rad_s2 of at least 0.152588 rad/s²"),
+    ],
+)
+def test_parameters_out_of_range_are_refused_by_name(name, fields, complaint):
+    with pytest.raises(ValidationError) as refusal:
+        SHAPES[name](**fields)
+    assert complaint in str(refusal.value)
+
+
+# --- from a file to a run
+
+
+def test_scenario_file_names_them(tmp_path, poses):
+    text = """
+duration = 0.05
+[trajectory]
+shape = "multisine"
+offset_rad = [0.05, 0.0, 0.0]
+[[trajectory.components]]
+amplitude_rad = [0.1, 0.1, 0.1]
+frequency_Hz = [0.5, 1.0, 1.5]
+[[trajectory.components]]
+amplitude_rad = [0.0, 0.05, 0.0]
+frequency_Hz = [2.0, 2.0, 2.0]
+phase_rad = [0.0, 1.5, 0.0]
+"""
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    loaded = scenarios.load(str(path))
+    assert len(loaded.trajectory.components) == 2
+    run = simulate(loaded)
+    expected = loaded.trajectory.sample(run.telemetry["t_s"])[:, :2]
+    np.testing.assert_array_equal(run.telemetry["q_ref_rad"], expected[:, 0])
+    np.testing.assert_array_equal(run.telemetry["qdot_ref_rad_s"], expected[:, 1])
+    path.write_text(f'[trajectory]\nshape = "waypoints"\nfile = "{poses}"\nlargest_rate_rad_s = 1e-3\n')
+    with pytest.raises(InputError, match=r"expected a largest rate of 0.001 rad/s, received .* on gamma at"):
+        scenarios.load(str(path))
+    path.write_text('[trajectory]\nshape = "tilt"\nrounding_rad_s2 = 1e-3\n')
+    with pytest.raises(InputError, match=r"trajectory: expected rounding_rad_s2 of at least 0.152588 rad/s²"):
+        scenarios.load(str(path))
