@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from spheretwin.control.laws.registry import NAMES
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.record import Change, RunRecord
@@ -50,9 +50,9 @@ def _record(metadata: Mapping[str, str], path: Path) -> RunRecord:
 def _plan(record: RunRecord, source: str) -> Plan:
     scenario = scenarios.from_record(record.scenario, source)
     for change in record.journal:
-        if change.name == "controller.law" and change.value not in NAMES and not is_reference(change.value):
+        if change.name == "controller.law" and change.value not in LAWS and not is_reference(change.value):
             raise InputError(
-                f"replay {source}: expected changes to {', '.join(NAMES)}, received one to {change.value}"
+                f"replay {source}: expected changes to {', '.join(LAWS)}, received one to {change.value}"
                 f" at tick {change.tick}, a law that the file does not hold"
             )
     if record.ticks < 1:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from spheretwin.control import belief as beliefs
 from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.law import Law
-from spheretwin.control.laws.registry import NAMES
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError, SpheretwinError
@@ -246,7 +246,7 @@ class Session:
         """
         with self._alone(), self._all_or_nothing():
             if snapshot.own_law is not None and snapshot.own_law not in self._own_laws:
-                known = ", ".join([*NAMES, *self._own_laws])
+                known = ", ".join([*LAWS, *self._own_laws])
                 raise InputError(
                     f"session: expected a snapshot under one of the laws {known},"
                     f" received one under {snapshot.own_law}"
@@ -460,7 +460,7 @@ def _array(values: trajectory.Triple | None) -> NDArray[np.float64]:
 
 def _name_of_own(law: Law) -> str:
     """Name of a user's law in the journal, where it must not be taken for a shipped one."""
-    return f"{law.name} of the user's" if law.name in NAMES else law.name
+    return f"{law.name} of the user's" if law.name in LAWS else law.name
 
 
 def _recorded(value: Any) -> Any:

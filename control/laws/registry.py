@@ -1,8 +1,6 @@
-"""The shipped laws: one row each."""
+"""The shipped laws: a new one is a file and a row."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Annotated, Union
+from typing import Annotated, get_args
 
 from pydantic import Field
 
@@ -11,15 +9,13 @@ from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.pd import PD
 from spheretwin.control.parts.parameters import LawParameters
 
-LAWS: tuple[type[LawParameters], ...] = (
-    PD,
-    AdaptiveFuzzy,
-    AFSM,
-)
+AnyLaw = Annotated[
+    PD  # one row each
+    | AdaptiveFuzzy
+    | AFSM,
+    Field(discriminator="law"),
+]
 
-NAMES: tuple[str, ...] = tuple(law.model_fields["law"].default for law in LAWS)
-
-if TYPE_CHECKING:
-    AnyLaw = LawParameters
-else:
-    AnyLaw = Annotated[Union[LAWS], Field(discriminator="law")]  # noqa: UP007
+LAWS: dict[str, type[LawParameters]] = {
+    kind.model_fields["law"].default: kind for kind in get_args(get_args(AnyLaw)[0])
+}

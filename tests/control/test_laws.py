@@ -55,7 +55,7 @@ class SlowLaw:
 
 
 @pytest.mark.parametrize("level", ["acceleration", "torque"])
-@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("kind", LAWS.values(), ids=LAWS)
 def test_law_follows_the_paper(actuator, kind, level):
     gains = kind(
         level=level, **{name: (value[0], 2 * value[1], value[2] / 3) for name, value in each_axis(kind)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from spheretwin.control.laws.registry import NAMES
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.twin.scenario.changing import check_events
@@ -44,9 +44,9 @@ def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
         It was run under a law of its user's that is in no file, or by a version with other fields.
     """
     law = fields.get("controller", {}).get("law")
-    if law not in NAMES and not is_reference(law):
+    if law not in LAWS and not is_reference(law):
         raise InputError(
-            f"scenario {source}: expected a run under {', '.join(NAMES)}, received one under {law},"
+            f"scenario {source}: expected a run under {', '.join(LAWS)}, received one under {law},"
             " a law that its file does not hold"
         )
     return validated(fields, source)

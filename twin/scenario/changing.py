@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from spheretwin.control.laws.registry import NAMES
+from pydantic import BaseModel
+from pydantic_core import to_jsonable_python
+
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.scenario.fields import Kind, kind_of, section_kind
 from spheretwin.twin.scenario.own_law import scenario_with
@@ -26,11 +29,15 @@ FIXED = (
     "plant.initial_rad_s",
 )
 
+FROM_FILES = ("trajectory", "disturbance")
+"""Sections whose files are read when they are made."""
+
 
 def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
     """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
 
     Another member of a family, as another law, keeps the fields that it has too; its own have their defaults.
+    What files of trajectories and disturbances held stays, unless it is they that are changed.
 
     Raises
     ------
@@ -39,12 +46,14 @@ def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
     """
     fields = scenario.model_dump(mode="json")
     if isinstance(scenario.controller, OwnController):
-        fields["controller"] = {"law": NAMES[0], "period_s": scenario.controller.period_s}
+        fields["controller"] = {"law": next(iter(LAWS)), "period_s": scenario.controller.period_s}
     # A user's law stays the one that was read, whatever has become of its file.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
     _keep_common(fields, dotted, value, kind)
     override(fields, dotted, value)
-    return validated(beside("", fields), scenario.name, None if dotted == "controller" else kind)
+    made = validated(beside("", fields), scenario.name, None if dotted == "controller" else kind)
+    update = {name: _kept(getattr(scenario, name), getattr(made, name)) for name in FROM_FILES}
+    return made.model_copy(update=update)
 
 
 def is_fixed(dotted: str) -> bool:
@@ -73,6 +82,20 @@ def check_events(scenario: Scenario, source: str) -> Scenario:
         except InputError as error:
             raise InputError(f"{error}, as event.{place} sets it") from None
     return scenario
+
+
+def _kept(before: Any, after: Any) -> Any:
+    """What comes after, with all that says the same as before left as it is: read when the run began."""
+    if to_jsonable_python(before) == to_jsonable_python(after):
+        return before
+    if isinstance(after, BaseModel) and type(before) is type(after):
+        names = type(after).model_fields
+        return after.model_copy(
+            update={name: _kept(getattr(before, name), getattr(after, name)) for name in names}
+        )
+    if isinstance(before, tuple) and isinstance(after, tuple):
+        return tuple(map(_kept, before, after)) + after[len(before) :]
+    return after
 
 
 def _keep_common(fields: dict[str, Any], dotted: str, value: Any, scenario: type[Scenario]) -> None:

@@ -44,7 +44,8 @@ def described(scenario: Scenario) -> list[tuple[str, str, str]]:
 
 def _shown(value: Any) -> str:
     if isinstance(value, tuple):
-        return " ".join(map(_shown, value))
+        nested = any(isinstance(each, tuple) for each in value)
+        return json.dumps(value) if nested else " ".join(map(_shown, value))
     if isinstance(value, float):
         return f"{value:g}"
     return "" if value is None else str(value)

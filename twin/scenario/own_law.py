@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, get_args
 
 from pydantic import Field, SerializeAsAny
 
 from spheretwin.control.laws.own import parameters_of
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LawParameters
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.twin.scenario.sections import Scenario
@@ -28,7 +28,7 @@ def scenario_with(law: Any) -> type[Scenario]:
 
 @lru_cache(maxsize=32)
 def _extended(own: type[LawParameters]) -> type[Scenario]:
-    laws: Any = Annotated[Union[(*LAWS, own)], Field(discriminator="law")]
+    laws: Any = Annotated[get_args(AnyLaw)[0] | own, Field(discriminator="law")]
 
     class Extended(Scenario):
         controller: SerializeAsAny[laws] = Scenario.model_fields["controller"].default

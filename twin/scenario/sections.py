@@ -10,7 +10,6 @@ from pydantic_core import PydanticCustomError
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
-from spheretwin.control.parts.gains import Gains, NonNegative, Positive
 from spheretwin.twin.disturbances.disturbance import Disturbance
 from spheretwin.twin.trajectories.registry import Trajectory
 from spheretwin.twin.trajectories.trajectory import Bounded, Triple
