@@ -20,7 +20,7 @@ A simplex method alone would reach the same torque, but along a path the current
 torque, also where it passes out of reach. Continuous is not slow. Close to the largest torque, groups with
 little torque an ampere go from limit to limit within a thousandth of the torque. Out of reach they jump as
 the rotor turns, where their columns pass through the plane of the free ones: there the largest torque has
-several answers. A `reserve` of some hundredths of the torque keeps off that edge.
+several answers. A torque some hundredths short of the largest has one answer, and calm currents.
 """
 
 from math import copysign, inf, isfinite
@@ -48,9 +48,7 @@ SOUND = 1e-6
 
 
 @compiled
-def allocate_bounded(
-    G: Array, torque_S: Array, limit: float, current: Array, scratch: Array, reserve: float = 0.0
-) -> float:
+def allocate_bounded(G: Array, torque_S: Array, limit: float, current: Array, scratch: Array) -> float:
     """Smallest currents within the limit that give the torque, or else the most torque in its direction.
 
     Never less torque than `control.allocation.least_norm.allocate` gives, and the same currents where they
@@ -69,9 +67,6 @@ def allocate_bounded(
         Result.
     scratch : (5, n) array
         Working space, `SCRATCH_ROWS` rows; what it holds does not matter.
-    reserve : float
-        Share of the largest torque to leave unused (though never to give less than the least-norm currents
-        do), from 0 to below 1. The currents then change less abruptly; finding them takes twice as long.
 
     Returns
     -------
@@ -90,13 +85,8 @@ def allocate_bounded(
         return 1.0
     largest = limit / scale
     start = (torque_S[0] / largest, torque_S[1] / largest, torque_S[2] / largest)  # what `allocate` gives
-    end = most = 1.0 / scale
-    if reserve > 0.0:
-        ahead = end / (1.0 - reserve)
-        found = reach(G, start, ahead, scratch)
-        if found < ahead:
-            most = min(max((1.0 - reserve) * found, 1.0), end)
-    share = reach(G, start, most, scratch)
+    end = 1.0 / scale
+    share = reach(G, start, end, scratch)
     if not share >= 1.0:  # by rounding, or for want of steps
         return scale
     for j in range(current.shape[0]):

@@ -27,11 +27,11 @@ directions = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array).filter(lambda u: n
 multiples = st.floats(0.1, 5.0)  # of the torque at which the least-norm currents meet the limit
 
 
-def bounded(G, torque, limit=LIMIT, reserve=0.0):
+def bounded(G, torque, limit=LIMIT):
     G = np.ascontiguousarray(G)  # any other layout is compiled for anew
     groups = G.shape[1]
     current = np.full(groups, np.nan)
-    scale = allocate_bounded(G, torque, limit, current, np.full((SCRATCH_ROWS, groups), np.nan), reserve)
+    scale = allocate_bounded(G, torque, limit, current, np.full((SCRATCH_ROWS, groups), np.nan))
     return scale, current
 
 
@@ -225,25 +225,18 @@ def test_currents_are_continuous_where_the_torque_passes_out_of_reach(actuator):
         assert bounded(G, torque * scale * (1 + 1e-9))[1] == pytest.approx(out_of_reach, abs=1e-6)
 
 
-def test_reserve_leaves_its_share_and_calms_the_currents(actuator):
-    rng = np.random.default_rng(4)
-    for _ in range(50):
-        G = pose_matrix(rng, actuator)
-        torque = at_multiple(G, rng.normal(size=3), 10.0)
-        largest, edge = bounded(G, torque)
-        scale, current = bounded(G, torque, reserve=0.03)
-        least = least_norm(G, torque)[0]
-        assert scale == pytest.approx(max(0.97 * largest, least), rel=1e-9)
-        np.testing.assert_allclose(G @ current, scale * torque, rtol=0, atol=1e-9 * np.linalg.norm(torque))
-        assert np.linalg.norm(current) <= np.linalg.norm(edge)
-        assert bounded(G, torque * 0.96 * largest, reserve=0.03)[0] == pytest.approx(1, rel=1e-9)
+def test_currents_jump_with_the_pose_out_of_reach_and_not_three_hundredths_within(actuator):
     q, turn = np.array([0.3, -0.2, 0.1]), np.array([0.1, 0.2, 0.5])
     torque = np.array([0.9, -1.8, 1.2])
-    matrices = [torque_matrix(q + turn * part, actuator) for part in np.linspace(0, 1, 2001)]
-    jumps = [
-        np.abs(np.diff([bounded(G, torque, reserve=reserve)[1] for G in matrices], axis=0)).max()
-        for reserve in (0.0, 0.03)
-    ]
+    edge, within = [], []
+    for part in np.linspace(0, 1, 2001):
+        G = torque_matrix(q + turn * part, actuator)
+        scale, current = bounded(G, torque)
+        assert scale < 1
+        edge.append(current)
+        within.append(bounded(G, 0.97 * scale * torque)[1])
+        assert np.linalg.norm(within[-1]) < np.linalg.norm(current)
+    jumps = [np.abs(np.diff(currents, axis=0)).max() for currents in (edge, within)]
     assert jumps[1] < 1.0 < 8.0 < jumps[0]
 
 
