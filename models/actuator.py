@@ -18,7 +18,6 @@ from spheretwin.models.torque_curve import TorqueCurve
 
 FOLDER = Path(__file__).resolve().parent
 MJCF_PATH = FOLDER / "actuator.xml"
-SCENE_PATH = FOLDER / "scene.xml"
 TORQUE_CURVE_PATH = FOLDER / "torque_curve.csv"
 
 HINGES = ("alpha", "beta", "gamma")

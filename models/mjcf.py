@@ -46,8 +46,6 @@ class Mjcf:
 
     Attributes
     ----------
-    path : Path
-        The file.
     described : MjModel
         With sites: pose of poles, coils, shaft tip.
     bare, loaded : MjModel
@@ -55,7 +53,6 @@ class Mjcf:
         hangs on that body.
     """
 
-    path: Path
     described: mujoco.MjModel
     bare: mujoco.MjModel
     loaded: mujoco.MjModel
@@ -183,7 +180,7 @@ def _read(path: Path) -> Mjcf:
         loaded = spec.compile()
     except ValueError as error:
         raise InputError(f"model {path}: expected valid MJCF, {without_breaks(error)}") from None
-    kept = Mjcf(path, described, _without_mount(spec, loaded), loaded)
+    kept = Mjcf(described, _without_mount(spec, loaded), loaded)
     for model in (kept.described, kept.loaded, kept.bare):
         _turn_principal_axes_back(model)
     return kept

@@ -73,21 +73,3 @@ def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: 
             consequents[RULES + k] += step * rate
             consequents[2 * RULES + k] += step * angle
     return output
-
-
-def basis(rate: float, angle: float) -> NDArray[np.float64]:
-    """Normalised firing strengths psi of the 25 rules (34).
-
-    The product of two sets of degrees that each sum to 1 sums to 1, so the inputs are normalised apart.
-
-    Parameters
-    ----------
-    rate : float, rad/s
-    angle : float, rad
-
-    Returns
-    -------
-    (25,) array
-        Non-negative, with sum 1; rule ``5 i + j`` joins set i of the rate and set j of the angle.
-    """
-    return np.outer(memberships(rate), memberships(angle)).ravel()

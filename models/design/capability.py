@@ -80,13 +80,6 @@ def torque_matrices(q: Array, actuator: Actuator) -> Array:
     return G
 
 
-def inscribed_radius(G: Array) -> float:
-    """Radius of the largest ball about 0 in ``{G I: |I_j| <= 1}``; 0 where a direction is lost."""
-    radius = np.empty(1)
-    _fill_inscribed(np.ascontiguousarray(G)[None], radius, np.empty((1, 3)))
-    return float(radius[0])
-
-
 def _capability(q: Array, actuator: Actuator) -> Capability:
     G = torque_matrices(q, actuator)
     limit = actuator.group.current_limit_A

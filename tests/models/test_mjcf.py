@@ -221,7 +221,7 @@ def bytes_of_a_run(path=None):
 def test_a_copy_of_the_shipped_model_runs_the_same_bytes(tmp_path):
     shipped = bytes_of_a_run()
     copy = shutil.copy(actuators.MJCF_PATH, tmp_path / "copy.xml")
-    for path in (copy, actuators.MJCF_PATH, actuators.SCENE_PATH):
+    for path in (copy, actuators.MJCF_PATH, actuators.FOLDER / "scene.xml"):
         assert bytes_of_a_run(path) == shipped
 
 

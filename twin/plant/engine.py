@@ -86,7 +86,6 @@ class Rotor:
             self.model.body_ipos[payload] = 0.0  # the compiler leaves it elsewhere for a body without mass
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
-        self._counts = self.data.warning.number  # a view
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Engine:
         """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""
@@ -99,7 +98,7 @@ class Rotor:
             self.data.qvel,
             self.data.xfrc_applied[self._rotor, 3:],
             self.data.qfrc_applied,
-            self._counts,
+            self.data.warning.number,
         )
 
     def state(self) -> NDArray[np.float64]:
@@ -111,11 +110,6 @@ class Rotor:
     def restore(self, state: NDArray[np.float64]) -> None:
         """Go on from a state of a rotor with the same model; what `start` returned stays valid."""
         mujoco.mj_setState(self.model, self.data, state, _STATE)
-
-    def warnings(self) -> list[str]:
-        """Names of the warnings that MuJoCo has counted since the start."""
-        kinds = mujoco.mjtWarning
-        return [kinds(i).name for i in range(kinds.mjNWARNING) if self._counts[i] > 0]
 
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)

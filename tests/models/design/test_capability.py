@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import linprog
 
 from spheretwin.control.allocation.least_norm import allocate
-from spheretwin.models.design.capability import capability, inscribed_radius, torque_matrices
+from spheretwin.models.design import capability as capabilities
+from spheretwin.models.design.capability import capability, torque_matrices
 from spheretwin.models.design.weakest import FIGURES, local_minima, worst_by_tilt
 from spheretwin.models.design.workspace import grid, pose
 from spheretwin.models.kinematics import rotation
@@ -48,7 +49,8 @@ def random_poses(count, seed=0):
     ],
 )
 def test_known_shapes(G, radius):
-    assert_allclose(inscribed_radius(np.asarray(G, dtype=float)), radius, atol=1e-12)
+    nearest, *_ = capabilities._nearest_facet(np.asarray(G, dtype=float))
+    assert_allclose(nearest, radius, atol=1e-12)
 
 
 def test_no_direction_has_less_and_the_facet_s_has_no_more(actuator):

@@ -47,7 +47,7 @@ def committed():
 
 @pytest.fixture(scope="module")
 def scene():
-    return mujoco.MjModel.from_xml_path(str(actuators.SCENE_PATH))
+    return mujoco.MjModel.from_xml_path(str(actuators.FOLDER / "scene.xml"))
 
 
 def radii(mesh):

@@ -395,7 +395,7 @@ def test_what_the_lagrangian_does_not_know_is_named_and_refused(written, case):
 
 
 def test_the_shipped_model_and_its_scene_hold_nothing_beyond_a_free_rotor():
-    for path in (actuators.MJCF_PATH, actuators.SCENE_PATH):
+    for path in (actuators.MJCF_PATH, actuators.FOLDER / "scene.xml"):
         kept = mjcf.read(path)
         for model in (kept.described, kept.loaded, kept.bare):
             assert mjcf.beyond_a_free_rotor(model) == []
