@@ -1,8 +1,8 @@
-"""One row of the cross-check: a figure, the bound it has to keep, and why the bound is what it is."""
+"""A figure, the bound it has to keep, and why the bound is what it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
@@ -77,6 +77,11 @@ class Check:
         if self.at_least is not None:
             return f"{self.at_least:g} to {_text(self.bound, self.unit)}"
         return f"≤ {_text(self.bound, self.unit)}"
+
+
+def broken(checks: Iterable[Check]) -> list[str]:
+    """Names of the checks that do not keep their bound."""
+    return [check.name for check in checks if not check.ok]
 
 
 def _finite(value: float | None) -> float | None:

@@ -7,27 +7,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models import actuator as actuators
-from spheretwin.models.actuator import Actuator
+from spheretwin.models.actuator import Actuator, from_model
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design.clearance import Overlap, air_gap_m, overlaps
 from spheretwin.models.magnetics import disagreements
+from spheretwin.models.mjcf import read
+from spheretwin.models.torque_curve import TorqueCurve
 
 
-def of_model_file(mjcf: Path, curve: Path | None = None) -> list[str]:
+def of_model_file(mjcf: Path, curve: TorqueCurve) -> list[str]:
     """Warnings for a model file that may still lack what the torque curve does not need.
 
     Parameters
     ----------
     mjcf : Path
         Model file.
-    curve : Path, optional
-        Torque curve that is held against it; none where one is about to be computed.
+    curve : TorqueCurve
+        Held against it, or just computed from it.
     """
     try:
-        if curve is None:
-            return of_parts(actuators.load(mjcf))
-        return of_geometry(actuators.load(mjcf, curve))
+        return of_geometry(from_model(read(mjcf).described, curve))
     except InputError:
         return []
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from spheretwin.models.base.check import Check
+from spheretwin.models.base.check import Check, broken
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.twin.crosscheck import closed_loop, dynamics, free_rotor, trajectories
@@ -87,8 +87,8 @@ def draw(evidence: Evidence) -> list[Drawing]:
 
 def markdown(checks: list[Check], drawings: list[Drawing], versions: Mapping[str, str]) -> str:
     """Text of the page."""
-    broken = [check.name for check in checks if not check.ok]
-    verdict = f"**Broken: {', '.join(broken)}.**" if broken else "Every bound is kept."
+    names = broken(checks)
+    verdict = f"**Broken: {'; '.join(names)}.**" if names else "Every bound is kept."
     rows = [
         f"| {_cell(check.name)} | {_cell(check.compares)} | {check.states:,} | {check.value_text()}"
         f" | {check.bound_text()} | {'yes' if check.ok else '**no**'} | {_cell(check.why)} |"

@@ -1,14 +1,15 @@
-"""The magnetic model's figures as tables for people, on stdout."""
+"""The magnetic model's verdicts as tables for people, on stdout."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
+from spheretwin.models.design.curve_fit import Misfit
+from spheretwin.models.design.curve_verdict import ComputedCurve, JudgedCurve, Peak
+from spheretwin.models.design.field_verdict import FieldVerdict
+from spheretwin.models.design.workspace_verdict import WorkspaceVerdict, direction_text
+from spheretwin.viz.terminal import style
 
 # A table row for every third tilt: one screen.
 ROW_STRIDE = 3
@@ -20,47 +21,59 @@ FIGURE_NAMES = {
 }
 
 
-def print_curve(title: str, rows: Sequence[tuple[str, str]]) -> None:
-    """Print what is known of a torque curve."""
-    table = Table(title=escape(title), title_justify="left", show_header=False, min_width=60)
-    for row in rows:
-        table.add_row(*map(escape, row))
-    Console().print(table)
+def print_computed_curve(computed: ComputedCurve) -> None:
+    """Print what is known of a curve that was computed."""
+    _print_curve("torque curve computed from the geometry", [("peak", _peak(computed.peak))])
 
 
-def print_field_check(figures: Mapping[str, Any]) -> None:
+def print_judged_curve(path: Path, judged: JudgedCurve) -> None:
+    """Print what is known of a user's curve."""
+    geometry = judged.geometry
+    rows = [
+        ("samples", str(judged.rows)),
+        ("peak", _peak(judged.peak)),
+        ("a sample left out is missed by", _misfit(judged.leave_one_out, "peak")),
+        ("apart from the geometry's curve", _misfit(geometry.as_given, "its peak")),
+        ("best factor on the geometry's curve", f"{geometry.scale:.4f}"),
+        ("apart from it, so scaled", _misfit(geometry.scaled, "its peak")),
+        ("look-up table apart from the spline", f"{judged.lookup_error:.1e} of the peak"),
+    ]
+    _print_curve(f"torque curve {path}", rows)
+
+
+def print_field(verdict: FieldVerdict) -> None:
     """Print the errors of the torque matrix by tilt, and where they come from."""
-    console = Console()
-    title = (
-        f"torque by the curve against the direct sum (largest torque {figures['largest_torque_Nm']:.3f} N·m)"
+    console = style.console()
+    title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
+    table = style.table(
+        title, "tilt", "poses", "median error", "largest", "of largest torque", "half the points"
     )
-    table = _table(title, "tilt", "poses", "median error", "largest", "of largest torque", "half the points")
-    for row in figures["by_tilt"]:
-        low, high = row["tilt_deg"]
+    for band in verdict.by_tilt:
+        low, high = band.tilt_deg
         table.add_row(
             f"{low:.0f}° to {high:.0f}°",
-            str(row["poses"]),
-            _percent(row["median_relative_error"]),
-            _percent(row["largest_relative_error"]),
-            _percent(row["largest_error_of_largest_torque"]),
-            _percent(row["quadrature_of_largest_torque"]),
+            str(band.poses),
+            _percent(band.median_relative_error),
+            _percent(band.largest_relative_error),
+            _percent(band.largest_error_of_largest_torque),
+            _percent(band.quadrature_of_largest_torque),
         )
     console.print(table)
-    source = figures["sources"]
+    sources = verdict.sources
     console.print(
         "Where it comes from: the direct sum's quadrature"
-        f" (half the points change it by {source['quadrature_of_largest_torque']:.0e} of the largest torque);"
-        f" the curve between its samples ({source['curve_between_samples_of_peak']:.0e} of its peak);"
-        f" the look-up table ({source['lookup_of_peak']:.0e} of the peak)."
+        f" (half the points change it by {sources.quadrature_of_largest_torque:.0e} of the largest torque);"
+        f" the curve between its samples ({sources.curve_between_samples_of_peak:.0e} of its peak);"
+        f" the look-up table ({sources.lookup_of_peak:.0e} of the peak)."
     )
 
 
-def print_map(figures: Mapping[str, Any]) -> None:
+def print_workspace(verdict: WorkspaceVerdict) -> None:
     """Print the torque capability by tilt, and the weakest poses."""
-    console = Console()
-    limit, poses = figures["current_limit_A"], figures["poses"]
-    table = _table(
-        f"torque in every direction at {limit:g} A, N·m: worst and median of {poses} poses",
+    console = style.console()
+    table = style.table(
+        f"torque in every direction at {verdict.current_limit_A:g} A, N·m:"
+        f" worst and median of {verdict.poses} poses",
         "tilt",
         "least norm",
         "median",
@@ -70,67 +83,42 @@ def print_map(figures: Mapping[str, Any]) -> None:
         "cond.",
         "copper, W/(N·m)²",
     )
-    rows = figures["by_tilt"]
-    for i, row in enumerate(rows):
-        if i % ROW_STRIDE == 0 or i == len(rows) - 1:
+    for i, tilt in enumerate(verdict.by_tilt):
+        if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1:
             table.add_row(
-                f"{row['tilt_deg']:g}°",
-                f"{row['least_norm_Nm']:.3f}",
-                f"{row['least_norm_median_Nm']:.3f}",
-                f"{row['best_Nm']:.3f}",
-                f"{row['best_median_Nm']:.3f}",
-                f"{row['singular_value_Nm_per_A']:.4f}",
-                f"{row['condition']:.2f}",
-                f"{row['copper_W_per_Nm2']:.0f}",
+                f"{tilt.tilt_deg:g}°",
+                f"{tilt.least_norm_Nm:.3f}",
+                f"{tilt.least_norm_median_Nm:.3f}",
+                f"{tilt.best_Nm:.3f}",
+                f"{tilt.best_median_Nm:.3f}",
+                f"{tilt.singular_value_Nm_per_A:.4f}",
+                f"{tilt.condition:.2f}",
+                f"{tilt.copper_W_per_Nm2:.0f}",
             )
     console.print(table)
-    weak = _table("weakest poses", "by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
-    for row in figures["weakest"]:
-        name, key, unit = FIGURE_NAMES[row["figure"]]
-        angles = (_tenths(angle) for angle in (row["tilt_deg"], *row["q_deg"]))
-        weak.add_row(name, f"{row[key]:.3g} {unit}", *angles, direction_text(row["direction"]))
+    weak = style.table("weakest poses", "by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
+    weak.columns[-1].no_wrap = True
+    for pose in verdict.weakest:
+        name, key, unit = FIGURE_NAMES[pose.figure]
+        angles = (_tenths(angle) for angle in (pose.tilt_deg, *pose.q_deg))
+        weak.add_row(name, f"{getattr(pose, key):.3g} {unit}", *angles, direction_text(pose.direction))
     console.print(weak)
 
 
-def print_checks(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Print measured figures against their bounds."""
-    table = Table(title="checks", title_justify="left")
-    for heading in ("check", "value", "bound", "", "why"):
-        table.add_column(heading, overflow="fold")
+def _print_curve(title: str, rows: Sequence[tuple[str, str]]) -> None:
+    table = style.table(title, "figure", "value")
     for row in rows:
-        bounded = row["bound"] is not None
-        table.add_row(
-            row["name"],
-            "not finite" if row["value"] is None else f"{row['value']:.2g}",
-            f"{row['bound']:g}" if bounded else "",
-            ("[green]ok[/]" if row["ok"] else "[red]broken[/]") if bounded else "",
-            escape(row["why"]),
-        )
-    Console().print(table)
+        table.add_row(*row)
+    style.console().print(table)
 
 
-def print_files(paths: Sequence[Path]) -> None:
-    """Print where files were written."""
-    for path in paths:
-        Console().print(f"written  {escape(str(path))}", soft_wrap=True)
+def _peak(peak: Peak) -> str:
+    return f"{peak.peak_Nm_per_A:.5f} N·m/A at {peak.peak_deg:.2f}°"
 
 
-def pose_text(q_deg: Sequence[float]) -> str:
-    """A pose in a line."""
-    return ", ".join(f"{name} {_tenths(angle)}°" for name, angle in zip("αβγ", q_deg, strict=True))
-
-
-def direction_text(direction: Sequence[float]) -> str:
-    """A unit vector in a line."""
-    return " ".join(f"{round(part, 2) + 0.0:.2f}" for part in direction)
-
-
-def _table(title: str, first: str, *others: str) -> Table:
-    table = Table(title=escape(title), title_justify="left")
-    table.add_column(first)
-    for heading in others:
-        table.add_column(heading, justify="right")
-    return table
+def _misfit(misfit: Misfit, unit: str) -> str:
+    rms, worst = 100 * misfit.rms, 100 * misfit.worst
+    return f"rms {rms:.2g} %, at most {worst:.2g} % of {unit} (at {misfit.worst_deg:.2f}°)"
 
 
 def _tenths(value: float) -> str:

@@ -1,31 +1,42 @@
-"""Progress of a run on stderr: how far, how fast, how long still."""
+"""Progress on stderr: how far, how long still; silent where stderr is no terminal."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 
 from rich.console import Console
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, ProgressColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 
 from spheretwin.models.telemetry.table import Table
 
 
+def tracked(label: str) -> Callable[[range], Iterable[int]]:
+    """A bar for a range of steps, which is gone when they are done."""
+
+    def followed(steps: range) -> Iterator[int]:
+        with _bars(transient=True) as bars:
+            yield from bars.track(steps, description=label)
+
+    return followed
+
+
+@contextmanager
+def parts(label: str, count: int) -> Iterator[Callable[[str], None]]:
+    """A bar for named parts of some work, to be told the name of each as it begins; gone at the end."""
+    with _bars(transient=True) as bars:
+        task = bars.add_task(label, total=count, completed=-1)  # the first to begin has none before it
+        yield lambda name: bars.update(task, description=name, advance=1)
+
+
 class Progress:
-    """A progress bar that counts control ticks; silent where stderr is no terminal."""
+    """A bar for the control ticks of a run, which stays and tells how it ended."""
 
     def __init__(self, name: str, ticks: int) -> None:
-        console = Console(stderr=True)
         self._name = name
-        self._bars = Bars(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TaskProgressColumn(),
-            TextColumn("{task.fields[simulated_s]:.2f} s simulated"),
-            TimeRemainingColumn(),
-            console=console,
-            disable=not console.is_terminal,
-        )
+        self._bars = _bars(TextColumn("{task.fields[simulated_s]:.2f} s simulated"))
         self._task = self._bars.add_task(f"{name}: getting ready", total=ticks, simulated_s=0.0)
 
     def __enter__(self) -> Progress:
@@ -49,3 +60,18 @@ class Progress:
     def finish(self, status: str) -> None:
         """Show how the run ended."""
         self._bars.update(self._task, description=f"{self._name}: {status}")
+
+
+def _bars(*more: ProgressColumn, transient: bool = False) -> Bars:
+    """Description, bar, share, whatever else there is to tell, and the time that is left."""
+    console = Console(stderr=True)
+    return Bars(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        *more,
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+        transient=transient,
+    )

@@ -1,4 +1,4 @@
-"""Tables for people, on stdout."""
+"""For people, on stdout: what a run found, where files are, and what a scenario's fields are."""
 
 from __future__ import annotations
 
@@ -6,20 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.terminal import style
 
 
 def print_run(scenario: str, law: str, summary: dict[str, Any], own: Sequence[str] = ()) -> None:
     """Print the figures of one run: errors per axis, currents and speed, then those of the user's own."""
-    console = Console()
-    errors = Table(title=escape(f"{scenario} under {law}: {summary['status']}"), title_justify="left")
-    errors.add_column("tracking error, rad")
-    for axis in ANGLES:
-        errors.add_column(axis, justify="right")
+    console = style.console()
+    errors = style.table(f"{scenario} under {law}: {summary['status']}", "tracking error, rad", *ANGLES)
     rows = {
         "largest": "max_abs_error_rad",
         "rms": "rms_error_rad",
@@ -54,7 +50,7 @@ def print_run(scenario: str, law: str, summary: dict[str, Any], own: Sequence[st
 
 def print_files(record: Path | None, telemetry: Path | None) -> None:
     """Print where a run's files are and how to open them."""
-    console = Console()
+    console = style.console()
     if telemetry:
         console.print(f"telemetry  {escape(str(telemetry))}", soft_wrap=True)
     if record:
@@ -62,12 +58,18 @@ def print_files(record: Path | None, telemetry: Path | None) -> None:
         console.print(f"open it:   rerun {escape(str(record))}", soft_wrap=True)
 
 
+def print_written(paths: Sequence[Path]) -> None:
+    """Print where other files were written."""
+    for path in paths:
+        style.console().print(f"written  {escape(str(path))}", soft_wrap=True)
+
+
 def print_fields(scenario: str, rows: Sequence[tuple[str, str, str]]) -> None:
     """Print every field of a scenario with its value and meaning."""
-    table = Table(title=escape(f"fields of {scenario}"), title_justify="left", box=None, header_style="bold")
-    table.add_column("flag", no_wrap=True)
+    table = style.table(f"fields of {scenario}", "flag")
+    table.columns[0].no_wrap = True
     table.add_column("value", overflow="fold", max_width=24)
     table.add_column("meaning", overflow="fold")
     for row in rows:
         table.add_row(*map(escape, row))
-    Console().print(table)
+    style.console().print(table)

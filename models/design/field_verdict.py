@@ -1,0 +1,165 @@
+"""Whether the torque matrix is what the field of all poles on all windings gives, in random poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.check import Check
+from spheretwin.models.design import curve_fit, field_check, warnings
+from spheretwin.models.design.field_check import Comparison, Errors
+from spheretwin.models.design.pole_torque import compute_curve
+
+# The last is the largest tilt of the paper's nutation.
+BANDS_DEG = (0.0, 12.0, 24.0, 36.0, 48.0, 57.0)
+
+TORQUE_BOUND = 0.01
+QUADRATURE_BOUND = 5e-3
+
+# Halfway between samples of the shipped curve, where its spline is least sure, and where f_t is large.
+BETWEEN_SAMPLES_DEG = np.arange(0.125, 30.0, 1.25)
+
+
+class Band(NamedTuple):
+    """Errors of the poses within a band of tilt, over all their currents."""
+
+    tilt_deg: tuple[float, float]
+    poses: int
+    median_relative_error: float
+    largest_relative_error: float
+    largest_error_of_largest_torque: float
+    quadrature_of_largest_torque: float
+
+
+class Sources(NamedTuple):
+    """Where the errors come from."""
+
+    quadrature_of_largest_torque: float
+    """What half the points in each direction change, of the direct sum that judges."""
+    curve_between_samples_of_peak: float
+    """Distance of the curve's spline from the geometry's own f_t."""
+    lookup_of_peak: float
+    """Distance of the compiled table from that spline."""
+
+
+class FieldVerdict(NamedTuple):
+    """The torque matrix judged by direct sums."""
+
+    largest_torque_Nm: float
+    """Of all poses and currents."""
+    by_tilt: list[Band]
+    sources: Sources
+    checks: list[Check]
+    warnings: list[str]
+
+    @property
+    def curve_is_of_another_geometry(self) -> bool:
+        """Whether the torque breaks its bound and the curve alone is as far from the model's geometry."""
+        torque, _ = self.checks
+        return not torque.ok and self.sources.curve_between_samples_of_peak > TORQUE_BOUND
+
+
+def judge(
+    actuator: Actuator,
+    poses: int = 15,
+    seed: int = 0,
+    track: Callable[[range], Iterable[int]] = iter,
+) -> FieldVerdict:
+    """Hold G_t(q)·I against the exact field of every magnet on every winding.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        With the torque curve that is judged.
+    poses : int
+        Random poses, from each of `BANDS_DEG` in turn; some seconds each.
+    seed : int
+        Of poses and currents.
+    track : callable
+        Passes on the numbers of the poses, and may show progress.
+
+    Raises
+    ------
+    InputError
+        magpylib is not installed.
+    """
+    tilt_rad = np.radians(_tilts_deg(poses, seed))
+    compared = field_check.compare(actuator, tilt_rad, seed, track=track)
+    errors = field_check.errors(compared, actuator.group.current_limit_A, seed=seed)
+    torque, quadrature = _torque(errors), _quadrature(errors)
+    return FieldVerdict(
+        largest_torque_Nm=float(errors.torque_Nm.max()),
+        by_tilt=_by_tilt(compared, errors),
+        sources=Sources(
+            quadrature_of_largest_torque=_of_largest(errors.quadrature_Nm, errors),
+            curve_between_samples_of_peak=_curve_error(actuator),
+            lookup_of_peak=curve_fit.lookup_error(actuator.torque_curve),
+        ),
+        checks=[torque, quadrature],
+        warnings=warnings.of_geometry(actuator),
+    )
+
+
+def _tilts_deg(poses: int, seed: int) -> NDArray[np.float64]:
+    """One random tilt after the other from each band in turn, so that few poses cover all bands."""
+    band = np.arange(poses) % (len(BANDS_DEG) - 1)
+    low, high = np.array(BANDS_DEG)[band], np.array(BANDS_DEG)[band + 1]
+    return np.asarray(np.random.default_rng([seed, 2]).uniform(low, high))
+
+
+def _curve_error(actuator: Actuator) -> float:
+    """Distance of the curve's spline from the geometry's f_t, between samples, over the curve's peak."""
+    phi = np.radians(BETWEEN_SAMPLES_DEG)
+    exact = compute_curve(actuator.magnet, actuator.coil, phi).torque_Nm_per_A
+    curve = actuator.torque_curve
+    return float(np.max(np.abs(curve.spline(phi) - exact)) / curve.peak_Nm_per_A)
+
+
+def _by_tilt(compared: Comparison, errors: Errors) -> list[Band]:
+    band = np.digitize(np.degrees(compared.tilt_rad), BANDS_DEG[1:-1])
+    rows = []
+    for i in np.unique(band):
+        here = Errors(*(each[band == i] for each in errors))
+        relative = here.model_Nm / here.torque_Nm
+        rows.append(
+            Band(
+                tilt_deg=(BANDS_DEG[i], BANDS_DEG[i + 1]),
+                poses=len(here.torque_Nm),
+                median_relative_error=float(np.median(relative)),
+                largest_relative_error=float(np.max(relative)),
+                largest_error_of_largest_torque=_of_largest(here.model_Nm, errors),
+                quadrature_of_largest_torque=_of_largest(here.quadrature_Nm, errors),
+            )
+        )
+    return rows
+
+
+def _of_largest(distance_Nm: NDArray[np.float64], errors: Errors) -> float:
+    return float(distance_Nm.max() / errors.torque_Nm.max())
+
+
+def _torque(errors: Errors) -> Check:
+    return Check(
+        name="torque",
+        compares="torque by the curve against the direct sum, over the largest torque",
+        states=errors.torque_Nm.size,
+        value=_of_largest(errors.model_Nm, errors),
+        bound=TORQUE_BOUND,
+        why="superposition is exact here, so only arithmetic is left: far less than the percent to which"
+        " a magnet's remanence and a coil's turns are known",
+    )
+
+
+def _quadrature(errors: Errors) -> Check:
+    return Check(
+        name="quadrature",
+        compares="direct sum with half the points in each direction, over the largest torque",
+        states=errors.torque_Nm.size,
+        value=_of_largest(errors.quadrature_Nm, errors),
+        bound=QUADRATURE_BOUND,
+        why="half the bound above: the sum that judges must be surer than what it judges",
+    )
