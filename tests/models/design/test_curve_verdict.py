@@ -1,0 +1,75 @@
+"""The verdict on a torque curve: one that is computed, and one that somebody else has measured."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models import torque_curve
+from spheretwin.models.base.check import broken
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.design import curve_fit, curve_verdict, pole_torque
+from spheretwin.models.torque_curve import TorqueCurve
+
+TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def few_samples(monkeypatch):
+    """A twentieth of the samples, 5 degrees apart: the checks, not the figures."""
+    full = pole_torque.sample_angles
+    monkeypatch.setattr(pole_torque, "sample_angles", lambda: full()[::20])
+
+
+def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
+    kept = actuator.torque_curve
+    rows = np.r_[0:120:4, 120:721:20]
+    judged = curve_verdict.judge(TorqueCurve(kept.phi_rad[rows], 0.93 * kept.torque_Nm_per_A[rows]))
+    assert judged.rows == 61
+    # The shipped samples are rounded to 12 decimals, 5e-11 of the peak.
+    assert judged.geometry.scale == pytest.approx(0.93, abs=1e-6)
+    assert judged.geometry.scaled.worst < 1e-6
+    assert judged.geometry.as_given.worst == pytest.approx(0.07, rel=0.01)
+    assert judged.peak.peak_Nm_per_A == pytest.approx(0.93 * kept.peak_Nm_per_A, rel=0.01)
+    assert 0 < judged.leave_one_out.rms < 0.01
+    assert 0 < judged.lookup_error < 1e-4
+    assert judged.warnings == []
+
+
+@pytest.mark.usefixtures("few_samples")
+def test_a_computed_curve_is_bounded():
+    computed = curve_verdict.compute()
+    mesh, lookup = computed.checks
+    assert broken(computed.checks) == computed.warnings == []
+    assert (mesh.bound, lookup.bound) == (5e-3, 1e-6)
+    assert mesh.value == computed.doubled_mesh.peak
+    assert lookup.value == computed.lookup_error
+    # What is written is what was computed, to the twelve decimals of the file.
+    path = Path("mine.csv")
+    again = torque_curve.parse(path, computed.csv.encode())
+    np.testing.assert_allclose(again.torque_Nm_per_A, computed.curve.torque_Nm_per_A, rtol=0, atol=5.1e-13)
+
+
+@pytest.mark.usefixtures("few_samples")
+def test_a_table_that_misses_the_spline_breaks_its_bound_alone(monkeypatch):
+    right = curve_fit.lookup_table
+    monkeypatch.setattr(curve_fit, "lookup_table", lambda curve: (1 + 1e-5) * right(curve))
+    computed = curve_verdict.compute()
+    assert broken(computed.checks) == ["lookup"]
+    # Over the peak of one coil, while the table holds it and its opposite; its own error is 3e-7.
+    assert computed.lookup_error == pytest.approx(1e-5, rel=0.1)
+
+
+@pytest.mark.usefixtures("few_samples")
+def test_a_model_with_nothing_but_poles_and_coils_has_a_curve(tmp_path):
+    (path := tmp_path / "mine.xml").write_text(TEXT.replace("group_resistance_ohm", "elsewhere"))
+    with pytest.raises(InputError, match="group_resistance_ohm"):
+        actuators.load(path)
+    computed = curve_verdict.compute(path)
+    assert computed.warnings == broken(computed.checks) == []
+    # The table's intervals are promised to the shipped model alone.
+    assert computed.checks[1].bound is None
+    np.testing.assert_array_equal(
+        computed.curve.torque_Nm_per_A, curve_verdict.compute().curve.torque_Nm_per_A
+    )

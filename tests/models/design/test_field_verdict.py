@@ -1,0 +1,63 @@
+"""The verdict on the torque matrix: it passes what is right, and tells a wrong matrix from a wrong curve."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spheretwin.models.base.check import broken
+from spheretwin.models.design import field_check, field_verdict
+from spheretwin.models.torque_curve import TorqueCurve
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Fewer points in the windings: errors of a thousandth, enough to tell right from wrong."""
+    few = field_check.Quadrature(field_check.Rule(12, 12, 48), field_check.Rule(6, 6, 24))
+    monkeypatch.setattr(field_check, "STANDARD", few)
+
+
+def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
+    verdict = field_verdict.judge(actuator, poses=2)
+    assert [band.tilt_deg for band in verdict.by_tilt] == [(0, 12), (12, 24)]
+    assert sum(band.poses for band in verdict.by_tilt) == 2
+    for band in verdict.by_tilt:
+        assert band.median_relative_error <= band.largest_relative_error
+        assert band.median_relative_error < 5e-4  # measured: 1.7e-4
+    torque, quadrature = verdict.checks
+    assert torque.value == max(band.largest_error_of_largest_torque for band in verdict.by_tilt)
+    assert torque.value < 1e-3  # measured: 2e-4
+    assert quadrature.value == verdict.sources.quadrature_of_largest_torque
+    assert broken(verdict.checks) == verdict.warnings == []
+    assert verdict.sources.curve_between_samples_of_peak < 1e-4
+    assert verdict.sources.lookup_of_peak < 1e-6
+    assert not verdict.curve_is_of_another_geometry
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_wrong_matrix_is_not_laid_to_the_curve(actuator, monkeypatch):
+    right = field_check.torque_matrix
+    monkeypatch.setattr(field_check, "torque_matrix", lambda q, actuator: -right(q, actuator))
+    verdict = field_verdict.judge(actuator, poses=1)
+    assert broken(verdict.checks) == ["torque"]
+    assert verdict.checks[0].value == pytest.approx(2, abs=0.01)  # as far off as the torque is large, twice
+    assert not verdict.curve_is_of_another_geometry
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_wrong_curve_is_found_and_named(actuator):
+    curve = actuator.torque_curve
+    stronger = replace(actuator, torque_curve=TorqueCurve(curve.phi_rad, 1.03 * curve.torque_Nm_per_A))
+    verdict = field_verdict.judge(stronger, poses=1)
+    assert broken(verdict.checks) == ["torque"]
+    assert verdict.checks[0].value == pytest.approx(0.03, abs=2e-3)  # the coarse sum's own error
+    # In units of the judged curve's own peak, and next to it: no angle that is tried hits the peak.
+    assert verdict.sources.curve_between_samples_of_peak == pytest.approx(0.03 / 1.03, rel=0.01)
+    assert verdict.curve_is_of_another_geometry
+
+
+def test_few_poses_come_from_all_bands(actuator, monkeypatch):
+    monkeypatch.setattr(field_check, "direct_torque_matrix", lambda *_: np.ones((3, 18)))
+    verdict = field_verdict.judge(actuator, poses=7, seed=3)
+    assert [band.poses for band in verdict.by_tilt] == [2, 2, 1, 1, 1]
+    assert [band.tilt_deg[1] for band in verdict.by_tilt] == list(field_verdict.BANDS_DEG[1:])
