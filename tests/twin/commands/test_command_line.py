@@ -2,8 +2,10 @@
 
 import contextlib
 import io
+import os
 from importlib.metadata import version
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -39,6 +41,55 @@ def refusal(*arguments):
 
 def test_version_is_printed():
     assert called("--version") == (0, f"spheretwin {version('spheretwin')}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["fly"], ["simulate", "magnetics", "fly"]),
+        ([], ["VERB"]),
+        (["simulate"], ["hold, nutation, sinusoid, tilt"]),
+        (["simulate", "spiral"], ["hold, nutation, sinusoid, tilt", "spiral"]),
+        (["simulate", "hold", "--controller.law", "pid"], ["pd, adaptive_fuzzy, afsm", "'pid'"]),
+        (["simulate", "hold", "--controler.law", "pd"], ["controller", "controler"]),
+        (["simulate", "hold", "--duration", "nan"], ["duration", "nan"]),
+        (["simulate", "hold", "--duration", "Infinity"], ["duration", "inf"]),
+        (["simulate", "hold", "--duration", "-2"], ["duration", "greater than 0", "-2"]),
+        (["simulate", "hold", "--duration"], ["value", "duration"]),
+        (["simulate", "hold", "7"], ["flag", "7"]),
+        (["simulate", "hold", "--controller.period-s", "0.0007"], ["whole multiple"]),
+        (["simulate", "hold", "--record", "missing/run.rrd"], ["writable", "missing"]),
+        (["simulate", "hold", "--telemetry", "."], ["file name", "folder"]),
+        (["simulate", "hold", "--plant.mjcf", "broken.xml"], ["broken.xml", "MJCF"]),
+        (["simulate", "hold", "--plant.mjcf", "empty.xml"], ["three degrees of freedom", "0"]),
+        (["simulate", "hold", "--plant.initial-rad", "0", "1.6", "0"], ["first pose", "1.6"]),
+        (["simulate", "hold", "--plant.step-s", "1e-12"], ["step_s", "1e-12"]),
+        (["simulate", "hold", "--trajectory.angle-rad", "1e200", "0", "0"], ["angle_rad", "1e+200"]),
+        (["simulate", "hold", "--record", "same", "--telemetry", "./same"], ["own", "twice"]),
+        (["simulate", "hold", "--seed", "9" * 5000], ["seed"]),
+        (["simulate", "hold", "--plant.mjcf", "missing.xml"], ["missing.xml"]),
+        (["simulate", "hold", "--plant.torque-curve", "broken.csv"], ["phi_deg", "broken.csv"]),
+        (["simulate", "hold", "--plant.torque-curve", "nan.csv"], ["finite", "nan.csv"]),
+        (["simulate", "scenario.toml"], ["trajectory"]),
+        (["magnetics"], ["PART"]),
+        (["magnetics", "curve", "--colour", "red"], ["--out", "--colour"]),
+    ],
+)
+def test_bad_input_is_one_line_exit_2_and_no_file(tmp_path, monkeypatch, arguments, parts):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken.xml").write_text("<mujoco><worldbody>")
+    (tmp_path / "empty.xml").write_text("<mujoco/>")
+    (tmp_path / "broken.csv").write_text("angle,torque\n0,0\n")
+    rows = "\n".join(f"{angle},nan" for angle in np.linspace(0, 180, 10))
+    (tmp_path / "nan.csv").write_text(f"phi_deg,torque_Nm_per_A\n{rows}\n")
+    (tmp_path / "scenario.toml").write_text("duration = 1\n")
+    before = sorted(os.listdir(tmp_path))
+    outputs = ["--record", "run.rrd", "--telemetry", "run.parquet"]
+    asks_for_files = arguments[:1] == ["simulate"] and not set(outputs[::2]) & set(arguments)
+    line = refusal(*arguments, *(outputs if asks_for_files and len(arguments) > 1 else []))
+    for part in parts:
+        assert part in line
+    assert sorted(os.listdir(tmp_path)) == before
 
 
 LONG = "x" * 20_000
@@ -87,24 +138,33 @@ value = st.sampled_from(VALUES) | st.text(st.characters(), max_size=12) | st.flo
 valid = st.sampled_from(["--seed=3", "--duration=2", "--controller.law=pd", "--name=a", "--json", "--live"])
 argument = valid | flag | value | st.builds(lambda name, text: f"{name}={text}", flag, value)
 scenario = st.sampled_from(["hold", *shipped(), "nutatoin", "none.toml"]) | value
-# After a bare -- the word -h is a value.
-help_or_refused = st.sampled_from(["--help", "--duration=-1", "--no.such.field=1"])
+refused = st.sampled_from(["--duration=-1", "--no.such.field=1"])
 
 
-# 300 examples: some seconds.
-@settings(max_examples=300)
-@given(scenario, st.lists(valid, max_size=6) | st.lists(argument, max_size=6), help_or_refused)
-def test_any_arguments_end_in_an_exit_code(source, arguments, last):
+def ended(source, *arguments):
+    """Exit code, stdout and stderr of a command that may not come as far as to run."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(simulate, "Session", _not_run)
-        code, _, stderr = called("simulate", source, *arguments, last)
-    assert code in (0, 2)
-    if code == 2:
-        assert stderr.endswith("\n")
-        assert stderr[:-1].isprintable()
-    else:
-        assert stderr == ""
+        return called("simulate", source, *arguments)
 
 
 def _not_run(scenario):
-    raise AssertionError("a run began, although its last argument asks for help or is invalid")
+    raise AssertionError("a run began, although an argument asks for help or is invalid")
+
+
+# 150 examples each: some seconds.
+@settings(max_examples=150)
+@given(scenario, st.lists(valid, max_size=6) | st.lists(argument, max_size=6), refused)
+def test_any_arguments_before_one_that_is_invalid_are_refused_on_one_line(source, arguments, last):
+    code, stdout, stderr = ended(source, *arguments, last)
+    assert (code, stdout) == (2, "")
+    assert stderr.endswith("\n")
+    assert stderr[:-1].isprintable()
+
+
+@settings(max_examples=150)
+@given(st.sampled_from(shipped()), st.lists(valid, max_size=6))
+def test_help_is_given_whatever_else_is_asked(source, arguments):
+    code, stdout, stderr = ended(source, *arguments, "--help")
+    assert (code, stderr) == (0, "")
+    assert "--controller.law" in stdout
