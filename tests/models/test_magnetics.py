@@ -1,9 +1,12 @@
 """The torque matrix against the paper's sum, and against what the arrangement's symmetries demand."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.magnetics import lookup_table, place, torque_matrix, torque_model
+from spheretwin.models.torque_curve import TorqueCurve
 
 # The look-up stays within 1e-6 of the curve's peak a pole and coil; a column sums 16 poles and two coils.
 LOOKUP = 1e-6
@@ -58,12 +61,18 @@ def test_pole_in_front_of_a_coil_is_no_singular_case(actuator):
     np.testing.assert_allclose(torque_matrix(q, actuator), papers_sum(q, actuator), atol=tolerance)
 
 
-def test_torque_is_linear_in_the_currents(actuator):
-    generator = np.random.default_rng(1)
-    first, second = generator.normal(size=(2, 18))
+def test_matrix_is_linear_in_the_torque_curve(actuator):
+    # Spline, table and sum over pairs are: of two kinds of magnet in each pole the torques add.
+    phi = actuator.torque_curve.phi_rad
+    curves = [2.0 * actuator.torque_curve.torque_Nm_per_A, -3e-3 * np.sin(phi) * np.exp(np.cos(phi))]
     for q in random_poses(5):
-        G = torque_matrix(q, actuator)
-        np.testing.assert_allclose(G @ (2 * first - 3 * second), 2 * G @ first - 3 * G @ second, atol=1e-12)
+        first, second, both = (
+            torque_matrix(q, replace(actuator, torque_curve=TorqueCurve(phi, curve)))
+            for curve in (*curves, sum(curves))
+        )
+        # Rounding of the table's coefficients, of the size of the curve, in 32 pairs a column.
+        np.testing.assert_allclose(both, first + second, atol=1e-12)
+        assert np.abs(second).max() > 1e-3
 
 
 def test_two_pole_pitches_of_spin_give_the_same_torque(actuator):

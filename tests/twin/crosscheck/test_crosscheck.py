@@ -13,7 +13,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.check import Check
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
-from spheretwin.twin import assembly
+from spheretwin.twin import assembly, cli
 from spheretwin.twin.crosscheck import (
     closed_loop,
     dynamics,
@@ -308,13 +308,13 @@ def test_a_model_the_lagrangian_does_not_have_exits_1_and_the_table_tells(tmp_pa
         (["--mjcf", "missing.xml", "--out", "page"], ["missing.xml"]),
     ],
 )
-def test_bad_input_is_one_line_exit_2_and_no_folder(tmp_path, monkeypatch, arguments, parts):
+def test_bad_input_is_one_line_exit_2_and_no_folder(tmp_path, monkeypatch, capsys, arguments, parts):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
-    done = crosscheck(*arguments)
-    assert done.returncode == 2, done.stderr
-    assert done.stdout == ""
-    (line,) = done.stderr.splitlines()
+    assert cli.main(["crosscheck", *arguments]) == cli.BAD_INPUT
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
     for part in parts:
         assert part in line
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
