@@ -20,8 +20,9 @@ check: setup .venv-wheel/installed ## format, lint, types, import layers
 	.venv-wheel/bin/mypy
 	.venv-wheel/bin/lint-imports
 
-benchmark: setup ## print the speed ratios
+benchmark: setup ## print the speed ratios, and hold the bounded allocation against linear programmes
 	$(BIN)/python tests/benchmarks/ratios.py
+	$(BIN)/python tests/benchmarks/allocation.py
 
 format: setup
 	$(BIN)/ruff format .
