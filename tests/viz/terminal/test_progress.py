@@ -1,0 +1,82 @@
+"""Progress: one look for a run, for steps and for parts; nothing at all where nobody watches."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spheretwin.viz.terminal.progress import Progress, parts, tracked
+
+ESCAPES = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
+LOOK = r"{} +[━╸╺]+ +100% {}0:00:00"
+
+
+def follow_steps():
+    assert list(tracked("direct sums")(range(4))) == [0, 1, 2, 3]
+
+
+def follow_parts():
+    with parts("crosscheck", 2) as begun:
+        begun("dynamics")
+        begun("closed loop")
+
+
+class Chunk(SimpleNamespace):
+    def __len__(self):
+        return len(self.t_s)
+
+    def __getitem__(self, name):
+        return getattr(self, name)
+
+
+def follow_a_run():
+    with Progress("hold", 100) as progress:
+        progress.write(Chunk(t_s=np.array([])))
+        progress.write(Chunk(t_s=np.arange(100) / 50))
+        progress.note(1.0, "saturation begins")
+        progress.finish("completed")
+
+
+@pytest.mark.parametrize("follow", [follow_steps, follow_parts, follow_a_run])
+def test_nothing_is_printed_where_stderr_is_no_terminal(capsys, follow):
+    follow()
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.fixture
+def watched(monkeypatch):
+    """A terminal on stderr, as rich is told of one."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("TERM", "xterm")
+
+
+@pytest.mark.usefixtures("watched")
+def test_steps_end_at_their_whole(capsys):
+    follow_steps()
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert re.search(LOOK.format("direct sums", ""), ESCAPES.sub("", err))
+
+
+@pytest.mark.usefixtures("watched")
+def test_parts_are_counted_as_they_begin(capsys):
+    follow_parts()
+    lines = re.split(r"[\r\n]+", ESCAPES.sub("", capsys.readouterr().err))
+    told = [
+        (line.split(" ━")[0].split(" ╸")[0], int(re.search(r"(\d+)%", line)[1]))
+        for line in lines
+        if "%" in line
+    ]
+    # The last to begin has half the parts behind it, and is not done.
+    assert told[-1] == ("closed loop", 50)
+    assert all(share >= 0 for _, share in told)
+
+
+@pytest.mark.usefixtures("watched")
+def test_a_run_tells_the_time_it_has_simulated_and_how_it_ended(capsys):
+    follow_a_run()
+    assert re.search(
+        LOOK.format("hold: completed", "1.98 s simulated "), ESCAPES.sub("", capsys.readouterr().err)
+    )
