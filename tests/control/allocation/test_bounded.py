@@ -16,7 +16,7 @@ from spheretwin.control.allocation.simplex import climb
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
 
-# By its path, as no module: tests install nothing.
+# By its path: the tests are no package.
 cases = SimpleNamespace(**runpy.run_path(str(Path(__file__).with_name("cases.py"))))
 
 LIMIT = cases.LIMIT

@@ -1,0 +1,183 @@
+"""Telemetry of a process that is killed, of a disk that fills up, and of two processes to one path."""
+
+import errno
+import os
+import resource
+import runpy
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+
+from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.telemetry.file import join
+from spheretwin.models.telemetry.signals import common_signals
+from spheretwin.models.telemetry.table import read_parquet
+
+SIGNALS = common_signals(18)
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("streams.py")))
+GAIN, PART_ROWS, parts_beside, short_parts, streamed, table = (
+    shared[name] for name in ("GAIN", "PART_ROWS", "parts_beside", "short_parts", "streamed", "table")
+)
+
+
+STREAM = """
+import sys
+import numpy as np
+from pathlib import Path
+from spheretwin.models.telemetry import file as telemetry_file
+from spheretwin.models.telemetry.signals import common_signals, width
+from spheretwin.models.telemetry.table import Table
+SIGNALS = common_signals(18)
+telemetry_file.PART_ROWS = 64
+path, rows, seed, pause = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4] == "pause"
+whole = Table(SIGNALS, np.random.default_rng(seed).normal(size=(rows, width(SIGNALS))))
+file = telemetry_file.TelemetryFile(path, SIGNALS, {"scenario": '{"a": 1}', "ticks": "0"})
+for first in range(0, rows, 10):
+    file.write(whole.rows(first, first + 10))
+if pause:
+    print("written", flush=True)
+    sys.stdin.read()
+file.close({})
+"""
+
+
+def streaming(path, rows, seed=0, pause=False, **options):
+    command = [sys.executable, "-c", STREAM, str(path), str(rows), str(seed), "pause" if pause else "go"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, text=True, **pipes, **options)
+
+
+def kill(process):
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+
+
+def test_a_process_killed_while_it_writes_leaves_its_first_rows(tmp_path):
+    path = tmp_path / "run.parquet"
+    process = streaming(path, 64 * 1500)
+    deadline = time.monotonic() + 60
+    while sum(part.stat().st_size for part in tmp_path.glob(".run.parquet.*.parts/*")) < size_of(64 * 6):
+        assert time.monotonic() < deadline, "waited in vain"
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.001)
+    kill(process)
+    assert not path.exists()
+    rows = join(parts_beside(path), path)
+    assert rows % 64 == 0
+    assert rows >= 64 * 5  # a sixth batch may be torn: the stream is longer than its rows
+    assert read_parquet(path)[0].values.tobytes() == table(64 * 1500).rows(0, rows).values.tobytes()
+
+
+def test_a_killed_process_loses_only_the_rows_that_waited(tmp_path):
+    process = streaming(path := tmp_path / "run.parquet", 64 * 5 + 63, pause=True)
+    assert process.stdout.readline() == "written\n"
+    kill(process)
+    assert join(parts_beside(path), path) == 64 * 5
+    assert read_parquet(path)[0].values.tobytes() == table(64 * 5 + 63).rows(0, 64 * 5).values.tobytes()
+
+
+def limited_to(size):
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def size_of(rows):
+    return table(rows).values.nbytes
+
+
+def full_disk(*_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def refusal(process):
+    _, complaint = process.communicate(timeout=60)
+    assert process.returncode == 1
+    line = complaint.splitlines()[-1]
+    assert line.startswith("spheretwin.models.base.errors.SpheretwinError: output: ")
+    return line
+
+
+def test_a_disk_that_is_full_at_the_end_keeps_all_rows_and_says_so(tmp_path):
+    process = streaming(path := tmp_path / "run.parquet", 640, pause=True)
+    assert process.stdout.readline() == "written\n"
+    room = size_of(640) // 2  # random numbers do not compress by half
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (room, room))
+    line = refusal(process)
+    (part,) = parts_beside(path)
+    assert f"640 rows are kept in {part.parent}" in line
+    assert os.listdir(tmp_path) == [part.parent.name]
+    assert join([part], path) == 640
+    assert read_parquet(path)[0].values.tobytes() == table(640).values.tobytes()
+
+
+def test_a_disk_that_is_full_in_the_midst_of_a_batch_keeps_those_before(tmp_path):
+    path = tmp_path / "run.parquet"
+    room = size_of(64 * 7 + 32)  # seven batches, the few kB that describe them, and some of the eighth
+    line = refusal(streaming(path, 640, preexec_fn=limited_to(room)))
+    (part,) = parts_beside(path)
+    assert part.stat().st_size == room
+    assert f"{64 * 7} rows are kept in {part.parent}" in line
+    assert not path.exists()
+    assert join([part], path) == 64 * 7
+    assert read_parquet(path)[0].values.tobytes() == table(640).rows(0, 64 * 7).values.tobytes()
+
+
+def test_a_disk_that_is_full_from_the_first_part_on_leaves_nothing_behind(tmp_path):
+    (path := tmp_path / "run.parquet").write_text("what was there before")
+    line = refusal(streaming(path, 640, preexec_fn=limited_to(size_of(64) // 2)))
+    assert "could not be written" in line
+    assert "kept" not in line
+    assert os.listdir(tmp_path) == ["run.parquet"]
+    assert path.read_text() == "what was there before"
+
+
+@pytest.mark.parametrize("signals", [SIGNALS, (*SIGNALS, GAIN)], ids=["same", "new"])
+def test_a_disk_that_fills_on_the_way_keeps_what_it_has_and_the_run_goes_on(signals, tmp_path, monkeypatch):
+    file = streamed(path := tmp_path / "run.parquet", whole := table(3 * PART_ROWS), 10)
+    monkeypatch.setattr(pa.ipc.RecordBatchStreamWriter, "write_table", full_disk)
+    more = table(300, signals)
+    for first in range(0, len(more), 10):
+        file.write(more.rows(first, first + 10))
+    monkeypatch.undo()
+    with pytest.raises(SpheretwinError, match=r"No space left on device; 192 rows are kept in"):
+        file.close({})
+    assert not path.exists()
+    (part,) = parts_beside(path)
+    assert os.listdir(part.parent) == [part.name]
+    assert join([part], path) == 192
+    assert read_parquet(path)[0].values.tobytes() == whole.values.tobytes()
+
+
+def test_two_processes_to_one_path_each_write_a_whole_file(tmp_path):
+    path = tmp_path / "run.parquet"
+    both = [streaming(path, rows, seed, pause=True) for rows, seed in ((300, 1), (500, 2))]
+    for process in both:
+        assert process.stdout.readline() == "written\n"
+    assert len(list(tmp_path.glob(".run.parquet.*.parts"))) == 2
+    for process, (rows, seed) in zip(both, ((300, 1), (500, 2)), strict=True):
+        _, complaint = process.communicate(timeout=60)
+        assert process.returncode == 0, complaint
+        assert read_parquet(path)[0].values.tobytes() == table(rows, seed=seed).values.tobytes()
+    assert os.listdir(tmp_path) == ["run.parquet"]
+
+
+def test_two_processes_that_close_together_leave_one_of_the_two(tmp_path):
+    path = tmp_path / "run.parquet"
+    both = [streaming(path, 300, seed, pause=True) for seed in (1, 2)]
+    for process in both:
+        assert process.stdout.readline() == "written\n"
+    with ThreadPoolExecutor(2) as pool:
+        complaints = [said[1] for said in pool.map(lambda process: process.communicate(timeout=60), both)]
+    assert [process.returncode for process in both] == [0, 0], complaints
+    assert os.listdir(tmp_path) == ["run.parquet"]
+    either = {table(300, seed=seed).values.tobytes() for seed in (1, 2)}
+    assert read_parquet(path)[0].values.tobytes() in either
