@@ -26,8 +26,13 @@ def spheretwin(*arguments, cwd=None):
 
 
 def started(*arguments):
-    command = [*COMMAND, *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    command, pipe = [*COMMAND, *map(str, arguments)], subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, preexec_fn=_heed_ctrl_c)
+
+
+def _heed_ctrl_c():
+    """As from a terminal, although tests that a shell runs in the background are told to ignore it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def one_line(stderr):
