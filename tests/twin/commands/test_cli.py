@@ -21,8 +21,8 @@ from spheretwin.models.telemetry.table import read_parquet
 COMMAND = [sys.executable, "-m", "spheretwin.twin.cli"]
 
 
-def spheretwin(*arguments, cwd=None):
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
+def spheretwin(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True)
 
 
 def started(*arguments):
@@ -167,9 +167,13 @@ def _wait_for(condition, seconds=60):
         time.sleep(0.05)
 
 
+INSTALLED = [str(Path(sys.executable).with_name("spheretwin"))]
+
+
+@pytest.mark.parametrize("command", [COMMAND, INSTALLED], ids=["module", "installed"])
 @pytest.mark.parametrize("arguments", [["fly"], ["simulate", "hold", "--plant.mjcf", "missing.xml"]])
-def test_a_refused_process_says_so_on_one_line_and_exits_2(arguments):
-    done = spheretwin(*arguments)
+def test_a_refused_process_says_so_on_one_line_and_exits_2(command, arguments):
+    done = subprocess.run([*command, *arguments], capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stdout == ""
     assert arguments[-1] in one_line(done.stderr)
