@@ -36,6 +36,7 @@ setup: .venv/installed
 
 # Type checkers and import-linter do not see folders that are mapped by an editable install.
 .venv-wheel/installed: uv.lock pyproject.toml $(TOOLS)/uv $(shell find models control viz twin -name '*.py')
+	rm -rf build
 	UV_PROJECT_ENVIRONMENT=.venv-wheel $(UV) sync --quiet --frozen --python $(PYTHON) --no-editable --reinstall-package spheretwin --all-extras --group dev
 	@touch $@
 
