@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.check import Check
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.crosscheck.part import Part
 from spheretwin.twin.scenario.changing import changed
 from spheretwin.twin.simulation import simulate
 
@@ -127,3 +128,6 @@ def _figures(pair: Pair) -> dict[str, float]:
 def _if_same_end(pair: Pair, value: float) -> float:
     """The value, or infinity where the runs ended apart."""
     return value if pair.same_end else float("inf")
+
+
+PART = Part("closed loop", lambda on: compare(on.mjcf))

@@ -24,6 +24,7 @@ from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf import PAYLOAD, gravity, read
+from spheretwin.twin.crosscheck.part import Part
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
 
@@ -293,3 +294,6 @@ def _times(matrices: Array, vectors: Array) -> Array:
 def _norm(values: Array) -> Array:
     """Euclidean norm of every vector, Frobenius norm of every matrix."""
     return np.sqrt(np.sum(values**2, axis=tuple(range(1, values.ndim))))
+
+
+PART = Part("dynamics", lambda on: compare(on.mjcf, on.actuator, on.states))

@@ -14,6 +14,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.check import Check
 from spheretwin.models.kinematics import rotation, rotor_rate_jacobian
 from spheretwin.models.mjcf import read
+from spheretwin.twin.crosscheck.part import Part
 from spheretwin.twin.plant.engine import Rotor
 
 Array = NDArray[np.float64]
@@ -168,3 +169,6 @@ def _check(quantity: str, spin: str, drift: Drift) -> Check:
         why=_WHY[quantity],
         unit="rad" if quantity == "attitude" else "1",
     )
+
+
+PART = Part("torque-free rotor", lambda on: check(on.mjcf, on.actuator))

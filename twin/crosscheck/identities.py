@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from spheretwin.models.base.check import Check
 from spheretwin.models.kinematics import rotor_rate_jacobian
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques, inertia_matrix
 from spheretwin.twin.crosscheck.dynamics import random_states
+from spheretwin.twin.crosscheck.part import Part
 
 Array = NDArray[np.float64]
 
@@ -19,13 +22,21 @@ BOUND = 1e-14
 _WHY = "rounding alone, near 1e-16: both sides are exact"
 
 
-def check(actuator: Actuator, count: int) -> list[Check]:
+class Identities(NamedTuple):
+    """Checks alone: nothing of it is drawn."""
+
+    checks: list[Check]
+
+
+def check(actuator: Actuator, count: int) -> Identities:
     """Check the identities at random states."""
     states = random_states(count)
-    return [
-        _skew_symmetry(actuator.inertia, states.q, states.qdot),
-        _coupling(float(np.mean(actuator.inertia)), states.q, states.qdot, states.qddot),
-    ]
+    return Identities(
+        [
+            _skew_symmetry(actuator.inertia, states.q, states.qdot),
+            _coupling(float(np.mean(actuator.inertia)), states.q, states.qdot, states.qddot),
+        ]
+    )
 
 
 def inertia_rate(q: Array, qdot: Array, inertia: Array) -> Array:
@@ -92,3 +103,6 @@ def _coupling(J: float, q: Array, qdot: Array, qddot: Array) -> Check:
         bound=BOUND,
         why=_WHY,
     )
+
+
+PART = Part("identities", lambda on: check(on.actuator, on.states))

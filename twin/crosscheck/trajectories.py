@@ -22,6 +22,7 @@ from spheretwin.models.base.check import Check
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration, coriolis_matrix, inertia_matrix
 from spheretwin.models.mjcf import read
+from spheretwin.twin.crosscheck.part import Part
 from spheretwin.twin.plant import lagrangian
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
@@ -191,3 +192,6 @@ def _order(name: str, measured: Convergence, order: int) -> Check:
             for step_s, error in zip(measured.steps_s, measured.errors_rad, strict=True)
         },
     )
+
+
+PART = Part("trajectories", lambda on: compare(on.mjcf, on.actuator))

@@ -1,0 +1,1 @@
+"""What is drawn of the cross-check, one figure a file."""

@@ -1,0 +1,16 @@
+"""A figure of the cross-check's page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Drawing(NamedTuple):
+    """A figure, the file it goes to, and what it shows."""
+
+    file: str
+    caption: str
+    figure: Figure

@@ -1,0 +1,23 @@
+"""How much of its bound each figure takes up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spheretwin.twin.crosscheck.figures.drawing import Drawing
+from spheretwin.twin.crosscheck.part import Evidence
+
+
+def draw(evidence: Evidence) -> Drawing:
+    """How much of its bound each figure takes up."""
+    from spheretwin.viz.figures import plots
+
+    shares = {
+        check.name: check.value / check.bound if np.isfinite(check.value) else np.inf
+        for check in evidence.checks
+        if check.value is not None and check.bound is not None and check.at_least is None
+    }
+    figure = plots.margins(shares, "How much of its bound each figure takes up")
+    return Drawing(
+        "margins.png", "Value over bound; the orders of convergence, which have two, are below.", figure
+    )
