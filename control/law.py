@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
-from spheretwin.models.telemetry.signals import RESERVED_NAMES, Signal, width
+from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, width
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
@@ -91,7 +91,7 @@ class Law:
                 f"law {self.name}: expected signals of at most {len(self.state)} numbers, the size of its"
                 f" state, received {shown(width(self.signals))}"
             )
-        names = [*RESERVED_NAMES, *(signal.name for signal in self.signals)]
+        names = [*COMMON_NAMES, *(signal.name for signal in self.signals)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,20 +21,19 @@ from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, disagreements, kept_matrix, torque_model
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.models.telemetry.signals import (
-    FRICTION_SIGNALS,
-    MEASURED_SIGNALS,
     Signal,
     common_signals,
     offsets,
     width,
 )
-from spheretwin.twin.loop import Columns
+from spheretwin.twin.columns.registry import ALL
+from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.drive import drive
-from spheretwin.twin.plant.engine import Rotor, integrator_name
+from spheretwin.twin.plant.engine import integrator_name
 from spheretwin.twin.plant.friction import Friction, friction
-from spheretwin.twin.plant.lagrangian import LagrangianRotor
 from spheretwin.twin.plant.plant import Plant
-from spheretwin.twin.plant.stepping import Stepped
+from spheretwin.twin.plant.registry import ENGINES
+from spheretwin.twin.plant.rotor import Rotor, Setting
 from spheretwin.twin.scenario.sections import DriveSection, OwnController, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.sensors import Sensors, sensors
@@ -45,8 +43,6 @@ from spheretwin.twin.trajectories import trajectory
 UNWRITTEN_STEP_s = 0.002
 UNWRITTEN_INTEGRATOR = "Euler"
 UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
-
-AnyRotor = Rotor | LagrangianRotor
 
 
 class Files(NamedTuple):
@@ -137,23 +133,28 @@ def law_of(scenario: Scenario) -> Law:
 
 
 def signals_of(scenario: Scenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
-    """Columns of a run's telemetry: common ones, those of its stages, then the law's own."""
+    """Columns of a run's telemetry: common ones, those of its stages, then the law's own.
+
+    Raises
+    ------
+    InputError
+        The law has a signal under the name of a stage's.
+    """
+    taken = {signal.name for columns in ALL for signal in columns.signals}
+    if twice := sorted(taken & {signal.name for signal in law.signals}):
+        raise InputError(f"law {law.name}: expected new names of signals, received {', '.join(twice)}")
     found = common_signals(len(actuator.groups))
-    if any(scenario.sensors.angle_offset_rad):
-        found += MEASURED_SIGNALS
-    if any(scenario.plant.coulomb_Nm) or any(scenario.plant.viscous_Nm_s):
-        found += FRICTION_SIGNALS
+    for columns in ALL:
+        if columns.logged(scenario):
+            found += columns.signals
     return found + law.signals
 
 
-def columns_of(signals: tuple[Signal, ...], law: Law) -> Columns:
+def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
     """Where the loop finds the columns that not every run has."""
     first = offsets(signals)
-    return Columns(
-        measured=first.get(MEASURED_SIGNALS[0].name, -1),
-        friction=first.get(FRICTION_SIGNALS[0].name, -1),
-        of_the_law=width(signals) - width(law.signals),
-    )
+    of_stages = tuple(first.get(columns.signals[0].name, -1) for columns in ALL)
+    return Places(of_stages, width(signals) - width(law.signals))
 
 
 def sensors_of(scenario: Scenario) -> Sensors:
@@ -200,7 +201,7 @@ def controller_of(scenario: Scenario, law: Law, magnetics: TorqueModel, kept: Ke
     return controller(law, magnetics, kept, limit_A, width(law.signals), believed)
 
 
-def plant_of(scenario: Scenario, actuator: Actuator, stepped: Stepped, kept: KeptMatrix) -> Plant:
+def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix) -> Plant:
     """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
     section, groups = scenario.plant, len(actuator.groups)
     lag_s, limit_A = scenario.drive.time_constant_s or 0.0, scenario.drive.current_limit_A or 0.0
@@ -218,6 +219,7 @@ def plant_of(scenario: Scenario, actuator: Actuator, stepped: Stepped, kept: Kep
         mean_current=np.zeros(groups),
         pulling=np.zeros(groups),
         friction_q=np.zeros(3),
+        first_friction_q=np.zeros(3),
     )
 
 
@@ -238,7 +240,7 @@ def kept_matrices(nominal: TorqueModel, true: TorqueModel) -> tuple[KeptMatrix, 
     return kept, kept if nominal is true else kept_matrix(true)
 
 
-def rotor_of(scenario: Scenario, files: Files) -> AnyRotor:
+def rotor_of(scenario: Scenario, files: Files) -> Rotor:
     """Rotor of a resolved scenario, in the engine that it names.
 
     Raises
@@ -246,43 +248,18 @@ def rotor_of(scenario: Scenario, files: Files) -> AnyRotor:
     InputError
         The engine does not know all that the model holds.
     """
-    return ENGINES[scenario.plant.engine](scenario.plant, files)
-
-
-def _mujoco(section: PlantSection, files: Files) -> Rotor:
-    return Rotor(
-        files.model,
-        section.step_s,
-        section.integrator,
-        section.modelling_error,
-        section.payload_kg,
-        section.gravity_m_s2,
-    )
-
-
-def _lagrangian(section: PlantSection, files: Files) -> LagrangianRotor:
-    unknown = mjcf.beyond_a_free_rotor(files.model.loaded)
-    if section.gravity_m_s2 is not None:
-        unknown = [name for name in unknown if name != mjcf.OTHER_GRAVITY]
-    if unknown:
-        raise InputError(
-            "Lagrangian plant: expected a rigid rotor on three ideal hinges, received a model with"
-            f" {', '.join(unknown)}; plant.engine mujoco computes it"
+    section = scenario.plant
+    return ENGINES[section.engine].set_up(
+        Setting(
+            model=files.model,
+            actuator=files.actuator,
+            step_s=section.step_s,
+            integrator=section.integrator,
+            modelling_error=section.modelling_error,
+            payload_kg=section.payload_kg,
+            gravity_m_s2=section.gravity_m_s2,
         )
-    return LagrangianRotor(
-        files.actuator,
-        section.step_s,
-        section.integrator,
-        section.modelling_error,
-        section.payload_kg,
-        gravity_m_s2=section.gravity_m_s2 or 0.0,
     )
-
-
-ENGINES: dict[str, Callable[[PlantSection, Files], AnyRotor]] = {
-    "mujoco": _mujoco,
-    "lagrangian": _lagrangian,
-}
 
 
 def _first_pose(scenario: Scenario) -> trajectory.Triple:

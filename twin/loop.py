@@ -9,6 +9,7 @@ from spheretwin.control.controller import LOST, Controller, control_tick
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.copying import copy_into, copy_rows
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
+from spheretwin.twin.columns.registry import write_columns
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
 from spheretwin.twin.sensors import Sensors, measure
 
@@ -29,11 +30,10 @@ class Inputs(NamedTuple):
     disturbance: NDArray[np.float64]  # (n, 3) N·m, generalised, subtracted in (1)
 
 
-class Columns(NamedTuple):
+class Places(NamedTuple):
     """First columns of the signals that not every run logs."""
 
-    measured: int  # of q_measured_rad and qdot_estimated_rad_s; -1 where they are not logged
-    friction: int  # of friction_Nm; -1 where it is not logged
+    of_stages: tuple[int, ...]  # in the order of `columns.registry.ALL`; -1 where they are not logged
     of_the_law: int
 
 
@@ -52,7 +52,7 @@ def loop(
     controller: Controller,
     sensors: Sensors,
     plant: Plant,
-    columns: Columns,
+    places: Places,
     scratch: Scratch,
     log: Array,
 ) -> tuple[int, int]:
@@ -68,7 +68,7 @@ def loop(
         Changed in place, as is the plant; neither sees the other.
     sensors : Sensors
     plant : Plant
-    columns : Columns
+    places : Places
     scratch : Scratch
         What it holds does not matter.
     log : (ticks, width) array
@@ -88,19 +88,16 @@ def loop(
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called: it may write into all that it is handed.
         write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
-        if columns.measured >= 0:
-            copy_into(row, columns.measured, measurement[0], 3)
-            copy_into(row, columns.measured + 3, measurement[1], 3)
         command = row[CURRENT_COMMAND:first_current]
         share = control_tick(controller, law, allocate, t, reference, measurement, command)
         if share == LOST:
             return tick, DIVERGED
         row[scale] = share
         copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
-        copy_into(row, columns.of_the_law, controller.memory, controller.logged)
-        friction = row[columns.friction : columns.friction + 3] if columns.friction >= 0 else plant.friction_q
-        delivered = Delivered(row[first_current:scale], row[TORQUE : TORQUE + 3], friction)
+        copy_into(row, places.of_the_law, controller.memory, controller.logged)
+        delivered = Delivered(row[first_current:scale], row[TORQUE : TORQUE + 3])
         status = plant_tick(plant, command, disturbance, delivered)
+        write_columns(row, places.of_stages, controller, sensors, plant)
         if status != GOING:
             return tick + 1, status
     return log.shape[0], GOING

@@ -12,12 +12,13 @@ class Sensors(NamedTuple):
     """Angle sensors of the three hinges."""
 
     offset_rad: NDArray[np.float64]  # (3,)
+    measured: NDArray[np.float64]  # (2, 3) what was handed over last: angles, rates; where not ideal
     ideal: bool
 
 
 def sensors(offset_rad: tuple[float, float, float]) -> Sensors:
     """Sensors with a constant error of each angle, rad."""
-    return Sensors(np.array(offset_rad), not any(offset_rad))
+    return Sensors(np.array(offset_rad), np.zeros((2, 3)), not any(offset_rad))
 
 
 @allocation_free
@@ -33,3 +34,4 @@ def measure(
     if not sensors.ideal:
         for i in range(3):
             measurement[0, i] += sensors.offset_rad[i]
+            sensors.measured[0, i], sensors.measured[1, i] = measurement[0, i], measurement[1, i]

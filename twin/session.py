@@ -354,7 +354,7 @@ class Session:
         self.law = self._own_law or assembly.law_of(scenario)
         self._signals = assembly.signals_of(scenario, self.actuator, self.law)
         self._columns = width(self._signals)
-        self._places = assembly.columns_of(self._signals, self.law)
+        self._places = assembly.places_of(self._signals, self.law)
         magnetics = assembly.nominal_magnetics(scenario, self._files)
         self._kept = assembly.kept_matrices(magnetics, torque_model(self.actuator))
         self._controller = assembly.controller_of(scenario, self.law, magnetics, self._kept[0])

@@ -103,22 +103,8 @@ def common_signals(groups: int) -> tuple[Signal, ...]:
     )
 
 
-MEASURED_SIGNALS = (
-    Signal("q_measured_rad", "rad", 3, "hinge angles as the controller has them", ANGLES),
-    Signal("qdot_estimated_rad_s", "rad/s", 3, "hinge rates as the controller has them", ANGLES),
-)
-"""Logged where the controller does not have the true state."""
-
-FRICTION_SIGNALS = (
-    Signal("friction_Nm", "N·m", 3, "friction on the hinges, over the physics step that begins now", ANGLES),
-)
-"""Logged where the hinges have friction."""
-
 COMMON_NAMES = frozenset(signal.name for signal in common_signals(1))
 """Names of what every run logs."""
-
-RESERVED_NAMES = COMMON_NAMES | {signal.name for signal in (*MEASURED_SIGNALS, *FRICTION_SIGNALS)}
-"""Names that no law can give to a signal of its own."""
 
 
 @cache

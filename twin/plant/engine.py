@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import COMPILES, compiled
 from spheretwin.models.base.mujoco_library import library
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf, idle_stages
+from spheretwin.twin.plant.rotor import EngineKind
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -129,3 +130,18 @@ else:
 def step(engine: Engine) -> None:
     """One physics step of MuJoCo, from compiled code or from Python."""
     _mj_step(engine.model_address, engine.data_address)
+
+
+MUJOCO = EngineKind(
+    "mujoco",
+    lambda setting: Rotor(
+        setting.model,
+        setting.step_s,
+        setting.integrator,
+        setting.modelling_error,
+        setting.payload_kg,
+        setting.gravity_m_s2,
+    ),
+    Engine,
+    step,
+)

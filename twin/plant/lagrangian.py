@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.errors import InputError
@@ -21,6 +22,7 @@ from spheretwin.models.lagrangian import (
     triple,
     turns,
 )
+from spheretwin.twin.plant.rotor import EngineKind, Setting
 
 
 class Equations(NamedTuple):
@@ -142,3 +144,25 @@ def _acceleration(plant: Equations, q: Triple, qdot: Triple) -> Triple:
 @allocation_free
 def _moved(start: Triple, time: float, rate: Triple) -> Triple:
     return start[0] + time * rate[0], start[1] + time * rate[1], start[2] + time * rate[2]
+
+
+def _set_up(setting: Setting) -> LagrangianRotor:
+    unknown = mjcf.beyond_a_free_rotor(setting.model.loaded)
+    if setting.gravity_m_s2 is not None:
+        unknown = [name for name in unknown if name != mjcf.OTHER_GRAVITY]
+    if unknown:
+        raise InputError(
+            "Lagrangian plant: expected a rigid rotor on three ideal hinges, received a model with"
+            f" {', '.join(unknown)}; plant.engine mujoco computes it"
+        )
+    return LagrangianRotor(
+        setting.actuator,
+        setting.step_s,
+        setting.integrator,
+        setting.modelling_error,
+        setting.payload_kg,
+        gravity_m_s2=setting.gravity_m_s2 or 0.0,
+    )
+
+
+LAGRANGIAN = EngineKind("lagrangian", _set_up, Equations, step)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from spheretwin.models.base.copying import copy_into
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
 from spheretwin.twin.plant.drive import Drive, advance
 from spheretwin.twin.plant.friction import Friction, friction_torque
-from spheretwin.twin.plant.stepping import Stepped, step
+from spheretwin.twin.plant.stepping import step
 
 GOING, LEFT_WORKSPACE, DIVERGED = 0, 1, 2
 
@@ -24,7 +24,7 @@ FASTEST_RATE_rad_s = 1e6
 class Plant(NamedTuple):
     """The far side of the wires: nothing of it is known to the controller."""
 
-    rotor: Stepped
+    rotor: Any  # what compiled code steps, as the engine's row says
     magnetics: TorqueModel  # true
     kept: KeptMatrix
     drive: Drive
@@ -37,6 +37,7 @@ class Plant(NamedTuple):
     mean_current: NDArray[np.float64]  # (n,) A, over the physics step
     pulling: NDArray[np.float64]  # (n,) A, the same times the gain
     friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, in the physics step
+    first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
 
 
 class Delivered(NamedTuple):
@@ -44,7 +45,6 @@ class Delivered(NamedTuple):
 
     current: NDArray[np.float64]  # (n,) A
     torque_S: NDArray[np.float64]  # (3,) N·m
-    friction_q: NDArray[np.float64]  # (3,) N·m
 
 
 @part_of_its_caller
@@ -97,7 +97,7 @@ def plant_tick(
         if substep == 0:
             copy_into(delivered.current, 0, mean_current, mean_current.shape[0])
             copy_into(delivered.torque_S, 0, torque_S, 3)
-            copy_into(delivered.friction_q, 0, friction_q, 3)
+            copy_into(plant.first_friction_q, 0, friction_q, 3)
         step(rotor)
         for i in range(3):
             if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number

@@ -11,18 +11,13 @@ from typing import Any
 
 from numba.extending import overload
 
-from spheretwin.twin.plant import engine, lagrangian
-from spheretwin.twin.plant.engine import Engine
-from spheretwin.twin.plant.lagrangian import Equations
+from spheretwin.twin.plant.registry import ENGINES
 
-Stepped = Engine | Equations
-"""What compiled code steps: it has `q`, `qdot`, and takes `torque_S` and `torque_q`."""
-
-_STEPS: dict[type, Callable[[Any], None]] = {Engine: engine.step, Equations: lagrangian.step}
+_STEPS: dict[type, Callable[[Any], None]] = {row.stepped: row.step for row in ENGINES.values()}
 
 
-def step(rotor: Stepped) -> None:
-    """One physics step of a rotor, from compiled code or from Python."""
+def step(rotor: Any) -> None:
+    """One physics step of what `Rotor.start` returned, from compiled code or from Python."""
     _STEPS[type(rotor)](rotor)
 
 

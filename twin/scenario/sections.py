@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializeAsAny, field_validator, model_validator
 from pydantic_core import PydanticCustomError
@@ -11,6 +11,7 @@ from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
 from spheretwin.twin.disturbances.disturbance import Disturbance
+from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.trajectories.registry import Trajectory
 from spheretwin.twin.trajectories.trajectory import Bounded, Triple
 
@@ -24,6 +25,12 @@ MOST_SUBSTEPS = 10_000
 
 # Clock times are built from decimal fractions; a period and a step that fit do so to rounding only.
 WHOLE = 1e-9
+
+
+if TYPE_CHECKING:
+    EngineName = str
+else:
+    EngineName = Literal[tuple(ENGINES)]
 
 
 class _Section(BaseModel):
@@ -49,7 +56,7 @@ class Event(_Section):
 class Plant(_Section):
     """The rotor as it really is, and how its motion is integrated."""
 
-    engine: Literal["mujoco", "lagrangian"] = Field(
+    engine: EngineName = Field(
         "mujoco", description="what computes the motion: MuJoCo, or the equations of motion (faster)"
     )
     step_s: Annotated[float, Field(ge=1e-7, le=1)] = Field(5e-4, description="physics step, s")

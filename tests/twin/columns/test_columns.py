@@ -1,0 +1,64 @@
+"""Columns that not every run has: each registered stage's, and that no law can take their names."""
+
+import numpy as np
+import pytest
+
+from spheretwin.control.law import Law
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import Signal, common_signals
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.columns.registry import ALL
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import simulate
+
+# What makes each stage log: a new one joins here, or the first test says so.
+LOGGED_BY = {
+    "q_measured_rad": {"sensors.angle_offset_rad": [0.01, 0.0, -0.02]},
+    "friction_Nm": {"plant.viscous_Nm_s": [1e-3, 1e-3, 1e-3]},
+}
+IDS = [columns.signals[0].name for columns in ALL]
+SIGNALS = [signal for columns in ALL for signal in columns.signals]
+
+
+def run(changes):
+    return simulate(scenarios.load("hold", {"duration": 0.05, **changes})).telemetry
+
+
+@pytest.mark.parametrize("columns", ALL, ids=IDS)
+def test_they_are_there_where_the_stage_acts_and_nowhere_else(columns):
+    names = [signal.name for signal in columns.signals]
+    table = run(LOGGED_BY[names[0]])
+    for name in names:
+        assert np.isfinite(table[name]).all()
+        assert table[name].any()
+    assert not set(names) & {signal.name for signal in run({}).signals}
+    # They move no other column.
+    others = [signal.name for signal in common_signals(18)]
+    together = run({key: value for each in LOGGED_BY.values() for key, value in each.items()})
+    assert set(names) <= {signal.name for signal in together.signals}
+    assert [signal.name for signal in together.signals][: len(others)] == others
+
+
+def test_each_holds_what_its_stage_did():
+    changes = {key: value for each in LOGGED_BY.values() for key, value in each.items()}
+    table = run(changes)
+    offset = table["q_measured_rad"] - table["q_rad"]
+    # A sum and a difference of numbers below 1: rounded twice.
+    np.testing.assert_allclose(offset, np.tile([0.01, 0.0, -0.02], (50, 1)), rtol=0, atol=2.3e-16)
+    np.testing.assert_array_equal(table["qdot_estimated_rad_s"], table["qdot_rad_s"])
+    # Viscous friction is taken at the rates after the step: it falls short of -1e-3 qdot by a step's change.
+    np.testing.assert_allclose(table["friction_Nm"], -1e-3 * table["qdot_rad_s"], rtol=0.2, atol=2e-5)
+
+
+@pytest.mark.parametrize("taken", SIGNALS, ids=lambda each: each.name)
+def test_their_names_are_refused_to_a_law(taken):
+    law = Law("mine", lambda *_: None, [], np.zeros(1), (Signal(taken.name, "1", 1, ""),))
+    with pytest.raises(InputError, match=f"expected new names of signals, received {taken.name}"):
+        Session(scenarios.load("hold"), law)
+
+
+@pytest.mark.parametrize("signal", SIGNALS, ids=lambda each: each.name)
+def test_each_is_documented(signal):
+    assert signal.unit
+    assert signal.meaning
+    assert len(signal.labels) == signal.size

@@ -1,0 +1,25 @@
+"""What the controller is handed, where that is not the truth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.twin.columns.column import Columns
+
+SIGNALS = (
+    Signal("q_measured_rad", "rad", 3, "hinge angles as the controller has them", ANGLES),
+    Signal("qdot_estimated_rad_s", "rad/s", 3, "hinge rates as the controller has them", ANGLES),
+)
+
+
+@part_of_its_caller
+def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:  # noqa: D103
+    for i in range(3):
+        row[i], row[3 + i] = sensors.measured[0, i], sensors.measured[1, i]
+
+
+COLUMNS = Columns(SIGNALS, lambda scenario: any(scenario.sensors.angle_offset_rad), write)
