@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
+from math import hypot, pi, sqrt
 from pathlib import Path
 
 import mujoco
@@ -23,6 +24,8 @@ TORQUE_CURVE_PATH = FOLDER / "torque_curve.csv"
 HINGES = ("alpha", "beta", "gamma")
 LOCKED_DEG = 90.0
 
+FRONT_RADIUS = "pole_front_radius_m"
+
 # Axes of one group are exact opposites in the MJCF; rotations built from degrees keep 1e-15.
 COLLINEAR_TOLERANCE = 1e-9
 
@@ -38,13 +41,62 @@ LONGEST_TIME_CONSTANT_S = 1e3
 
 @dataclass(frozen=True)
 class Magnet:
-    """One cylindrical pole magnet, magnetised along its axis."""
+    """One pole magnet, magnetised along its axis: a cylinder whose front is flat, or ground to a sphere.
+
+    Radius, length and distance are those of the blank, the cylinder before it is ground: grinding takes off
+    the front's edge and leaves the middle of the front where it was.
+    """
 
     remanence_T: float
     radius_m: float
     length_m: float
     distance_m: float
-    """From the joint centre to the magnet's centre."""
+    """From the joint centre to the middle of the blank."""
+    front_radius_m: float = 0.0
+    """Radius of the sphere to which the front is ground, its centre on the axis; 0 where it is flat."""
+
+    @property
+    def front_m(self) -> float:
+        """From the joint centre to the middle of the front, m."""
+        return self.distance_m + self.length_m / 2
+
+    @property
+    def back_m(self) -> float:
+        """From the joint centre to the back, m."""
+        return self.distance_m - self.length_m / 2
+
+    @property
+    def sagitta_m(self) -> float:
+        """How far the front's rim lies behind its middle, m."""
+        return self.sagitta_at_m(self.radius_m)
+
+    @property
+    def rim_m(self) -> float:
+        """Height of the front's rim along the axis, from the joint centre, m."""
+        return self.front_m - self.sagitta_m
+
+    @property
+    def reach_m(self) -> float:
+        """From the joint centre to the farthest point of the front, m."""
+        return max(self.front_m, hypot(self.rim_m, self.radius_m))
+
+    @property
+    def volume_m3(self) -> float:
+        """Volume of what is left of the blank, m³."""
+        return self.volume_within_m3(self.radius_m)
+
+    def volume_within_m3(self, rho_m: float) -> float:
+        """Volume of what is left of the blank within a distance from its axis, m³."""
+        sagitta = self.sagitta_at_m(rho_m)
+        cap = pi / 6 * sagitta * (3 * rho_m**2 + sagitta**2)
+        return pi * rho_m**2 * (self.length_m - sagitta) + cap
+
+    def sagitta_at_m(self, rho_m: float) -> float:
+        """How far the front lies behind its middle at a distance from the axis, m."""
+        if not self.front_radius_m:
+            return 0.0
+        depth = sqrt(max(0.0, self.front_radius_m**2 - rho_m**2))  # rho may round past the sphere
+        return rho_m**2 / (self.front_radius_m + depth)
 
 
 @dataclass(frozen=True)
@@ -262,12 +314,29 @@ def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.f
 
 
 def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
-    return Magnet(
+    blank = Magnet(
         remanence_T=_number(model, "magnet_remanence_T"),
         radius_m=_shared(model.site_size[poles, 0], "radius of the poles"),
         length_m=2 * _shared(model.site_size[poles, 1], "length of the poles"),
         distance_m=_shared(np.linalg.norm(model.site_pos[poles], axis=1), "distance of the poles"),
     )
+    return replace(blank, front_radius_m=_front_radius(model, blank))
+
+
+def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
+    """Radius to which the poles' fronts are ground; 0, a flat face, where the model does not say."""
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, FRONT_RADIUS) < 0:
+        return 0.0
+    value = float(model.numeric(FRONT_RADIUS).data[0])
+    depth = min(blank.radius_m, blank.length_m)  # of the deepest cap that the blank holds
+    smallest = (blank.radius_m**2 + depth**2) / (2 * depth)
+    if value != 0.0 and not smallest <= value <= LARGEST_LENGTH_M:
+        low, high, received = told_apart(smallest, LARGEST_LENGTH_M, value)
+        raise InputError(
+            f"model: expected {FRONT_RADIUS} of 0, for a flat face, or from {low} to {high} for poles of this"
+            f" radius and length, received {received}"
+        )
+    return value
 
 
 def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:

@@ -16,11 +16,14 @@ from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
 
 # The look-up's intervals: wide where |cos phi| is below the knee, narrow above it, where f_t rises and falls
-# (phi below 18 degrees). 780 intervals (25 kB) hold the spline to 3e-7 of its peak; equal intervals would
+# (phi below 18 degrees). 780 intervals (25 kB) hold the spline to 2e-7 of its peak; equal intervals would
 # need 8192 of them (262 kB), which falls out of the first-level cache.
 KNEE = 0.95
 WIDE_PER_UNIT = 200
 NARROW_PER_UNIT = 4000
+
+# What a curve's file says of a number that it does not name: before poles could be ground they were flat.
+UNSAID = {"magnet front_radius_m": 0.0}
 
 # The model's lengths come from sums and rotations, and keep 1e-15; a torque follows its numbers as a
 # small power. So this is equality, while the millionth part of a percent is told.
@@ -235,10 +238,10 @@ def disagreements(actuator: Actuator) -> list[str]:
     -------
     list of str
         Empty where both agree, and for a curve that does not say what it was computed for: measured, or
-        from another program.
+        from another program. One that says so, but not of the front, was computed for flat poles.
     """
     curve = actuator.torque_curve
-    computed_for = curve.computed_for or {}
+    computed_for = UNSAID | dict(curve.computed_for) if curve.computed_for else {}
     lines = []
     for name, has in computed_from(actuator.magnet, actuator.coil).items():
         had = computed_for.get(name, has)

@@ -41,13 +41,12 @@ def overlaps(actuator: Actuator) -> list[Overlap]:
 
 
 def air_gap_m(actuator: Actuator) -> float:
-    """Room between the ball and the coils' faces, m; negative where the coils reach into the ball.
+    """Room between the turning rotor and the coils' faces, m; negative where the rotor cannot turn.
 
-    The ball goes through the middle of the poles' outer faces: a pole is ground to it, although its rim
-    stands proud in the magnetic model.
+    The rotor is the ball through the farthest points of the poles: the whole front of a pole that is ground
+    to the ball, the rim of a flat one.
     """
-    magnet, coil = actuator.magnet, actuator.coil
-    return (coil.distance_m - coil.length_m / 2) - (magnet.distance_m + magnet.length_m / 2)
+    return actuator.coil.distance_m - actuator.coil.length_m / 2 - actuator.magnet.reach_m
 
 
 def clearance(axes: NDArray[np.float64], radius_m: float, length_m: float, distance_m: float) -> NDArray:
@@ -68,7 +67,8 @@ def clearance(axes: NDArray[np.float64], radius_m: float, length_m: float, dista
     Notes
     -----
     Exact for the question whether they overlap: the two are mirror images in that plane, and a convex
-    body meets its mirror image only where it reaches the mirror.
+    body meets its mirror image only where it reaches the mirror. A cylinder does so first with its inner
+    edge, so that a front may be ground.
     """
     cosine = np.clip(axes @ axes.T, -1.0, 1.0)
     sine_half, cosine_half = np.sqrt((1 - cosine) / 2), np.sqrt((1 + cosine) / 2)

@@ -1,8 +1,9 @@
 """The torque matrix by direct summation: the field of the pole magnets on the current of all windings.
 
 It shares nothing with the torque curve but the geometry: no angle between axes, no curve, no look-up. The
-exact field of each magnet (magpylib) acts on every conductor of every coil, ``I dl x B``, and the rotor
-turns by the reaction. What the paper does instead, adding one curve's value for each pair of pole and
+field of each magnet (magpylib) acts on every conductor of every coil, ``I dl x B``, and the rotor turns by
+the reaction. A flat magnet's field is exact; one that is ground to a sphere is a stack of cylinders of the
+same volume, whose field tends to its own with the square of their number. What the paper does instead, adding one curve's value for each pair of pole and
 coil (13), is exact for magnets and coils of revolution in air: fields add, and the torque of such a pair
 is normal to its two axes and depends on their angle alone. So the two must agree but for arithmetic.
 Neither knows the iron hoop behind the poles: that is a question to finite elements or to a bench.
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil
+from spheretwin.models.actuator import Actuator, Coil, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design.workspace import pose
 from spheretwin.models.kinematics import rotation
@@ -33,7 +34,7 @@ BLOCK = 8192
 
 
 class Rule(NamedTuple):
-    """Numbers of quadrature points in one winding."""
+    """Numbers of quadrature points in one winding, and of the pieces of a magnet."""
 
     across: int
     """Gauss points from the bore to the outer radius."""
@@ -41,28 +42,32 @@ class Rule(NamedTuple):
     """Gauss points along the axis, crowded towards the face at the air gap."""
     around: int
     """Equal steps around the axis."""
+    stacked: int = 8
+    """Cylinders that stand for a ground magnet; a flat one is one cylinder."""
 
     def halved(self) -> Rule:
-        """Half the points in each direction."""
-        return Rule(self.across // 2, self.along // 2, self.around // 2)
+        """Half the points in each direction, and half the cylinders."""
+        return Rule(*(number // 2 for number in self))
 
 
 class Quadrature(NamedTuple):
-    """Rule for a coil that a magnet's rim passes close by, or through, and for all others.
+    """Rule for a coil that a magnet's rim passes close by, or through, and for all others."""
 
-    A flat magnet's sharp rim stands 0.5 mm deep in the winding of the shipped actuator, where the real
-    one is ground to a ball. B has a logarithm at the rim: the sum over points converges, but slowly.
-    """
-
-    near: Rule = Rule(24, 24, 96)  # within 3e-4 of the curve's peak for one pair
-    far: Rule = Rule(8, 8, 32)  # within 1e-6
+    near: Rule
+    far: Rule
 
     def halved(self) -> Quadrature:
         """Half the points in each direction."""
         return Quadrature(self.near.halved(), self.far.halved())
 
 
-STANDARD = Quadrature()
+# For ground magnets. Of the curve's peak, for one pair: near within 2e-4, all but 1e-6 of it the steps of the
+# stack, which fall with the square of their number; far within 1e-5.
+STANDARD = Quadrature(near=Rule(12, 12, 48, 24), far=Rule(8, 8, 32, 8))
+
+# A flat magnet's sharp rim may stand within the winding. B has a logarithm at the rim: the sum over points
+# converges, but slowly. Near within 3e-4, far within 1e-6.
+FLAT = Quadrature(near=Rule(24, 24, 96), far=Rule(8, 8, 32))
 
 
 class Comparison(NamedTuple):
@@ -93,7 +98,7 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
     actuator : Actuator
         Its geometry; its torque curve is not used.
     quadrature : Quadrature
-        Points in the windings; the default ones unless given.
+        Points in the windings; unless given, what suits flat or ground magnets.
 
     Returns
     -------
@@ -105,14 +110,14 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
     InputError
         magpylib is not installed.
     """
-    quadrature = quadrature or STANDARD
+    quadrature = quadrature or _standard(actuator.magnet)
     near_angle = _rim_reaches_winding(actuator)
     poles = actuator.pole_axes @ rotation(np.asarray(q, dtype=np.float64)).T  # (16, 3), stator frame
     torque = np.zeros((len(actuator.coil_axes), 3))
     for pole, polarity in zip(poles, actuator.pole_polarity, strict=True):
-        magnet = _magnet(actuator, pole, float(polarity))
         near = np.arccos(np.clip(actuator.coil_axes @ pole, -1.0, 1.0)) < near_angle
         for coils, rule in ((near, quadrature.near), (~near, quadrature.far)):
+            magnet = _magnet(actuator, pole, float(polarity), rule.stacked)
             torque[coils] -= _torque_on_coils(magnet, actuator.coil_axes[coils], actuator.coil, rule)
     return torque[actuator.groups].sum(axis=1).T
 
@@ -139,7 +144,7 @@ def compare(
     track : callable
         Passes on the numbers of the poses, and may show progress.
     """
-    quadrature = quadrature or STANDARD
+    quadrature = quadrature or _standard(actuator.magnet)
     azimuth, spin = np.random.default_rng(seed).uniform(-np.pi, np.pi, (2, len(tilt_rad)))
     q = pose(tilt_rad, azimuth, spin)
     direct, coarse = np.empty((2, len(q), 3, len(actuator.groups)))
@@ -176,9 +181,14 @@ def errors(compared: Comparison, limit_A: float, currents: int = 200, seed: int 
     )
 
 
-def _magnet(actuator: Actuator, axis: Array, polarity: float) -> Any:
-    """One pole as magpylib's homogeneously magnetised cylinder, in the stator frame."""
+def _standard(magnet: Magnet) -> Quadrature:
+    return STANDARD if magnet.front_radius_m else FLAT
+
+
+def _magnet(actuator: Actuator, axis: Array, polarity: float, stacked: int) -> Any:
+    """One pole as magpylib's homogeneously magnetised cylinders, in the stator frame."""
     try:
+        from magpylib import Collection
         from magpylib.magnet import Cylinder
     except ImportError:
         raise InputError(
@@ -187,13 +197,32 @@ def _magnet(actuator: Actuator, axis: Array, polarity: float) -> Any:
         ) from None
     from scipy.spatial.transform import Rotation
 
-    size = actuator.magnet
-    return Cylinder(
-        polarization=(0.0, 0.0, polarity * size.remanence_T),
-        dimension=(2 * size.radius_m, size.length_m),
-        position=size.distance_m * axis,
-        orientation=Rotation.from_matrix(_frame(axis)),
-    )
+    cylinders = [
+        Cylinder(
+            polarization=(0.0, 0.0, polarity * actuator.magnet.remanence_T),
+            dimension=(2 * radius, top - bottom),
+            position=0.5 * (top + bottom) * axis,
+            orientation=Rotation.from_matrix(_frame(axis)),
+        )
+        for radius, bottom, top in _cylinders(actuator.magnet, stacked)
+    ]
+    return Collection(cylinders)
+
+
+@lru_cache(maxsize=8)
+def _cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]:
+    """Radius, lower and upper end of cylinders that stand for a magnet, m from the joint centre.
+
+    A ground front becomes steps: rings of equal width, each at the mean height of the front over it. So the
+    charge on the front moves up or down by a little and by nothing on the whole, and the volume stays.
+    """
+    if not magnet.front_radius_m:
+        return [(magnet.radius_m, magnet.back_m, magnet.front_m)]
+    edges = magnet.radius_m * np.arange(stacked + 1) / stacked
+    under = [magnet.volume_within_m3(edge) for edge in edges]
+    heights = magnet.back_m + np.diff(under) / (np.pi * np.diff(edges**2))  # (stacked,), falling outward
+    lower = [*heights[1:], magnet.back_m]
+    return [(float(r), float(b), float(t)) for r, b, t in zip(edges[1:], lower, heights, strict=True)]
 
 
 def _torque_on_coils(magnet: Any, axes: Array, coil: Coil, rule: Rule) -> Array:
@@ -236,7 +265,7 @@ def _conductors(coil: Coil, rule: Rule) -> tuple[Array, Array]:
 def _rim_reaches_winding(actuator: Actuator) -> float:
     """Angle between two axes below which the magnet's rim and the coil's edge are next to each other."""
     magnet, coil = actuator.magnet, actuator.coil
-    rim = np.arctan2(magnet.radius_m, magnet.distance_m + magnet.length_m / 2)
+    rim = np.arctan2(magnet.radius_m, magnet.rim_m)
     edge = np.arctan2(coil.outer_radius_m, coil.distance_m - coil.length_m / 2)
     return float(rim + edge + RIM_MARGIN)
 

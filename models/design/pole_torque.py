@@ -1,10 +1,11 @@
 """The torque curve from geometry: one coil's pull on one pole magnet, computed with magpylib.
 
-The magnet is its equivalent current sheet, ``Br / mu0`` ampere per metre around its side. The coil is a
-stack of thin solenoids, one for each radius of the winding, whose field magpylib knows in closed form.
-So the Lorentz torque on the sheet is an integral of a continuous function over a surface. The other
-way round, the force on the winding in the magnet's field, the integrand is infinite along the magnet's
-sharp rim, which passes half a millimetre from the winding, or through it.
+The magnet is its equivalent current sheet ``M x n``: M = Br / mu0 ampere per metre around its side, and on a
+front that is ground to a sphere M times the sine of the angle between axis and normal. The coil is a stack
+of thin solenoids, one for each radius of the winding, whose field magpylib knows in closed form. So the
+Lorentz torque on the sheet is an integral of a continuous function over a surface. The other way round, the
+force on the winding in the magnet's field, the integrand is infinite along the magnet's sharp rim, which
+passes half a millimetre from the winding, or, where the front is flat, through it.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from spheretwin.models.torque_curve import TorqueCurve, head
 
 Array = NDArray[np.float64]
 
-# Where the magnet's rim crosses the bore of the winding (8 and 14.7 degrees) the second derivative of f_t
-# jumps: a cubic spline through samples 0.5 degrees apart misses 1.3e-4 of the peak there, 0.25 misses 4e-5.
+# Where the rim of a flat magnet crosses the bore of the winding (8 and 14.7 degrees at the shipped sizes) the
+# second derivative of f_t jumps: a cubic spline through samples 0.5 degrees apart misses 1.3e-4 of the peak
+# there, 0.25 misses 4e-5. A magnet that is ground to the ball stays out of the winding: 1.0e-6 and 5.8e-8.
 STEP_DEG = 0.25
 
 # Samples between two that `convergence` computes again: 2 degrees apart.
@@ -39,15 +41,17 @@ class Mesh(NamedTuple):
     """Numbers of quadrature points; with the default ones f_t is within 1e-5 of its peak."""
 
     along: int = 24
-    """Gauss points along the magnet, crowded towards its outer rim."""
+    """Gauss points along the magnet's side, crowded towards its outer rim."""
     around: int = 256
     """Equal steps around one half of the magnet; the other half mirrors it."""
     across: int = 8
     """Gauss points across the winding on either side of the field point's own radius."""
+    over: int = 24
+    """Gauss points over a ground front, from its rim to its middle."""
 
     def doubled(self) -> Mesh:
         """Twice the points in each direction."""
-        return Mesh(2 * self.along, 2 * self.around, 2 * self.across)
+        return Mesh(*(2 * points for points in self))
 
 
 class Convergence(NamedTuple):
@@ -70,6 +74,7 @@ def compute_curve(
     phi_rad: Array | None = None,
     mesh: Mesh | None = None,
     track: Callable[[range], Iterable[int]] = iter,
+    on_iron: bool = False,
 ) -> TorqueCurve:
     """Torque of one ampere in a coil on one pole of polarity +1, about the joint centre.
 
@@ -85,6 +90,9 @@ def compute_curve(
         Quadrature; the default one unless given.
     track : callable
         Passes on the numbers of the angles, and may show progress.
+    on_iron : bool
+        Whether the pole's back stands on an infinite plane of iron: what a hoop behind the poles adds at
+        most. The curve then does not say what it was computed for, as no model file holds such a plane.
 
     Returns
     -------
@@ -98,9 +106,14 @@ def compute_curve(
 
     Notes
     -----
-    On the sheet ``K = Br / mu0 t`` the torque about the origin is ``∫ p x (K x B) dA``. The tangent t is
-    normal to the position p, so the integrand is ``K (p.B)``: only the coil's *radial* field, seen from
-    the joint centre, turns the rotor.
+    On the sheet ``K = M x n`` the torque about the origin is ``∫ p x (K x B) dA``. K runs around the pole's
+    axis, normal to the position p, so the integrand is ``K (p.B)``: only the coil's *radial* field, seen from
+    the joint centre, turns the rotor. On side and ground front alike ``|K| dA`` is ``M rho dpsi dh``, rho
+    being the distance from the axis, h the height along it.
+
+    Iron of infinite permeability mirrors a magnet that stands on it upright: outside, the field is that of the
+    magnet and its mirror image, magnetised alike, twice as long together. What the coil's own field does to
+    the iron, quadratic in the current, is not in it.
 
     References
     ----------
@@ -114,9 +127,11 @@ def compute_curve(
     phi_rad = sample_angles() if phi_rad is None else np.asarray(phi_rad, dtype=np.float64)
     solenoid = _solenoid_field()
     angles = track(range(len(phi_rad)))
-    torque = np.array([_torque(magnet, coil, phi_rad[i], mesh or Mesh(), solenoid) for i in angles])
+    mesh = mesh or Mesh()
+    sheet = _on_iron(_sheet(magnet, mesh), magnet) if on_iron else _sheet(magnet, mesh)
+    torque = np.array([_torque(sheet, magnet.remanence_T, coil, phi_rad[i], mesh, solenoid) for i in angles])
     torque[(phi_rad == 0.0) | (phi_rad == np.pi)] = 0.0  # by symmetry; the sum leaves 1e-18
-    return TorqueCurve(phi_rad, torque, computed_from(magnet, coil))
+    return TorqueCurve(phi_rad, torque, None if on_iron else computed_from(magnet, coil))
 
 
 def convergence(
@@ -159,33 +174,70 @@ def provenance(magnet: Magnet, coil: Coil, measured: Convergence, mesh: Mesh | N
         "Torque curve f_t(phi): torque on one pole of polarity +1, of one ampere in one coil, about the",
         "joint centre, against the angle between their axes; positive where it pulls the pole to the coil.",
         f"Magnet: Br {magnet.remanence_T:g} T along its axis, radius {_mm(magnet.radius_m)},"
-        f" length {_mm(magnet.length_m)}, centre at {_mm(magnet.distance_m)}.",
+        f" length {_mm(magnet.length_m)}, centre at {_mm(magnet.distance_m)}, {_front(magnet)}.",
         f"Coil: {coil.turns:g} turns in air, radii {_mm(coil.inner_radius_m)} to {_mm(coil.outer_radius_m)},"
         f" length {_mm(coil.length_m)}, centre at {_mm(coil.distance_m)}.",
         *head(computed_from(magnet, coil)),
         "Method: torque on the magnet's equivalent current sheet in the exact field of solenoids (magpylib"
         f" {magpylib.__version__}).",
-        f"Quadrature: {mesh.along} points along the sheet, {mesh.around} on half its circumference,"
-        f" 2 x {mesh.across} across the winding.",
+        f"Quadrature: {mesh.along} points along the side, {_over_front(magnet, mesh)}{mesh.around} on half a"
+        f" circle, 2 x {mesh.across} across the winding.",
         f"Convergence: twice the points in each direction change the peak by {measured.peak:.0e} of itself",
         f"and any sample by {measured.worst:.0e} of the peak at most.",
         "Remake: spheretwin magnetics curve",
     ]
 
 
-def _torque(magnet: Magnet, coil: Coil, phi: float, mesh: Mesh, solenoid: SolenoidField) -> float:
+class _Sheet(NamedTuple):
+    """Circles about the pole's axis that stand for its current sheet."""
+
+    height: Array  # (n,), m, along the axis from the joint centre
+    rho: Array  # (n,), m
+    weight: Array  # (n,), m: share of the height
+
+
+def _sheet(magnet: Magnet, mesh: Mesh) -> _Sheet:
+    """The side's circles from the rim inward, then those of a ground front from the rim to the middle."""
+    along, d_along = _graded(mesh.along, power=2)
+    side = magnet.rim_m - magnet.back_m  # m, of height
+    height, rho, weight = (
+        magnet.rim_m - side * along,
+        np.full(mesh.along, magnet.radius_m),
+        side * d_along,
+    )
+    if not magnet.front_radius_m:
+        return _Sheet(height, rho, weight)
+    over, d_over = _graded(mesh.over, power=2)
+    rim = np.arcsin(magnet.radius_m / magnet.front_radius_m)
+    angle = rim * (1.0 - over)  # (over,), at the sphere's centre, from the axis
+    circle = magnet.front_radius_m * np.sin(angle)
+    fallen = 2.0 * magnet.front_radius_m * np.sin(0.5 * angle) ** 2  # behind the middle of the front
+    return _Sheet(
+        np.append(height, magnet.front_m - fallen),
+        np.append(rho, circle),
+        np.append(weight, rim * d_over * circle),
+    )
+
+
+def _on_iron(sheet: _Sheet, magnet: Magnet) -> _Sheet:
+    """A sheet and its mirror image in the plane of the magnet's back."""
+    mirrored = _Sheet(2 * magnet.back_m - sheet.height, sheet.rho, sheet.weight)
+    return _Sheet(*(np.concatenate(both) for both in zip(sheet, mirrored, strict=True)))
+
+
+def _torque(
+    sheet: _Sheet, remanence_T: float, coil: Coil, phi: float, mesh: Mesh, solenoid: SolenoidField
+) -> float:
     """f_t at one angle, N·m/A; the coil's axis is z, the pole's lies in the plane of x and z."""
-    height, d_height = _graded(mesh.along, power=2)
-    height = magnet.distance_m + magnet.length_m * (0.5 - height)  # (along,), from the outer rim inward
     psi = (np.arange(mesh.around) + 0.5) * np.pi / mesh.around  # (around,)
-    side = magnet.radius_m * np.cos(psi)  # (around,), in the plane of both axes
-    x = np.add.outer(height * np.sin(phi), side * np.cos(phi))  # (along, around)
-    z = np.add.outer(height * np.cos(phi), -side * np.sin(phi))
-    rho = np.hypot(x, magnet.radius_m * np.sin(psi))
+    side = np.outer(sheet.rho, np.cos(psi))  # (n, around), in the plane of both axes
+    x = sheet.height[:, None] * np.sin(phi) + side * np.cos(phi)
+    z = sheet.height[:, None] * np.cos(phi) - side * np.sin(phi)
+    rho = np.hypot(x, np.outer(sheet.rho, np.sin(psi)))
     radial = _radial_field(coil, rho.ravel(), z.ravel(), mesh.across, solenoid).reshape(rho.shape)
-    area = 2.0 * magnet.length_m * np.pi / mesh.around  # both halves
+    both_halves = 2.0 * np.pi / mesh.around
     # Br / mu0 of the sheet times mu0 of the coil's field: mu0 cancels.
-    return float(-magnet.remanence_T * area * (d_height @ radial @ side))
+    return float(-remanence_T * both_halves * (sheet.weight @ np.sum(radial * side, axis=1)))
 
 
 def _radial_field(coil: Coil, rho: Array, z: Array, across: int, solenoid: SolenoidField) -> Array:
@@ -261,6 +313,16 @@ def _solenoid_field() -> SolenoidField:
             " received an installation without magpylib"
         ) from None
     return magnet_cylinder_axial_Bfield
+
+
+def _front(magnet: Magnet) -> str:
+    if not magnet.front_radius_m:
+        return "front flat"
+    return f"front ground to radius {_mm(magnet.front_radius_m)}"
+
+
+def _over_front(magnet: Magnet, mesh: Mesh) -> str:
+    return f"{mesh.over} over the front, " if magnet.front_radius_m else ""
 
 
 def _mm(length_m: float) -> str:
