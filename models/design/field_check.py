@@ -3,10 +3,12 @@
 It shares nothing with the torque curve but the geometry: no angle between axes, no curve, no look-up. The
 field of each magnet (magpylib) acts on every conductor of every coil, ``I dl x B``, and the rotor turns by
 the reaction. A flat magnet's field is exact; one that is ground to a sphere is a stack of cylinders of the
-same volume, whose field tends to its own with the square of their number. What the paper does instead, adding one curve's value for each pair of pole and
-coil (13), is exact for magnets and coils of revolution in air: fields add, and the torque of such a pair
-is normal to its two axes and depends on their angle alone. So the two must agree but for arithmetic.
-Neither knows the iron hoop behind the poles: that is a question to finite elements or to a bench.
+same volume, whose field tends to its own with the square of their number.
+
+What the paper does instead, adding one curve's value for each pair of pole and coil (13), is exact for
+magnets and coils of revolution in air: fields add, and the torque of such a pair is normal to its two axes
+and depends on their angle alone. So the two must agree but for arithmetic. Neither knows the iron hoop
+behind the poles: that is a question to finite elements or to a bench.
 """
 
 from __future__ import annotations

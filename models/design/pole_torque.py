@@ -111,9 +111,9 @@ def compute_curve(
     the joint centre, turns the rotor. On side and ground front alike ``|K| dA`` is ``M rho dpsi dh``, rho
     being the distance from the axis, h the height along it.
 
-    Iron of infinite permeability mirrors a magnet that stands on it upright: outside, the field is that of the
-    magnet and its mirror image, magnetised alike, twice as long together. What the coil's own field does to
-    the iron, quadratic in the current, is not in it.
+    Iron of infinite permeability mirrors a magnet that stands on it upright: outside, the field is that of
+    the magnet and its mirror image, magnetised alike, twice as long together. What the coil's own field does
+    to the iron, quadratic in the current, is not in it.
 
     References
     ----------

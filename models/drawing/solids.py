@@ -1,10 +1,23 @@
-"""Making solids out of solids: revolve, repeat, join."""
+"""Making solids: revolve, repeat, join; and the shapes that several parts are made of, in metres."""
 
 from collections.abc import Iterable
 
 import numpy as np
 from manifold3d import CrossSection, FillRule, Manifold, OpType
 from numpy.typing import NDArray
+
+MM = 1e-3
+
+# How finely circles are drawn, by the size of what they bound.
+SECTIONS = 60
+SMALL_SECTIONS = 40
+PIN_SECTIONS = 24
+HOLE_SECTIONS = 24
+ARC_STEP_DEG = 6.0
+
+RING_CHAMFER_M = 0.5 * MM
+
+Points = list[tuple[float, float]]
 
 
 def revolve(outline: Iterable[tuple[float, float]], sections: int) -> Manifold:
@@ -54,3 +67,42 @@ def union(solids: Iterable[Manifold]) -> Manifold:
 def section(outline: Iterable[tuple[float, float]]) -> CrossSection:
     """Plane figure inside an outline of points."""
     return CrossSection([np.array(list(outline), dtype=float)], FillRule.NonZero)
+
+
+def flat_ring(inner: float, outer: float, half_height: float) -> Manifold:
+    """Flat ring about z with chamfered edges."""
+    c, h = RING_CHAMFER_M, half_height
+    return revolve(
+        [
+            (inner, -h + c),
+            (inner + c, -h),
+            (outer - c, -h),
+            (outer, -h + c),
+            (outer, h - c),
+            (outer - c, h),
+            (inner + c, h),
+            (inner, h - c),
+        ],
+        SECTIONS,
+    )
+
+
+def spherical_shell(inner: float, outer: float, lowest_deg: float, highest_deg: float) -> Manifold:
+    """Spherical shell between two latitudes, its rims cut towards the centre."""
+    steps = max(1, round((highest_deg - lowest_deg) / ARC_STEP_DEG))
+    latitude = np.radians(np.linspace(lowest_deg, highest_deg, steps + 1))
+    circle = np.column_stack([np.cos(latitude), np.sin(latitude)])
+    return revolve([*map(tuple, outer * circle), *map(tuple, inner * circle[::-1])], SECTIONS)
+
+
+def tube(inner: float, outer: float, low: float, high: float) -> Manifold:
+    """Hollow cylinder about z between two heights."""
+    return revolve([(inner, low), (outer, low), (outer, high), (inner, high)], SECTIONS)
+
+
+def chamfered_pin(radius: float, low: float, high: float) -> Manifold:
+    """Cylinder about z between two heights, its upper edge chamfered."""
+    c = RING_CHAMFER_M
+    return revolve(
+        [(0.0, low), (radius, low), (radius, high - c), (radius - c, high), (0.0, high)], PIN_SECTIONS
+    )
