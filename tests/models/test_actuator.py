@@ -1,8 +1,10 @@
 """The actuator read from its MJCF, and models that are none."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from spheretwin.twin.simulation import simulate
 
 TEXT = actuators.MJCF_PATH.read_text()
 GAMMA = '<joint name="gamma" axis="0 0 1"/>'
+FRONT = '<numeric name="pole_front_radius_m" data="0.05"/>'
 SITE = "\n        <site"
 RING = '<replicate count="12" euler="0 0 30">'
 RING_OF_EIGHT = '<replicate count="8" euler="0 0 45">'
@@ -66,6 +69,13 @@ def test_shipped_actuator_is_read_once():
         ('data="320"', 'data="1e-300"', "coil_turns from"),
         ('size="0.010 0.005"', 'size="1e-300 0.005"', "a radius of the poles in metres from 1e-06 to 1000"),
         ('size="0.010 0.005"', 'size="0.010 1e-12"', "a length of the poles in metres"),
+        (FRONT, FRONT.replace("0.05", "0.009"),
+         "pole_front_radius_m of 0, for a flat face, or from 0.01 to 1000 for poles of this radius and length,"
+         " received 0.009"),
+        (FRONT, FRONT.replace("0.05", "-0.05"), "received -0.05"),
+        (FRONT, FRONT.replace("0.05", "1e6"), "received 1e+06"),
+        (FRONT, FRONT.replace("0.05", "nan"), "received nan"),
+        ('size="0.010 0.005"', 'size="0.010 0.0004"', "or from 0.0629 to 1000"),
         ('size="0.011 0.0125"', 'size="1e6 0.0125"', "a radius of the coils in metres from 1e-06 to 1000"),
         ('size="0.011 0.0125"', 'size="0.011 1e300"', "at most 1e+09, received 1e+300 in site_size"),
         ('pos="0.045 0 0"', 'pos="0 0 0"', "a distance of the poles in metres from 1e-06"),
@@ -103,6 +113,62 @@ def test_two_groups_cannot_give_three_torques(tmp_path):
     (path := tmp_path / "mine.xml").write_text(text)
     with pytest.raises(InputError, match="at least 3 groups of two coils, received 2"):
         actuators.load(path)
+
+
+@pytest.mark.parametrize("front", ["", FRONT.replace("0.05", "0")])
+def test_poles_are_flat_unless_the_model_says_how_they_are_ground(tmp_path, front):
+    (path := tmp_path / "mine.xml").write_text(TEXT.replace(FRONT, front))
+    magnet = actuators.load(path).magnet
+    assert magnet.front_radius_m == 0.0
+    assert magnet.sagitta_m == 0.0
+    assert magnet.volume_m3 == pytest.approx(np.pi * 0.010**2 * 0.010, rel=1e-12)
+
+
+def test_the_shipped_poles_are_ground_to_the_ball(actuator):
+    magnet = actuator.magnet
+    assert magnet.front_m == pytest.approx(0.050, rel=1e-12)
+    assert magnet.back_m == pytest.approx(0.040, rel=1e-12)
+    # Sphere of 50 mm about the joint centre: the rim of a front of radius 10 mm lies on it.
+    assert magnet.rim_m == pytest.approx(np.sqrt(0.050**2 - 0.010**2), rel=1e-12)
+    assert magnet.reach_m == pytest.approx(0.050, rel=1e-12)
+    # A flat front reaches farther, as its rim stands out of that sphere.
+    assert replace(magnet, front_radius_m=0.0).reach_m == pytest.approx(np.hypot(0.050, 0.010), rel=1e-12)
+
+
+@pytest.mark.parametrize("front_radius_m", [0.0101, 0.03, 0.05, 0.2])
+def test_the_volume_of_a_ground_pole_is_the_sum_of_its_discs(actuator, front_radius_m):
+    magnet = replace(actuator.magnet, front_radius_m=front_radius_m)
+    rho = magnet.radius_m * (np.arange(20_000) + 0.5) / 20_000
+    depth = front_radius_m - np.sqrt(front_radius_m**2 - rho**2)
+    np.testing.assert_allclose([magnet.sagitta_at_m(r) for r in rho[::997]], depth[::997], rtol=0, atol=1e-15)
+    shells = np.sum((magnet.length_m - depth) * 2 * np.pi * rho) * magnet.radius_m / 20_000
+    # The midpoint rule's error falls with the square of 20,000 steps; steepest at the rim of a hemisphere.
+    assert magnet.volume_m3 == pytest.approx(shells, rel=1e-6)
+
+
+@pytest.mark.parametrize("ring", ["outer_ring", "inner_ring"])
+def test_in_a_medium_a_ring_is_a_box_no_wider_than_it_is_drawn(ring):
+    scene = mujoco.MjModel.from_xml_path(str(actuators.MJCF_PATH))
+    body, mesh = scene.body(ring).id, scene.mesh(ring)
+    I_x, I_y, I_z = scene.body_inertia[body]
+    # The engine's equivalent box: edges along the principal axes, of the body's mass and inertia.
+    edge = np.sqrt(6 * (I_y + I_z - I_x) / scene.body_mass[body])
+    drawn = scene.mesh_vert[mesh.vertadr[0] : mesh.vertadr[0] + mesh.vertnum[0]]
+    # Across the ring itself: its pins stand out further on one axis.
+    across = np.sort(np.ptp(drawn, axis=0))[1]
+    assert 0.95 * across < edge < across
+    assert max(I_x, I_y, I_z) < 1e-12 * scene.body_inertia[scene.body("rotor").id].min()
+
+
+def test_in_water_the_rings_hold_the_rotor_no_more_than_its_own_shell_does():
+    text = TEXT.replace("<option ", '<option density="1000" viscosity="1e-3" ')
+    meshes = f'meshdir="{actuators.FOLDER / "assets"}"'
+    model = mujoco.MjModel.from_xml_string(text.replace('meshdir="assets"', meshes))
+    data = mujoco.MjData(model)
+    data.qvel[:] = 1.0, 2.0, 3.0
+    mujoco.mj_forward(model, data)
+    # The rotor alone turns about gamma; boxes of 1.8 m, as of a mass of 2e-15 kg, held with 1236 N·m.
+    assert np.abs(data.qfrc_fluid).max() == pytest.approx(np.abs(data.qfrc_fluid[2]))
 
 
 def test_an_edited_file_is_read_again(tmp_path):
@@ -148,5 +214,5 @@ def test_files_that_have_not_changed_are_one_actuator(tmp_path):
     (curve := tmp_path / "mine.csv").write_bytes(actuators.TORQUE_CURVE_PATH.read_bytes())
     first = actuators.load(path, curve)
     assert actuators.load(path, curve) is first
-    curve.write_bytes(curve.read_bytes().replace(b"0.000762479810", b"0.000762479811"))
+    curve.write_bytes(curve.read_bytes().replace(b"0.000746190511", b"0.000746190512"))
     assert actuators.load(path, curve) is not first

@@ -28,6 +28,8 @@ def test_shipped_model_agrees_with_its_curve(actuator):
         ('data="1.2"', 'data="1.3"', "magnet remanence_T 1.2, the model has 1.3"),
         ('data="1.2"', 'data="1.20000001"', "magnet remanence_T 1.2, the model has 1.20000001"),
         ('pos="0.045 0 0"', 'pos="0.044 0 0"', "magnet distance_m 0.045, the model has 0.044"),
+        ('_m" data="0.05"', '_m" data="0.06"', "magnet front_radius_m 0.05, the model has 0.06"),
+        ('_m" data="0.05"', '_m" data="0"', "magnet front_radius_m 0.05, the model has 0"),
         ('pos="0.063 0 0"', 'pos="0.064 0 0"', "coil distance_m 0.063, the model has 0.064"),
     ],
 )
@@ -54,6 +56,14 @@ def test_every_number_of_magnet_and_coil_is_compared(actuator, part, name):
 def test_each_number_has_a_line_of_its_own(actuator):
     coil = replace(actuator.coil, turns=1.0, length_m=0.03)
     assert len(disagreements(replace(actuator, coil=coil))) == 2
+
+
+def test_a_curve_that_says_nothing_of_the_front_was_computed_for_flat_poles(actuator):
+    said = {k: v for k, v in actuator.torque_curve.computed_for.items() if k != "magnet front_radius_m"}
+    older = replace(actuator, torque_curve=replace(actuator.torque_curve, computed_for=said))
+    (line,) = disagreements(older)
+    assert line.endswith("was computed for magnet front_radius_m 0, the model has 0.05")
+    assert disagreements(replace(older, magnet=replace(actuator.magnet, front_radius_m=0.0))) == []
 
 
 def test_a_curve_that_does_not_say_is_taken_as_it_is(actuator):
