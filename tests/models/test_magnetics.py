@@ -153,9 +153,9 @@ def test_work_around_a_closed_path_is_zero(actuator):
 
 
 def test_least_norm_torque_reaches_what_the_layout_was_chosen_for(actuator):
-    # Worst direction at 8 A, sampled over azimuth and spin; sampled elsewhere: 0.62, 0.48, 0.41 N·m.
+    # Worst direction at 8 A, sampled over azimuth and spin; searched elsewhere: 0.557, 0.418, 0.378 N·m.
     generator = np.random.default_rng(3)
-    for tilt_deg, torque in ((12, 0.60), (20, 0.45), (30, 0.38)):
+    for tilt_deg, torque in ((12, 0.557), (20, 0.418), (30, 0.378)):
         worst = np.inf
         for _ in range(300):
             azimuth, spin = generator.uniform(0, 2 * np.pi, 2)

@@ -74,3 +74,22 @@ def test_air_gap_is_the_paper_s_half_millimetre(actuator):
     assert air_gap_m(actuator) == pytest.approx(0.5e-3, abs=1e-12)
     inward = replace(actuator, coil=replace(actuator.coil, distance_m=actuator.coil.distance_m - 8e-3))
     assert air_gap_m(inward) == pytest.approx(-7.5e-3, abs=1e-12)
+
+
+@pytest.mark.parametrize("front_radius_m", [0.0, 0.012, 0.03, 0.05, 0.2])
+def test_air_gap_is_that_of_the_farthest_point_of_a_pole(actuator, front_radius_m):
+    magnet = replace(actuator.magnet, front_radius_m=front_radius_m)
+    rho = np.linspace(0, magnet.radius_m, 1001)
+    if front_radius_m:
+        height = magnet.front_m - front_radius_m + np.sqrt(front_radius_m**2 - rho**2)
+    else:
+        height = np.full_like(rho, magnet.front_m)
+    farthest = np.hypot(rho, height).max()
+    face = actuator.coil.distance_m - actuator.coil.length_m / 2
+    assert air_gap_m(replace(actuator, magnet=magnet)) == pytest.approx(face - farthest, abs=1e-12)
+
+
+def test_a_flat_pole_of_the_same_blank_stands_in_the_windings(actuator):
+    flat = replace(actuator, magnet=replace(actuator.magnet, front_radius_m=0.0))
+    assert air_gap_m(flat) == pytest.approx(50.5e-3 - np.hypot(50e-3, 10e-3), abs=1e-12)
+    assert air_gap_m(flat) < -0.4e-3

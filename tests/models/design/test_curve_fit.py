@@ -39,7 +39,7 @@ def test_a_single_bad_sample_is_pointed_at():
 
 
 def test_lookup_of_the_shipped_curve(actuator):
-    # A tenth of the curve's own error: what its table was laid out for.
+    # A tenth of the curve's own error: what its table was laid out for. Measured: 2e-7.
     assert curve_fit.lookup_error(actuator.torque_curve) < 1e-6
 
 
@@ -53,8 +53,8 @@ def test_difference_knows_a_scaled_curve(actuator):
     kept = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:40]
     data = TorqueCurve(kept.phi_rad[rows], 0.9 * kept.torque_Nm_per_A[rows])
-    found = curve_fit.difference(data, actuator.magnet, actuator.coil, Mesh(12, 64, 6))
+    found = curve_fit.difference(data, actuator.magnet, actuator.coil, Mesh(12, 64, 6, 12))
     assert found.scale == pytest.approx(0.9, abs=1e-4)
     assert found.as_given.worst == pytest.approx(0.1, rel=0.02)
-    assert found.as_given.worst_deg == pytest.approx(10.75, abs=1.0)
+    assert found.as_given.worst_deg == pytest.approx(10.5, abs=1.0)
     assert found.scaled.worst < 1e-3
