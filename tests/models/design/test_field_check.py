@@ -72,8 +72,6 @@ def drawn_body(magnet, sections, steps):
         faces=solid.tri_verts,
         polarization=(0.0, 0.0, magnet.remanence_T),
         reorient_faces="skip",  # manifold3d's solids are closed, their faces outward
-        check_open="skip",
-        check_disconnected="skip",
         check_selfintersecting="skip",
     )
 
