@@ -63,9 +63,9 @@ class Quadrature(NamedTuple):
         return Quadrature(self.near.halved(), self.far.halved())
 
 
-# For ground magnets. Of the curve's peak, for one pair: near within 2e-4, all but 1e-6 of it the steps of the
-# stack, which fall with the square of their number; far within 1e-5.
-STANDARD = Quadrature(near=Rule(12, 12, 48, 24), far=Rule(8, 8, 32, 8))
+# For ground magnets. Of the curve's peak, for one pair: near within 2e-4, all but 1e-5 of it the steps of the
+# stack, which fall with the square of their number; far within 3e-5.
+STANDARD = Quadrature(near=Rule(8, 8, 32, 24), far=Rule(8, 8, 32, 4))
 
 # A flat magnet's sharp rim may stand within the winding. B has a logarithm at the rim: the sum over points
 # converges, but slowly. Near within 3e-4, far within 1e-6.

@@ -136,7 +136,7 @@ def test_a_pair_s_torque_is_normal_to_its_two_axes(actuator):
 
 
 def test_model_is_the_direct_sum(compared, actuator):
-    # Measured: 1e-3 on this coarse quadrature; 9e-5 on the default one.
+    # Measured: 1e-3 on this coarse quadrature; 1e-4 on the default one.
     assert error_share(compared, actuator) < 3e-3
 
 
