@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 # Angles at which the look-up table is held against the spline: 64 or more in each of its intervals.
 LOOKUP_POINTS = 50_001
 
-# Samples compared with the geometry's own curve at most: each costs 16 ms.
+# Samples compared with the geometry's own curve at most: each costs 23 ms, of a flat pole 16.
 COMPARED = 181
 
 
