@@ -45,7 +45,7 @@ def of_parts(actuator: Actuator) -> list[str]:
         if pairs:
             lines.append(_line(pairs, axes))
     if (gap_m := air_gap_m(actuator)) < 0:
-        lines.append(f"the coils' faces reach {-1e3 * gap_m:.2g} mm into the ball that carries the poles")
+        lines.append(f"the coils' faces reach {-1e3 * gap_m:.2g} mm into the ball that the poles sweep")
     return lines
 
 
