@@ -26,8 +26,8 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.facts import facts_of
 from spheretwin.twin.plant.engine import Rotor
+from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz.recording.recorder import Recorder

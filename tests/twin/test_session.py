@@ -24,10 +24,11 @@ from spheretwin.models.telemetry import file as telemetry_file
 from spheretwin.models.telemetry.file import TelemetryFile
 from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.models.telemetry.table import Table, read_parquet
-from spheretwin.twin import cli, replay
+from spheretwin.twin import cli
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.exogenous import BLOCK_TICKS
-from spheretwin.twin.facts import facts_of, record_of
+from spheretwin.twin.records import replay
+from spheretwin.twin.records.facts import facts_of, record_of
 from spheretwin.twin.session import Change, Session
 from spheretwin.twin.simulation import follow, simulate
 

@@ -9,9 +9,9 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.metrics.metric import Planned
 from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.records.summary import BESIDE, Figures, figures_of, summary
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
-from spheretwin.twin.summary import BESIDE, Figures, figures_of, summary
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.file import TelemetryFile
-from spheretwin.twin.facts import facts_of, record_of
+from spheretwin.twin.records.facts import facts_of, record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink
 

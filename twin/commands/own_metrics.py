@@ -9,9 +9,9 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.kept import KeptTelemetry
 from spheretwin.models.telemetry.status import Status
+from spheretwin.twin.records.summary import OwnMetric, check_names, own_value
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Run
-from spheretwin.twin.summary import OwnMetric, check_names, own_value
 
 
 class OwnMetrics:

@@ -16,19 +16,19 @@ import numpy as np
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import replay
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
 from spheretwin.twin.commands.outputs import Outputs
 from spheretwin.twin.commands.own_metrics import OwnMetrics
 from spheretwin.twin.commands.reporting import print_json
 from spheretwin.twin.metrics.metric import Planned
-from spheretwin.twin.replay import Plan
+from spheretwin.twin.records import replay
+from spheretwin.twin.records.replay import Plan
+from spheretwin.twin.records.summary import Figures, summary
 from spheretwin.twin.scenario import flags
 from spheretwin.twin.scenario.reading import shipped
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink, follow
-from spheretwin.twin.summary import Figures, summary
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.progress import Progress
 

@@ -71,7 +71,7 @@ def test_a_function_that_fails_costs_neither_figures_nor_files(file, tmp_path, c
 def test_a_replayed_run_shows_the_columns_that_came_on_its_way(file, tmp_path, capsys):
     from spheretwin.models.telemetry.file import TelemetryFile
     from spheretwin.twin import scenario as scenarios
-    from spheretwin.twin.facts import record_of
+    from spheretwin.twin.records.facts import record_of
     from spheretwin.twin.session import Session
 
     path = tmp_path / "run.parquet"

@@ -14,9 +14,9 @@ from spheretwin.twin.metrics.metric import Planned
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.metrics.rms_error import PIECE_TICKS
 from spheretwin.twin.metrics.settling_time import BAND_rad
+from spheretwin.twin.records.summary import figures_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import simulate
-from spheretwin.twin.summary import figures_of
 
 UNITS = {"_A_s": "A/s", "_rad": "rad", "_Nm": "N·m", "_A": "A", "_J": "J", "_s": "s", "_fraction": "0 to 1"}
 

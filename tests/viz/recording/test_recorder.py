@@ -21,7 +21,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.facts import facts_of
+from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz import palette

@@ -11,7 +11,7 @@ from spheretwin.models import mjcf, torque_curve
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.facts import facts_of
+from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.viz import palette
 from spheretwin.viz.recording import blueprint, scene

@@ -11,8 +11,8 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.telemetry.record import Change, RunRecord
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import facts
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.records import facts
 from spheretwin.twin.scenario.sections import Scenario
 
 

@@ -6,7 +6,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.facts import facts_of, record_of
+from spheretwin.twin.records.facts import facts_of, record_of
 from spheretwin.twin.session import Session
 
 

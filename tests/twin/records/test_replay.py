@@ -10,10 +10,11 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli, replay
+from spheretwin.twin import cli
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands.outputs import Outputs
-from spheretwin.twin.facts import record_of
+from spheretwin.twin.records import replay
+from spheretwin.twin.records.facts import record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow
 
