@@ -34,10 +34,10 @@ from spheretwin.twin.plant.friction import Friction, friction
 from spheretwin.twin.plant.plant import Plant
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.plant.rotor import Rotor, Setting
-from spheretwin.twin.scenario.sections import DriveSection, OwnController, Scenario
+from spheretwin.twin.scenario.sections import DriveSection, OwnController, OwnPath, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.sensors import Sensors, sensors
-from spheretwin.twin.trajectories import trajectory
+from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, Triple
 
 # What the engine's compiler takes where a file says nothing.
 UNWRITTEN_STEP_s = 0.002
@@ -79,7 +79,7 @@ def digest(files: Files) -> str:
     return hashlib.sha256(b"".join(each.tobytes() for each in content)).hexdigest()
 
 
-def resolved(scenario: Scenario, files: Files, law: Law | None) -> Scenario:
+def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None) -> Scenario:
     """Scenario whose open values are filled in from the model and the trajectory.
 
     Raises
@@ -109,7 +109,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None) -> Scenario:
         ),
         "plant": section.model_copy(
             update={
-                "initial_rad": section.initial_rad or _first_pose(scenario),
+                "initial_rad": section.initial_rad or _first_pose(trajectory or scenario.trajectory),
                 "gravity_m_s2": _gravity(section, files.model),
             }
         ),
@@ -119,6 +119,8 @@ def resolved(scenario: Scenario, files: Files, law: Law | None) -> Scenario:
             law=law.name, period_s=scenario.controller.period_s, parameters=tuple(law.parameters.tolist())
         )
         filled["controller"] = own
+    if trajectory:
+        filled["trajectory"] = OwnPath(shape=trajectory.name)
     made = scenario.model_copy(update=filled)
     _check_pose(made.plant.initial_rad or (0.0, 0.0, 0.0), actuator)
     _check_groups(section, actuator)
@@ -262,8 +264,8 @@ def rotor_of(scenario: Scenario, files: Files) -> Rotor:
     )
 
 
-def _first_pose(scenario: Scenario) -> trajectory.Triple:
-    return tuple(scenario.trajectory.sample(np.zeros(1))[0, 0].tolist())
+def _first_pose(trajectory: Sampled) -> Triple:
+    return tuple(trajectory.sample(np.zeros(1))[0, 0].tolist())
 
 
 def _gravity(section: PlantSection, model: Mjcf) -> float | None:
@@ -274,7 +276,7 @@ def _gravity(section: PlantSection, model: Mjcf) -> float | None:
     return None if any(own[:2]) or own[2] > 0 else 0.0 - own[2]  # none is 0, not -0
 
 
-def _check_pose(pose: trajectory.Triple, actuator: Actuator) -> None:
+def _check_pose(pose: Triple, actuator: Actuator) -> None:
     for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
         if not low <= angle <= high:
             least, most, received = told_apart(low, high, angle)

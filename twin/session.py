@@ -34,8 +34,8 @@ from spheretwin.twin.matching import matching
 from spheretwin.twin.scenario.changing import changed, is_fixed
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.trajectories import trajectory
+from spheretwin.twin.scenario.sections import OwnPath, Scenario
+from spheretwin.twin.trajectories.trajectory import Sampled, Triple, checked
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,8 @@ class Session:
         From `scenario.load`; its duration is of no concern here.
     law : Law, optional
         Runs instead of the law that the scenario names.
+    trajectory : object with ``sample(t)``, optional
+        Followed instead of the trajectory that the scenario names, to the end.
 
     Attributes
     ----------
@@ -98,19 +100,20 @@ class Session:
     A session belongs to one thread at a time: calls from a second one while the first is at work are refused.
     """
 
-    def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
+    def __init__(self, scenario: Scenario, law: Law | None = None, trajectory: Sampled | None = None) -> None:
         self._busy = threading.Lock()
         self._closed = False
         self._scratch = loops.Scratch(np.empty((3, 3)), np.empty((3, 3)))
         self._own_law = law
         self._own_laws = {law.name: law} if law else {}
+        self._own_trajectory = None if trajectory is None else checked(trajectory)
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
         self._files = assembly.files_of(scenario)
         self.scenario = self.begun_as = self._resolved(scenario)
-        self._exogenous = Exogenous(self.scenario)
+        self._exogenous = Exogenous(self.scenario, self._own_trajectory)
         self._build_rotor()
         self._build_controller()
         self._build_plant()
@@ -251,6 +254,11 @@ class Session:
                     f"session: expected a snapshot under one of the laws {known},"
                     f" received one under {snapshot.own_law}"
                 )
+            if isinstance(snapshot.scenario.trajectory, OwnPath) != (self._own_trajectory is not None):
+                raise InputError(
+                    "session: expected a snapshot along the trajectory that it follows itself,"
+                    f" received one along {snapshot.scenario.trajectory.shape}"
+                )
             self._own_law = self._own_laws[snapshot.own_law] if snapshot.own_law is not None else None
             self._restore(snapshot)
 
@@ -341,7 +349,7 @@ class Session:
         return ticks
 
     def _resolved(self, scenario: Scenario) -> Scenario:
-        return assembly.resolved(scenario, self._files, self._own_law)
+        return assembly.resolved(scenario, self._files, self._own_law, self._own_trajectory)
 
     def _build_rotor(self) -> None:
         section = self.scenario.plant
@@ -384,6 +392,11 @@ class Session:
         if own:
             self._own_law, scenario = own, self.scenario
         else:
+            if self._own_trajectory and name.split(".")[0] == "trajectory":
+                raise InputError(
+                    "session: expected no field of a scenario's trajectory, as"
+                    f" {self._own_trajectory.name} is followed instead"
+                )
             if name == "controller.law":
                 self._own_law = None
             elif before and name.startswith("controller."):
@@ -449,12 +462,12 @@ class Session:
         beliefs.restore(self._controller.belief, snapshot.belief)
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
         self.events = snapshot.events
-        self._exogenous = Exogenous(self.scenario)
+        self._exogenous = Exogenous(self.scenario, self._own_trajectory)
         self._exogenous.restore(snapshot.exogenous)
         self._connect()
 
 
-def _array(values: trajectory.Triple | None) -> NDArray[np.float64]:
+def _array(values: Triple | None) -> NDArray[np.float64]:
     return np.array(values or (0.0, 0.0, 0.0))
 
 

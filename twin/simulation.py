@@ -19,6 +19,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.session import Session
+from spheretwin.twin.trajectories.trajectory import Sampled
 
 # Long enough to make the calls between chunks cheap, short enough for a progress bar and for Ctrl-C.
 CHUNK_STEPS = 2000
@@ -63,7 +64,12 @@ class Run:
     actuator: Actuator
 
 
-def simulate(scenario: Scenario, law: Law | None = None, sinks: Sequence[Sink] = ()) -> Run:
+def simulate(
+    scenario: Scenario,
+    law: Law | None = None,
+    sinks: Sequence[Sink] = (),
+    trajectory: Sampled | None = None,
+) -> Run:
     """Run a scenario to its end.
 
     Parameters
@@ -74,6 +80,8 @@ def simulate(scenario: Scenario, law: Law | None = None, sinks: Sequence[Sink] =
         Runs instead of the law that the scenario names.
     sinks : sequence of Sink
         Handed the telemetry while the run goes on.
+    trajectory : object with ``sample(t)``, optional
+        Followed instead of the trajectory that the scenario names.
 
     Raises
     ------
@@ -81,7 +89,7 @@ def simulate(scenario: Scenario, law: Law | None = None, sinks: Sequence[Sink] =
         The model file, the torque curve, the law or a value of the scenario cannot be used, or the telemetry
         does not fit in memory.
     """
-    with Session(scenario, law) as session:
+    with Session(scenario, law, trajectory) as session:
         if scenario.event:  # which may change the columns
             kept = KeptTelemetry(session.signals, scenario.ticks)
             status = follow(session, scenario.ticks, [kept, *sinks])

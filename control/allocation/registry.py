@@ -23,4 +23,7 @@ def bounded(G: Array, torque_S: Array, limit: float, current: Array, scratch: Ar
     return allocate_bounded(G, torque_S, limit, current, scratch)
 
 
-ALLOCATIONS = {"least_norm": least_norm, "bounded": bounded}
+ALLOCATIONS = {
+    "least_norm": least_norm,
+    "bounded": bounded,
+}

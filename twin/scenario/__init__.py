@@ -11,6 +11,7 @@ from spheretwin.models.base.user_code import is_reference
 from spheretwin.twin.scenario.changing import check_events
 from spheretwin.twin.scenario.reading import beside, override, read, validated
 from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.trajectories.registry import SHAPES
 
 
 def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
@@ -41,12 +42,19 @@ def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
     Raises
     ------
     InputError
-        It was run under a law of its user's that is in no file, or by a version with other fields.
+        It was run under a law, or along a trajectory, of its user's that is in no file, or by a version with
+        other fields.
     """
     law = fields.get("controller", {}).get("law")
     if law not in LAWS and not is_reference(law):
         raise InputError(
             f"scenario {source}: expected a run under {', '.join(LAWS)}, received one under {law},"
             " a law that its file does not hold"
+        )
+    shape = fields.get("trajectory", {}).get("shape")
+    if shape not in SHAPES:
+        raise InputError(
+            f"scenario {source}: expected a run along one of {', '.join(SHAPES)}, received one along {shape},"
+            " a trajectory that its file does not hold"
         )
     return validated(fields, source)

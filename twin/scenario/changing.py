@@ -12,7 +12,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.twin.scenario.fields import Kind, kind_of, section_kind
 from spheretwin.twin.scenario.own_law import scenario_with
 from spheretwin.twin.scenario.reading import beside, override, validated
-from spheretwin.twin.scenario.sections import OwnController, Scenario
+from spheretwin.twin.scenario.sections import OwnController, OwnPath, Scenario
 
 # What a run is begun with cannot be changed on its way.
 FIXED = (
@@ -49,6 +49,8 @@ def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
         fields["controller"] = {"law": next(iter(LAWS)), "period_s": scenario.controller.period_s}
     # A user's law stays the one that was read, whatever has become of its file.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
+    if isinstance(scenario.trajectory, OwnPath):
+        fields["trajectory"] = {"shape": "hold"}
     _keep_common(fields, dotted, value, kind)
     override(fields, dotted, value)
     made = validated(beside("", fields), scenario.name, None if dotted == "controller" else kind)

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializeAsAny, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
 from spheretwin.twin.disturbances.disturbance import Disturbance
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.trajectories.registry import Trajectory
-from spheretwin.twin.trajectories.trajectory import Bounded, Triple
+from spheretwin.twin.trajectories.trajectory import Bounded, Shape, Triple
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 
@@ -28,8 +29,9 @@ WHOLE = 1e-9
 
 
 if TYPE_CHECKING:
-    EngineName = str
+    AllocationName = EngineName = str
 else:
+    AllocationName = Literal[tuple(ALLOCATIONS)]
     EngineName = Literal[tuple(ENGINES)]
 
 
@@ -41,6 +43,12 @@ class OwnController(LawParameters):
     """What a run under a law that its user made in Python says of it, in the place of a law's parameters."""
 
     parameters: tuple[float, ...] = Field(description="numbers handed to the law")
+
+
+class OwnPath(Shape):
+    """What a run along a trajectory that its user made in Python says of it, in a shape's place."""
+
+    shape: str = Field(description="class of the object that is followed")
 
 
 class Event(_Section):
@@ -151,7 +159,7 @@ class Scenario(_Section):
     description: str = Field("", description="what it shows")
     duration: Positive = Field(5.0, description="length of the run, s")
     seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the random torque")
-    allocation: Literal["least_norm", "bounded"] = Field(
+    allocation: AllocationName = Field(
         "least_norm",
         description="currents for a torque: least-norm and scaled at the limit (16), or all the limit allows",
     )

@@ -100,6 +100,11 @@ class OwnTrajectory:
     own : Sampled
         Any object with ``sample(t)``.
 
+    Attributes
+    ----------
+    name : str
+        Of its class.
+
     Raises
     ------
     InputError
@@ -109,7 +114,7 @@ class OwnTrajectory:
     def __init__(self, own: Sampled) -> None:
         if isinstance(own, type) or not callable(getattr(own, "sample", None)):
             raise InputError(f"trajectory: expected an object with sample(t), received {shown(own)}")
-        self._own = own
+        self._own, self.name = own, type(own).__name__
         start = self.sample(np.zeros(1))
         if not np.isfinite(start).all():
             raise InputError(f"trajectory: expected finite numbers at 0 s, received {start[0].tolist()}")

@@ -13,7 +13,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.check import Check
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
-from spheretwin.twin import assembly, cli
+from spheretwin.twin import cli
 from spheretwin.twin.crosscheck import (
     closed_loop,
     dynamics,
@@ -23,6 +23,7 @@ from spheretwin.twin.crosscheck import (
     suite,
     trajectories,
 )
+from spheretwin.twin.plant import lagrangian as plant
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
 from spheretwin.twin.simulation import simulate
@@ -219,7 +220,7 @@ def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
     def heavier(actuator, step_s, integrator, modelling_error, payload_kg, **rest):
         return LagrangianRotor(actuator, step_s, integrator, modelling_error + error, payload_kg, **rest)
 
-    monkeypatch.setattr(assembly, "LagrangianRotor", heavier)
+    monkeypatch.setattr(plant, "LagrangianRotor", heavier)
     assert broken(closed_loop.compare(actuators.MJCF_PATH).checks) == rows
 
 

@@ -1,0 +1,435 @@
+"""A copy of the package with a new member in every family: one file and one row each, and it works.
+
+What is added here is what CONTRIBUTING.md says. Nothing else of the copy is touched, so a family that needs
+a third place to be told of a new member fails here.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("models", "control", "viz", "twin")
+
+
+class Addition(NamedTuple):
+    """What is written for a new member: its file, and its row (with the import) in the family's list."""
+
+    file: str
+    text: str
+    registry: str
+    row: tuple[str, str]
+    imported: str = ""
+
+
+ADDITIONS = {
+    "law": Addition(
+        "control/laws/lazy.py",
+        """
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.control.law import Known, Law
+from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each, named
+
+
+class Lazy(LawParameters):
+    law: Literal["lazy"] = named("lazy")
+    slackness: PositiveEach = Field(each(2.0), description="torque a unit of error, N·m")
+
+    def build(self, known: Known) -> Law:
+        return Law(self.law, step, np.array(self.slackness), np.zeros(0))
+
+
+def step(t, reference, measurement, parameters, state, torque):
+    for axis in range(3):
+        torque[axis] = -parameters[axis] * (measurement[0, axis] - reference[0, axis])
+        torque[axis] -= 0.05 * (measurement[1, axis] - reference[1, axis])
+""",
+        "control/laws/registry.py",
+        ("    | AFSM,\n", "    | AFSM\n    | Lazy,\n"),
+        "from spheretwin.control.laws.lazy import Lazy\n",
+    ),
+    "trajectory": Addition(
+        "twin/trajectories/ramp.py",
+        """
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.twin.trajectories.trajectory import Shape, Triple
+
+
+class Ramp(Shape):
+    shape: Literal["ramp"] = Field("ramp", description="kind of trajectory")
+    rate_rad_s: Triple = Field((0.1, 0.2, 0.3), description="rate of each axis, rad/s")
+
+    def sharp(self, t):
+        rate = np.array(self.rate_rad_s)
+        rows = [np.outer(t, rate), np.tile(rate, (len(t), 1)), np.zeros((len(t), 3))]
+        return np.stack(rows, axis=1)
+""",
+        "twin/trajectories/registry.py",
+        ("    | Waypoints,\n", "    | Waypoints\n    | Ramp,\n"),
+        "from spheretwin.twin.trajectories.ramp import Ramp\n",
+    ),
+    "disturbance": Addition(
+        "twin/disturbances/kick.py",
+        """
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.twin.disturbances.term import Term, Torque
+
+
+class Kick(Term):
+    kind: Literal["kick"] = Field("kick", description="kind of disturbance")
+    torque_Nm: Torque = Field(0.01, description="on the second axis from 10 to 20 ms, N·m")
+
+    def sample(self, t, draws):
+        return np.outer((t >= 0.01) & (t < 0.02), [0.0, self.torque_Nm, 0.0])
+""",
+        "twin/disturbances/registry.py",
+        ("    | Random,\n", "    | Random\n    | Kick,\n"),
+        "from spheretwin.twin.disturbances.kick import Kick\n",
+    ),
+    "telemetry column": Addition(
+        "twin/columns/largest.py",
+        """
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.twin.columns.column import Columns
+
+
+@part_of_its_caller
+def write(row, controller, sensors, plant):
+    row[0] = 0.0
+    for j in range(plant.current.shape[0]):
+        row[0] = max(row[0], abs(plant.current[j]))
+
+
+SIGNALS = (Signal("largest_current_A", "A", 1, "largest group current at the end of the tick"),)
+COLUMNS = Columns(SIGNALS, lambda scenario: True, write)
+""",
+        "twin/columns/registry.py",
+        ("    friction.COLUMNS,\n", "    friction.COLUMNS,\n    largest.COLUMNS,\n"),
+        "from spheretwin.twin.columns import largest\n",
+    ),
+    "plant": Addition(
+        "twin/plant/stiff.py",
+        """
+from typing import NamedTuple
+
+import numpy as np
+
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.twin.plant.rotor import EngineKind
+
+
+class Integrators(NamedTuple):
+    step_s: float
+    inertia: np.ndarray
+    q: np.ndarray
+    qdot: np.ndarray
+    torque_S: np.ndarray
+    torque_q: np.ndarray
+    warnings: np.ndarray
+
+
+class Uncoupled:
+    def __init__(self, setting):
+        self.setting = setting
+
+    def start(self, q, qdot):
+        self.q, self.qdot = np.array(q, float), np.array(qdot, float)
+        inertia = self.setting.actuator.inertia
+        none = np.zeros(1, np.int32)
+        return Integrators(
+            self.setting.step_s, inertia, self.q, self.qdot, np.zeros(3), np.zeros(3), none
+        )
+
+    def state(self):
+        return np.concatenate([self.q, self.qdot])
+
+    def restore(self, state):
+        self.q[:], self.qdot[:] = state[:3], state[3:]
+
+
+@allocation_free
+def step(rotor):
+    for i in range(3):
+        rotor.qdot[i] += rotor.step_s * (rotor.torque_S[i] + rotor.torque_q[i]) / rotor.inertia[i]
+        rotor.q[i] += rotor.step_s * rotor.qdot[i]
+
+
+UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
+""",
+        "twin/plant/registry.py",
+        ("        lagrangian.LAGRANGIAN,\n", "        lagrangian.LAGRANGIAN,\n        stiff.UNCOUPLED,\n"),
+        "from spheretwin.twin.plant import stiff\n",
+    ),
+    "metric": Addition(
+        "twin/metrics/mean_load.py",
+        '''
+import numpy as np
+
+from spheretwin.twin.metrics.metric import Metric, added
+
+
+class MeanLoad(Metric):
+    """Mean disturbance on each axis, N·m."""
+
+    def __init__(self, planned):
+        super().__init__(planned)
+        self.total, self.rows = np.zeros(3), 0
+
+    def write(self, rows):
+        self.total, self.rows = added(self.total, rows["disturbance_Nm"]), self.rows + len(rows)
+
+    def value(self):
+        return (self.total / self.rows).tolist() if self.rows else None
+''',
+        "twin/metrics/registry.py",
+        (
+            '    "copper_loss_J": CopperLoss,\n',
+            '    "copper_loss_J": CopperLoss,\n    "mean_load_Nm": MeanLoad,\n',
+        ),
+        "from spheretwin.twin.metrics.mean_load import MeanLoad\n",
+    ),
+    "check": Addition(
+        "twin/crosscheck/units.py",
+        """
+from typing import NamedTuple
+
+from spheretwin.models.base.check import Check
+from spheretwin.twin.crosscheck.part import Part
+
+
+class Units(NamedTuple):
+    checks: list[Check]
+
+
+def examine(subject):
+    value = float(abs(subject.actuator.inertia).max())
+    return Units([Check("inertia is small", "largest inertia, kg·m²", 1, value, 1.0, "it fits a hand")])
+
+
+PART = Part("units", examine)
+""",
+        "twin/crosscheck/suite.py",
+        ("    closed_loop.PART,\n", "    closed_loop.PART,\n    units.PART,\n"),
+        "from spheretwin.twin.crosscheck import units\n",
+    ),
+    "figure": Addition(
+        "twin/crosscheck/figures/names.py",
+        """
+from spheretwin.twin.crosscheck.figures.drawing import Drawing
+
+
+def draw(evidence):
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    figure.text(0.1, 0.5, ", ".join(check.name for check in evidence.checks))
+    return Drawing("names.png", "Names of the checks.", figure)
+""",
+        "twin/crosscheck/figures/registry.py",
+        ("    closed_loop.draw,\n", "    closed_loop.draw,\n    names.draw,\n"),
+        "from spheretwin.twin.crosscheck.figures import names\n",
+    ),
+    "status": Addition(
+        "",
+        "",
+        "models/telemetry/status.py",
+        (
+            '    INTERRUPTED = "interrupted",',
+            '    BORED = "bored", Level.WARN, "nothing went on any more"\n    INTERRUPTED = "interrupted",',
+        ),
+    ),
+    "allocation": Addition(
+        "control/allocation/halved.py",
+        """
+from spheretwin.control.allocation.least_norm import allocate
+
+
+def halved(G, torque_S, limit, current, scratch):
+    share = allocate(G, torque_S, 0.5 * limit, current)
+    return share
+""",
+        "control/allocation/registry.py",
+        ('    "bounded": bounded,\n', '    "bounded": bounded,\n    "halved": halved,\n'),
+        "from spheretwin.control.allocation.halved import halved\n",
+    ),
+}
+
+SCRIPT = """
+import json, sys
+from pathlib import Path
+
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]
+folder = Path(sys.argv[1])
+
+from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin import cli
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario import flags
+from spheretwin.twin.crosscheck import page, suite
+from spheretwin.twin.crosscheck.part import Evidence, Subject
+from spheretwin.models import actuator as actuators
+from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.twin.records.facts import facts_of
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+
+(folder / "new.toml").write_text('''
+name = "new"
+duration = 0.05
+allocation = "halved"
+[trajectory]
+shape = "ramp"
+[controller]
+law = "lazy"
+slackness = [1.0, 2.0, 3.0]
+[plant]
+engine = "uncoupled"
+[[disturbance.terms]]
+kind = "kick"
+torque_Nm = 0.02
+''')
+parquet = folder / "new.parquet"
+code = cli.main(["simulate", str(folder / "new.toml"), "--telemetry", str(parquet), "--json"])
+scenario = scenarios.load(str(folder / "new.toml"))
+helped = {flag: text for flag, _, text in flags.described(scenario)}
+refused = {}
+for name in ("controller.law", "trajectory.shape", "plant.engine", "allocation"):
+    try:
+        scenarios.load("hold", {name: "nothing"})
+    except Exception as error:
+        refused[name] = str(error)
+
+class Bored:
+    def write(self, rows): pass
+    def note(self, t_s, text): pass
+    def finish(self, status): self.status = status
+
+with Session(scenario) as session:
+    recorder = Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=folder / "n.rrd")
+    recorder.write(session.advance(10))
+    recorder.finish(Status.BORED)
+    recorder.close()
+
+part = suite.PARTS[-1]
+evidence = Evidence({part.name: part.examine(Subject(actuators.MJCF_PATH, actuators.load(), 10))})
+from spheretwin.twin.crosscheck.figures.registry import FIGURES
+page.FIGURES = FIGURES[-1:]
+page.write(folder, evidence, {"none": "1"})
+table = read_parquet(parquet)[0]
+print("RESULT" + json.dumps({
+    "code": code, "helped": helped, "refused": refused, "status": str(Status("bored")),
+    "columns": [signal.name for signal in table.signals],
+    "largest": table["largest_current_A"].tolist(), "q_ref": table["q_ref_rad"][-1].tolist(),
+    "disturbance": table["disturbance_Nm"][:, 1].tolist(), "current": abs(table["current_command_A"]).max(),
+    "page": (folder / page.PAGE).read_text(), "figure": (folder / "names.png").stat().st_size,
+    "recording": (folder / "n.rrd").stat().st_size,
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    """What the copy says of its new members."""
+    folder = tmp_path_factory.mktemp("grown")
+    package = folder / "spheretwin"
+    for name in FOLDERS:
+        shutil.copytree(ROOT / name, package / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for addition in ADDITIONS.values():
+        if addition.file:
+            assert not (package / addition.file).exists()
+            (package / addition.file).write_text('"""New."""\n' + addition.text)
+        registry = package / addition.registry
+        text, (old, new) = registry.read_text(), addition.row
+        assert text.count(old) == 1, f"{addition.registry} has no row {old!r}"
+        text = text.replace(old, new)
+        first = text.find("\nfrom spheretwin")
+        registry.write_text(text[: first + 1] + addition.imported + text[first + 1 :])
+    environment = {**os.environ, "PYTHONPATH": str(folder), "SPHERETWIN_CACHE_DIR": str(folder / "cache")}
+    command = [sys.executable, "-c", SCRIPT, str(folder)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    figures, told = done.stdout.split("RESULT")
+    return {"summary": json.loads(figures), **json.loads(told)}
+
+
+def test_a_law(grown):
+    assert (grown["code"], grown["summary"]["status"]) == (0, "completed")
+    assert grown["summary"]["scenario"]["controller"]["slackness"] == [1.0, 2.0, 3.0]
+    assert grown["helped"]["--controller.slackness"] == "torque a unit of error, N·m"
+    assert "pd, adaptive_fuzzy, afsm, lazy" in grown["refused"]["controller.law"]
+
+
+def test_a_trajectory(grown):
+    # 49 ms at 0.1, 0.2 and 0.3 rad/s: a product, rounded once.
+    assert grown["q_ref"] == pytest.approx([0.0049, 0.0098, 0.0147], rel=1e-14)
+    assert grown["helped"]["--trajectory.rate-rad-s"] == "rate of each axis, rad/s"
+    assert grown["refused"]["trajectory.shape"].count("ramp") == 1
+
+
+def test_a_disturbance(grown):
+    assert grown["disturbance"] == [0.02 if 10 <= tick < 20 else 0.0 for tick in range(50)]
+    assert "--disturbance.terms.0.torque-Nm" in grown["helped"]
+
+
+def test_a_telemetry_column(grown):
+    assert "largest_current_A" in grown["columns"]
+    assert max(grown["largest"]) > 0
+
+
+def test_a_plant(grown):
+    assert grown["summary"]["scenario"]["plant"]["engine"] == "uncoupled"
+    assert "'uncoupled'" in grown["refused"]["plant.engine"]
+
+
+def test_an_allocation(grown):
+    assert 0 < grown["current"] <= 4.0
+    assert "'halved'" in grown["refused"]["allocation"]
+
+
+def test_a_metric(grown):
+    # Ten of fifty ticks with 0.02 N·m: sums of ten numbers, rounded at 1e-18.
+    assert grown["summary"]["mean_load_Nm"] == pytest.approx([0.0, 0.004, 0.0], abs=1e-16)
+
+
+def test_a_status(grown):
+    assert grown["status"] == "bored"
+    assert grown["recording"] > 0
+
+
+def test_a_check(grown):
+    assert "| inertia is small |" in grown["page"]
+
+
+def test_a_figure(grown):
+    assert "(names.png)" in grown["page"]
+    assert grown["figure"] > 1000
+
+
+def test_contributing_names_the_file_and_the_row_of_each():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    for family, addition in ADDITIONS.items():
+        (row,) = [line for line in text.splitlines() if line.startswith(f"| a {family}") or
+                  line.startswith(f"| an {family}")]  # fmt: skip
+        assert f"`{addition.registry}`" in row
+        if addition.file:
+            assert f"`{Path(addition.file).parent}/" in row
