@@ -29,7 +29,8 @@ WHOLE = 1e-9
 
 
 if TYPE_CHECKING:
-    AllocationName = EngineName = str
+    AllocationName = str
+    EngineName = str
 else:
     AllocationName = Literal[tuple(ALLOCATIONS)]
     EngineName = Literal[tuple(ENGINES)]
