@@ -113,6 +113,7 @@ class Session:
         self._status = Status.RUNNING
         self._files = assembly.files_of(scenario)
         self.scenario = self.begun_as = self._resolved(scenario)
+        self._planned = planned(self.begun_as)
         self._exogenous = Exogenous(self.scenario, self._own_trajectory)
         self._build_rotor()
         self._build_controller()
@@ -321,7 +322,7 @@ class Session:
         return done
 
     def _waiting(self) -> tuple[Change, ...]:
-        return planned(self.begun_as)[len(self.events) :]
+        return self._planned[len(self.events) :]
 
     def _most(self, ticks: int) -> int:
         """Ticks that can be run at once: an event ends them."""
@@ -461,7 +462,7 @@ class Session:
         _check_length("belief", snapshot.belief, beliefs.state_of(self._controller.belief))
         beliefs.restore(self._controller.belief, snapshot.belief)
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
-        self.events = snapshot.events
+        self.events, self._planned = snapshot.events, planned(snapshot.begun_as)
         self._exogenous = Exogenous(self.scenario, self._own_trajectory)
         self._exogenous.restore(snapshot.exogenous)
         self._connect()

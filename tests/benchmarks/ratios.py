@@ -26,6 +26,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.disturbances.draws import Draws
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
@@ -120,7 +121,7 @@ def plain_seconds() -> float:
     actuator, rotor = actuators.load(), _rotor()
     t = scenario.controller.period_s * np.arange(PLAIN_TICKS)
     reference = scenario.trajectory.sample(t)
-    disturbance = scenario.disturbance.sample(t, np.random.default_rng(0).random(PLAIN_TICKS))
+    disturbance = scenario.disturbance.sample(t, Draws(np.random.default_rng(0).random(PLAIN_TICKS), None))
     rotor.start(reference[0, 0], np.zeros(3))
     work = seconds_of(
         lambda: plain.run(rotor.model, rotor.data, actuator, scenario, reference, disturbance, PLAIN_TICKS)
