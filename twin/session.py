@@ -14,28 +14,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control import belief as beliefs
-from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.law import Law
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown
-from spheretwin.models.magnetics import torque_model
 from spheretwin.models.telemetry.record import Change
-from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
+from spheretwin.twin.assembly import Files
 from spheretwin.twin.exogenous import Exogenous
-from spheretwin.twin.matching import matching
+from spheretwin.twin.machine import Machine, State
 from spheretwin.twin.scenario.changing import changed, is_fixed
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain
 from spheretwin.twin.scenario.sections import OwnPath, Scenario
-from spheretwin.twin.trajectories.trajectory import Sampled, Triple, checked
+from spheretwin.twin.trajectories.trajectory import Sampled, checked
 
 
 @dataclass(frozen=True)
@@ -49,11 +46,7 @@ class Snapshot:
     """Digest of model and torque curves."""
     tick: int
     status: Status
-    rotor: NDArray[np.float64]
-    current: NDArray[np.float64]
-    parameters: NDArray[np.float64]
-    memory: NDArray[np.float64]
-    belief: NDArray[np.float64]
+    machine: State
     exogenous: dict[str, Any]
     journal: tuple[Change, ...]
     events: tuple[Change, ...]
@@ -77,8 +70,6 @@ class Session:
         In force now: what was left open is filled in from the model and the trajectory.
     begun_as : Scenario
         The same at tick 0; with the journal it says all that has happened.
-    law : Law
-        In force now.
     signals : tuple of Signal
         Columns of the telemetry; a change of law, friction or sensors may change them.
     journal : tuple of Change
@@ -103,7 +94,6 @@ class Session:
     def __init__(self, scenario: Scenario, law: Law | None = None, trajectory: Sampled | None = None) -> None:
         self._busy = threading.Lock()
         self._closed = False
-        self._scratch = loops.Scratch(np.empty((3, 3)), np.empty((3, 3)))
         self._own_law = law
         self._own_laws = {law.name: law} if law else {}
         self._own_trajectory = None if trajectory is None else checked(trajectory)
@@ -112,13 +102,10 @@ class Session:
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
         self._files = assembly.files_of(scenario)
-        self.scenario = self.begun_as = self._resolved(scenario)
+        self.scenario = self.begun_as = assembly.resolved(scenario, self._files, law, self._own_trajectory)
         self._planned = planned(self.begun_as)
         self._exogenous = Exogenous(self.scenario, self._own_trajectory)
-        self._build_rotor()
-        self._build_controller()
-        self._build_plant()
-        self._connect()
+        self._machine = Machine(self.scenario, self._files, law)
         self._make_planned()
 
     @property
@@ -139,12 +126,17 @@ class Session:
     @property
     def q_rad(self) -> NDArray[np.float64]:
         """Hinge angles now, (3,) in rad."""
-        return self._stepped.q.copy()
+        return self._machine.q_rad
 
     @property
     def signals(self) -> tuple[Signal, ...]:
         """Columns of the telemetry: the common ones, those of its stages, then the law's own."""
-        return self._signals
+        return self._machine.signals
+
+    @property
+    def law(self) -> Law:
+        """In force now."""
+        return self._machine.law
 
     def advance(self, ticks: int) -> Table:
         """Run some control ticks.
@@ -164,8 +156,8 @@ class Session:
             raise InputError(f"session: expected a number of ticks from 0 on, received {shown(ticks)}")
         with self._alone():
             self._make_planned()
-            log = allocated(int(ticks), self._columns)
-            return Table(self._signals, log[: self._advance(log)])
+            log = allocated(int(ticks), self._machine.columns)
+            return Table(self.signals, log[: self._advance(log)])
 
     def advance_into(self, log: NDArray[np.float64]) -> int:
         """Run a control tick for each row of an array of the caller's; returns how many were run.
@@ -177,7 +169,7 @@ class Session:
         """
         with self._alone():
             self._make_planned()
-            _check_rows(log, self._columns)
+            _check_rows(log, self._machine.columns)
             return self._advance(log)
 
     def check_horizon(self, ticks: int) -> None:
@@ -230,11 +222,7 @@ class Session:
                 assembly.digest(self._files),
                 self.tick,
                 self._status,
-                self._rotor.state(),
-                self._plant.current.copy(),
-                self._controller.parameters.copy(),
-                self._controller.memory.copy(),
-                beliefs.state_of(self._controller.belief),
+                self._machine.state(),
                 self._exogenous.state(),
                 self.journal,
                 self.events,
@@ -312,12 +300,12 @@ class Session:
                     break
                 raise
             done += self._run(inputs, log[done : done + len(inputs.t)])
-            before = self._signals
+            before = self.signals
             try:
                 self._make_planned()
             except SpheretwinError:  # the next call makes it again, and says it
                 break
-            if self._signals != before:
+            if self.signals != before:
                 break
         return done
 
@@ -340,7 +328,7 @@ class Session:
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> int:
         started = time.perf_counter()
         try:
-            ticks, code = self._loop(inputs, *self._parts, log)
+            ticks, code = self._machine.run(inputs, log)
         except BaseException:  # a law in plain Python: the state is somewhere within a tick
             self._status = Status.DIVERGED
             raise
@@ -348,45 +336,6 @@ class Session:
         self.tick += ticks
         self._status = BY_CODE[code]
         return ticks
-
-    def _resolved(self, scenario: Scenario) -> Scenario:
-        return assembly.resolved(scenario, self._files, self._own_law, self._own_trajectory)
-
-    def _build_rotor(self) -> None:
-        section = self.scenario.plant
-        self._rotor = assembly.rotor_of(self.scenario, self._files)
-        self._stepped = self._rotor.start(_array(section.initial_rad), _array(section.initial_rad_s))
-
-    def _build_controller(self) -> None:
-        """Law, allocation and what they know; the plant shares what both have the same of."""
-        scenario = self.scenario
-        self.law = self._own_law or assembly.law_of(scenario)
-        self._signals = assembly.signals_of(scenario, self.actuator, self.law)
-        self._columns = width(self._signals)
-        self._places = assembly.places_of(self._signals, self.law)
-        magnetics = assembly.nominal_magnetics(scenario, self._files)
-        self._kept = assembly.kept_matrices(magnetics, torque_model(self.actuator))
-        self._controller = assembly.controller_of(scenario, self.law, magnetics, self._kept[0])
-        self._sensors = assembly.sensors_of(scenario)
-        self._functions = matching(self.law, ALLOCATIONS[scenario.allocation])
-
-    def _build_plant(self) -> None:
-        self._plant = assembly.plant_of(self.scenario, self.actuator, self._stepped, self._kept[1])
-
-    def _connect(self) -> None:
-        """Put the parts into the order of the loop; compile it, or load it, for their types."""
-        functions = self._functions
-        self._parts = (
-            functions.law,
-            functions.allocate,
-            self._controller,
-            self._sensors,
-            self._plant,
-            self._places,
-            self._scratch,
-        )
-        inputs, log = self._exogenous.rows(self.tick, 1), np.empty((0, self._columns))
-        self._loop = for_types_of(functions.loop, inputs, *self._parts, log)
 
     def _change(self, name: str, value: Any, own: Law | None) -> None:
         before = self._own_law
@@ -403,73 +352,39 @@ class Session:
             elif before and name.startswith("controller."):
                 raise InputError(f"session: expected no field of a shipped law, as {before.name} is not one")
             scenario = changed(self.scenario, name, value)
-        if assembly.named_files(scenario) != assembly.named_files(self.scenario):
-            self._files = assembly.files_of(scenario)
-        self._apply(self._resolved(scenario))
+        files = self._files_of(scenario)
+        self._apply(assembly.resolved(scenario, files, self._own_law, self._own_trajectory), files)
         if own:
             self._own_laws = {**self._own_laws, own.name: own}
 
-    def _apply(self, scenario: Scenario) -> None:
-        """Build anew what a scenario changes, and carry over what it is in the midst of."""
-        before, self.scenario = self.scenario, scenario
-        outside = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
-        if before.model_copy(update=outside) != scenario or self._own_law not in (None, self.law):
-            if scenario.plant != before.plant:
-                self._rebuild_rotor()
-            self._rebuild_controller()
-            current = self._plant.current
-            self._build_plant()
-            self._plant.current[:] = current
-            self._connect()
+    def _apply(self, scenario: Scenario, files: Files) -> None:
+        """Build anew what a scenario changes; what comes from outside is no part of the machine."""
+        before = self.scenario.model_copy(
+            update={"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
+        )
+        if before != scenario or files is not self._files or self._own_law not in (None, self.law):
+            self._machine = self._machine.changed(scenario, files, self._own_law)
+        self.scenario, self._files = scenario, files
         self._exogenous.scenario = scenario  # last: it is altered, and what fails must have changed nothing
 
-    def _rebuild_rotor(self) -> None:
-        """Rotor of the present scenario, in the same state."""
-        rotor = assembly.rotor_of(self.scenario, self._files)
-        stepped, state = rotor.start(self._stepped.q, self._stepped.qdot), self._rotor.state()
-        if len(rotor.state()) == len(state):  # else a body has come or gone: pose and rates are what remains
-            rotor.restore(state)
-        self._rotor, self._stepped = rotor, stepped
-
-    def _rebuild_controller(self) -> None:
-        """Controller of the present scenario; a law that stays, if with other gains, keeps its memory."""
-        law, before, step = self.law, self._controller, self.law.step
-        self._build_controller()
-        if self.law is law:  # one of the user's, which may have changed its parameters
-            self._controller.parameters[:] = before.parameters
-        if self.law is law or (self._own_law is None and self.law.step is step):  # a shipped one, other gains
-            self._controller.memory[:] = before.memory
-        believed = beliefs.state_of(before.belief)
-        if before.belief.asked and len(believed) == len(beliefs.state_of(self._controller.belief)):
-            beliefs.restore(self._controller.belief, believed)
+    def _files_of(self, scenario: Scenario) -> Files:
+        """Files of a scenario: those that have been read, where it names no others."""
+        same = assembly.named_files(scenario) == assembly.named_files(self.scenario)
+        return self._files if same else assembly.files_of(scenario)
 
     def _restore(self, snapshot: Snapshot) -> None:
-        if assembly.named_files(snapshot.scenario) != assembly.named_files(self.scenario):
-            self._files = assembly.files_of(snapshot.scenario)
-        if assembly.digest(self._files) != snapshot.files:
+        files = self._files_of(snapshot.scenario)
+        if assembly.digest(files) != snapshot.files:
             raise InputError(
                 "session: expected a snapshot of the same model and torque curves, received one of others"
             )
-        self.scenario, self.begun_as = snapshot.scenario, snapshot.begun_as
-        self._build_rotor()
-        self._build_controller()
-        self._build_plant()
-        _check_length("the engine's state", snapshot.rotor, self._rotor.state())
-        self._rotor.restore(snapshot.rotor)
-        _fill("currents", self._plant.current, snapshot.current)
-        _fill("the law's parameters", self._controller.parameters, snapshot.parameters)
-        _fill("the law's memory", self._controller.memory, snapshot.memory)
-        _check_length("belief", snapshot.belief, beliefs.state_of(self._controller.belief))
-        beliefs.restore(self._controller.belief, snapshot.belief)
+        self._machine = Machine(snapshot.scenario, files, self._own_law)
+        self._machine.restore(snapshot.machine)
+        self._files, self.scenario, self.begun_as = files, snapshot.scenario, snapshot.begun_as
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
         self.events, self._planned = snapshot.events, planned(snapshot.begun_as)
         self._exogenous = Exogenous(self.scenario, self._own_trajectory)
         self._exogenous.restore(snapshot.exogenous)
-        self._connect()
-
-
-def _array(values: Triple | None) -> NDArray[np.float64]:
-    return np.array(values or (0.0, 0.0, 0.0))
 
 
 def _name_of_own(law: Law) -> str:
@@ -491,15 +406,3 @@ def _check_rows(log: NDArray[np.float64], columns: int) -> None:
         f"session: expected contiguous, writeable rows of {columns} float64, received"
         f" {getattr(log, 'dtype', type(log).__name__)} of shape {np.shape(log)}"
     )
-
-
-def _fill(what: str, target: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    _check_length(what, values, target)
-    target[:] = values
-
-
-def _check_length(what: str, received: NDArray[np.float64], own: NDArray[np.float64]) -> None:
-    if len(received) != len(own):
-        raise InputError(
-            f"session: expected a snapshot with {len(own)} numbers of {what}, received {len(received)}"
-        )

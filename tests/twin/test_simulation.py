@@ -10,8 +10,8 @@ from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.twin import loop as loops
+from spheretwin.twin import machine as machines
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin import session as sessions
 from spheretwin.twin import simulation as simulations
 from spheretwin.twin.matching import Functions
 from spheretwin.twin.session import Session
@@ -112,7 +112,7 @@ def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
     overrides = {"controller__law": name, "duration": 0.1}
     compiled = run("nutation", **overrides)
     monkeypatch.setattr(
-        sessions,
+        machines,
         "matching",
         lambda law, allocate: Functions(loops.loop.py_func, law.step, allocate, ()),
     )

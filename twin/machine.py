@@ -1,0 +1,183 @@
+"""The parts of one twin at work: built from a scenario, built anew where it changes, kept and restored."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.control import belief as beliefs
+from spheretwin.control.allocation.registry import ALLOCATIONS
+from spheretwin.control.law import Law
+from spheretwin.models.base.compiled import for_types_of
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.magnetics import torque_model
+from spheretwin.models.telemetry.signals import width
+from spheretwin.twin import assembly
+from spheretwin.twin import loop as loops
+from spheretwin.twin.assembly import Files
+from spheretwin.twin.matching import matching
+from spheretwin.twin.plant.rotor import Rotor
+from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.trajectories.trajectory import Triple
+
+# For their types alone.
+NO_INPUTS = loops.Inputs(np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)))
+
+
+class State(NamedTuple):
+    """All that the parts go on from."""
+
+    rotor: NDArray[np.float64]
+    current: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+    memory: NDArray[np.float64]
+    belief: NDArray[np.float64]
+
+
+class Moving(NamedTuple):
+    """A rotor that has been started, and what compiled code steps of it."""
+
+    rotor: Rotor
+    stepped: Any
+
+
+class Machine:
+    """Controller, sensors and plant of a scenario, put into the order of the loop.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Resolved.
+    files : Files
+        Model and torque curves.
+    own_law : Law, optional
+        Runs instead of the law that the scenario names.
+    moving : Moving, optional
+        A rotor at work; one that starts as the scenario says unless given.
+
+    Attributes
+    ----------
+    law : Law
+        In force.
+    signals : tuple of Signal
+        Columns of the telemetry.
+    columns : int
+        Numbers in a row of it.
+
+    Raises
+    ------
+    InputError
+        The engine does not know all that the model holds, or the law cannot be used.
+    """
+
+    def __init__(
+        self, scenario: Scenario, files: Files, own_law: Law | None, moving: Moving | None = None
+    ) -> None:
+        self._scenario = scenario
+        self._moving = moving or _started(scenario, files)
+        self.law = own_law or assembly.law_of(scenario)
+        self.signals = assembly.signals_of(scenario, files.actuator, self.law)
+        self.columns = width(self.signals)
+        magnetics = assembly.nominal_magnetics(scenario, files)
+        kept = assembly.kept_matrices(magnetics, torque_model(files.actuator))
+        self._controller = assembly.controller_of(scenario, self.law, magnetics, kept[0])
+        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, kept[1])
+        # The loop has bare addresses of its functions: they are held for as long as it is.
+        self._functions = matching(self.law, ALLOCATIONS[scenario.allocation])
+        self._parts = (
+            self._functions.law,
+            self._functions.allocate,
+            self._controller,
+            assembly.sensors_of(scenario),
+            self._plant,
+            assembly.places_of(self.signals, self.law),
+            loops.Scratch(np.empty((3, 3)), np.empty((3, 3))),
+        )
+        self._loop = for_types_of(self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.columns)))
+
+    @property
+    def q_rad(self) -> NDArray[np.float64]:
+        """Hinge angles now, (3,) in rad."""
+        return self._moving.stepped.q.copy()
+
+    def run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
+        """Run a control tick for each row of `log`: rows written, and the code of a status."""
+        return self._loop(inputs, *self._parts, log)
+
+    def changed(self, scenario: Scenario, files: Files, own_law: Law | None) -> Machine:
+        """Machine of another scenario that carries on what this one is in the midst of.
+
+        A law that stays, if with other gains, keeps its memory; one of the user's keeps its parameters too,
+        as it may have changed them.
+        """
+        same = scenario.plant == self._scenario.plant
+        moving = self._moving if same else _carried_on(self._moving, scenario, files)
+        made = Machine(scenario, files, own_law, moving)
+        made._plant.current[:] = self._plant.current
+        if made.law is self.law:
+            made._controller.parameters[:] = self._controller.parameters
+        stays = own_law is None and made.law.step is self.law.step
+        if made.law is self.law or stays:
+            made._controller.memory[:] = self._controller.memory
+        believed = beliefs.state_of(self._controller.belief)
+        if self._controller.belief.asked and len(believed) == len(beliefs.state_of(made._controller.belief)):
+            beliefs.restore(made._controller.belief, believed)
+        return made
+
+    def state(self) -> State:
+        """All that it goes on from."""
+        controller = self._controller
+        return State(
+            rotor=self._moving.rotor.state(),
+            current=self._plant.current.copy(),
+            parameters=controller.parameters.copy(),
+            memory=controller.memory.copy(),
+            belief=beliefs.state_of(controller.belief),
+        )
+
+    def restore(self, state: State) -> None:
+        """Go on from a state of a machine of the same scenario.
+
+        Raises
+        ------
+        InputError
+            It is that of another.
+        """
+        own = self.state()
+        _check_length("the engine's state", state.rotor, own.rotor)
+        _check_length("currents", state.current, own.current)
+        _check_length("the law's parameters", state.parameters, own.parameters)
+        _check_length("the law's memory", state.memory, own.memory)
+        _check_length("what the controller believes", state.belief, own.belief)
+        self._moving.rotor.restore(state.rotor)
+        self._plant.current[:] = state.current
+        self._controller.parameters[:] = state.parameters
+        self._controller.memory[:] = state.memory
+        beliefs.restore(self._controller.belief, state.belief)
+
+
+def _started(scenario: Scenario, files: Files) -> Moving:
+    rotor, section = assembly.rotor_of(scenario, files), scenario.plant
+    return Moving(rotor, rotor.start(_array(section.initial_rad), _array(section.initial_rad_s)))
+
+
+def _carried_on(moving: Moving, scenario: Scenario, files: Files) -> Moving:
+    """Rotor of another scenario, in the same state."""
+    rotor, state = assembly.rotor_of(scenario, files), moving.rotor.state()
+    stepped = rotor.start(moving.stepped.q, moving.stepped.qdot)
+    if len(rotor.state()) == len(state):  # else a body has come or gone: pose and rates are what remains
+        rotor.restore(state)
+    return Moving(rotor, stepped)
+
+
+def _array(values: Triple | None) -> NDArray[np.float64]:
+    return np.array(values or (0.0, 0.0, 0.0))
+
+
+def _check_length(what: str, received: NDArray[np.float64], own: NDArray[np.float64]) -> None:
+    if len(received) != len(own):
+        raise InputError(
+            f"session: expected a snapshot with {len(own)} numbers of {what}, received {len(received)}"
+        )
