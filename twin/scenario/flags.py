@@ -9,7 +9,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.scenario.fields import INDEX, every_field, fields_of
+from spheretwin.twin.scenario.fields import INDEX, every_field, fields_of, kind_of
 from spheretwin.twin.scenario.sections import Scenario
 
 
@@ -36,10 +36,24 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
 
 def described(scenario: Scenario) -> list[tuple[str, str, str]]:
     """Flag, value in force and meaning of every field of a scenario."""
+    families = {
+        f"{name}.{kind.told_apart_by}": f": {', '.join(kind.members)}"
+        for name, field in every_field(type(scenario))
+        if (kind := kind_of(field)) and kind.told_apart_by
+    }
     return [
-        ("--" + dotted.replace("_", "-"), _shown(value), field.description or "")
+        (
+            "--" + dotted.replace("_", "-"),
+            _shown(value),
+            (field.description or "") + families.get(_anywhere(dotted), ""),
+        )
         for dotted, value, field in fields_of(scenario)
     ]
+
+
+def _anywhere(dotted: str) -> str:
+    """Name of a field, whatever its place in a list."""
+    return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)
 
 
 def _shown(value: Any) -> str:
@@ -65,7 +79,7 @@ def _grouped(tokens: Sequence[str]) -> list[tuple[str, list[str]]]:
 
 
 def _value(name: str, text: str) -> Any:
-    if re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", name) in _TEXT_FIELDS:
+    if _anywhere(name) in _TEXT_FIELDS:
         return text
     for read in (json.loads, float):
         try:
