@@ -11,11 +11,8 @@ import time
 import tomllib
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from spheretwin.models import actuator as actuators
-from spheretwin.models import torque_curve
 from spheretwin.models.telemetry.table import read_parquet
 
 COMMAND = [sys.executable, "-m", "spheretwin.twin.cli"]
@@ -193,20 +190,6 @@ def test_reader_that_leaves_is_no_error():
     with process:
         process.stdout.close()
         assert process.stderr.read() == ""
-
-
-def test_curve_is_the_shipped_one(tmp_path):
-    out = tmp_path / "curve.csv"
-    done = spheretwin("magnetics", "curve", "--out", out, "--json")
-    assert done.returncode == 0, done.stderr
-    computed, shipped = torque_curve.read(out), torque_curve.read(actuators.TORQUE_CURVE_PATH)
-    # Twelve decimals are written; another processor's rounding may move the last.
-    np.testing.assert_allclose(computed.torque_Nm_per_A, shipped.torque_Nm_per_A, rtol=0, atol=1.5e-12)
-    np.testing.assert_array_equal(computed.phi_rad, shipped.phi_rad)
-    assert computed.computed_for == shipped.computed_for
-    figures = json.loads(done.stdout)
-    assert figures["peak_Nm_per_A"] == pytest.approx(0.02008, abs=1e-5)
-    assert figures["doubled_mesh_moves_peak"] < 5e-3
 
 
 def test_console_script_is_this_command():
