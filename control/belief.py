@@ -106,6 +106,18 @@ def believe(
     generalised_torque(pose, belief.torque_S, belief.torque_q)
 
 
+def carried_on(before: Belief, belief: Belief) -> None:
+    """Go on with what was believed before, under another delay or lag; commands older than any known repeat.
+
+    Nothing is known where nobody asked before: what is believed then begins at rest.
+    """
+    if not (before.asked and belief.asked):
+        return
+    belief.current[:], belief.torque_q[:] = before.current, before.torque_q
+    for row in range(len(belief.commands)):
+        belief.commands[row] = before.commands[min(row, len(before.commands) - 1)]
+
+
 def state_of(belief: Belief) -> NDArray[np.float64]:
     """All that the belief goes on from."""
     return np.concatenate([belief.commands.ravel(), belief.current, belief.torque_q])

@@ -62,7 +62,7 @@ class Law:
         Names of the leading entries of the state, which the loop logs after every call.
     asks_torque : bool
         Whether the third row of `measurement` is wanted. What is not asked for is not computed: the row
-        holds no numbers then.
+        holds no numbers then. It begins at 0 at the first tick under the law.
 
     Raises
     ------
@@ -85,6 +85,10 @@ class Law:
             raise InputError(f"law {self.name}: expected step as a function, received {shown(self.step)}")
         for field in ("parameters", "state"):
             object.__setattr__(self, field, _numbers(self.name, field, getattr(self, field)))
+        if not isinstance(self.asks_torque, bool):
+            raise InputError(
+                f"law {self.name}: expected asks_torque as True or False, received {shown(self.asks_torque)}"
+            )
         object.__setattr__(self, "signals", _signals(self.name, self.signals))
         if width(self.signals) > len(self.state):
             raise InputError(

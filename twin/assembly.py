@@ -12,11 +12,13 @@ import numpy as np
 from spheretwin.control.belief import belief
 from spheretwin.control.controller import Controller, controller
 from spheretwin.control.law import Known, Law
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models import actuator as actuators
-from spheretwin.models import mjcf
+from spheretwin.models import mjcf, torque_curve
 from spheretwin.models.actuator import HINGES, Actuator
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import told_apart
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.user_code import is_reference
+from spheretwin.models.base.wording import shown, told_apart, without_breaks
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, disagreements, kept_matrix, torque_model
 from spheretwin.models.mjcf import Mjcf
@@ -34,9 +36,11 @@ from spheretwin.twin.plant.friction import Friction, friction
 from spheretwin.twin.plant.plant import Plant
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.plant.rotor import Rotor, Setting
+from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.sections import DriveSection, OwnController, OwnPath, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.sensors import Sensors, sensors
+from spheretwin.twin.trajectories.registry import SHAPES
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, Triple
 
 # What the engine's compiler takes where a file says nothing.
@@ -61,6 +65,30 @@ def files_of(scenario: Scenario) -> Files:
     actuator = actuators.load(path, curve)
     other = scenario.nominal.torque_curve
     return Files(mjcf.read(path), actuator, actuators.load(path, Path(other)) if other else actuator)
+
+
+def files_again(files: Files, before: Scenario, scenario: Scenario) -> Files:
+    """Files of a changed scenario: what it names as before stays as it was read."""
+    if scenario.plant.mjcf != before.plant.mjcf:
+        return files_of(scenario)
+    actuator, nominal, other = files.actuator, files.nominal, scenario.nominal.torque_curve
+    if scenario.plant.torque_curve != before.plant.torque_curve:
+        actuator = _with_curve(files.model, scenario.plant.torque_curve)
+    if other is None:
+        nominal = actuator
+    elif other != before.nominal.torque_curve:
+        nominal = _with_curve(files.model, other)
+    return Files(files.model, actuator, nominal)
+
+
+def _with_curve(model: Mjcf, curve: str | None) -> Actuator:
+    read = torque_curve.read(Path(curve or actuators.TORQUE_CURVE_PATH))
+    return actuators.from_model(model.described, read)
+
+
+def name_of_own(name: str) -> str:
+    """Name of a law or trajectory of the user's, where it must not be taken for one that can be had."""
+    return f"{name} of the user's" if name in LAWS or name in SHAPES or is_reference(name) else name
 
 
 def named_files(scenario: Scenario) -> tuple[str | None, ...]:
@@ -115,12 +143,13 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
         ),
     }
     if law:
-        own = OwnController(
-            law=law.name, period_s=scenario.controller.period_s, parameters=tuple(law.parameters.tolist())
+        filled["controller"] = OwnController(
+            law=name_of_own(law.name),
+            period_s=scenario.controller.period_s,
+            parameters=tuple(law.parameters.tolist()),
         )
-        filled["controller"] = own
     if trajectory:
-        filled["trajectory"] = OwnPath(shape=trajectory.name)
+        filled["trajectory"] = OwnPath(shape=name_of_own(trajectory.name))
     made = scenario.model_copy(update=filled)
     _check_pose(made.plant.initial_rad or (0.0, 0.0, 0.0), actuator)
     _check_groups(section, actuator)
@@ -128,10 +157,37 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
 
 
 def law_of(scenario: Scenario) -> Law:
-    """Law that a resolved scenario names, for its nominal model."""
+    """Law that a resolved scenario names, for its nominal model.
+
+    Raises
+    ------
+    InputError
+        It is one of the user's, and makes none.
+    """
     section = scenario.controller
-    known = Known(section.period_s, scenario.nominal.delay_s, np.array(scenario.nominal.inertia_kg_m2))
-    return section.build(known)
+    try:
+        law = section.build(_known(scenario))
+    except SpheretwinError:
+        raise
+    except Exception as error:  # whatever a user's code may raise
+        told = without_breaks(error) or "no word of why"
+        raise InputError(
+            f"law {section.law}: expected build(known) to make a Law, received {type(error).__name__}: {told}"
+        ) from error
+    if not isinstance(law, Law):
+        raise InputError(f"law {section.law}: expected build(known) to make a Law, received {shown(law)}")
+    return law
+
+
+def same_known(scenario: Scenario, other: Scenario) -> bool:
+    """Whether a law is told the same of both."""
+    first, second = _known(scenario), _known(other)
+    return first[:2] == second[:2] and np.array_equal(first.inertia, second.inertia)
+
+
+def _known(scenario: Scenario) -> Known:
+    nominal = scenario.nominal
+    return Known(scenario.controller.period_s, nominal.delay_s, np.array(nominal.inertia_kg_m2))
 
 
 def signals_of(scenario: Scenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
@@ -166,7 +222,12 @@ def sensors_of(scenario: Scenario) -> Sensors:
 
 def warnings_of(scenario: Scenario, files: Files) -> list[str]:
     """What a user should know of model and scenario before believing the figures; one line each."""
-    return disagreements(files.actuator) + _overridden(scenario.plant, files.model.described.opt)
+    late = [change for change in planned(scenario) if change.tick >= scenario.ticks]
+    return [
+        *disagreements(files.actuator),
+        *_overridden(scenario.plant, files.model.described.opt),
+        *(f"the event that sets {change.name} is not made: the run ends before" for change in late),
+    ]
 
 
 def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:

@@ -52,8 +52,8 @@ class Machine:
         Resolved.
     files : Files
         Model and torque curves.
-    own_law : Law, optional
-        Runs instead of the law that the scenario names.
+    law : Law
+        In force.
     moving : Moving, optional
         A rotor at work; one that starts as the scenario says unless given.
 
@@ -72,12 +72,10 @@ class Machine:
         The engine does not know all that the model holds, or the law cannot be used.
     """
 
-    def __init__(
-        self, scenario: Scenario, files: Files, own_law: Law | None, moving: Moving | None = None
-    ) -> None:
+    def __init__(self, scenario: Scenario, files: Files, law: Law, moving: Moving | None = None) -> None:
         self._scenario = scenario
         self._moving = moving or _started(scenario, files)
-        self.law = own_law or assembly.law_of(scenario)
+        self.law = law
         self.signals = assembly.signals_of(scenario, files.actuator, self.law)
         self.columns = width(self.signals)
         magnetics = assembly.nominal_magnetics(scenario, files)
@@ -109,22 +107,28 @@ class Machine:
     def changed(self, scenario: Scenario, files: Files, own_law: Law | None) -> Machine:
         """Machine of another scenario that carries on what this one is in the midst of.
 
-        A law that stays, if with other gains, keeps its memory; one of the user's keeps its parameters too,
-        as it may have changed them.
+        A law that stays keeps its memory, and its parameters, which it may have changed. With other gains, or
+        told of another nominal model, it keeps its memory where that is still of the same size.
         """
         same = scenario.plant == self._scenario.plant
         moving = self._moving if same else _carried_on(self._moving, scenario, files)
-        made = Machine(scenario, files, own_law, moving)
+        law = own_law or self._law_for(scenario)
+        made = Machine(scenario, files, law, moving)
         made._plant.current[:] = self._plant.current
         if made.law is self.law:
             made._controller.parameters[:] = self._controller.parameters
-        stays = own_law is None and made.law.step is self.law.step
-        if made.law is self.law or stays:
-            made._controller.memory[:] = self._controller.memory
-        believed = beliefs.state_of(self._controller.belief)
-        if self._controller.belief.asked and len(believed) == len(beliefs.state_of(made._controller.belief)):
-            beliefs.restore(made._controller.belief, believed)
+        memory = made._controller.memory
+        same_kind = own_law is None and type(scenario.controller) is type(self._scenario.controller)
+        if made.law is self.law or (same_kind and len(memory) == len(self._controller.memory)):
+            memory[:] = self._controller.memory
+        beliefs.carried_on(self._controller.belief, made._controller.belief)
         return made
+
+    def _law_for(self, scenario: Scenario) -> Law:
+        """Law that a scenario names: the present one where nothing that it is made from has changed."""
+        before = self._scenario
+        same = before.controller == scenario.controller and assembly.same_known(before, scenario)
+        return self.law if same else assembly.law_of(scenario)
 
     def state(self) -> State:
         """All that it goes on from."""

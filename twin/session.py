@@ -30,7 +30,7 @@ from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.machine import Machine, State
 from spheretwin.twin.scenario.changing import changed, is_fixed
 from spheretwin.twin.scenario.planned import planned
-from spheretwin.twin.scenario.reading import as_plain
+from spheretwin.twin.scenario.reading import as_plain, is_dotted
 from spheretwin.twin.scenario.sections import OwnPath, Scenario
 from spheretwin.twin.trajectories.trajectory import Sampled, checked
 
@@ -44,6 +44,8 @@ class Snapshot:
     own_law: str | None
     files: str
     """Digest of model and torque curves."""
+    law_source: str
+    """Module of the law's parameters; that of a user's file is named after its content."""
     tick: int
     status: Status
     machine: State
@@ -96,6 +98,7 @@ class Session:
         self._closed = False
         self._own_law = law
         self._own_laws = {law.name: law} if law else {}
+        self._seen: dict[str, Signal] = {}
         self._own_trajectory = None if trajectory is None else checked(trajectory)
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
@@ -105,7 +108,9 @@ class Session:
         self.scenario = self.begun_as = assembly.resolved(scenario, self._files, law, self._own_trajectory)
         self._planned = planned(self.begun_as)
         self._exogenous = Exogenous(self.scenario, self._own_trajectory)
-        self._machine = Machine(self.scenario, self._files, law)
+        self._machine = Machine(self.scenario, self._files, law or assembly.law_of(self.scenario))
+        self._seen = self._with(self._machine.signals)
+        self._check_plan()
         self._make_planned()
 
     @property
@@ -194,7 +199,8 @@ class Session:
         name : str
             Dotted, as ``disturbance.load``.
         value : any
-            Checked as a scenario is; for ``controller.law`` also a `Law`.
+            Checked as a scenario is; for ``controller.law`` also a `Law`. A law that stays keeps its memory,
+            also with other gains, unless these make the memory longer or shorter: then it begins anew.
 
         Raises
         ------
@@ -202,6 +208,10 @@ class Session:
             A field that is unknown, fixed for the run, or a value out of range; nothing has changed then.
         """
         with self._alone():
+            if not is_dotted(name):
+                raise InputError(
+                    f"session: expected a field such as disturbance.load, received {shown(name)}"
+                )
             if is_fixed(name):
                 raise InputError(f"session: expected a field that may change during a run, received {name}")
             own = value if isinstance(value, Law) else None
@@ -209,7 +219,7 @@ class Session:
                 raise InputError(f"session: expected a law for controller.law, received one for {name}")
             with self._all_or_nothing():
                 self._change(name, value, own)
-            recorded = _name_of_own(own) if own else _recorded(value)
+            recorded = assembly.name_of_own(own.name) if own else _recorded(value)
             self.journal += (Change(self.tick, name, recorded),)
 
     def snapshot(self) -> Snapshot:
@@ -218,8 +228,9 @@ class Session:
             return Snapshot(
                 self.scenario,
                 self.begun_as,
-                self._own_law.name if self._own_law else None,
+                self._key_of_own(),
                 assembly.digest(self._files),
+                type(self.scenario.controller).__module__,
                 self.tick,
                 self._status,
                 self._machine.state(),
@@ -322,7 +333,10 @@ class Session:
             if change.tick > self.tick or self._status != Status.RUNNING:
                 break
             with self._all_or_nothing():
-                self._change(change.name, change.value, None)
+                try:
+                    self._change(change.name, change.value, None)
+                except InputError as error:
+                    raise InputError(f"{error}, as the event at {self.t_s:g} s sets it") from None
                 self.events += (change,)
 
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> int:
@@ -338,58 +352,103 @@ class Session:
         return ticks
 
     def _change(self, name: str, value: Any, own: Law | None) -> None:
-        before = self._own_law
-        if own:
-            self._own_law, scenario = own, self.scenario
-        else:
+        self._own_law = own or (None if name == "controller.law" else self._own_law)
+        scenario, files = self._next(self.scenario, self._files, name, None if own else value)
+        before = self.scenario.model_copy(
+            update={"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
+        )
+        # What comes from outside is no part of the machine.
+        if before != scenario or files != self._files or self._own_law not in (None, self.law):
+            self._machine = self._machine.changed(scenario, files, self._own_law)
+            self._seen = self._with(self._machine.signals)
+        self.scenario, self._files = scenario, files
+        if own and own not in self._own_laws.values():
+            self._own_laws = {**self._own_laws, self._key_for(own): own}
+        self._exogenous.scenario = scenario  # last: it is altered, and what fails must have changed nothing
+
+    def _next(self, scenario: Scenario, files: Files, name: str, value: Any) -> tuple[Scenario, Files]:
+        """Scenario with one more change, resolved, and its files; without a value the law alone changes."""
+        if value is not None or name != "controller.law":
             if self._own_trajectory and name.split(".")[0] == "trajectory":
                 raise InputError(
                     "session: expected no field of a scenario's trajectory, as"
                     f" {self._own_trajectory.name} is followed instead"
                 )
-            if name == "controller.law":
-                self._own_law = None
-            elif before and name.startswith("controller."):
-                raise InputError(f"session: expected no field of a shipped law, as {before.name} is not one")
-            scenario = changed(self.scenario, name, value)
-        files = self._files_of(scenario)
-        self._apply(assembly.resolved(scenario, files, self._own_law, self._own_trajectory), files)
-        if own:
-            self._own_laws = {**self._own_laws, own.name: own}
+            if self._own_law and name.startswith("controller."):
+                raise InputError(
+                    f"session: expected no field of a shipped law, as {self._own_law.name} is not one"
+                )
+            before, scenario = scenario, changed(scenario, name, value)
+            files = assembly.files_again(files, before, scenario)
+        return assembly.resolved(scenario, files, self._own_law, self._own_trajectory), files
 
-    def _apply(self, scenario: Scenario, files: Files) -> None:
-        """Build anew what a scenario changes; what comes from outside is no part of the machine."""
-        before = self.scenario.model_copy(
-            update={"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
-        )
-        if before != scenario or files is not self._files or self._own_law not in (None, self.law):
-            self._machine = self._machine.changed(scenario, files, self._own_law)
-        self.scenario, self._files = scenario, files
-        self._exogenous.scenario = scenario  # last: it is altered, and what fails must have changed nothing
+    def _check_plan(self) -> None:
+        """Find out before the first tick what an event would only be refused for at its own.
 
-    def _files_of(self, scenario: Scenario) -> Files:
-        """Files of a scenario: those that have been read, where it names no others."""
-        same = assembly.named_files(scenario) == assembly.named_files(self.scenario)
-        return self._files if same else assembly.files_of(scenario)
+        Raises
+        ------
+        InputError
+            An event sets what cannot be set under this law, along this trajectory, with these files.
+        """
+        scenario, files, own, seen = self.scenario, self._files, self._own_law, self._seen
+        try:
+            for change in self._planned:
+                if change.name == "controller.law":
+                    self._own_law = None
+                scenario, files = self._next(scenario, files, change.name, change.value)
+                law = self._own_law or assembly.law_of(scenario)
+                self._seen = self._with(assembly.signals_of(scenario, files.actuator, law))
+        except InputError as error:
+            at_s = change.tick * self.scenario.controller.period_s
+            raise InputError(f"{error}, as the event at {at_s:g} s sets it") from None
+        finally:
+            self._own_law, self._seen = own, seen
+
+    def _with(self, signals: tuple[Signal, ...]) -> dict[str, Signal]:
+        """All signals of the session so far by name: a name means one thing throughout.
+
+        Raises
+        ------
+        InputError
+            One of them has the name of another.
+        """
+        for signal in signals:
+            known = self._seen.get(signal.name, signal)
+            if known != signal:
+                raise InputError(
+                    f"session: expected {signal.name} as it was before, {known.size} numbers of"
+                    f" {known.unit}, {known.meaning}; received {signal.size} of {signal.unit}, {signal.meaning}"
+                )
+        return self._seen | {signal.name: signal for signal in signals}
+
+    def _key_for(self, law: Law) -> str:
+        """Key under which a snapshot knows a law of the user's: its name, told apart from others' of it."""
+        taken = [key for key in self._own_laws if key.split(" #")[0] == law.name]
+        return law.name if not taken else f"{law.name} #{len(taken) + 1}"
+
+    def _key_of_own(self) -> str | None:
+        return next((key for key, law in self._own_laws.items() if law is self._own_law), None)
 
     def _restore(self, snapshot: Snapshot) -> None:
-        files = self._files_of(snapshot.scenario)
+        files = assembly.files_again(self._files, self.scenario, snapshot.scenario)
+        if type(snapshot.scenario.controller).__module__ != snapshot.law_source:
+            raise InputError(
+                f"session: expected {snapshot.scenario.controller.law} as it was when the snapshot was taken,"
+                " received a file that was changed since"
+            )
         if assembly.digest(files) != snapshot.files:
             raise InputError(
                 "session: expected a snapshot of the same model and torque curves, received one of others"
             )
-        self._machine = Machine(snapshot.scenario, files, self._own_law)
+        law = self._own_law or assembly.law_of(snapshot.scenario)
+        self._machine = Machine(snapshot.scenario, files, law)
+        self._seen = self._with(self._machine.signals)
         self._machine.restore(snapshot.machine)
         self._files, self.scenario, self.begun_as = files, snapshot.scenario, snapshot.begun_as
         self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
         self.events, self._planned = snapshot.events, planned(snapshot.begun_as)
         self._exogenous = Exogenous(self.scenario, self._own_trajectory)
         self._exogenous.restore(snapshot.exogenous)
-
-
-def _name_of_own(law: Law) -> str:
-    """Name of a user's law in the journal, where it must not be taken for a shipped one."""
-    return f"{law.name} of the user's" if law.name in LAWS else law.name
 
 
 def _recorded(value: Any) -> Any:

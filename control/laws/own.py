@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from pydantic import Field, create_model
@@ -32,12 +31,19 @@ def parameters_of(reference: str) -> type[LawParameters]:
     InputError
         The file cannot be run, or the name is none of a law.
     """
-    return _named(reference, load_named(reference, "law"))
+    found = load_named(reference, "law")
+    key = reference, id(found)
+    if key not in _CLASSES:
+        _CLASSES[key] = found, _class_of(reference, found)
+    return _CLASSES[key][1]
 
 
-@lru_cache(maxsize=32)
-def _named(reference: str, found: Any) -> type[LawParameters]:
-    """One class for one law: sections of two scenarios can only be equal where their classes are."""
+# One class for one law: sections of two scenarios can only be equal where their classes are. What a class
+# was made of is held, so that nothing else gets its identity.
+_CLASSES: dict[tuple[str, int], tuple[Any, type[LawParameters]]] = {}
+
+
+def _class_of(reference: str, found: Any) -> type[LawParameters]:
     if isinstance(found, type) and issubclass(found, LawParameters):
         base = found
     elif isinstance(found, Law):
@@ -50,7 +56,21 @@ def _named(reference: str, found: Any) -> type[LawParameters]:
             f" received {shown(found)}"
         )
     fields: Any = {"law": (Literal[reference], named(reference))}
-    return create_model(base.__name__, __base__=base, __module__=base.__module__, **fields)
+    made = create_model(base.__name__, __base__=(_FromFile, base), __module__=base.__module__, **fields)
+    return cast("type[LawParameters]", made)
+
+
+class _FromFile(LawParameters):
+    """Parameters of a class that is made for a file, and made anew where they are unpickled."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Class by its file, then what the parameters hold."""
+        return _blank, (self.law,), self.__getstate__()
+
+
+def _blank(reference: str) -> LawParameters:
+    kind = parameters_of(reference)
+    return kind.__new__(kind)
 
 
 def _without_memory(reference: str, step: Callable[..., Any]) -> Law:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import copy
+from dataclasses import replace
 from typing import Any
 
-from pydantic import BaseModel
 from pydantic_core import to_jsonable_python
 
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
 from spheretwin.twin.scenario.fields import Kind, kind_of, section_kind
 from spheretwin.twin.scenario.own_law import scenario_with
-from spheretwin.twin.scenario.reading import beside, override, validated
-from spheretwin.twin.scenario.sections import OwnController, OwnPath, Scenario
+from spheretwin.twin.scenario.reading import beside, is_dotted, override, validated
+from spheretwin.twin.scenario.sections import OwnController, Scenario
 
 # What a run is begun with cannot be changed on its way.
 FIXED = (
@@ -29,38 +31,73 @@ FIXED = (
     "plant.initial_rad_s",
 )
 
-FROM_FILES = ("trajectory", "disturbance")
-"""Sections whose files are read when they are made."""
 
-
-def changed(scenario: Scenario, dotted: str, value: Any) -> Scenario:
+def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = None) -> Scenario:
     """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
 
     Another member of a family, as another law, keeps the fields that it has too; its own have their defaults.
     What files of trajectories and disturbances held stays, unless it is they that are changed.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    dotted : str
+        Name of the field.
+    value : any
+        As JSON has it.
+    source : str, optional
+        Where the scenario comes from, for complaints; its name unless given.
 
     Raises
     ------
     InputError
         A field that is unknown, of the wrong type or out of range.
     """
+    if not is_dotted(dotted):
+        raise InputError(f"scenario: expected a field such as controller.law, received {shown(dotted)}")
+    value = copy.deepcopy(value)
     fields = scenario.model_dump(mode="json")
     if isinstance(scenario.controller, OwnController):
         fields["controller"] = {"law": next(iter(LAWS)), "period_s": scenario.controller.period_s}
+    untouched = _set_aside(fields, dotted)
     # A user's law stays the one that was read, whatever has become of its file.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
-    if isinstance(scenario.trajectory, OwnPath):
-        fields["trajectory"] = {"shape": "hold"}
     _keep_common(fields, dotted, value, kind)
     override(fields, dotted, value)
-    made = validated(beside("", fields), scenario.name, None if dotted == "controller" else kind)
-    update = {name: _kept(getattr(scenario, name), getattr(made, name)) for name in FROM_FILES}
-    return made.model_copy(update=update)
+    chosen = None if dotted == "controller" else kind
+    made = validated(beside("", fields), source or scenario.name, chosen)
+    if "trajectory" in untouched:
+        made = made.model_copy(update={"trajectory": scenario.trajectory})
+    else:
+        kept = _kept(scenario.trajectory, made.trajectory, "trajectory", dotted)
+        made = made.model_copy(update={"trajectory": kept})
+    if "terms" in untouched:
+        terms = scenario.disturbance.terms
+    else:
+        terms = _kept(scenario.disturbance.terms, made.disturbance.terms, "disturbance.terms", dotted)
+    return made.model_copy(update={"disturbance": made.disturbance.model_copy(update={"terms": terms})})
+
+
+def _set_aside(fields: dict[str, Any], dotted: str) -> set[str]:
+    """Take out of the fields what holds files and is not changed: it is not to be read again."""
+    untouched = set()
+    if not _leads_into(dotted, "trajectory"):
+        fields["trajectory"] = {"shape": "hold"}
+        untouched.add("trajectory")
+    if not _leads_into(dotted, "disturbance.terms"):
+        fields["disturbance"]["terms"] = []
+        untouched.add("terms")
+    return untouched
+
+
+def _leads_into(dotted: str, section: str) -> bool:
+    """Whether one of two names is that of a part of the other."""
+    return f"{dotted}.".startswith(f"{section}.") or f"{section}.".startswith(f"{dotted}.")
 
 
 def is_fixed(dotted: str) -> bool:
-    """Whether a name is that of a fixed field, or of a section that holds one."""
-    return any(f"{field}.".startswith(f"{dotted}.") for field in FIXED)
+    """Whether a name is that of a fixed field, of a part of one, or of a section that holds one."""
+    return any(_leads_into(dotted, field) for field in FIXED)
 
 
 def check_events(scenario: Scenario, source: str) -> Scenario:
@@ -80,37 +117,44 @@ def check_events(scenario: Scenario, source: str) -> Scenario:
                 f" received {event.set}"
             )
         try:
-            after = changed(after, event.set, event.value)
+            after = changed(after, event.set, event.value, source)
         except InputError as error:
             raise InputError(f"{error}, as event.{place} sets it") from None
     return scenario
 
 
-def _kept(before: Any, after: Any) -> Any:
+def _kept(before: Any, after: Any, path: str, dotted: str) -> Any:
     """What comes after, with all that says the same as before left as it is: read when the run began."""
-    if to_jsonable_python(before) == to_jsonable_python(after):
+    if f"{path}.".startswith(f"{dotted}."):
+        return after  # it is this that is set, if to what it says already
+    within = dotted.startswith(f"{path}.")
+    if not within and to_jsonable_python(before) == to_jsonable_python(after):
         return before
-    if isinstance(after, BaseModel) and type(before) is type(after):
-        names = type(after).model_fields
-        return after.model_copy(
-            update={name: _kept(getattr(before, name), getattr(after, name)) for name in names}
-        )
     if isinstance(before, tuple) and isinstance(after, tuple):
-        return tuple(map(_kept, before, after)) + after[len(before) :]
+        pairs = enumerate(zip(before, after, strict=False))
+        return tuple(_kept(*pair, f"{path}.{i}", dotted) for i, pair in pairs) + after[len(before) :]
     return after
 
 
 def _keep_common(fields: dict[str, Any], dotted: str, value: Any, scenario: type[Scenario]) -> None:
     """Where a family's member is exchanged, drop what the new one does not have."""
-    *sections, name = dotted.split(".") if isinstance(dotted, str) else [""]
+    *sections, name = dotted.split(".")
     kind: Kind | None = section_kind(scenario)
     inside: Any = fields
     for section in sections:
-        if kind is None or not isinstance(inside, dict) or section not in inside:
+        if kind is None:
             return
-        member = kind.chosen(inside)[0]
-        inside = inside[section]
-        kind = kind_of(member.model_fields[section]) if section in member.model_fields else None
+        if isinstance(inside, list):
+            if not section.isdecimal() or int(section) >= len(inside):
+                return
+            inside, kind = inside[int(section)], replace(kind, is_list=False)
+            continue
+        member = kind.chosen(inside)[0] if isinstance(inside, dict) and section in inside else None
+        if member is None or section not in member.model_fields:
+            return
+        inside, kind = inside[section], kind_of(member.model_fields[section])
     if kind and kind.told_apart_by == name and isinstance(value, str) and value in kind.members:
-        for field in [each for each in inside if each not in kind.members[value].model_fields]:
-            del inside[field]
+        old, new = kind.chosen(inside)[0].model_fields, kind.members[value].model_fields
+        for field in list(inside):
+            if field not in new or (field != name and new[field].annotation != old[field].annotation):
+                del inside[field]

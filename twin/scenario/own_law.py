@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Any, get_args
 
@@ -33,13 +32,14 @@ def _extended(own: type[LawParameters]) -> type[Scenario]:
     class Extended(Scenario):
         controller: SerializeAsAny[laws] = Scenario.model_fields["controller"].default
 
-        def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-            """A class made for a file is made anew where it is unpickled."""
-            return _again, (own.model_fields["law"].default, self.model_dump_json())
+        def __reduce__(self) -> tuple[Any, ...]:
+            """A class made for a file is made anew where it is unpickled; what the scenario holds stays."""
+            return _blank, (own.model_fields["law"].default,), self.__getstate__()
 
     Extended.__name__ = Extended.__qualname__ = Scenario.__name__
     return Extended
 
 
-def _again(law: str, fields: str) -> Scenario:
-    return scenario_with(law).model_validate_json(fields)
+def _blank(law: str) -> Scenario:
+    kind = scenario_with(law)
+    return kind.__new__(kind)
