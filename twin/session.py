@@ -45,7 +45,7 @@ class Snapshot:
     files: str
     """Digest of model and torque curves."""
     law_source: str
-    """Module of the law's parameters; that of a user's file is named after its content."""
+    """Digest of the file that the law is from, if it is one of the user's."""
     tick: int
     status: Status
     machine: State
@@ -230,7 +230,7 @@ class Session:
                 self.begun_as,
                 self._key_of_own(),
                 assembly.digest(self._files),
-                type(self.scenario.controller).__module__,
+                self.scenario.controller.source,
                 self.tick,
                 self._status,
                 self._machine.state(),
@@ -416,8 +416,9 @@ class Session:
             known = self._seen.get(signal.name, signal)
             if known != signal:
                 raise InputError(
-                    f"session: expected {signal.name} as it was before, {known.size} numbers of"
-                    f" {known.unit}, {known.meaning}; received {signal.size} of {signal.unit}, {signal.meaning}"
+                    f"session: expected the signal {signal.name} as it was before,"
+                    f" {known.size} in {known.unit} ({known.meaning}),"
+                    f" received {signal.size} in {signal.unit} ({signal.meaning})"
                 )
         return self._seen | {signal.name: signal for signal in signals}
 
@@ -431,7 +432,7 @@ class Session:
 
     def _restore(self, snapshot: Snapshot) -> None:
         files = assembly.files_again(self._files, self.scenario, snapshot.scenario)
-        if type(snapshot.scenario.controller).__module__ != snapshot.law_source:
+        if snapshot.scenario.controller.source != snapshot.law_source:
             raise InputError(
                 f"session: expected {snapshot.scenario.controller.law} as it was when the snapshot was taken,"
                 " received a file that was changed since"

@@ -12,7 +12,7 @@ from pydantic import Field, create_model
 from spheretwin.control.law import Known, Law
 from spheretwin.control.parts.parameters import LawParameters, named
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.user_code import load_named
+from spheretwin.models.base.user_code import load_with_digest
 from spheretwin.models.base.wording import shown
 
 
@@ -31,10 +31,10 @@ def parameters_of(reference: str) -> type[LawParameters]:
     InputError
         The file cannot be run, or the name is none of a law.
     """
-    found = load_named(reference, "law")
+    found, digest = load_with_digest(reference, "law")
     key = reference, id(found)
     if key not in _CLASSES:
-        _CLASSES[key] = found, _class_of(reference, found)
+        _CLASSES[key] = found, _class_of(reference, found, digest)
     return _CLASSES[key][1]
 
 
@@ -43,7 +43,7 @@ def parameters_of(reference: str) -> type[LawParameters]:
 _CLASSES: dict[tuple[str, int], tuple[Any, type[LawParameters]]] = {}
 
 
-def _class_of(reference: str, found: Any) -> type[LawParameters]:
+def _class_of(reference: str, found: Any, digest: str) -> type[LawParameters]:
     if isinstance(found, type) and issubclass(found, LawParameters):
         base = found
     elif isinstance(found, Law):
@@ -57,6 +57,7 @@ def _class_of(reference: str, found: Any) -> type[LawParameters]:
         )
     fields: Any = {"law": (Literal[reference], named(reference))}
     made = create_model(base.__name__, __base__=(_FromFile, base), __module__=base.__module__, **fields)
+    made.source = digest
     return cast("type[LawParameters]", made)
 
 

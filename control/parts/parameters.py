@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,9 @@ class LawParameters(BaseModel):
     A subclass makes the law in `build`, and a shipped one names itself in `law`. That is all that a law is,
     here or in a file of its user's.
     """
+
+    source: ClassVar[str] = ""
+    """Digest of the file of one of the user's."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 

@@ -44,7 +44,18 @@ def load_function(reference: str, what: str) -> Callable[..., Any]:
 
 
 def load_named(reference: str, what: str) -> Any:
-    """Object that a reference names.
+    """Object that a reference names, as `load_with_digest` finds it.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    return load_with_digest(reference, what)[0]
+
+
+def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
+    """Object that a reference names, and a digest of the file that it was found in.
 
     Parameters
     ----------
@@ -67,23 +78,23 @@ def load_named(reference: str, what: str) -> Any:
         source = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
         raise InputError(f"{what}: expected a readable file of Python, {error}") from None
-    defined = vars(_module(path, source, what))
+    digest = hashlib.sha256(source).hexdigest()
+    defined = vars(_module(path, source, digest, what))
     if name not in defined:
         known = [key for key, value in defined.items() if callable(value) and not key.startswith("__")]
         expected = f"one of {', '.join(known)}" if known else "a function"
         raise InputError(f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, known)}")
-    return defined[name]
+    return defined[name], digest
 
 
 @lru_cache(maxsize=32)
-def _module(path: Path, source: bytes, what: str) -> ModuleType:
+def _module(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
     """Module of a file, run once as long as its content stays the same.
 
     Compiled from that content: the import system would take an older `.pyc` for a file that was edited
     within the second, and leave a folder beside it.
     """
-    digest = hashlib.sha256(source).hexdigest()[:12]
-    module = ModuleType(f"spheretwin_user_{path.stem}_{digest}")
+    module = ModuleType(f"spheretwin_user_{path.stem}_{digest[:12]}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses and pickles look their module up by its name
     try:

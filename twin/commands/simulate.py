@@ -15,6 +15,7 @@ import numpy as np
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
@@ -84,7 +85,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
         files = Outputs(session, options.record, options.telemetry, options.live)
         try:
-            with progress, timers_stopped():
+            with progress, timers_stopped(), _code_of_the_user(session, options.json):
                 status = follow(
                     session,
                     plan.ticks,
@@ -142,6 +143,24 @@ def _report_files(files: Outputs, faults: Sequence[SpheretwinError], as_json: bo
         tables.print_files(files.record, files.telemetry)
     for fault in faults:
         print(f"spheretwin: {fault}", file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
+    """Tell on one line what a plain law of the user's raises; keep what it prints away from the JSON."""
+    try:
+        with contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext():
+            yield
+    except SpheretwinError:
+        raise
+    except Exception as error:
+        if session.law.step.__module__.startswith("spheretwin."):
+            raise
+        told = without_breaks(error) or "no word of why"
+        raise SpheretwinError(
+            f"law {session.law.name}: expected a torque at {session.t_s:g} s,"
+            f" received {type(error).__name__}: {told}"
+        ) from error
 
 
 @contextlib.contextmanager

@@ -33,7 +33,11 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     fields = read(source)
     for dotted, value in (overrides or {}).items():
         override(fields, dotted, value)
-    return check_events(validated(beside("", fields), source), source)
+    try:
+        taken = beside("", fields)
+    except RecursionError:
+        raise InputError(f"scenario {source}: expected values of less depth") from None
+    return check_events(validated(taken, source), source)
 
 
 def from_record(fields: Mapping[str, Any], source: str) -> Scenario:

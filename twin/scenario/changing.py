@@ -6,6 +6,7 @@ import copy
 from dataclasses import replace
 from typing import Any
 
+from pydantic import BaseModel
 from pydantic_core import to_jsonable_python
 
 from spheretwin.control.laws.registry import LAWS
@@ -62,7 +63,7 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
     untouched = _set_aside(fields, dotted)
     # A user's law stays the one that was read, whatever has become of its file.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
-    _keep_common(fields, dotted, value, kind)
+    _keep_common(fields, dotted, value, kind, scenario)
     override(fields, dotted, value)
     chosen = None if dotted == "controller" else kind
     made = validated(beside("", fields), source or scenario.name, chosen)
@@ -136,25 +137,30 @@ def _kept(before: Any, after: Any, path: str, dotted: str) -> Any:
     return after
 
 
-def _keep_common(fields: dict[str, Any], dotted: str, value: Any, scenario: type[Scenario]) -> None:
-    """Where a family's member is exchanged, drop what the new one does not have."""
+def _keep_common(
+    fields: dict[str, Any], dotted: str, value: Any, kind_after: type[Scenario], before: Scenario
+) -> None:
+    """Where a family's member is exchanged, drop what the new one does not have, or has of another kind."""
     *sections, name = dotted.split(".")
-    kind: Kind | None = section_kind(scenario)
+    kind: Kind | None = section_kind(kind_after)
     inside: Any = fields
+    present: Any = before
     for section in sections:
         if kind is None:
             return
         if isinstance(inside, list):
             if not section.isdecimal() or int(section) >= len(inside):
                 return
-            inside, kind = inside[int(section)], replace(kind, is_list=False)
+            inside, present, kind = inside[int(section)], present[int(section)], replace(kind, is_list=False)
             continue
-        member = kind.chosen(inside)[0] if isinstance(inside, dict) and section in inside else None
-        if member is None or section not in member.model_fields:
+        field = type(present).model_fields.get(section) if isinstance(present, BaseModel) else None
+        if field is None or section not in inside:
             return
-        inside, kind = inside[section], kind_of(member.model_fields[section])
+        owner = kind.chosen(inside)[0].model_fields.get(section, field)
+        inside, present, kind = inside[section], getattr(present, section), kind_of(owner)
     if kind and kind.told_apart_by == name and isinstance(value, str) and value in kind.members:
-        old, new = kind.chosen(inside)[0].model_fields, kind.members[value].model_fields
-        for field in list(inside):
-            if field not in new or (field != name and new[field].annotation != old[field].annotation):
-                del inside[field]
+        old, new = type(present).model_fields, kind.members[value].model_fields
+        for each in list(inside):
+            same = each in new and each in old and new[each].annotation == old[each].annotation
+            if each != name and not same:
+                del inside[each]

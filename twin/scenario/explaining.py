@@ -40,7 +40,14 @@ def _untold(kind: Kind, tag: Any) -> str:
     """Complaint about a member that its family does not have."""
     near = did_you_mean(str(tag), kind.members)
     received = "none" if tag is None else shown(tag)
-    return f"{kind.told_apart_by}: expected one of {', '.join(kind.members)}, received {received}{near}"
+    own = " or FILE.py:NAME" if _may_be_own(kind) else ""
+    return f"{kind.told_apart_by}: expected one of {', '.join(kind.members)}{own}, received {received}{near}"
+
+
+def _may_be_own(kind: Kind) -> bool:
+    member = next(iter(kind.members.values()))
+    extra = member.model_fields[kind.told_apart_by or ""].json_schema_extra
+    return isinstance(extra, dict) and extra.get("path") == "code"
 
 
 def _unknown(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
@@ -56,7 +63,20 @@ def _unknown(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
         if INDEX not in dotted and not (here and dotted.startswith(here))
     )
     elsewhere = next((f"; did you mean {d}?" for d in everywhere if d.endswith(f".{name}")), "")
+    other = _field_of_another(path, scenario)
     return (
         f"expected one of {', '.join(valid)} in {place.dotted or 'the scenario'},"
-        f" received {name}{did_you_mean(str(name), valid) or elsewhere}"
+        f" received {name}{other or did_you_mean(str(name), valid) or elsewhere}"
     )
+
+
+def _field_of_another(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
+    """What is amiss where a field is that of another member of its family: a flag may have chosen this."""
+    if len(path) < 3:
+        return ""
+    *above, tag, name = path
+    family = place_of(scenario, tuple(above)).kind
+    if family is None or family.is_list or tag not in family.members:
+        return ""
+    owners = [each for each, member in family.members.items() if name in member.model_fields]
+    return f", a field of {family.told_apart_by} {' and '.join(owners)}, not of {tag}" if owners else ""

@@ -9,7 +9,9 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.user_code import is_reference
 from spheretwin.twin.scenario.fields import INDEX, every_field, fields_of, kind_of
+from spheretwin.twin.scenario.own_law import scenario_with
 from spheretwin.twin.scenario.sections import Scenario
 
 
@@ -25,11 +27,14 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
         A token is no flag, or a flag has no value.
     """
     found: dict[str, Any] = {}
-    for flag, values in _grouped(tokens):
+    groups = _grouped(tokens)
+    law = next((values[0] for flag, values in groups if flag == "controller.law" and values), None)
+    texts = _text_fields(scenario_with(law)) if is_reference(law) else _TEXT_FIELDS
+    for flag, values in groups:
         if not values:
             raise InputError(f"command line: expected a value after --{flag}, received none")
         name = flag.replace("-", "_")
-        read = [_value(name, text) for text in values]
+        read = [text if _anywhere(name) in texts else _value(text) for text in values]
         found[name] = read[0] if len(read) == 1 else read
     return found
 
@@ -60,6 +65,8 @@ def _shown(value: Any) -> str:
     if isinstance(value, tuple):
         nested = any(isinstance(each, tuple) for each in value)
         return json.dumps(value) if nested else " ".join(map(_shown, value))
+    if isinstance(value, dict | list | bool):
+        return json.dumps(value, ensure_ascii=False)
     if isinstance(value, float):
         return f"{value:g}"
     return "" if value is None else str(value)
@@ -78,9 +85,7 @@ def _grouped(tokens: Sequence[str]) -> list[tuple[str, list[str]]]:
     return groups
 
 
-def _value(name: str, text: str) -> Any:
-    if _anywhere(name) in _TEXT_FIELDS:
-        return text
+def _value(text: str) -> Any:
     for read in (json.loads, float):
         try:
             value = read(text)

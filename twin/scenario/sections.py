@@ -24,6 +24,9 @@ LEAST_SCALE = 1e-3
 # A tick must end before its user does: 10,000 physics steps take some 50 ms.
 MOST_SUBSTEPS = 10_000
 
+# Commands on their way are kept, and moved on at every tick.
+MOST_DELAY = 1000
+
 # Clock times are built from decimal fractions; a period and a step that fit do so to rounding only.
 WHOLE = 1e-9
 
@@ -180,6 +183,11 @@ class Scenario(_Section):
             raise ValueError(
                 f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
                 f" received {self.controller.period_s!r} and {self.plant.step_s!r} s"
+            )
+        if self.nominal.delay_s > MOST_DELAY * self.controller.period_s:
+            raise ValueError(
+                f"expected nominal.delay_s of at most {MOST_DELAY} control periods,"
+                f" received {self.nominal.delay_s!r} s"
             )
         if self.ticks < 1:
             raise ValueError(

@@ -23,7 +23,7 @@ TRAIL_S = 2.0
 
 def entity(signal: str) -> str:
     """Entity that holds a signal, at the full rate of the control ticks."""
-    return f"{TELEMETRY}/{signal}"
+    return f"{TELEMETRY}/{rr.escape_entity_path_part(signal)}"
 
 
 def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:

@@ -1,0 +1,400 @@
+"""What a session goes on from when something is changed: laws, beliefs, files, plans and names."""
+
+import os
+import pickle
+
+import numpy as np
+import pytest
+
+from spheretwin.control.law import Law
+from spheretwin.models.actuator import TORQUE_CURVE_PATH
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.twin import cli
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario import flags
+from spheretwin.twin.session import Session
+
+LAWS = '''
+import numba
+import numpy as np
+from pydantic import Field
+
+from spheretwin.control.law import Law
+from spheretwin.control.parts.parameters import LawParameters
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+
+SEEN = (Signal("seen", "N·m", 3, "third row", ANGLES),)
+
+
+class Pid(LawParameters):
+    """Its step is made anew by every build."""
+
+    integral: float = Field(0.5, description="gain of the integral, N·m/s")
+    mode: str = Field("plain", description="a text")
+
+    def build(self, known):
+        ki, period = self.integral, known.period_s
+
+        @numba.njit
+        def step(t, reference, measurement, parameters, state, torque):
+            parameters[0] += 1.0
+            for i in range(3):
+                error = measurement[0, i] - reference[0, i]
+                state[i] += error * period
+                torque[i] = -0.5 * error - 0.03 * measurement[1, i] - ki * state[i]
+
+        return Law("pid", step, [0.0], np.zeros(3), (Signal("integral", "rad·s", 3, "of the error", ANGLES),))
+
+
+class Sized(LawParameters):
+    order: int = Field(3, ge=3, description="numbers it remembers")
+
+    def build(self, known):
+        return Law("sized", see, [], np.zeros(self.order), SEEN)
+
+
+@numba.njit
+def see(t, reference, measurement, parameters, state, torque):
+    for i in range(3):
+        state[i] = measurement[2, i] if measurement[2, i] == measurement[2, i] else -7.0
+        torque[i] = -0.5 * (measurement[0, i] - reference[0, i]) - 0.03 * measurement[1, i]
+
+
+asks = Law("asks", see, [], np.zeros(3), SEEN, True)
+silent = Law("silent", see, [], np.zeros(3), SEEN)
+clash = Law("clash", see, [], np.zeros(3), (Signal("seen", "1", 1, "something else"),))
+gains = [1.0, 2.0]
+
+
+class Broken(LawParameters):
+    def build(self, known):
+        return 1 / 0
+
+
+class Lazy(LawParameters):
+    pass
+
+
+class Other(LawParameters):
+    level: float = Field(1.0, description="a number under a name that others have for a text")
+
+    def build(self, known):
+        return silent
+'''
+
+
+@pytest.fixture
+def file(tmp_path):
+    (path := tmp_path / "laws.py").write_text(LAWS)
+    return path
+
+
+def hold(**changes):
+    return scenarios.load("hold", {"duration": 0.2, **changes})
+
+
+@pytest.mark.parametrize(
+    "change",
+    [("plant.coulomb_Nm", [0.0, 0.0, 1e-9]), ("disturbance.load", 1.0), ("allocation", "bounded")],
+    ids=lambda each: each[0],
+)
+def test_a_law_whose_step_is_made_by_its_build_goes_on_through_other_changes(file, change):
+    with Session(hold(**{"controller.law": f"{file}:Pid"})) as session:
+        before = session.advance(50)["integral"][-1]
+        session.set(*change)
+        after = session.advance(1)["integral"][0]
+        # One more tick of an error of at most 0.3 rad over 1 ms.
+        np.testing.assert_allclose(after, before, rtol=0, atol=3.1e-4)
+        assert session.snapshot().machine.parameters[0] == 51.0  # what it made of its parameters stays
+
+
+def test_with_other_gains_it_keeps_its_memory_and_takes_the_gains(file):
+    with Session(hold(**{"controller.law": f"{file}:Pid"})) as session:
+        before = session.advance(50)["integral"][-1]
+        session.set("controller.integral", 5.0)
+        np.testing.assert_allclose(session.advance(1)["integral"][0], before, rtol=0, atol=3.1e-4)
+
+
+def test_a_memory_of_another_size_begins_anew(file):
+    with Session(hold(**{"controller.law": f"{file}:Sized"})) as session:
+        session.advance(10)
+        session.set("controller.order", 5)
+        session.advance(10)
+        np.testing.assert_array_equal(session.snapshot().machine.memory[3:], 0.0)
+
+
+def test_who_does_not_ask_is_told_nothing_after_one_who_did(file):
+    with Session(hold(**{"controller.law": f"{file}:asks"})) as session:
+        assert np.all(session.advance(50)["seen"][-1] != -7.0)
+        session.set("controller.law", f"{file}:silent")
+        np.testing.assert_array_equal(session.advance(5)["seen"], -7.0)
+
+
+@pytest.mark.parametrize("delay_s", [5e-4, 1e-3, 2.5e-3])
+def test_a_belief_goes_on_under_another_delay(file, delay_s):
+    with Session(hold(**{"controller.law": f"{file}:asks"})) as session:
+        before = session.advance(100)["seen"][-1]
+        session.set("nominal.delay_s", delay_s)
+        after = session.advance(1)["seen"][0]
+        # From one tick to the next the torque changes by little, as at any other tick.
+        np.testing.assert_allclose(after, before, rtol=0.05, atol=2e-3)
+
+
+def test_events_within_one_tick_are_made_in_the_order_of_their_times():
+    planned = [
+        {"t_s": 0.0108, "set": "disturbance.load", "value": 5.0},
+        {"t_s": 0.0102, "set": "disturbance.load", "value": 1.5},
+    ]
+    with Session(hold(event=planned)) as session:
+        session.advance(20)
+        assert session.scenario.disturbance.load == 5.0
+
+
+def test_an_event_far_off_is_in_force_at_its_tick():
+    event = {"t_s": 3e5, "set": "disturbance.load", "value": 1.0}
+    with Session(hold(event=[event], duration=4e5)) as session:
+        assert session._planned[0].tick == 300_000_000
+
+
+@pytest.mark.parametrize("name", ["event", "event.0", "event.0.t_s", "controller.period_s", "plant"])
+def test_what_is_fixed_is_fixed_with_all_its_parts(name):
+    event = {"t_s": 0.1, "set": "disturbance.load", "value": 1.0}
+    with Session(hold(event=[event])) as session, pytest.raises(InputError, match="may change during a run"):
+        session.set(name, 0.05)
+
+
+@pytest.mark.parametrize("name", [3, None, "", "a..b", "0.a"])
+def test_a_name_that_is_none_is_refused_under_any_law(name):
+    own = Law("own", lambda *_: None, [], [])
+    with Session(hold(), own) as session, pytest.raises(InputError, match="expected a field such as"):
+        session.set(name, 1.0)
+
+
+def test_files_that_stay_are_not_read_again(tmp_path):
+    (true := tmp_path / "true.csv").write_bytes(TORQUE_CURVE_PATH.read_bytes())
+    (nominal := tmp_path / "nominal.csv").write_bytes(TORQUE_CURVE_PATH.read_bytes())
+    with Session(hold(**{"plant.torque_curve": str(true)})) as session:
+        true.write_text(
+            "phi_deg,torque_Nm_per_A\n" + "\n".join(f"{a},{0.1 * (0 < a < 180)}" for a in range(181))
+        )
+        session.set("nominal.torque_curve", str(nominal))
+        with Session(hold(**{"nominal.torque_curve": str(nominal)})) as other:
+            assert session.actuator.torque_curve.peak_Nm_per_A == other.actuator.torque_curve.peak_Nm_per_A
+
+
+def test_one_name_means_one_signal_throughout(file):
+    with Session(hold(**{"controller.law": f"{file}:asks"})) as session:
+        session.advance(10)
+        with pytest.raises(InputError, match="expected the signal seen as it was before"):
+            session.set("controller.law", f"{file}:clash")
+        assert session.scenario.controller.law == f"{file}:asks"
+    planned = [{"t_s": 0.1, "set": "controller.law", "value": f"{file}:clash"}]
+    with pytest.raises(InputError, match=r"signal seen .*, as the event at 0\.1 s sets it"):
+        Session(hold(**{"controller.law": f"{file}:asks", "event": planned}))
+
+
+def test_two_laws_of_one_name_are_two_to_a_snapshot():
+    def law(torque_Nm):
+        def step(t, reference, measurement, parameters, state, torque):
+            torque[:] = torque_Nm
+
+        return Law("mine", step, [], [])
+
+    with Session(hold(), law(1e-3)) as session:
+        session.advance(3)
+        kept = session.snapshot()
+        session.set("controller.law", law(2e-3))
+        second = session.snapshot()
+        session.restore(kept)
+        np.testing.assert_array_equal(session.advance(1)["torque_command_Nm"], 1e-3)
+        session.restore(second)
+        np.testing.assert_array_equal(session.advance(1)["torque_command_Nm"], 2e-3)
+
+
+def test_a_snapshot_knows_a_law_of_a_file_by_what_the_file_held(file):
+    with Session(hold(**{"controller.law": f"{file}:asks"})) as session:
+        session.advance(3)
+        taken = pickle.dumps(session.snapshot())
+        file.write_text(LAWS.replace("-0.5 *", "-0.6 *"))
+        with pytest.raises(InputError, match="as it was when the snapshot was taken"):
+            session.restore(pickle.loads(taken))
+
+
+def test_a_trajectory_of_the_user_s_is_not_taken_for_a_shape():
+    class hold_:
+        def sample(self, t):
+            return np.zeros((len(t), 3, 3))
+
+    hold_.__name__ = "hold"
+    with Session(hold(), trajectory=hold_()) as session:
+        assert session.begun_as.trajectory.shape == "hold of the user's"
+    named = Law("pd", lambda *_: None, [], [])
+    with Session(hold(), named) as session:
+        assert session.begun_as.controller.law == "pd of the user's"
+
+
+POSES = "t_s,alpha_rad,beta_rad,gamma_rad\n0,0,0,0\n0.1,0.1,0,0\n"
+TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0,0.01,0,0\n1,0.02,0,0\n"
+TABLES = (
+    'duration = 0.2\n[trajectory]\nshape = "waypoints"\nfile = "poses.csv"\n'
+    '[[disturbance.terms]]\nkind = "table"\nfile = "torques.csv"\n'
+)
+
+
+@pytest.fixture
+def tables(tmp_path):
+    (tmp_path / "poses.csv").write_text(POSES)
+    (tmp_path / "torques.csv").write_text(TORQUES)
+    (path := tmp_path / "tables.toml").write_text(TABLES)
+    return path
+
+
+def test_tables_that_are_gone_do_not_hinder_other_changes(tables):
+    with Session(scenarios.load(str(tables))) as kept, Session(scenarios.load(str(tables))) as session:
+        for each in ("poses.csv", "torques.csv"):
+            (tables.parent / each).unlink()
+        for each in (kept, session):
+            each.advance(20)
+        for name, value in (("disturbance.load", 0.0), ("controller.law", "pd"), ("controller.law", "afsm")):
+            session.set(name, value)
+        kept.set("controller.law", "pd")
+        kept.set("controller.law", "afsm")
+        assert session.advance(50).values.tobytes() == kept.advance(50).values.tobytes()
+
+
+def test_a_table_that_is_set_is_read_again(tables):
+    with Session(scenarios.load(str(tables))) as session:
+        (tables.parent / "torques.csv").write_text(TORQUES.replace("0.01", "0.03"))
+        session.set("disturbance.load", 0.0)
+        assert session.advance(1)["disturbance_Nm"][0, 0] == 0.01
+        session.set("disturbance.terms.0.file", str(tables.parent / "torques.csv"))
+        # The second tick of a line from 0.03 to 0.02 N·m in 1 s.
+        np.testing.assert_allclose(session.advance(1)["disturbance_Nm"][0, 0], 0.02999, rtol=1e-12)
+
+
+def test_a_pickled_session_needs_its_law_s_file_and_no_table(file, tables, tmp_path, monkeypatch):
+    scenario = scenarios.load(str(tables), {"controller.law": f"{file}:asks"})
+    with Session(scenario) as session:
+        session.advance(10)
+        taken = pickle.dumps((session.snapshot(), session.scenario.controller))
+        ahead = session.advance(10).values.tobytes()
+        (tables.parent / "poses.csv").unlink()
+        (elsewhere := tmp_path / "elsewhere").mkdir()
+        monkeypatch.chdir(elsewhere)
+        snapshot, controller = pickle.loads(taken)
+        assert controller == scenario.controller
+        session.restore(snapshot)
+        assert session.advance(10).values.tobytes() == ahead
+
+
+def test_a_session_under_a_law_of_its_own_beside_one_from_a_file_is_pickled(file):
+    own = Law("own", lambda *_: None, [], [])
+    with Session(hold(**{"controller.law": f"{file}:asks"}), own) as session:
+        assert pickle.loads(pickle.dumps(session.snapshot())).scenario == session.scenario
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [
+        ("gains", "a subclass of LawParameters, a Law, or a function, received [1.0, 2.0]"),
+        ("Broken", "expected build(known) to make a Law, received ZeroDivisionError: division by zero"),
+        ("Lazy", "expected build(known) to make a Law, received NotImplementedError"),
+    ],
+)
+def test_a_law_that_cannot_be_built_is_told_in_one_line(file, capsys, name, part):
+    assert cli.main(["simulate", "hold", "--controller.law", f"{file}:{name}"]) == 2
+    assert part in capsys.readouterr().err
+    with Session(hold()) as session:
+        session.advance(5)
+        with pytest.raises(InputError):
+            session.set("controller.law", f"{file}:{name}")
+        assert session.scenario.controller.law == "afsm"
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        {"set": "plant.group_gain", "value": [1.0, 2.0]},
+        {"set": "nominal.torque_curve", "value": "/nowhere/curve.csv"},
+        {"set": "controller.law", "value": "LAWS:Broken"},
+    ],
+    ids=lambda event: event["set"],
+)
+def test_an_event_that_would_fail_is_found_before_the_first_tick(file, event):
+    value = event["value"].replace("LAWS", str(file)) if isinstance(event["value"], str) else event["value"]
+    planned = [{"t_s": 0.1, **event, "value": value}]
+    with pytest.raises(InputError, match=r"as (the event at 0\.1 s|event\.0) sets it"):
+        Session(hold(event=planned))
+
+
+def test_an_event_after_the_end_is_warned_of():
+    event = {"t_s": 0.2, "set": "disturbance.load", "value": 1.0}
+    with Session(hold(event=[event])) as session:
+        assert session.warnings() == ["the event that sets disturbance.load is not made: the run ends before"]
+
+
+def test_another_member_keeps_what_it_has_of_the_same_kind(file):
+    with Session(hold(**{"controller.surface_slope": 60.0})) as session:
+        session.set("controller.law", "adaptive_fuzzy")
+        assert session.scenario.controller.surface_slope == (60.0, 60.0, 60.0)
+        session.set("controller.law", f"{file}:Other")  # whose level is a number
+        assert session.scenario.controller.level == 1.0
+
+
+def test_a_member_of_a_list_is_exchanged_too():
+    term = {"kind": "constant", "torque_Nm": [0.01, 0.0, 0.0]}
+    with Session(hold(**{"disturbance.terms": [term]})) as session:
+        session.set("disturbance.terms.0.kind", "sinusoidal")
+        assert session.scenario.disturbance.terms[0].kind == "sinusoidal"
+
+
+def test_nothing_of_the_caller_s_is_altered(tables, monkeypatch):
+    monkeypatch.setenv("HOME", str(tables.parent))
+    term = {"kind": "table", "file": "~/torques.csv"}
+    with Session(hold()) as session:
+        session.set("disturbance.terms", [term])
+    assert term["file"] == "~/torques.csv"
+
+
+def test_a_text_of_a_law_from_a_file_may_look_like_a_number(file):
+    tokens = ["--controller.law", f"{file}:Pid", "--controller.mode", "12"]
+    assert scenarios.load("hold", flags.overrides(tokens)).controller.mode == "12"
+
+
+def test_what_a_plain_law_raises_is_told_in_one_line_and_keeps_the_json_alone(tmp_path, capsys):
+    (path := tmp_path / "plain.py").write_text(
+        "def fails(t, reference, measurement, parameters, state, torque):\n"
+        "    print('here')\n    torque[:] = 1 / 0 if t > 0.05 else 0\n"
+    )
+    assert cli.main(["simulate", "hold", "--controller.law", f"{path}:fails", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    told = [line for line in err.splitlines() if line != "here"]
+    assert told == [
+        "spheretwin: law fails: expected a torque at 0 s, received ZeroDivisionError: division by zero"
+    ]
+
+
+def test_a_flag_nested_beyond_measure_is_refused():
+    value = "[" * 900 + "]" * 900
+    with pytest.raises(InputError):
+        scenarios.load(
+            "hold", flags.overrides(f"--event.0.t-s 0 --event.0.set plant --event.0.value {value}".split())
+        )
+
+
+def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):
+    def step(t, reference, measurement, parameters, state, torque):
+        torque[:] = 0.0
+
+    from spheretwin.twin.records.facts import facts_of
+    from spheretwin.viz.recording.recorder import Recorder
+
+    law = Law("odd", step, [], np.zeros(3), (Signal("a b", "1", 3, "odd", ANGLES),))
+    with Session(hold(), law) as session:
+        path = tmp_path / "odd.rrd"
+        with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
+            recorder.write(session.advance(10))
+    assert capfd.readouterr().err == ""
+    assert os.path.getsize(path) > 0
