@@ -57,8 +57,9 @@ def _class_of(reference: str, found: Any, digest: str) -> type[LawParameters]:
         )
     fields: Any = {"law": (Literal[reference], named(reference))}
     made = create_model(base.__name__, __base__=(_FromFile, base), __module__=base.__module__, **fields)
-    made.source = digest
-    return cast("type[LawParameters]", made)
+    kind = cast("type[LawParameters]", made)
+    kind.source = digest
+    return kind
 
 
 class _FromFile(LawParameters):
