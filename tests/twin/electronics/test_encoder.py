@@ -1,0 +1,53 @@
+"""The encoder against its definition: the nearest line of a grid, over any number of turns."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.twin.electronics.encoder import EncoderSection, counted, encoder
+
+COUNTS = st.integers(1, 2**20)
+
+
+def made(counts):
+    return encoder(EncoderSection(counts=counts))
+
+
+@given(st.floats())
+def test_without_counts_the_bits_are_the_same(angle):
+    got = counted(made(0), angle)
+    assert np.float64(got).tobytes() == np.float64(angle).tobytes() or np.isnan(angle) & np.isnan(got)
+
+
+@given(st.floats(-1e4, 1e4), COUNTS)
+def test_the_line_is_the_nearest(angle, counts):
+    line = 2 * np.pi / counts
+    got = counted(made(counts), angle)
+    # Products of the angle round to 2⁻⁵³ of it, three of them.
+    assert abs(got - angle) <= line / 2 + 4e-16 * abs(angle)
+    assert got / line == pytest.approx(round(got / line), rel=1e-15)
+
+
+@given(st.integers(-(10**7), 10**7), st.integers(0, 1999), st.floats(-0.49, 0.49))
+def test_a_count_is_exact_over_ten_million_turns(turns, place, inside):
+    # At 1.3e11 radians of counts the angle itself rounds to 4e-6 of a line.
+    line, count = 2 * np.pi / 2000, turns * 2000 + place
+    assert counted(made(2000), (count + inside) * line) == count * line
+
+
+def test_the_index_is_a_line_and_steps_come_half_way():
+    line = 2 * np.pi / 2000
+    assert np.degrees(line) == pytest.approx(0.18)
+    for turn in range(-3, 4):
+        assert counted(made(2000), 2 * np.pi * turn) == pytest.approx(2 * np.pi * turn, rel=1e-15)
+    for just_below, just_above in ((0.4999, 0.5001), (-0.5001, -0.4999), (1234.4999, 1234.5001)):
+        below, above = counted(made(2000), just_below * line), counted(made(2000), just_above * line)
+        assert above - below == pytest.approx(line, rel=1e-12)  # rounding of 1235 lines
+
+
+def test_none_stays_none_and_the_endless_endless():
+    assert np.isnan(counted(made(2000), np.nan))
+    assert counted(made(2000), np.inf) == np.inf
+    assert counted(made(2000), -1e308) == -np.inf
+    assert counted(made(2000), 5e-324) == 0

@@ -1,0 +1,61 @@
+"""Random rows: normal, independent, and each number a function of seed, tick and column alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import kstest
+
+from spheretwin.twin.disturbances.draws import term_draws
+from spheretwin.twin.electronics.noise import STAGE, noise_rows
+
+SEED, TICKS, WIDTH = 7, 400, 11
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return noise_rows(SEED, 0, TICKS, WIDTH)
+
+
+@given(first=st.integers(0, TICKS - 1), ticks=st.integers(0, 40), width=st.integers(0, WIDTH))
+def test_neither_blocks_nor_further_columns_move_a_bit(whole, first, ticks, width):
+    ticks = min(ticks, TICKS - first)
+    rows = noise_rows(SEED, first, ticks, width)
+    assert rows.shape == (ticks, width)
+    np.testing.assert_array_equal(rows, whole[first : first + ticks, :width])
+
+
+def test_a_number_is_that_of_its_tick_alone(whole):
+    for tick, column in ((0, 0), (3, 1), (250, 6), (399, 10)):
+        block, place = divmod(column, 4)
+        stream = np.random.Philox(np.random.SeedSequence([SEED, STAGE, block])).advance(tick)
+        uniform = np.random.Generator(stream).random(4)
+        pair = place % 2
+        radius = np.sqrt(-2 * np.log(1 - uniform[pair]))
+        turn = (np.cos, np.sin)[place // 2](2 * np.pi * uniform[2 + pair])
+        assert whole[tick, column] == pytest.approx(radius * turn, rel=1e-14)
+
+
+def test_numbers_are_normal_and_independent():
+    rows = noise_rows(1, 0, 50_000, 8)
+    for column in rows.T:
+        assert kstest(column, "norm").pvalue > 1e-3  # one fixed draw of eight: 0.8 % would fall below
+    followed = np.concatenate([rows[1:], rows[:-1], rows[1:] ** 2 - 1], axis=1)
+    related = np.corrcoef(followed.T) - np.eye(24)
+    # 276 coefficients, each 1/√n or, among the squares, as small: five of its deviations.
+    assert np.abs(related).max() < 5 / np.sqrt(50_000)
+    assert np.abs(rows).max() < 8.6
+
+
+def test_streams_are_those_of_the_seed_and_of_nothing_else(whole):
+    assert not np.any(noise_rows(SEED + 1, 0, TICKS, WIDTH) == whole)
+    uniform = np.random.Generator(np.random.Philox(np.random.SeedSequence([SEED, STAGE, 0]))).random(
+        4 * TICKS
+    )
+    for place in range(5):
+        assert not np.isin(term_draws(SEED, 0, TICKS, place), uniform).any()
+
+
+@pytest.mark.parametrize("seed", [0, 2**32, 2**64 + 1, 10**40])
+def test_any_seed_will_do(seed):
+    assert np.isfinite(noise_rows(seed, 10**12, 5, 3)).all()

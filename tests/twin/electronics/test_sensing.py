@@ -1,0 +1,312 @@
+"""The whole way in: ideal bits, a plain copy of the chain, and numbers of every kind at every input."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba.core.runtime import _nrt_python, rtsys
+from scipy.optimize import minimize_scalar
+
+from spheretwin.models.base.compiled import compiled
+from spheretwin.twin import electronics
+from spheretwin.twin.electronics.hardware import PROTOTYPE_SENSORS
+from spheretwin.twin.electronics.noise import noise_rows
+from spheretwin.twin.electronics.sections import SensorsSection
+from spheretwin.twin.electronics.sensing import noise_width, sense, sensing
+from spheretwin.twin.scenario.fields import every_field
+
+NO_NOISE = np.empty(0)
+STAGES = {
+    "potentiometer": {"nonlinearity_rad": 1e-3},
+    "adc": {"bits": 10, "offset_V": 1e-2, "gain_error": 1e-2},
+    "encoder": {"counts": 100},
+}
+
+
+def prototype(**more):
+    """Section with the prototype's values, and others by dotted name over them."""
+    fields = {}
+    for dotted, value in {**PROTOTYPE_SENSORS, **more}.items():
+        _, stage, name = dotted.split(".")
+        fields.setdefault(stage, {})[name] = value
+    return SensorsSection(**fields)
+
+
+def measured(section, seed, q, first=0):
+    """Angles (n, 3) that are handed over at poses q (n, 3) of consecutive ticks."""
+    sensors, noise = sensing(section, seed), noise_rows(seed, first, len(q), noise_width(section))
+    measurement, angles = np.empty((3, 3)), np.empty_like(q)
+    for tick in range(len(q)):
+        assert sense(sensors, q[tick], q[tick], noise[tick], measurement)
+        angles[tick] = measurement[0]
+    return angles
+
+
+def poses(ticks, seed=0):
+    """Within the range of the joints, γ over many turns."""
+    return np.random.default_rng(seed).uniform([-1.4, -1.4, -500], [1.4, 1.4, 500], (ticks, 3))
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        SensorsSection(),
+        SensorsSection(
+            potentiometer={"electrical_angle_rad": 0.1, "supply_V": 12.0},
+            adc={"range_V": 0.01, "oversampling": 10},
+        ),
+    ],
+)
+@given(q=st.tuples(*[st.floats(allow_nan=False)] * 3), qdot=st.tuples(*[st.floats(allow_nan=False)] * 3))
+def test_an_ideal_chain_hands_over_the_very_bits(section, q, qdot):
+    measurement, state = np.full((3, 3), 7.0), np.array([q, qdot])
+    sensors = sensing(section, 0)
+    assert sense(sensors, state[0], state[1], NO_NOISE, measurement) == np.isfinite(state).all()
+    assert measurement[:2].tobytes() == sensors.measured.tobytes() == state.tobytes()
+    np.testing.assert_array_equal(measurement[2], 7.0)  # the torque believed, which is another's
+    assert sensors.ideal
+    assert noise_width(section) == 0
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_touches_its_own_angles_alone(stage):
+    q = poses(100)
+    angles = measured(SensorsSection(**{stage: STAGES[stage]}), 0, q)
+    own = [2] if stage == "encoder" else [0, 1]
+    others = [axis for axis in range(3) if axis not in own]
+    assert angles[:, others].tobytes() == q[:, others].tobytes()
+    assert np.all(np.any(angles[:, own] != q[:, own], axis=0))
+
+
+def test_one_stage_moves_no_draw_of_another():
+    together, alone = sensing(SensorsSection(**STAGES), 3), {}
+    for stage, fields in STAGES.items():
+        alone[stage] = sensing(SensorsSection(**{stage: fields}), 3)
+    for channel in range(2):
+        for got, expected in zip(
+            alone["potentiometer"].potentiometers[channel], together.potentiometers[channel], strict=True
+        ):
+            np.testing.assert_array_equal(got, expected)
+        assert alone["adc"].adcs[channel] == together.adcs[channel]
+    assert np.all(together.potentiometers[0].cosine_rad != together.potentiometers[1].cosine_rad)
+    assert together.adcs[0].offset_V != together.adcs[1].offset_V
+
+
+def test_a_mounting_error_alone_is_added_to_each_angle():
+    offset, q = (0.01, -0.02, 0.03), poses(50)
+    assert (
+        measured(SensorsSection(angle_offset_rad=offset), 0, q).tobytes() == (q + np.array(offset)).tobytes()
+    )
+
+
+def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
+    sensors, measurement = sensing(prototype(), 0), np.zeros((3, 3))
+    rates = np.array([1.0, -2.0, 3.0])
+    sense(sensors, np.array([0.1, 0.2, 0.3]), rates, np.zeros(2), measurement)
+    np.testing.assert_array_equal(measurement[1], rates)
+    np.testing.assert_array_equal(sensors.measured, measurement[:2])
+
+
+def slow_residual(fields, seed, channel, angle):
+    """The residual as its definition reads, its peak found on a grid and searched for further."""
+    order = np.arange(1, 5)
+    phases = np.random.default_rng([seed, 1, channel]).uniform(0, 2 * np.pi, 4)
+
+    def shape(turn):
+        return np.sum(np.cos(np.multiply.outer(turn, order) + phases) / order**2, axis=-1)
+
+    grid = np.linspace(-np.pi, np.pi, 10_000)
+    top = grid[np.argmax(np.abs(shape(grid)))]
+    found = minimize_scalar(
+        lambda turn: -abs(shape(turn)),
+        bounds=(top - 1e-3, top + 1e-3),
+        method="bounded",
+        options={"xatol": 1e-9},
+    )
+    turn = 2 * np.pi * angle / fields.electrical_angle_rad
+    return fields.nonlinearity_rad / -found.fun * shape(turn)
+
+
+def slow_chain(section, seed, q):
+    """The chain of α, β and γ in NumPy, all ticks at once."""
+    track, converter = section.potentiometer, section.adc
+    draws = noise_rows(seed, 0, len(q), 2 * converter.oversampling).reshape(len(q), converter.oversampling, 2)
+    turned = q + np.array(section.angle_offset_rad)
+    angles = np.empty_like(q)
+    slope = track.supply_V / track.electrical_angle_rad
+    noise = np.sqrt((slope * track.noise_rad) ** 2 + converter.noise_V**2)
+    for channel in range(2):
+        end = track.electrical_angle_rad / 2
+        angle = np.clip(turned[:, channel], -end, end)
+        angle = angle + slow_residual(track, seed, channel, angle)
+        volts = np.clip(slope * angle, -track.supply_V / 2, track.supply_V / 2)
+        volts = volts[:, None] + noise * draws[:, :, channel]
+        shares = np.random.default_rng([seed, 2, channel]).uniform(-1, 1, 2)
+        volts = (1 + converter.gain_error * shares[1]) * volts + converter.offset_V * shares[0]
+        if converter.bits:
+            step = 2 * converter.range_V / 2**converter.bits
+            last = 2 ** (converter.bits - 1)
+            volts = np.clip(np.round(volts / step), -last, last - 1) * step
+        angles[:, channel] = volts.mean(axis=1) / slope
+    counts = section.encoder.counts
+    angles[:, 2] = turned[:, 2]
+    if counts:
+        angles[:, 2] = np.round(turned[:, 2] * counts / (2 * np.pi)) * 2 * np.pi / counts
+    return angles
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"sensors.adc.oversampling": 10},
+        {"sensors.potentiometer.nonlinearity_rad": 0.26, "sensors.adc.bits": 8},
+        {"sensors.potentiometer.electrical_angle_rad": 1.5, "sensors.adc.oversampling": 3},
+        {"sensors.adc.bits": 0, "sensors.encoder.counts": 0},
+        {"sensors.potentiometer.noise_rad": 0.0, "sensors.adc.noise_V": 0.0, "sensors.adc.oversampling": 5},
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 123])
+def test_the_chain_is_its_plain_copy(more, seed):
+    section = prototype(**more).model_copy(update={"angle_offset_rad": (0.01, -0.02, 0.03)})
+    q = poses(2000, seed)
+    # Rounding: 1e-16 of 500 rad in γ, and of 2.5 V over 1 V/rad; a code that it flips would be 1e-5 off.
+    np.testing.assert_allclose(measured(section, seed, q), slow_chain(section, seed, q), rtol=0, atol=1e-12)
+
+
+@given(st.lists(st.integers(1, 60), min_size=1, max_size=8))
+def test_the_same_seed_gives_the_same_bytes_at_any_chunks(lengths):
+    section, q = prototype(**{"sensors.adc.oversampling": 3}), poses(sum(lengths))
+    starts = np.cumsum([0, *lengths[:-1]]).tolist()
+    chunks = [
+        measured(section, 5, q[start : start + length], start)
+        for start, length in zip(starts, lengths, strict=True)
+    ]
+    whole = measured(section, 5, q)
+    assert np.concatenate(chunks).tobytes() == whole.tobytes()
+    assert measured(section, 6, q).tobytes() != whole.tobytes()
+
+
+@pytest.mark.parametrize("oversampling", [1, 10])
+def test_the_noise_of_an_angle_is_the_root_of_the_sum_of_squares(oversampling):
+    section, ticks = prototype(**{"sensors.adc.oversampling": oversampling}), 20_000
+    noise = measured(section, 2, np.tile([0.3, -0.4, 0.0], (ticks, 1)))[:, :2].std(axis=0)
+    code = np.radians(300) / 2**16
+    # Wiper, a code of the converter's own, and a twelfth of its square of quantisation; gain adds 1e-3.
+    expected = np.sqrt((np.radians(0.02) ** 2 + code**2 * (1 + 1 / 12)) / oversampling)
+    np.testing.assert_allclose(noise, expected, rtol=4 / np.sqrt(2 * ticks) + 1e-3)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_is_constant_in_the_error_keeps_within_the_stated_bounds(seed):
+    silent = {"sensors.potentiometer.noise_rad": 0.0, "sensors.adc.noise_V": 0.0}
+    q = poses(500, seed)
+    off = measured(prototype(**silent), seed, q) - q
+    volts_per_rad, code = 5 / np.radians(300), np.radians(300) / 2**16
+    bound = np.radians(0.02) * 1.001 + 1e-3 / volts_per_rad + 1e-3 * np.abs(q[:, :2]) + code / 2
+    assert np.all(np.abs(off[:, :2]) <= bound)
+    assert np.all(np.abs(off[:, 2]) <= np.radians(0.09) + 1e-12)
+
+
+ANY = st.floats()
+LARGE = st.floats(-1e300, 1e300)
+BOUND = st.floats(0, 1e3)
+SECTIONS = st.builds(
+    lambda track, converter, counts, offset: SensorsSection(
+        angle_offset_rad=offset, potentiometer=track, adc=converter, encoder={"counts": counts}
+    ),
+    st.fixed_dictionaries(
+        {
+            "electrical_angle_rad": st.floats(0.01, 100),
+            "supply_V": st.floats(1e-3, 1e3),
+            "nonlinearity_rad": st.floats(0, 5.9e-4),
+            "noise_rad": st.floats(0, 1),
+        }
+    ),
+    st.fixed_dictionaries(
+        {
+            "bits": st.integers(0, 32),
+            "range_V": st.floats(1e-3, 1e3),
+            "offset_V": BOUND,
+            "gain_error": st.floats(0, 0.5),
+            "noise_V": BOUND,
+            "oversampling": st.integers(1, 5),
+        }
+    ),
+    st.integers(0, 2**31),
+    st.tuples(*[st.floats(-1e4, 1e4)] * 3),
+)
+
+
+def sensed(section, state, draws):
+    """What is returned, and what is handed over, with draws repeated to the width needed."""
+    measurement = np.zeros((3, 3))
+    noise = np.resize(np.array(draws), noise_width(section))
+    finite = sense(sensing(section, 0), np.array(state[:3]), np.array(state[3:]), noise, measurement)
+    return finite, measurement[:2]
+
+
+@given(SECTIONS, st.tuples(*[LARGE] * 6), st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=4))
+def test_finite_numbers_of_any_size_stay_finite(section, state, draws):
+    # 2³¹ counts a turn of 1e290 rad are the most that fit.
+    state = (*state[:2], state[2] * 1e-10, *state[3:])
+    finite, handed = sensed(section, state, draws)
+    assert finite
+    assert np.isfinite(handed).all()
+
+
+@given(SECTIONS, st.tuples(*[ANY] * 6), st.lists(ANY, min_size=1, max_size=4))
+def test_whatever_goes_in_is_told_where_it_comes_out_as_no_number(section, state, draws):
+    finite, handed = sensed(section, state, draws)
+    assert finite == np.isfinite(handed).all()
+    for axis in range(6):
+        if np.isnan(state[axis]):
+            assert np.isnan(handed.ravel()[axis])
+
+
+@pytest.mark.parametrize("place", range(6))
+def test_no_stage_makes_a_number_of_none(place):
+    state = np.array([0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
+    state[place] = np.nan
+    finite, handed = sensed(prototype(), state, [0.5, -0.5])
+    assert not finite
+    assert np.isnan(handed.ravel()).nonzero()[0].tolist() == [place]
+
+
+def test_a_short_row_of_noise_is_no_number_either():
+    measurement = np.zeros((3, 3))
+    assert not sense(sensing(prototype(), 0), np.zeros(3), np.zeros(3), NO_NOISE, measurement)
+
+
+def test_sensing_allocates_nothing():
+    section = prototype(**{"sensors.adc.oversampling": 4})
+    arguments = (sensing(section, 0), np.zeros(3), np.zeros(3), np.zeros(8), np.zeros((3, 3)))
+    _nrt_python.memsys_enable_stats()
+
+    def allocations(count):
+        before = rtsys.get_allocation_stats().alloc
+        repeated(count, *arguments)
+        return rtsys.get_allocation_stats().alloc - before
+
+    # What is left is the wrapping of the arguments, once a call from Python.
+    assert allocations(1000) == allocations(1)
+
+
+@compiled
+def repeated(count, sensors, q, qdot, noise, measurement):
+    for _ in range(count):
+        sense(sensors, q, qdot, noise, measurement)
+
+
+def test_every_field_has_its_value_and_its_origin():
+    leaves = {
+        name for name, _ in every_field(SensorsSection) if name not in ("potentiometer", "adc", "encoder")
+    }
+    named = {dotted.removeprefix("sensors.") for dotted in PROTOTYPE_SENSORS}
+    assert named == leaves - {"angle_offset_rad"}
+    text = (Path(electronics.__file__).parent / "README.md").read_text(encoding="utf-8")
+    for name in leaves:
+        row = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
+        assert "sheet" in row or "assumed" in row

@@ -1,0 +1,134 @@
+"""The converter of the potentiometers' voltages: held together, quantised, averaged."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field
+
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.twin.trajectories.trajectory import CONFIG
+
+STAGE = 2
+"""Of the generators that draw the errors of this stage: ``default_rng([seed, STAGE, channel])``."""
+
+CONVERSION_s = 4e-6
+"""Of the ADS8364: 20 clocks at 5 MHz, from its sheet."""
+
+# What fits into a control period of 1 ms.
+MOST_CONVERSIONS = 250
+
+
+class AdcSection(BaseModel):
+    """Analogue-to-digital converter of α and β; ideal while bits, offset, gain error and noise are 0.
+
+    All channels are held at the control tick, the encoder's count with them, and what they hold is converted
+    once or several times within the period.
+    """
+
+    model_config = CONFIG
+
+    bits: Annotated[int, Field(ge=0, le=32)] = Field(
+        0, description="resolution; 0 for neither steps nor ends (ADS8364's sheet: 16)"
+    )
+    range_V: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
+        2.5, description="largest input of either sign, V (ADS8364's sheet: ±2.5 V)"
+    )
+    offset_V: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        0.0, description="largest offset; each channel's is drawn from the seed, V (assumed: 1 mV)"
+    )
+    gain_error: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.0, description="largest error of the gain; each channel's is drawn from the seed (assumed: 0.1 %)"
+    )
+    noise_V: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        0.0, description="noise of a conversion at the input, V rms (assumed: 1 LSB, 76 µV)"
+    )
+    oversampling: Annotated[int, Field(ge=1, le=MOST_CONVERSIONS)] = Field(
+        1,
+        description="conversions averaged in a control period, each with noise of its own, of what is held"
+        " (4 µs each by ADS8364's sheet)",
+    )
+
+    @property
+    def ideal(self) -> bool:
+        """Whether the voltage comes out as it goes in."""
+        return self.bits == 0 and self.offset_V == 0 and self.gain_error == 0 and self.noise_V == 0
+
+    @property
+    def step_V(self) -> float:
+        """Voltage of one code; 0 without steps."""
+        return 2 * self.range_V / 2**self.bits if self.bits else 0.0
+
+
+class Adc(NamedTuple):
+    """One channel of the converter, for compiled code."""
+
+    step_V: float  # 0 for none
+    lowest: float  # code
+    highest: float
+    gain: float
+    offset_V: float
+
+
+def adc(section: AdcSection, rng: np.random.Generator) -> Adc:
+    """Channel with an offset and a gain of its own.
+
+    Parameters
+    ----------
+    section : AdcSection
+    rng : Generator
+        Of this channel; two numbers are taken from it, whatever the section says.
+    """
+    offset, gain = rng.uniform(-1, 1, 2)
+    half = 2.0 ** (section.bits - 1)
+    return Adc(
+        section.step_V,
+        -half,
+        half - 1,
+        1 + section.gain_error * float(gain),
+        section.offset_V * float(offset),
+    )
+
+
+@allocation_free
+def converted(
+    adc: Adc, held_V: float, noise_V: float, draws: NDArray[np.float64], first: int, stride: int
+) -> float:
+    """Mean voltage (V) that the codes of some conversions stand for.
+
+    Codes are mid-tread: a step of the staircase has its middle at a whole number of LSB, and 0 V is one. They
+    end at −2ⁿ⁻¹ and 2ⁿ⁻¹ − 1. What is no number stays none.
+
+    Parameters
+    ----------
+    adc : Adc
+    held_V : float, V
+        At the input, the same for all conversions.
+    noise_V : float, V
+        Standard deviation of all noise at the input; 0 for one conversion, of which others were copies.
+    draws : array
+        Standard normal numbers: every `stride`-th from `first` on, one a conversion; none without noise.
+    first, stride : int
+    """
+    if noise_V == 0:
+        return _code_voltage(adc, held_V)
+    total, conversions = 0.0, 0
+    for place in range(first, draws.shape[0], stride):
+        total += _code_voltage(adc, held_V + noise_V * draws[place])
+        conversions += 1
+    return total / conversions
+
+
+@allocation_free
+def _code_voltage(adc: Adc, input_V: float) -> float:
+    volts = adc.gain * input_V + adc.offset_V
+    if adc.step_V == 0:
+        return volts
+    code = np.rint(volts / adc.step_V)
+    if code > adc.highest:
+        code = adc.highest
+    elif code < adc.lowest:
+        code = adc.lowest
+    return code * adc.step_V

@@ -1,0 +1,27 @@
+"""What a scenario says of the sensors, stage by stage."""
+
+from pydantic import BaseModel, Field
+
+from spheretwin.twin.electronics.adc import AdcSection
+from spheretwin.twin.electronics.encoder import EncoderSection
+from spheretwin.twin.electronics.potentiometer import PotentiometerSection
+from spheretwin.twin.trajectories.trajectory import CONFIG, Triple
+
+
+class SensorsSection(BaseModel):
+    """How the controller sees the rotor; each stage is ideal unless told otherwise."""
+
+    model_config = CONFIG
+
+    angle_offset_rad: Triple = Field(
+        (0.0, 0.0, 0.0), description="constant error of each angle, with which its sensor is mounted, rad"
+    )
+    potentiometer: PotentiometerSection = PotentiometerSection()
+    adc: AdcSection = AdcSection()
+    encoder: EncoderSection = EncoderSection()
+
+    @property
+    def ideal(self) -> bool:
+        """Whether the controller is handed the true angles."""
+        stages = (self.potentiometer, self.adc, self.encoder)
+        return not any(self.angle_offset_rad) and all(stage.ideal for stage in stages)
