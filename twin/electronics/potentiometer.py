@@ -73,8 +73,8 @@ class Potentiometer(NamedTuple):
     half_angle_rad: float
     half_supply_V: float
     turns: float  # of the first harmonic for a radian of the joint, in rad
-    cosine_rad: NDArray[np.float64]  # (HARMONICS,) of the residual, from the first harmonic on
-    sine_rad: NDArray[np.float64]  # (HARMONICS,)
+    cosine_rad: tuple[float, ...]  # (HARMONICS,) of the residual, from the first harmonic on
+    sine_rad: tuple[float, ...]  # (HARMONICS,)
 
 
 def potentiometer(section: PotentiometerSection, rng: np.random.Generator) -> Potentiometer:
@@ -97,8 +97,8 @@ def potentiometer(section: PotentiometerSection, rng: np.random.Generator) -> Po
         section.electrical_angle_rad / 2,
         section.supply_V / 2,
         2 * pi / section.electrical_angle_rad,
-        np.ascontiguousarray(residual.real),
-        np.ascontiguousarray(-residual.imag),
+        tuple(residual.real.tolist()),
+        tuple((-residual.imag).tolist()),
     )
 
 
