@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -109,7 +110,8 @@ def converted(
     noise_V : float, V
         Standard deviation of all noise at the input; 0 for one conversion, of which others were copies.
     draws : array
-        Standard normal numbers: every `stride`-th from `first` on, one a conversion; none without noise.
+        Standard normal numbers: every `stride`-th from `first` on, one a conversion; none without
+        noise. With noise, and none of them, there is no voltage.
     first, stride : int
     """
     if noise_V == 0:
@@ -118,7 +120,7 @@ def converted(
     for place in range(first, draws.shape[0], stride):
         total += _code_voltage(adc, held_V + noise_V * draws[place])
         conversions += 1
-    return total / conversions
+    return total / conversions if conversions else nan
 
 
 @allocation_free
