@@ -29,6 +29,7 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
+from spheretwin.twin.electronics.sensing import Sensing, sensing
 from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.drive import drive
 from spheretwin.twin.plant.engine import integrator_name
@@ -39,7 +40,6 @@ from spheretwin.twin.plant.rotor import Rotor, Setting
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.sections import DriveSection, OwnController, OwnPath, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
-from spheretwin.twin.sensors import Sensors, sensors
 from spheretwin.twin.trajectories.registry import SHAPES
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, Triple
 
@@ -215,9 +215,9 @@ def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
     return Places(of_stages, width(signals) - width(law.signals))
 
 
-def sensors_of(scenario: Scenario) -> Sensors:
-    """Sensors of a scenario."""
-    return sensors(scenario.sensors.angle_offset_rad)
+def sensors_of(scenario: Scenario) -> Sensing:
+    """Sensors of a scenario, with the errors that its seed gives them."""
+    return sensing(scenario.sensors, scenario.seed)
 
 
 def warnings_of(scenario: Scenario, files: Files) -> list[str]:

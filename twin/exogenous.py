@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.disturbances.draws import Draws, term_draws
+from spheretwin.twin.electronics.noise import noise_rows
+from spheretwin.twin.electronics.sensing import noise_width
 from spheretwin.twin.loop import Inputs
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Sampled, checked
@@ -80,12 +82,12 @@ class Exogenous:
             )
         first = tick - self._first
         last = min(first + most, BLOCK_TICKS)
-        t, reference, disturbance = self._block
+        t, reference, disturbance, noise = self._block
         if last > self._numbers:
             if first >= self._numbers:
                 self._refuse(self._block, first)
             last = self._numbers
-        return Inputs(t[first:last], reference[first:last], disturbance[first:last])
+        return Inputs(t[first:last], reference[first:last], disturbance[first:last], noise[first:last])
 
     def check_horizon(self, tick: int) -> None:
         """Refuse before a run what would only be found out at its end.
@@ -120,7 +122,8 @@ class Exogenous:
         t = scenario.controller.period_s * ticks
         followed: Sampled = scenario.trajectory if self._own is None else self._own
         reference = np.ascontiguousarray(followed.sample(t))
-        return Inputs(t, reference, scenario.disturbance.sample(t, draws))
+        noise = noise_rows(scenario.seed, int(ticks[0]), len(ticks), noise_width(scenario.sensors))
+        return Inputs(t, reference, scenario.disturbance.sample(t, draws), noise)
 
     def _refuse(self, rows: Inputs, row: int) -> NoReturn:
         name = "disturbance" if np.isfinite(rows.reference[row]).all() else "trajectory"

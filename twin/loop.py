@@ -10,8 +10,8 @@ from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.copying import copy_into, copy_rows
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.twin.columns.registry import write_columns
+from spheretwin.twin.electronics.sensing import Sensing, sense
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
-from spheretwin.twin.sensors import Sensors, measure
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,7 @@ class Inputs(NamedTuple):
     t: NDArray[np.float64]  # (n,) s
     reference: NDArray[np.float64]  # (n, 3, 3) angle, rate, acceleration as rows
     disturbance: NDArray[np.float64]  # (n, 3) N·m, generalised, subtracted in (1)
+    noise: NDArray[np.float64]  # (n, k) standard normal numbers of the sensors
 
 
 class Places(NamedTuple):
@@ -50,7 +51,7 @@ def loop(
     law: Any,
     allocate: Any,
     controller: Controller,
-    sensors: Sensors,
+    sensors: Sensing,
     plant: Plant,
     places: Places,
     scratch: Scratch,
@@ -66,7 +67,7 @@ def loop(
         Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`.
     controller : Controller
         Changed in place, as is the plant; neither sees the other.
-    sensors : Sensors
+    sensors : Sensing
     plant : Plant
     places : Places
     scratch : Scratch
@@ -84,10 +85,12 @@ def loop(
     first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 2 * groups
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
-        measure(sensors, plant.rotor.q, plant.rotor.qdot, measurement)
+        measured = sense(sensors, plant.rotor.q, plant.rotor.qdot, inputs.noise[tick], measurement)
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called: it may write into all that it is handed.
         write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
+        if not measured:
+            return tick, DIVERGED
         command = row[CURRENT_COMMAND:first_current]
         share = control_tick(controller, law, allocate, t, reference, measurement, command)
         if share == LOST:

@@ -23,7 +23,7 @@ from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Triple
 
 # For their types alone.
-NO_INPUTS = loops.Inputs(np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)))
+NO_INPUTS = loops.Inputs(np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)))
 
 
 class State(NamedTuple):

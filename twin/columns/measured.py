@@ -22,4 +22,4 @@ def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:  # n
         row[i], row[3 + i] = sensors.measured[0, i], sensors.measured[1, i]
 
 
-COLUMNS = Columns(SIGNALS, lambda scenario: any(scenario.sensors.angle_offset_rad), write)
+COLUMNS = Columns(SIGNALS, lambda scenario: not scenario.sensors.ideal, write)

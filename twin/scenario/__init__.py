@@ -9,6 +9,7 @@ from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.twin.scenario.changing import check_events
+from spheretwin.twin.scenario.hardware import left_open
 from spheretwin.twin.scenario.reading import beside, override, read, validated
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.registry import SHAPES
@@ -32,6 +33,9 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     """
     fields = read(source)
     for dotted, value in (overrides or {}).items():
+        override(fields, dotted, value)
+    hardware = fields.get("hardware")
+    for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
         override(fields, dotted, value)
     try:
         taken = beside("", fields)

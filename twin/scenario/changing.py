@@ -23,6 +23,7 @@ FIXED = (
     "description",
     "duration",
     "seed",
+    "hardware",
     "event",
     "controller.period_s",
     "plant.step_s",

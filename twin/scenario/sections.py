@@ -12,7 +12,9 @@ from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
 from spheretwin.twin.disturbances.disturbance import Disturbance
+from spheretwin.twin.electronics.sections import SensorsSection
 from spheretwin.twin.plant.registry import ENGINES
+from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.trajectories.registry import Trajectory
 from spheretwin.twin.trajectories.trajectory import Bounded, Shape, Triple
 
@@ -33,9 +35,11 @@ WHOLE = 1e-9
 
 if TYPE_CHECKING:
     AllocationName = str
+    HardwareName = str
     EngineName = str
 else:
     AllocationName = Literal[tuple(ALLOCATIONS)]
+    HardwareName = Literal[tuple(HARDWARE)]
     EngineName = Literal[tuple(ENGINES)]
 
 
@@ -141,12 +145,6 @@ class Nominal(_Section):
         return scale
 
 
-class SensorsSection(_Section):
-    """How the controller sees the rotor."""
-
-    angle_offset_rad: Triple = Field((0.0, 0.0, 0.0), description="constant error of each angle, rad")
-
-
 class DriveSection(_Section):
     """Amplifiers and coils; what is not given comes from the model file."""
 
@@ -162,10 +160,15 @@ class Scenario(_Section):
     name: str = Field("unnamed", description="name of the scenario")
     description: str = Field("", description="what it shows")
     duration: Positive = Field(5.0, description="length of the run, s")
-    seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the random torque")
+    seed: Annotated[int, Field(ge=0)] = Field(
+        0, description="seed of all that is drawn: random torque, errors and noise"
+    )
     allocation: AllocationName = Field(
         "least_norm",
         description="currents for a torque: least-norm and scaled at the limit (16), or all the limit allows",
+    )
+    hardware: HardwareName = Field(
+        "ideal", description="named set of fields; it gives those a value that are not set themselves"
     )
     trajectory: SerializeAsAny[Trajectory]
     controller: SerializeAsAny[AnyLaw] = AFSM()
