@@ -10,8 +10,8 @@ L^⅓ ε^⅔, the best order that any differentiator can have.
 
 *Sampled.* Euler's step would keep z₂ jumping by 1.1 L T about its value for ever. Here e on the right-hand
 side is the error *after* the step (implicit; compare Koch et al., IEEE Trans. Autom. Control 65, 2020), and
-the prediction z⁻ is that of a parabola. With r = (z₀⁻ − y)/(L T³), held to positive by its sign, the error after
-the step is L T³ u³, where u ≥ 0 solves
+the prediction z⁻ is that of a parabola. With r = |z₀⁻ − y|/(L T³), and all signs those of z₀⁻ − y, the error
+after the step is L T³ u³, where u ≥ 0 solves
 
     u³ + 2 u² + 2.12 u + min(r, 1.1) = r,
 
@@ -79,7 +79,7 @@ PERIOD, FILTERS, JERK = 0, 1, 2  # layout of the parameters
 STARTED, ANGLE, RATE, ACCELERATION = 0, 3, 6, 9  # layout of the memory
 
 UNKNOWN_NOISE_rad = math.radians(0.02)  # the prototype's potentiometers, where no noise is told
-LEAST_JERK_rad_s3, LARGEST_JERK_rad_s3 = 1e-12, 1e24  # beyond these its products with periods underflow
+LEAST_JERK_rad_s3, LARGEST_JERK_rad_s3 = 1e-30, 1e30  # beyond these its products with periods underflow
 
 
 def _mean_gain(power: float) -> float:
@@ -88,7 +88,7 @@ def _mean_gain(power: float) -> float:
 
 
 L1, L2, L3 = OUTER * _mean_gain(2 / 3), MIDDLE * _mean_gain(1 / 3), INNER * _mean_gain(0)
-BANDWIDTH = 1.64657  # of the linear filter with these gains
+BANDWIDTH = 1.646549  # of the linear filter with these gains
 VARIANCE = 2.113056  # of its rate, a unit of noise density
 
 
@@ -139,9 +139,10 @@ def root(rest: float) -> float:
 
     Newton's method from above on a function that rises and is bent upward: it descends to the root, and ends
     where rounding lets it descend no more. It starts at the smallest of what each term alone would allow,
-    where the function is at most three times as large as it should be.
+    where the function is at most three times as large as it should be; a hair above it, as a power of 1/3
+    in floating point is not quite the cube root.
     """
-    u = min(rest ** (1 / 3), math.sqrt(rest / OUTER), rest / MIDDLE)
+    u = min(rest ** (1 / 3), math.sqrt(rest / OUTER), rest / MIDDLE) * (1 + 1e-12)
     while True:
         excess = ((u + OUTER) * u + MIDDLE) * u - rest
         lower = u - excess / ((3 * u + 2 * OUTER) * u + MIDDLE)

@@ -16,7 +16,7 @@ poles are their common zeros within the unit circle:
 
     x² − (κ/6) x + κ = 0,      κ = q T³/σ²,      δ = 1 − z = x/2 ± √(x²/4 − x), |1 − δ| < 1,
 
-and by comparing coefficients α = δ₁ + δ₂ − δ₁δ₂, β = δ₁δ₂: the solution of the Riccati equation in closed form.
+and by comparing coefficients α = δ₁ + δ₂ − δ₁δ₂, β = δ₁δ₂: the Riccati equation solved in closed form.
 
 *Tuning.* Only κ matters. For small T the filter is ω²/(s² + √2 ω s + ω²) from rate to rate, Butterworth's,
 with ω⁴ = q/(σ² T), so κ = (ωT)⁴ and ω is the bandwidth. It is the parameter; a density q, where one is
@@ -43,13 +43,13 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.estimation.estimator import (
-    FASTEST_rad_s,
-    SLOWEST_rad_s,
     BandwidthEach,
     Derived,
     Estimator,
     EstimatorParameters,
+    FASTEST_rad_s,
     Sampling,
+    SLOWEST_rad_s,
     bandwidth_field,
     named,
     usable,
