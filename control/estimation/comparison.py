@@ -15,6 +15,7 @@ from spheretwin.models.base.errors import InputError
 
 Array = NDArray[np.float64]
 
+BANDWIDTH = "bandwidth_rad_s"
 SETTLING = 0.25  # share of a record, at least, that is not judged
 
 
@@ -37,6 +38,7 @@ class Compared(NamedTuple):
     lag_deviation_s: Array  # (b,) standard deviation of the lag, by its scatter over the sine's periods
     derived_rms_error_rad_s: Array  # (b,) by the derived noise gain, and lag times acceleration
     derived_lag_s: Array  # (b,) behind a ramp of the rate: the limit of low frequencies
+    default_rad_s: float  # bandwidth
 
 
 def compare(bandwidths_rad_s: Sequence[float], motion: Motion | None = None) -> dict[str, Compared]:
@@ -64,25 +66,27 @@ def compare(bandwidths_rad_s: Sequence[float], motion: Motion | None = None) -> 
             f"motion: expected a duration of at least {2 / (1 - SETTLING) / motion.frequency_Hz:g} s,"
             f" received {motion.duration_s:g}"
         )
-    t_s = motion.period_s * np.arange(round(motion.duration_s / motion.period_s))
+    ticks = round(motion.duration_s / motion.period_s)
+    t_s = motion.period_s * np.arange(ticks, dtype=np.float64)
     phase = 2 * np.pi * motion.frequency_Hz * t_s
     noise = np.random.default_rng(motion.seed).normal(scale=motion.noise_rad, size=(len(t_s), 3))
     angle_rad = motion.amplitude_rad * np.sin(phase)[:, None] + noise
-    kinds = [kind for kind, parameters in ESTIMATORS.items() if "bandwidth_rad_s" in parameters.model_fields]
     return {
         kind: Compared(
             *np.array(
                 [_judged(kind, bandwidth, motion, phase, angle_rad) for bandwidth in bandwidths_rad_s]
-            ).T
+            ).T,
+            default_rad_s=parameters.model_fields[BANDWIDTH].default[0],
         )
-        for kind in kinds
+        for kind, parameters in ESTIMATORS.items()
+        if BANDWIDTH in parameters.model_fields
     }
 
 
 def _judged(
     kind: str, bandwidth_rad_s: float, motion: Motion, phase: Array, angle_rad: Array
 ) -> tuple[float, ...]:
-    parameters = ESTIMATORS[kind].model_validate({"bandwidth_rad_s": float(bandwidth_rad_s)})
+    parameters = ESTIMATORS[kind].model_validate({BANDWIDTH: float(bandwidth_rad_s)})
     sampling = Sampling(motion.period_s, np.full(3, motion.noise_rad), np.zeros(3))
     estimator = parameters.build(sampling)
     assert estimator is not None  # it has a bandwidth

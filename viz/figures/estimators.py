@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.plots import FAINT, INK, SERIES, WIDTH_in, save
+from spheretwin.viz.figures.plots import FAINT, SERIES, WIDTH_in, save
 
 __all__ = ["Curve", "estimators", "save"]
 
@@ -26,25 +26,20 @@ class Curve(NamedTuple):
     lag_deviation_s: Array  # (b,)
     derived_rms_error_rad_s: Array  # (b,)
     derived_lag_s: Array  # (b,)
+    default_rad_s: float
 
 
-def estimators(
-    bandwidths_rad_s: Array,
-    curves: Mapping[str, Curve],
-    title: str,
-    slowest_rad_s: float | None = None,
-) -> Figure:
+def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str) -> Figure:
     """RMS error of the rate above, lag below: a colour an estimator, dots measured, lines derived.
 
-    A lag that the noise does not let be told from none is drawn hollow, at the largest that it may be.
+    Each estimator's default is a dashed line of its colour. A lag that the noise does not let be told from
+    none is drawn hollow, at the largest that it may be.
 
     Parameters
     ----------
     bandwidths_rad_s : (b,) array, rad/s
     curves : mapping of estimator to Curve
     title : str
-    slowest_rad_s : float, optional, rad/s
-        Bandwidth below which a control loop fails, drawn as a dashed line.
     """
     figure = Figure(figsize=(WIDTH_in, 6.4), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
@@ -62,8 +57,8 @@ def estimators(
         if np.any(curve.derived_lag_s > 0):
             below.plot(bandwidths_rad_s, 1e3 * curve.derived_lag_s, color=colour, linewidth=1)
     for axes, quantity in ((above, "RMS error of the rate, rad/s"), (below, "lag of the rate, ms")):
-        if slowest_rad_s is not None:
-            axes.axvline(slowest_rad_s, color=INK, linestyle="--", linewidth=1.2, label="slowest for AFSM")
+        for colour, curve in zip(SERIES, curves.values(), strict=False):
+            axes.axvline(curve.default_rad_s, color=colour, linestyle="--", linewidth=1.2)
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_ylabel(quantity)
@@ -71,6 +66,6 @@ def estimators(
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    above.set_title(f"{title}\ndots measured, lines derived", fontsize="medium")
+    above.set_title(f"{title}\ndots measured, lines derived, dashed the defaults", fontsize="medium")
     below.set_xlabel("bandwidth, rad/s")
     return figure

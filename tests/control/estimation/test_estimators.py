@@ -256,7 +256,7 @@ def test_rounding_of_angles_counts_as_noise(kind):
 @pytest.mark.parametrize("kind", ["kalman", "differentiator"])
 @pytest.mark.parametrize("filters", [False, True])
 def test_angles_are_replaced_only_where_that_is_asked_for(kind, filters):
-    estimator = built(kind, filters_angle=filters)
+    estimator = built(kind, bandwidth_rad_s=150.0, filters_angle=filters)
     state, rate = estimator.state.copy(), np.empty(3)
     raw = np.random.default_rng(3).normal(scale=NOISE, size=(3000, 3))
     handed = raw.copy()

@@ -9,16 +9,16 @@ from spheretwin.viz.figures import estimators
 BANDWIDTHS = np.geomspace(20, 1000, 7)
 CURVES = {
     "slow": estimators.Curve(
-        BANDWIDTHS / 1e3, 1 / BANDWIDTHS, np.full(7, 1e-6), BANDWIDTHS / 1e3, 1 / BANDWIDTHS
+        BANDWIDTHS / 1e3, 1 / BANDWIDTHS, np.full(7, 1e-6), BANDWIDTHS / 1e3, 1 / BANDWIDTHS, 150.0
     ),
     "exact": estimators.Curve(
-        BANDWIDTHS / 3e3, np.linspace(-1e-4, 1e-3, 7), np.full(7, 1e-4), BANDWIDTHS / 3e3, np.zeros(7)
+        BANDWIDTHS / 3e3, np.linspace(-1e-4, 1e-3, 7), np.full(7, 1e-4), BANDWIDTHS / 3e3, np.zeros(7), 800.0
     ),
 }
 
 
 def drawn() -> Figure:
-    return estimators.estimators(BANDWIDTHS, CURVES, "rates", 60.0)
+    return estimators.estimators(BANDWIDTHS, CURVES, "rates")
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_axes_have_units_and_are_logarithmic(figure):
 
 def test_lag_within_noise_is_drawn_hollow_at_its_bound(figure):
     named = {line.get_label(): line for line in figure.axes[1].get_lines()}
-    assert {"slow", "exact", "exact: at most", "slowest for AFSM"} <= set(named)
+    assert {"slow", "exact", "exact: at most"} <= set(named)
     assert "slow: at most" not in named
     hollow = named["exact: at most"]
     assert hollow.get_markerfacecolor() == "none"
@@ -51,8 +51,11 @@ def test_lag_within_noise_is_drawn_hollow_at_its_bound(figure):
     assert len(named["exact"].get_ydata()) == 5
 
 
-def test_each_estimator_keeps_its_colour(figure):
+def test_each_estimator_keeps_its_colour_and_has_its_default(figure):
     for axes in figure.axes:
-        colours = {line.get_label().split(":")[0]: line.get_color() for line in axes.get_lines()}
+        lines = axes.get_lines()
+        colours = {line.get_label().split(":")[0]: line.get_color() for line in lines}
         assert colours["slow"] == estimators.SERIES[0]
         assert colours["exact"] == estimators.SERIES[1]
+        dashed = {line.get_color(): line.get_xdata()[0] for line in lines if line.get_linestyle() == "--"}
+        assert dashed == {estimators.SERIES[0]: 150.0, estimators.SERIES[1]: 800.0}
