@@ -76,7 +76,7 @@ def compare(bandwidths_rad_s: Sequence[float], motion: Motion | None = None) -> 
             *np.array(
                 [_judged(kind, bandwidth, motion, phase, angle_rad) for bandwidth in bandwidths_rad_s]
             ).T,
-            default_rad_s=parameters.model_fields[BANDWIDTH].default[0],
+            parameters.model_fields[BANDWIDTH].default[0],
         )
         for kind, parameters in ESTIMATORS.items()
         if BANDWIDTH in parameters.model_fields
