@@ -72,15 +72,19 @@ def compare(bandwidths_rad_s: Sequence[float], motion: Motion | None = None) -> 
     noise = np.random.default_rng(motion.seed).normal(scale=motion.noise_rad, size=(len(t_s), 3))
     angle_rad = motion.amplitude_rad * np.sin(phase)[:, None] + noise
     return {
-        kind: Compared(
-            *np.array(
-                [_judged(kind, bandwidth, motion, phase, angle_rad) for bandwidth in bandwidths_rad_s]
-            ).T,
-            parameters.model_fields[BANDWIDTH].default[0],
-        )
+        kind: _over(bandwidths_rad_s, kind, motion, phase, angle_rad)
         for kind, parameters in ESTIMATORS.items()
         if BANDWIDTH in parameters.model_fields
     }
+
+
+def _over(
+    bandwidths_rad_s: Sequence[float], kind: str, motion: Motion, phase: Array, angle_rad: Array
+) -> Compared:
+    judged = [_judged(kind, bandwidth, motion, phase, angle_rad) for bandwidth in bandwidths_rad_s]
+    rms, lag, deviation, derived_rms, derived_lag = np.array(judged).T
+    default = ESTIMATORS[kind].model_fields[BANDWIDTH].default[0]
+    return Compared(rms, lag, deviation, derived_rms, derived_lag, default)
 
 
 def _judged(
