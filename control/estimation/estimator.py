@@ -14,6 +14,7 @@ The defaults come from the loop: AFSM with the paper's gains at 1 kHz, angles wi
 (0.02° rms on α and β, 0.18° a count on γ), one period of delay, and bandwidths at steps of a quarter and
 more. Noise costs little but current; what is too slow makes the sliding variable swing, which shows first in
 the largest errors: of the sinusoid, 1.8° with true rates, and of the nutation. TVI is Σ|Δi| a group a second.
+One seed:
 
 | estimator | sinusoid 1.8° from | swings at | loses the rotor at | default | nutation | TVI of the sinusoid |
 |---|---|---|---|---|---|---|

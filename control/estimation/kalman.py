@@ -33,8 +33,8 @@ Unlike the difference's it falls with the period: all samples within 1/ω are av
 A ramp of the angle is followed with an error that falls by |z| ≈ e^(−ωT/√2) at each tick.
 
 *Default.* ω = 400 1/s has the noise of the filtered difference at its default, 0.05 rad/s of 0.02° rms, with
-less than half of its lag, 3.1 ms, and moves the currents less; at that difference's lag, ω = 200 1/s, it has
-less than half of its noise, but being of second order it costs the loop more phase, and AFSM swings.
+less than half of its lag, 3.1 ms; at that difference's lag, ω = 200 1/s, it has less than half of its noise,
+but being of second order it costs the loop more phase, and AFSM swings.
 """
 
 from typing import Annotated, Literal
