@@ -11,6 +11,7 @@ from spheretwin.control import law as laws
 from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
 from spheretwin.control.belief import Belief, believe
+from spheretwin.control.estimation.estimator import Estimator, estimator_at
 from spheretwin.models.base.callbacks import function_at
 from spheretwin.models.base.compiled import compilable
 from spheretwin.models.kinematics import cartesian_torque
@@ -26,6 +27,15 @@ law_at = function_at(laws.SIGNATURE)
 allocation_at = function_at(allocations.SIGNATURE)
 
 
+class Estimates(NamedTuple):
+    """What rates are estimated with, and what the estimator remembers."""
+
+    made: bool
+    """Whether there is an estimator; if not, the rates are handed over as they come."""
+    parameters: NDArray[np.float64]
+    memory: NDArray[np.float64]
+
+
 class Controller(NamedTuple):
     """What the near side of the wires knows and remembers: nothing of the plant itself."""
 
@@ -37,7 +47,9 @@ class Controller(NamedTuple):
     logged: int  # leading entries of the memory that are logged
     torque_q: NDArray[np.float64]  # (3,) N·m, what the law asked for in this tick
     torque_S: NDArray[np.float64]  # (3,) N·m, the same in the stator frame
-    pose: NDArray[np.float64]  # (3,) rad, as measured
+    estimates: Estimates
+    pose: NDArray[np.float64]  # (3,) rad, as the law is handed it
+    rates: NDArray[np.float64]  # (3,) rad/s, likewise
     scratch: NDArray[np.float64]  # of the allocation
     belief: Belief
 
@@ -49,6 +61,7 @@ def controller(
     current_limit_A: float,
     logged: int,
     belief: Belief,
+    estimator: Estimator | None = None,
 ) -> Controller:
     """Controller at the start of a run.
 
@@ -66,6 +79,8 @@ def controller(
         Numbers of the law's state that the telemetry logs.
     belief : Belief
         Of the torque that the law's commands led to.
+    estimator : Estimator, optional
+        Of the rates; the law is handed those that are measured unless given.
     """
     groups = magnetics.group_axes.shape[1]
     return Controller(
@@ -77,7 +92,13 @@ def controller(
         logged=logged,
         torque_q=np.zeros(3),
         torque_S=np.zeros(3),
+        estimates=Estimates(
+            estimator is not None,
+            estimator.parameters.copy() if estimator else np.zeros(0),
+            estimator.state.copy() if estimator else np.zeros(0),
+        ),
         pose=np.zeros(3),
+        rates=np.zeros(3),
         scratch=np.empty((SCRATCH_ROWS, groups)),
         belief=belief,
     )
@@ -88,6 +109,7 @@ def control_tick(
     controller: Controller,
     law: Any,
     allocate: Any,
+    estimate: Any,
     t: float,
     reference: NDArray[np.float64],
     measurement: NDArray[np.float64],
@@ -101,6 +123,8 @@ def control_tick(
         Changed in place.
     law, allocate : address or callable
         Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`: addresses in compiled code.
+    estimate : address or callable
+        Of `control.estimation.estimator.SIGNATURE`; anything where nothing is estimated.
     t : float, s
         Time of the tick.
     reference : (3, 3) array
@@ -116,10 +140,12 @@ def control_tick(
         Share of the law's torque that `command` gives; `LOST` where the law gave no torque, or one beyond
         `LARGEST_TORQUE_Nm`, or logs what is no number.
     """
-    torque_q, pose = controller.torque_q, controller.pose
+    torque_q, pose, estimates = controller.torque_q, controller.pose, controller.estimates
+    if estimates.made:
+        estimator_at(estimate)(measurement[0], estimates.parameters, estimates.memory, measurement[1])
     for i in range(3):
         torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
-        pose[i] = measurement[0, i]
+        pose[i], controller.rates[i] = measurement[0, i], measurement[1, i]
         measurement[2, i] = controller.belief.torque_q[i]
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
     for i in range(3):

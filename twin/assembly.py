@@ -11,6 +11,7 @@ import numpy as np
 
 from spheretwin.control.belief import belief
 from spheretwin.control.controller import Controller, controller
+from spheretwin.control.estimation.estimator import Estimator, Sampling
 from spheretwin.control.law import Known, Law
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models import actuator as actuators
@@ -29,7 +30,7 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
-from spheretwin.twin.electronics.sensing import Sensing, sensing
+from spheretwin.twin.electronics.sensing import Sensing, reckoned, sensing
 from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.drive import drive
 from spheretwin.twin.plant.engine import integrator_name
@@ -256,12 +257,26 @@ def nominal_magnetics(scenario: Scenario, files: Files) -> TorqueModel:
     return model if scale == 1 else model._replace(line_weights=scale * model.line_weights)
 
 
-def controller_of(scenario: Scenario, law: Law, magnetics: TorqueModel, kept: KeptMatrix) -> Controller:
+def estimator_of(scenario: Scenario) -> Estimator | None:
+    """Estimator of the rates, tuned to what the controller reckons with; None where the rates are true.
+
+    Raises
+    ------
+    InputError
+        Its parameters do not fit the control period or the sensors.
+    """
+    noise_rad, quantum_rad = reckoned(scenario.sensors)
+    return scenario.estimator.build(Sampling(scenario.controller.period_s, noise_rad, quantum_rad))
+
+
+def controller_of(
+    scenario: Scenario, law: Law, magnetics: TorqueModel, kept: KeptMatrix, estimator: Estimator | None
+) -> Controller:
     """Controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
     limit_A, lag_s = nominal.current_limit_A or 0.0, nominal.time_constant_s or 0.0
     believed = belief(law.asks_torque, groups, scenario.controller.period_s, nominal.delay_s, lag_s)
-    return controller(law, magnetics, kept, limit_A, width(law.signals), believed)
+    return controller(law, magnetics, kept, limit_A, width(law.signals), believed, estimator)
 
 
 def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix) -> Plant:

@@ -50,6 +50,7 @@ def loop(
     inputs: Inputs,
     law: Any,
     allocate: Any,
+    estimate: Any,
     controller: Controller,
     sensors: Sensing,
     plant: Plant,
@@ -92,7 +93,7 @@ def loop(
         if not measured:
             return tick, DIVERGED
         command = row[CURRENT_COMMAND:first_current]
-        share = control_tick(controller, law, allocate, t, reference, measurement, command)
+        share = control_tick(controller, law, allocate, estimate, t, reference, measurement, command)
         if share == LOST:
             return tick, DIVERGED
         row[scale] = share

@@ -34,6 +34,7 @@ class State(NamedTuple):
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
     belief: NDArray[np.float64]
+    estimates: NDArray[np.float64]
 
 
 class Moving(NamedTuple):
@@ -80,13 +81,17 @@ class Machine:
         self.columns = width(self.signals)
         magnetics = assembly.nominal_magnetics(scenario, files)
         kept = assembly.kept_matrices(magnetics, torque_model(files.actuator))
-        self._controller = assembly.controller_of(scenario, self.law, magnetics, kept[0])
+        estimator = assembly.estimator_of(scenario)
+        self._controller = assembly.controller_of(scenario, self.law, magnetics, kept[0], estimator)
         self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, kept[1])
         # The loop has bare addresses of its functions: they are held for as long as it is.
-        self._functions = matching(self.law, ALLOCATIONS[scenario.allocation])
+        self._functions = matching(
+            self.law, ALLOCATIONS[scenario.allocation], estimator.step if estimator else None
+        )
         self._parts = (
             self._functions.law,
             self._functions.allocate,
+            self._functions.estimate,
             self._controller,
             assembly.sensors_of(scenario),
             self._plant,
@@ -122,6 +127,8 @@ class Machine:
         if made.law is self.law or (same_kind and len(memory) == len(self._controller.memory)):
             memory[:] = self._controller.memory
         beliefs.carried_on(self._controller.belief, made._controller.belief)
+        if type(scenario.estimator) is type(self._scenario.estimator):
+            made._controller.estimates.memory[:] = self._controller.estimates.memory
         return made
 
     def _law_for(self, scenario: Scenario) -> Law:
@@ -139,6 +146,7 @@ class Machine:
             parameters=controller.parameters.copy(),
             memory=controller.memory.copy(),
             belief=beliefs.state_of(controller.belief),
+            estimates=controller.estimates.memory.copy(),
         )
 
     def restore(self, state: State) -> None:
@@ -155,11 +163,13 @@ class Machine:
         _check_length("the law's parameters", state.parameters, own.parameters)
         _check_length("the law's memory", state.memory, own.memory)
         _check_length("what the controller believes", state.belief, own.belief)
+        _check_length("the estimator's memory", state.estimates, own.estimates)
         self._moving.rotor.restore(state.rotor)
         self._plant.current[:] = state.current
         self._controller.parameters[:] = state.parameters
         self._controller.memory[:] = state.memory
         beliefs.restore(self._controller.belief, state.belief)
+        self._controller.estimates.memory[:] = state.estimates
 
 
 def _started(scenario: Scenario, files: Files) -> Moving:

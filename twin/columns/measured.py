@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.twin.columns.column import Columns
+from spheretwin.twin.scenario.sections import Scenario
 
 SIGNALS = (
     Signal("q_measured_rad", "rad", 3, "hinge angles as the controller has them", ANGLES),
@@ -19,7 +20,11 @@ SIGNALS = (
 @part_of_its_caller
 def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:  # noqa: D103
     for i in range(3):
-        row[i], row[3 + i] = sensors.measured[0, i], sensors.measured[1, i]
+        row[i], row[3 + i] = controller.pose[i], controller.rates[i]
 
 
-COLUMNS = Columns(SIGNALS, lambda scenario: not scenario.sensors.ideal, write)
+def _logged(scenario: Scenario) -> bool:
+    return not scenario.sensors.ideal or scenario.estimator.kind != "ideal"
+
+
+COLUMNS = Columns(SIGNALS, _logged, write)

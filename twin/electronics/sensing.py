@@ -31,7 +31,6 @@ class Sensing(NamedTuple):
     shifts: bool  # whether any offset is not 0
     in_volts: bool  # whether potentiometers or converter are more than a line
     ideal: bool  # whether all angles are handed over as they are
-    measured: NDArray[np.float64]  # (2, 3) what was handed over last: angles, rates
 
 
 def sensing(section: SensorsSection, seed: int) -> Sensing:
@@ -62,13 +61,30 @@ def sensing(section: SensorsSection, seed: int) -> Sensing:
         any(section.angle_offset_rad),
         not (track.ideal and converter.ideal),
         section.ideal,
-        np.zeros((2, 3)),
     )
 
 
 def noise_width(section: SensorsSection) -> int:
     """Standard normal numbers that `sense` needs a tick; 0 without noise."""
     return CHANNELS * section.adc.oversampling if _noise_V(section) else 0
+
+
+def reckoned(section: SensorsSection) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Noise and resolution of the three measured angles, as their sheets tell them to the controller.
+
+    Returns
+    -------
+    (3,) array, rad
+        Standard deviation of the noise of each; with oversampling, of the mean of all conversions.
+    (3,) array, rad
+        Distance between two values that each can have; 0 for any.
+    """
+    track, converter, lines = section.potentiometer, section.adc, section.encoder.counts
+    noise_rad = _noise_V(section) / track.volts_per_rad / converter.oversampling**0.5
+    step_V = 2 * converter.range_V / 2**converter.bits if converter.bits else 0.0
+    step_rad = step_V / track.volts_per_rad / converter.oversampling
+    count_rad = 2 * np.pi / lines if lines else 0.0
+    return np.array([noise_rad, noise_rad, 0.0]), np.array([step_rad, step_rad, count_rad])
 
 
 @allocation_free
@@ -87,7 +103,6 @@ def sense(
     Parameters
     ----------
     sensing : Sensing
-        Keeps what was handed over.
     q, qdot : (3,) arrays, rad and rad/s
         True.
     noise : (`noise_width`,) array
@@ -116,7 +131,6 @@ def sense(
         measurement[0, 2] = counted(sensing.encoder, measurement[0, 2])
     finite = True
     for i in range(3):
-        sensing.measured[0, i], sensing.measured[1, i] = measurement[0, i], measurement[1, i]
         finite = finite and isfinite(measurement[0, i]) and isfinite(measurement[1, i])
     return finite
 

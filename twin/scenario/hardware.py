@@ -12,9 +12,12 @@ PROTOTYPE_BEARINGS: dict[str, Any] = {
     "plant.viscous_Nm_s": (1e-4, 1e-4, 1e-4),
 }
 
+# The prototype's software is not described: rates are estimated by the filter of least noise for its lag.
+PROTOTYPE_ESTIMATOR: dict[str, Any] = {"estimator.kind": "kalman"}
+
 HARDWARE: dict[str, dict[str, Any]] = {
     "ideal": {},
-    "prototype": {**PROTOTYPE_SENSORS, **PROTOTYPE_BEARINGS},
+    "prototype": {**PROTOTYPE_SENSORS, **PROTOTYPE_BEARINGS, **PROTOTYPE_ESTIMATOR},
 }
 """Fields by dotted name that a set gives a value to; each of them can be set alone as well."""
 

@@ -8,6 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializeAsAny, fi
 from pydantic_core import PydanticCustomError
 
 from spheretwin.control.allocation.registry import ALLOCATIONS
+from spheretwin.control.estimation.ideal import Ideal
+from spheretwin.control.estimation.registry import AnyEstimator
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
@@ -174,6 +176,7 @@ class Scenario(_Section):
     controller: SerializeAsAny[AnyLaw] = AFSM()
     nominal: Nominal = Nominal()
     sensors: SensorsSection = SensorsSection()
+    estimator: SerializeAsAny[AnyEstimator] = Ideal()
     plant: Plant = Plant()
     drive: DriveSection = DriveSection()
     disturbance: Disturbance = Disturbance()
