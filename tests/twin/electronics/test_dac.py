@@ -1,0 +1,144 @@
+"""The converter against its definition: codes, ends, errors of a channel, and what is drawn."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.twin.electronics.dac import DacSection, convert, dac
+
+GAIN_A_V, RANGE_V, GROUPS = 0.8, 10.0, 18
+LSB_A = GAIN_A_V * 2 * RANGE_V / 2**16
+PLAIN = DacSection(dac_bits=16)
+PROTOTYPE = DacSection(dac_bits=16, dac_offset_V=2e-3, dac_gain_error=1e-3, dac_inl_lsb=4.0)
+CODES = np.arange(-(2**15), 2**15)
+
+
+def converted(made, command):
+    asked = np.empty_like(command)
+    convert(made, command, asked)
+    return asked
+
+
+def curve(made, channel):
+    """What one channel makes of every code, A."""
+    one = made._replace(
+        offset_V=np.repeat(made.offset_V[channel], len(CODES)),
+        gain=np.repeat(made.gain[channel], len(CODES)),
+        inl_lsb=np.repeat(made.inl_lsb[channel : channel + 1], len(CODES), axis=0),
+    )
+    return converted(one, CODES * LSB_A)
+
+
+def test_without_bits_commands_pass_bit_by_bit():
+    odd = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 5e-324, -1.7e308, 0.1])
+    section = DacSection(dac_offset_V=1.0, dac_gain_error=0.1, dac_inl_lsb=9.0)
+    for ideal in (DacSection(), section):
+        assert converted(dac(ideal, GAIN_A_V, len(odd), 0), odd).tobytes() == odd.tobytes()
+
+
+def test_every_code_is_a_step_of_one_lsb():
+    asked = curve(dac(PLAIN, GAIN_A_V, 1, 0), 0)
+    # Code times LSB and transconductance, each product rounded once.
+    np.testing.assert_allclose(asked, CODES * LSB_A, rtol=4e-16)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 8, 16, 24, 32])
+def test_one_code_is_nothing_and_reaches_half_a_step_to_both_sides(bits):
+    made = dac(DacSection(dac_bits=bits), GAIN_A_V, 5, 0)
+    step = GAIN_A_V * 2 * RANGE_V / 2**bits
+    asked = converted(made, step * np.array([0.0, 0.499, -0.499, -0.501, 0.501]))
+    up = 0.0 if bits == 1 else step  # of one bit, the codes are -1 and 0
+    np.testing.assert_allclose(asked, [0, 0, 0, -step, up], rtol=4e-16)
+
+
+@given(st.floats(-7.9997, 7.9997))
+def test_within_the_range_rounding_is_at_most_half_a_step(command):
+    asked = converted(dac(PLAIN, GAIN_A_V, 1, 0), np.array([command]))[0]
+    assert abs(asked - command) <= LSB_A / 2 * (1 + 1e-11)  # 1e-16 of 8 A is 4e-12 of half a step
+    assert asked / LSB_A == pytest.approx(round(asked / LSB_A), abs=1e-10)
+
+
+@given(st.floats(8.0, None, allow_infinity=True))
+def test_beyond_the_range_is_its_end(command):
+    asked = converted(dac(PLAIN, GAIN_A_V, 2, 0), np.array([command, -command]))
+    np.testing.assert_allclose(asked, [8.0 - LSB_A, -8.0], rtol=4e-16)
+
+
+def test_what_is_not_a_number_stays_so_in_its_channel():
+    asked = converted(dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, np.nan, 1.0]))
+    np.testing.assert_array_equal(np.isnan(asked), [False, True, False])
+
+
+@given(st.lists(st.floats(allow_nan=False), min_size=GROUPS, max_size=GROUPS), st.integers(0, 2**63))
+def test_any_number_gives_a_current_within_the_range_and_its_errors(command, seed):
+    asked = converted(dac(PROTOTYPE, GAIN_A_V, GROUPS, seed), np.array(command))
+    most = GAIN_A_V * (RANGE_V * (1 + 1e-3) + 2e-3) + 4 * LSB_A
+    assert np.all(np.abs(asked) <= most)  # and so is none that is not a number
+
+
+def test_offset_and_gain_are_those_of_a_straight_line_through_the_ends():
+    made = dac(PROTOTYPE, GAIN_A_V, GROUPS, 7)
+    for channel in range(GROUPS):
+        asked = curve(made, channel)
+        slope = (asked[-1] - asked[0]) / (CODES[-1] - CODES[0]) / LSB_A
+        # 1e-15 A of rounding over 16 A; sin(3 pi) is 4e-16 instead of 0, of 4 LSB.
+        assert slope == pytest.approx(made.gain[channel], rel=1e-14)
+        middle = asked[0] + slope * LSB_A * 2**15
+        assert middle == pytest.approx(GAIN_A_V * made.offset_V[channel], abs=1e-14)
+
+
+def test_inl_is_smooth_keeps_to_its_bound_and_turns_no_code_back():
+    made = dac(PROTOTYPE, GAIN_A_V, GROUPS, 3)
+    largest = []
+    for channel in range(GROUPS):
+        asked = curve(made, channel)
+        straight = np.linspace(asked[0], asked[-1], len(asked))
+        inl = (asked - straight) / LSB_A
+        largest.append(np.abs(inl).max())
+        assert np.all(np.diff(asked) > 0)
+        # The third harmonic is steepest: 4 LSB times 3 pi over the codes. Rounding: 1e-15 A of 2.4e-4 A.
+        assert np.abs(np.diff(inl)).max() <= 4 * 3 * np.pi / 2**16 + 2e-11
+    assert max(largest) <= 4.0 * (1 + 1e-3)  # in ideal steps, which the gain stretches
+    assert min(largest) > 0.1
+
+
+def test_inl_is_its_sum_of_sines():
+    made = dac(PROTOTYPE, GAIN_A_V, 1, 5)
+    share = (CODES + 2**15) / (2**16 - 1)
+    sines = sum(made.inl_lsb[0, n] * np.sin((n + 1) * np.pi * share) for n in range(3))
+    volts = made.lsb_V * (CODES * made.gain[0] + sines) + made.offset_V[0]
+    # The recurrence of sines and the sum: some roundings of 8 A.
+    np.testing.assert_allclose(curve(made, 0), GAIN_A_V * volts, rtol=0, atol=1e-14)
+
+
+def test_draws_fill_their_bounds_and_are_the_channels_own():
+    made = dac(PROTOTYPE, GAIN_A_V, 400, 1)
+    for drawn, bound in ((made.offset_V, 2e-3), (made.gain - 1, 1e-3)):
+        assert np.all(np.abs(drawn) <= bound * (1 + 1e-12))
+        # Uniform: the mean of 400 strays by bound / sqrt(1200); five of these. Extremes within 5 % of it.
+        assert abs(drawn.mean()) < 5 * bound / np.sqrt(1200)
+        assert drawn.max() > 0.95 * bound
+        assert drawn.min() < -0.95 * bound
+    fewer = dac(PROTOTYPE, GAIN_A_V, 18, 1)
+    np.testing.assert_array_equal(made.offset_V[:18], fewer.offset_V)
+    only = dac(DacSection(dac_bits=16, dac_offset_V=2e-3), GAIN_A_V, 18, 1)
+    np.testing.assert_array_equal(only.offset_V, fewer.offset_V)
+    np.testing.assert_array_equal(only.gain, 1)
+    assert np.all(dac(PROTOTYPE, GAIN_A_V, 18, 2).offset_V != fewer.offset_V)
+
+
+def test_a_command_may_be_converted_in_place():
+    made, command = dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, -2.0, 7.0])
+    expected = converted(made, command)
+    convert(made, command, command)
+    np.testing.assert_array_equal(command, expected)
+
+
+@pytest.mark.parametrize(
+    ("field", "bad"),
+    [("dac_bits", -1), ("dac_bits", 33), ("dac_bits", 16.0), ("dac_range_V", 0.0), ("dac_inl_lsb", -1.0)],
+)
+def test_no_converter_is_outside_the_bounds(field, bad):
+    with pytest.raises(ValueError, match=field):
+        DacSection(**{field: bad})

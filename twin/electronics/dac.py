@@ -1,0 +1,132 @@
+"""Digital-to-analogue converter: each channel's command as one of the voltages that it can set.
+
+All channels are set at once (simultaneous latch). A command i is asked for as the voltage i / k, with the
+transconductance k of the amplifier behind; the code is the nearest of ``-2**(bits - 1) .. 2**(bits - 1) - 1``
+(mid-tread: one code is 0 V), the ends where the command lies beyond. Set is ``LSB code (1 + gain) + offset +
+INL(code)``, and the amplifier is asked for k times that.
+
+Integral nonlinearity is a smooth curve a channel: a few harmonics that are nothing at both ends of the codes,
+as INL is told against the straight line through them. It is far too flat to turn 16 bits back: the converter
+stays monotonic, as its sheet says. Settling (20 µs) and glitches are left out: a few hundredths of a physics
+step.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin.models.base.compiled import allocation_free
+
+# What separates the draws of this stage from those of any other under the same seed.
+STAGE = 101
+
+HARMONICS = 3
+
+
+class DacSection(BaseModel):
+    """Converter of the commands, one channel a group; neutral with 0 bits."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    dac_bits: Annotated[int, Field(ge=0, le=32)] = Field(
+        0,
+        description="of a code; with 0 the converter is ideal, without range and errors"
+        " (AD5370, from its sheet: 16)",
+    )
+    dac_range_V: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
+        10.0,
+        description="output from -range to range, V (span 20 V at a reference of 5 V from the sheet;"
+        " that it is centred on 0, assumed)",
+    )
+    dac_offset_V: Annotated[float, Field(ge=0, le=10)] = Field(
+        0.0, description="largest offset of a channel, drawn from the seed, V (assumed: 2e-3)"
+    )
+    dac_gain_error: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.0, description="largest relative gain error of a channel, drawn from the seed (assumed: 1e-3)"
+    )
+    dac_inl_lsb: Annotated[float, Field(ge=0, le=1e4)] = Field(
+        0.0,
+        description="largest integral nonlinearity of a channel, a smooth curve drawn from the seed, LSB"
+        " (assumed: 4)",
+    )
+
+
+class Dac(NamedTuple):
+    """Converter of a run as compiled code sees it."""
+
+    converts: bool  # whether it is one; if not, a command passes as it is
+    transconductance_A_V: float
+    lsb_V: float
+    lowest: float  # code
+    highest: float
+    offset_V: NDArray[np.float64]  # (n,)
+    gain: NDArray[np.float64]  # (n,) 1 where there is no error
+    inl_lsb: NDArray[np.float64]  # (n, HARMONICS) amplitudes over the codes
+
+
+def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int) -> Dac:
+    """Converter in front of amplifiers of a transconductance (A/V), a channel a group.
+
+    A channel's errors are drawn uniformly within their bounds, INL such that its curve keeps to its bound
+    whatever the code. Each channel has its own stream: no field, group or other stage moves what it draws.
+    """
+    drawn = np.array(
+        [
+            np.random.default_rng([seed, STAGE, channel]).uniform(-1, 1, 2 + HARMONICS)
+            for channel in range(groups)
+        ]
+    ).reshape(groups, 2 + HARMONICS)
+    harmonics = drawn[:, 2:] / np.maximum(1.0, np.abs(drawn[:, 2:]).sum(axis=1, keepdims=True))
+    codes = 2.0**section.dac_bits
+    return Dac(
+        converts=section.dac_bits > 0,
+        transconductance_A_V=transconductance_A_V,
+        lsb_V=2 * section.dac_range_V / codes,
+        lowest=-codes / 2,
+        highest=codes / 2 - 1,
+        offset_V=section.dac_offset_V * drawn[:, 0],
+        gain=1 + section.dac_gain_error * drawn[:, 1],
+        inl_lsb=section.dac_inl_lsb * harmonics,
+    )
+
+
+@allocation_free
+def convert(dac: Dac, command: NDArray[np.float64], asked: NDArray[np.float64]) -> None:
+    """Convert a command.
+
+    It depends on nothing but the command: it may be called when a command comes into force, or once when it
+    is computed.
+
+    Parameters
+    ----------
+    dac : Dac
+    command : (n,) array, A
+        Any number; beyond the range, and infinity, is its end, and what is not a number stays so.
+    asked : (n,) array, A
+        Result, what the amplifiers are asked for; may be `command` itself.
+    """
+    if not dac.converts:
+        for j in range(command.shape[0]):
+            asked[j] = command[j]
+        return
+    for j in range(command.shape[0]):
+        code = np.rint(command[j] / dac.transconductance_A_V / dac.lsb_V)
+        code = min(max(code, dac.lowest), dac.highest)
+        inl = _inl(dac.inl_lsb[j], (code - dac.lowest) / (dac.highest - dac.lowest))
+        volts = dac.lsb_V * (code * dac.gain[j] + inl) + dac.offset_V[j]
+        asked[j] = dac.transconductance_A_V * volts
+
+
+@allocation_free
+def _inl(amplitudes: NDArray[np.float64], share: float) -> float:
+    """``sum(a[n - 1] sin(n pi share))``, by the sines' recurrence: 0 at both ends of the codes."""
+    total, before, now, twice = 0.0, 0.0, sin(pi * share), 2.0 * cos(pi * share)
+    for n in range(amplitudes.shape[0]):
+        total += amplitudes[n] * now
+        before, now = now, twice * now - before
+    return total

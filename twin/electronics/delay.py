@@ -1,0 +1,101 @@
+"""Computation delay: a command is in force a while after the sample that it was computed from."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin.models.base.compiled import allocation_free
+
+# Clock times are built from decimal fractions; a delay and a step that fit do so to rounding only.
+WHOLE = 1e-9
+
+# A slip of the pen must not fill the memory: each control period of delay keeps one more command.
+MOST_PERIODS = 1000
+
+
+class DelaySection(BaseModel):
+    """How late a command comes into force."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    delay_s: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0,
+        description="from sample to output, s; whole physics steps"
+        " (prototype: assumed, one control period of 1 ms)",
+    )
+
+
+class Delay(NamedTuple):
+    """Commands on their way, oldest overwritten first."""
+
+    ring: NDArray[np.float64]  # (commands, n) A
+    newest: NDArray[np.int64]  # (1,) row of `ring` with the command computed last
+    steps: int  # of physics, from sample to output
+    substeps: int  # physics steps in a control period
+
+
+def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> Delay:
+    """Delay before whose first command there is none: 0 A.
+
+    Parameters
+    ----------
+    section : DelaySection
+    step_s : float, s
+        Physics step.
+    substeps : int
+        Physics steps in a control period.
+    groups : int
+        Length of a command.
+
+    Raises
+    ------
+    ValueError
+        The delay is not a whole number of physics steps, or longer than 1000 control periods.
+    """
+    ratio = section.delay_s / step_s
+    steps = round(ratio)
+    if abs(ratio - steps) > WHOLE * ratio or steps > MOST_PERIODS * substeps:
+        raise ValueError(
+            f"expected drive.delay_s a whole multiple of plant.step_s, at most {MOST_PERIODS} control periods,"
+            f" received {section.delay_s!r} and {step_s!r} s"
+        )
+    commands = -(-steps // substeps) + 1
+    return Delay(np.zeros((commands, groups)), np.zeros(1, dtype=np.int64), steps, substeps)
+
+
+@allocation_free
+def latch(delay: Delay, command: NDArray[np.float64]) -> None:
+    """Take the command (n,), A, that was computed from this control tick's sample."""
+    ring = delay.ring
+    newest = (delay.newest[0] + 1) % ring.shape[0]
+    delay.newest[0] = newest
+    for j in range(ring.shape[1]):
+        ring[newest, j] = command[j]
+
+
+@allocation_free
+def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
+    """Write the command in force at a physics step of the period.
+
+    That of k periods ago is in force from step ``steps - k substeps`` of this period on, until the next one
+    is: the latest with ``k substeps + substep >= steps``.
+
+    Parameters
+    ----------
+    delay : Delay
+        After `latch` of this control tick.
+    substep : int
+        From 0 to the physics steps of a period, less 1.
+    out : (n,) array, A
+        Result.
+    """
+    ring = delay.ring
+    missing = delay.steps - substep
+    ago = (missing + delay.substeps - 1) // delay.substeps if missing > 0 else 0
+    row = (delay.newest[0] - ago) % ring.shape[0]
+    for j in range(ring.shape[1]):
+        out[j] = ring[row, j]
