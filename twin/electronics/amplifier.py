@@ -24,7 +24,7 @@ of the offset (20 uV/K).
 
 from __future__ import annotations
 
-from math import inf, log1p
+from math import inf, isnan, log1p, nan
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -240,6 +240,9 @@ def _within_limits(
     stiffness = inductance_H * rate
     left, limited = amplifier.step_s, 0.0
     volts = R * start + stiffness * (target - start) + e
+    last_volts = R * target + e
+    if isnan(volts + last_volts):  # following, the current would not know of the back-EMF
+        return Phase(nan, nan, nan, nan), 0.0
     passed = Phase(start, 0.0, 0.0, 0.0)
 
     if volts > highest or volts < lowest:
@@ -252,7 +255,6 @@ def _within_limits(
         if left <= 0.0:
             return passed, limited
 
-    last_volts = R * target + e
     limit = highest if last_volts > highest else lowest
     duration = left
     if last_volts > highest or last_volts < lowest:

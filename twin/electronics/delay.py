@@ -60,8 +60,8 @@ def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> D
     steps = round(ratio)
     if abs(ratio - steps) > WHOLE * ratio or steps > MOST_PERIODS * substeps:
         raise ValueError(
-            f"expected drive.delay_s a whole multiple of plant.step_s, at most {MOST_PERIODS} control periods,"
-            f" received {section.delay_s!r} and {step_s!r} s"
+            f"expected drive.delay_s a whole multiple of plant.step_s, at most {MOST_PERIODS} control"
+            f" periods, received {section.delay_s!r} and {step_s!r} s"
         )
     commands = -(-steps // substeps) + 1
     return Delay(np.zeros((commands, groups)), np.zeros(1, dtype=np.int64), steps, substeps)

@@ -1,0 +1,333 @@
+"""Current under a limited voltage: against an ODE solver, energy, two halves, limits, and any input."""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from spheretwin.twin.electronics.amplifier import AmplifierSection, amplifier, clear, drive_coils, flow
+from spheretwin.twin.electronics.coil import CoilSection, coil
+from spheretwin.twin.plant.drive import advance, drive
+
+STEP_S = 5e-4
+SUPPLY = {"supply_V": 24.0, "drop_up_V": 4.8, "drop_down_V": 4.6}
+PERIOD_S = 1e-3
+
+
+class Case(NamedTuple):
+    """One group in one step."""
+
+    start: float
+    asked: float
+    emf: float
+    phases: str  # F follows, U and D are at the upper and the lower limit
+    R: float = 1.3
+    L: float = 0.9e-3
+    rate: float = 12566.370614359172
+    highest: float = 19.2
+    lowest: float = -19.4
+    step_s: float = STEP_S
+    limit: float = 8.0
+
+
+CASES = [
+    Case(2.0, 2.5, 1.0, "F"),
+    Case(-1.0, -1.2, -3.0, "F"),
+    Case(-8.0, 8.0, 0.0, "U"),
+    Case(8.0, -8.0, 0.0, "D"),
+    Case(0.0, 3.0, 0.0, "UF"),
+    Case(0.0, -3.0, 1.0, "DF"),
+    Case(6.0, 6.0, 15.0, "U"),  # never enough for the target
+    Case(8.5, 8.0, 9.5, "FU"),
+    Case(-8.5, -8.0, -9.5, "FD"),
+    Case(9.5, 5.0, 15.0, "DFU"),
+    Case(-9.5, -5.0, -15.0, "UFD"),
+    # Slower than the coil by itself (L rate < R): the voltage falls as the current does.
+    Case(6.0, 8.0, 8.0, "F", rate=500.0),
+    Case(4.0, 8.0, 9.0, "FU", rate=1000.0, step_s=5e-3),
+    Case(-4.0, -8.0, -9.5, "FD", rate=1000.0, step_s=5e-3),
+    Case(25.0, 8.0, 2.0, "UF", rate=900.0),
+    # A voltage that stays where it is (L rate = R), all but within.
+    Case(2.0, 5.0, 1.0, "F", R=1.25, L=1.25e-3, rate=1000.0),
+    Case(2.0, 5.0, 15.0, "U", R=1.25, L=1.25e-3, rate=1000.0),
+]
+NAMES = [f"{case.phases}-{number}" for number, case in enumerate(CASES)]
+
+
+class Stepped(NamedTuple):
+    """What a group has done in a step."""
+
+    current: float
+    mean: float
+    copper: float
+    work: float
+    limited: float
+
+
+def made(case, groups=1):
+    """Amplifiers and coils of a case."""
+    highest = max(case.highest, -case.lowest)
+    section = AmplifierSection(
+        supply_V=highest,
+        drop_up_V=highest - case.highest,
+        drop_down_V=highest + case.lowest,
+        bandwidth_rad_s=case.rate,
+    )
+    coils = coil(CoilSection(), case.R, case.L, PERIOD_S, groups)
+    return amplifier(section, case.limit, case.step_s, groups, 0), coils
+
+
+def stepped(case, times=1):
+    amplifiers, coils = made(case)
+    current, passed = np.array([case.start]), flow(1)
+    charge = 0.0
+    for _ in range(times):
+        drive_coils(amplifiers, coils, np.array([case.asked]), np.array([case.emf]), current, passed)
+        charge += passed.mean_current_A[0] * case.step_s
+    mean = charge / (times * case.step_s)
+    return Stepped(current[0], mean, passed.copper_J[0], passed.work_J[0], passed.voltage_limited_s[0])
+
+
+def voltage(case, current):
+    """What the amplifier would set, had it any voltage."""
+    return case.R * current + case.L * case.rate * (case.asked - current) + case.emf
+
+
+def integrated(case):
+    """The same by scipy's solver, to 1e-12 a step; and which limits hold, in order."""
+
+    def slope(t, state):
+        v = np.clip(voltage(case, state[0]), case.lowest, case.highest)
+        return [
+            (v - case.R * state[0] - case.emf) / case.L,
+            state[0],
+            case.R * state[0] ** 2,
+            v * state[0],
+        ]
+
+    def upper(t, state):
+        return voltage(case, state[0]) - case.highest
+
+    def lower(t, state):
+        return voltage(case, state[0]) - case.lowest
+
+    tolerances = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15, "max_step": case.step_s / 50}
+    solution = solve_ivp(slope, (0, case.step_s), [case.start, 0, 0, 0], events=[upper, lower], **tolerances)
+    assert solution.success
+    edges = [0.0, *sorted(np.concatenate(solution.t_events)), case.step_s]
+    phases, limited = "", 0.0
+    for begin, end in pairwise(edges):
+        volts = voltage(case, np.interp((begin + end) / 2, solution.t, solution.y[0]))
+        phases += "U" if volts > case.highest else "D" if volts < case.lowest else "F"
+        limited += (end - begin) * (phases[-1] != "F")
+    current, charge, copper, work = solution.y[:, -1]
+    return Stepped(current, charge / case.step_s, copper, work, limited), phases
+
+
+@pytest.mark.parametrize("case", CASES, ids=NAMES)
+def test_a_step_is_what_an_ode_solver_finds(case):
+    expected, phases = integrated(case)
+    assert phases == case.phases
+    # The solver's 1e-12 a step, over a hundred; each switch is a kink that costs it some of its order.
+    np.testing.assert_allclose(stepped(case), expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("case", CASES, ids=NAMES)
+def test_many_small_steps_are_one_whole(case):
+    whole, parts = stepped(case), stepped(case._replace(step_s=case.step_s / 64), times=64)
+    # Rounding of 64 steps, of currents up to 15 A and voltages that are 8 times as large.
+    np.testing.assert_allclose(parts, whole, rtol=1e-12, atol=1e-15)
+
+
+def test_with_enough_voltage_the_current_is_the_ideal_lag():
+    generator, groups = np.random.default_rng(0), 18
+    section = AmplifierSection(supply_V=1e6, bandwidth_rad_s=4096.0)  # 1 / rate is exact
+    coils = coil(CoilSection(), 1.3, 0.9e-3, PERIOD_S, groups)
+    for amplifiers in (
+        amplifier(section, 8.0, STEP_S, groups, 0),
+        amplifier(AmplifierSection(bandwidth_rad_s=4096.0), 8.0, STEP_S, groups, 0),
+    ):
+        current, ideal, mean, passed = np.zeros(groups), np.zeros(groups), np.empty(groups), flow(groups)
+        for _ in range(100):
+            asked = generator.uniform(-10, 10, groups)  # some beyond the limit
+            drive_coils(amplifiers, coils, asked, generator.normal(size=groups), current, passed)
+            advance(drive(1 / 4096.0, STEP_S, 8.0), asked, ideal, mean)
+            # Both are the same closed form; the roundings of a few currents of 8 A.
+            np.testing.assert_allclose(current, ideal, rtol=0, atol=1e-14)
+            np.testing.assert_allclose(passed.mean_current_A, mean, rtol=0, atol=1e-14)
+        np.testing.assert_array_equal(passed.voltage_limited_s, 0)
+
+
+def test_at_rest_nothing_moves_by_a_bit():
+    amplifiers, coils = made(Case(0, 0, 0, "F"), groups=3)
+    asked, passed = np.array([0.0, 3.3, -8.0]), flow(3)
+    current = asked.copy()
+    for _ in range(1000):
+        drive_coils(amplifiers, coils, asked, np.zeros(3), current, passed)
+    np.testing.assert_array_equal(current, asked)
+    np.testing.assert_allclose(passed.copper_J, 1.3 * asked**2 * 0.5, rtol=1e-12)  # 1000 sums
+
+
+def test_a_rise_under_the_voltage_limit_is_the_ramp_of_the_voltage_that_is_left():
+    # HARDWARE: 24 - 4.8 - 1.3 * 8 = 8.8 V are left at 8 A, and 8.8 V / 0.9 mH are 9.8 kA/s.
+    case = Case(8.0, 12.0, 0.0, "U", limit=20.0, step_s=1e-7)
+    slope = (stepped(case).current - 8.0) / 1e-7
+    assert slope == pytest.approx(8.8 / 0.9e-3, rel=1e-4)  # half of R step / L, 7e-5, is lost on the way
+    assert slope == pytest.approx(9.8e3, rel=0.01)
+
+
+def test_back_emf_takes_from_the_voltage():
+    from_rest = Case(0.0, 8.0, 0.0, "U", step_s=1e-5)
+    rises = [stepped(from_rest._replace(emf=emf)).current for emf in (-9.6, 0.0, 9.6)]
+    np.testing.assert_allclose(np.array(rises) / rises[1], [1.5, 1.0, 0.5], rtol=1e-12)
+
+
+@pytest.mark.parametrize("x", [1e-12, 1e-9, 1e-6, 1e6, 1e12])
+def test_time_constants_far_from_the_step_keep_their_digits(x):
+    """Time of a step in time constants L/R: a ramp of nearly pure inductance, or none at all."""
+    R = 1.0
+    case = Case(0.0, 1e9, 0.0, "U", R=R, L=R * STEP_S / x, rate=1e9, limit=1e9)
+    current, mean, copper, work, limited = stepped(case)
+    last = case.highest / R
+    if x < 1:
+        expected = [last * x, last * x / 2, R * (last * x) ** 2 / 3 * STEP_S, last**2 * R * x / 2 * STEP_S]
+    else:
+        expected = [last, last, R * last**2 * STEP_S, R * last**2 * STEP_S]
+    # The next term of either limit is the share x, or 1.5 / x; then rounding.
+    np.testing.assert_allclose([current, mean, copper, work], expected, rtol=1.5 * min(x, 1 / x) + 1e-14)
+    assert limited == STEP_S
+
+
+def decades(lowest, highest):
+    return st.floats(lowest, highest).map(lambda exponent: 10.0**exponent)
+
+
+def signed(numbers):
+    return st.one_of(st.just(0.0), numbers, numbers.map(lambda number: -number))
+
+
+ANY = st.builds(
+    Case,
+    start=signed(decades(-3, 1.5)),
+    asked=signed(decades(-3, 1.5)),
+    emf=signed(decades(-3, 1.5)),
+    phases=st.just(""),
+    R=decades(-2, 2),
+    L=decades(-6, 0),
+    rate=decades(1, 5),
+    highest=decades(0, 2),
+    lowest=decades(0, 2).map(lambda volts: -volts),
+    step_s=decades(-5, -2),
+    limit=st.just(1e3),
+)
+
+
+@given(ANY)
+def test_work_is_copper_loss_and_emf_work_and_the_change_of_what_is_stored(case):
+    after = stepped(case)
+    emf_work = case.emf * after.mean * case.step_s
+    stored = 0.5 * case.L * (after.current**2 - case.start**2)
+    largest = max(abs(case.start), abs(after.current))
+    power = max(case.highest, -case.lowest, abs(case.emf), case.R * largest) * largest
+    # Rounding of each integral, and of what is stored at either end.
+    rounding = 1e-14 * (power * case.step_s + 0.5 * case.L * largest**2)
+    assert after.work == pytest.approx(after.copper + emf_work + stored, rel=0, abs=20 * rounding)
+
+
+@given(ANY)
+def test_two_halves_are_one_whole_whatever_the_phases(case):
+    whole, halves = stepped(case), stepped(case._replace(step_s=case.step_s / 2), times=2)
+    largest = max(abs(case.start), abs(whole.current), abs(halves.current))
+    power = max(case.highest, -case.lowest, abs(case.emf), case.R * largest) * largest
+    scales = np.array([largest, largest, power * case.step_s, power * case.step_s, case.step_s])
+    # Times are ill-conditioned where a limit is met slowly, or only just: not what they lead to.
+    difference = np.abs(np.subtract(halves, whole))
+    assert np.all(difference[:4] <= 1e-12 * scales[:4])
+
+
+@given(ANY)
+def test_current_goes_towards_its_rest_and_voltage_within_its_swing(case):
+    after = stepped(case)
+    # At rest: the target, or what the limits allow.
+    rest = np.clip(case.asked, (case.lowest - case.emf) / case.R, (case.highest - case.emf) / case.R)
+    slack = 1e-12 * max(abs(case.start), abs(rest))
+    low, high = sorted((case.start, rest))
+    assert low - slack <= after.current <= high + slack
+    assert low - slack <= after.mean <= high + slack
+    assert 0 <= after.limited <= case.step_s * (1 + 1e-15)
+    assert after.copper >= 0
+
+
+ANY_NUMBER = st.floats(allow_nan=False)
+REACHABLE = st.floats(-1e12, 1e12)  # A: of 1e9 V over 1 mohm
+
+
+@given(
+    st.lists(st.tuples(REACHABLE, ANY_NUMBER, ANY_NUMBER), min_size=4, max_size=4),
+    decades(-3, 6),
+    decades(-9, 3),
+    decades(-3, 9),
+    decades(-3, 6),
+    decades(-7, 0),
+)
+def test_no_number_however_large_or_small_gives_anything_but_numbers(groups, R, L, bandwidth, supply, step_s):
+    current, asked, emf = (np.array(column) for column in zip(*groups, strict=True))
+    section = AmplifierSection(supply_V=supply, bandwidth_rad_s=bandwidth)
+    amplifiers = amplifier(section, 8.0, step_s, 4, 0)
+    coils, passed = coil(CoilSection(), R, L, PERIOD_S, 4), flow(4)
+    most = np.maximum(np.abs(current), (supply + 1e9) / R)
+    for _ in range(3):
+        drive_coils(amplifiers, coils, asked, emf, current, passed)
+    for sums in (current, *passed):
+        assert np.all(np.isfinite(sums))
+    assert np.all(np.abs(current) <= most * (1 + 1e-12))
+    assert np.all(passed.voltage_limited_s <= 3 * step_s * (1 + 1e-12))
+
+
+@pytest.mark.parametrize("place", ["asked", "emf", "current"])
+def test_what_is_not_a_number_stays_so_in_its_group_alone(place):
+    amplifiers, coils = made(CASES[0], groups=3)
+    inputs = {"asked": np.full(3, 2.0), "emf": np.full(3, 0.5), "current": np.zeros(3)}
+    inputs[place][1] = np.nan
+    passed = flow(3)
+    drive_coils(amplifiers, coils, **inputs, flow=passed)
+    lost = np.array([False, True, False])
+    for sums in (inputs["current"], passed.mean_current_A, passed.copper_J, passed.work_J):
+        np.testing.assert_array_equal(np.isnan(sums), lost)
+
+
+def test_the_target_keeps_to_the_current_limit_with_its_offset():
+    section = AmplifierSection(**SUPPLY, amplifier_offset_V=5e-3)
+    amplifiers = amplifier(section, 8.0, STEP_S, 18, 4)
+    assert np.all(np.abs(amplifiers.offset_A) <= 4e-3)  # 5 mV at 0.8 A/V
+    coils, passed = coil(CoilSection(), 1.3, 0.9e-3, PERIOD_S, 18), flow(18)
+    current = np.zeros(18)
+    for asked, expected in ((1.0, 1.0 + amplifiers.offset_A), (9.0, 8.0), (-np.inf, -8.0)):
+        clear(passed)
+        for _ in range(40):
+            drive_coils(amplifiers, coils, np.full(18, asked), np.zeros(18), current, passed)
+        np.testing.assert_allclose(current, expected, rtol=1e-14)
+        limited = 0.0 if asked == 1.0 else 40 * STEP_S
+        np.testing.assert_allclose(passed.current_limited_s, limited, rtol=1e-13)
+
+
+def test_offsets_fill_their_bound_and_are_the_groups_own():
+    section = AmplifierSection(**SUPPLY, amplifier_offset_V=1.0, transconductance_A_V=1.0)
+    offset = amplifier(section, 8.0, STEP_S, 400, 9).offset_A
+    # Uniform: the mean of 400 strays by 1 / sqrt(1200); five of these.
+    assert abs(offset.mean()) < 5 / np.sqrt(1200)
+    assert offset.max() > 0.95
+    assert offset.min() < -0.95
+    np.testing.assert_array_equal(amplifier(section, 8.0, STEP_S, 18, 9).offset_A, offset[:18])
+    np.testing.assert_array_equal(amplifier(AmplifierSection(), 8.0, STEP_S, 18, 9).offset_A, 0)
+
+
+@pytest.mark.parametrize("drops", [{"drop_up_V": 24.0}, {"drop_down_V": 30.0}])
+def test_a_swing_of_nothing_is_refused(drops):
+    with pytest.raises(ValueError, match=r"drive\.drop_up_V .*below drive\.supply_V.*24\.0 V"):
+        AmplifierSection(supply_V=24.0, **drops)
+    AmplifierSection(**drops)  # nobody asks for a swing without a supply
