@@ -61,6 +61,7 @@ class Dac(NamedTuple):
 
     converts: bool  # whether it is one; if not, a command passes as it is
     transconductance_A_V: float
+    span_A: float  # twice what the range is as a current: beyond every code
     lsb_V: float
     lowest: float  # code
     highest: float
@@ -86,6 +87,7 @@ def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int
     return Dac(
         converts=section.dac_bits > 0,
         transconductance_A_V=transconductance_A_V,
+        span_A=2 * section.dac_range_V * transconductance_A_V,
         lsb_V=2 * section.dac_range_V / codes,
         lowest=-codes / 2,
         highest=codes / 2 - 1,
@@ -115,7 +117,8 @@ def convert(dac: Dac, command: NDArray[np.float64], asked: NDArray[np.float64]) 
             asked[j] = command[j]
         return
     for j in range(command.shape[0]):
-        code = np.rint(command[j] / dac.transconductance_A_V / dac.lsb_V)
+        held = min(max(command[j], -dac.span_A), dac.span_A)  # its quotients stay numbers
+        code = np.rint(held / dac.transconductance_A_V / dac.lsb_V)
         code = min(max(code, dac.lowest), dac.highest)
         inl = _inl(dac.inl_lsb[j], (code - dac.lowest) / (dac.highest - dac.lowest))
         volts = dac.lsb_V * (code * dac.gain[j] + inl) + dac.offset_V[j]

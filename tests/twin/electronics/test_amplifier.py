@@ -254,7 +254,8 @@ def test_current_goes_towards_its_rest_and_voltage_within_its_swing(case):
     after = stepped(case)
     # At rest: the target, or what the limits allow.
     rest = np.clip(case.asked, (case.lowest - case.emf) / case.R, (case.highest - case.emf) / case.R)
-    slack = 1e-12 * max(abs(case.start), abs(rest))
+    swing = max(case.highest, -case.lowest, abs(case.emf)) / case.R
+    slack = 1e-12 * max(abs(case.start), abs(case.asked), swing)  # of what the currents are differences of
     low, high = sorted((case.start, rest))
     assert low - slack <= after.current <= high + slack
     assert low - slack <= after.mean <= high + slack
