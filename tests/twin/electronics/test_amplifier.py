@@ -202,6 +202,16 @@ def test_time_constants_far_from_the_step_keep_their_digits(x):
     assert limited == STEP_S
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_step_that_begins_at_a_limit_to_the_bit_and_goes_beyond_stays_there(sign):
+    # L rate = 2: the voltage is 2 * 4 - 5 + 5 = 8 V at the start, and would be 4 + 5 = 9 V at the target.
+    figures = {"R": 1.0, "L": 0.5, "rate": 4.0, "highest": 8.0, "lowest": -8.0}
+    case = Case(5.0 * sign, 4.0 * sign, 5.0 * sign, "", **figures, step_s=0.25)
+    after = stepped(case)
+    assert after.limited == 0.25
+    assert after.current == pytest.approx(sign * (3.0 + 2.0 * np.exp(-0.5)), rel=1e-15)
+
+
 def decades(lowest, highest):
     return st.floats(lowest, highest).map(lambda exponent: 10.0**exponent)
 
@@ -314,6 +324,13 @@ def test_the_target_keeps_to_the_current_limit_with_its_offset():
         np.testing.assert_allclose(current, expected, rtol=1e-14)
         limited = 0.0 if asked == 1.0 else 40 * STEP_S
         np.testing.assert_allclose(passed.current_limited_s, limited, rtol=1e-13)
+
+
+def test_the_current_limit_itself_may_be_asked_for():
+    amplifiers, coils = made(CASES[0], groups=2)
+    current, passed = np.array([8.0, -8.0]), flow(2)
+    drive_coils(amplifiers, coils, current.copy(), np.zeros(2), current, passed)
+    np.testing.assert_array_equal(passed.current_limited_s, 0)
 
 
 def test_offsets_fill_their_bound_and_are_the_groups_own():
