@@ -84,6 +84,23 @@ def test_heat_is_stored_or_passed_on():
     assert 60 * (made.temperature_degC[0] - 20) + lost == pytest.approx(heat, rel=1e-9)
 
 
+def warmed(current_A, periods):
+    """Temperature at the end of periods of 1 s with a constant current."""
+    made = coil(COPPER, R, L, 1.0, 1)
+    for _ in range(periods):
+        warm(made, made.resistance_ohm * current_A**2)
+    return made.temperature_degC[0]
+
+
+def test_a_constant_current_comes_to_rest_where_copper_lets_it_and_runs_away_beyond():
+    # Rise = 4 K/W R20 i² (1 + 0.0039 rise), at rest only for i² below 1 / (4 R20 0.0039): 7.02 A.
+    cold = 4 * R * 3.0**2
+    rest = 20 + cold / (1 - 0.0039 * cold)
+    assert warmed(3.0, 20_000) == pytest.approx(rest, rel=1e-12)  # 60 time constants and more
+    assert warmed(7.1, 20_000) > 1000
+    assert warmed(7.1, 40_000) > 1.5 * warmed(7.1, 20_000)
+
+
 def test_a_coil_that_is_cooled_at_once_stays_at_the_temperature_around_it():
     made = coil(CoilSection(thermal_resistance_K_W=0.0, ambient_degC=40.0), R, L, PERIOD_S, 1)
     warm(made, np.array([100.0]))
