@@ -82,7 +82,7 @@ def test_offset_and_gain_are_those_of_a_straight_line_through_the_ends():
     for channel in range(GROUPS):
         asked = curve(made, channel)
         slope = (asked[-1] - asked[0]) / (CODES[-1] - CODES[0]) / LSB_A
-        # 1e-15 A of rounding over 16 A; sin(3 pi) is 4e-16 instead of 0, of 4 LSB.
+        # 1e-15 A of rounding over 16 A.
         assert slope == pytest.approx(made.gain[channel], rel=1e-14)
         middle = asked[0] + slope * LSB_A * 2**15
         assert middle == pytest.approx(GAIN_A_V * made.offset_V[channel], abs=1e-14)
@@ -97,18 +97,18 @@ def test_inl_is_smooth_keeps_to_its_bound_and_turns_no_code_back():
         inl = (asked - straight) / LSB_A
         largest.append(np.abs(inl).max())
         assert np.all(np.diff(asked) > 0)
-        # The third harmonic is steepest: 4 LSB times 3 pi over the codes. Rounding: 1e-15 A of 2.4e-4 A.
-        assert np.abs(np.diff(inl)).max() <= 4 * 3 * np.pi / 2**16 + 2e-11
+        # The third term is steepest: 4 LSB times 2 * 3 over half the codes. Rounding: 1e-15 A of 2.4e-4 A.
+        assert np.abs(np.diff(inl)).max() <= 4 * 2 * 3 / 2**15 + 2e-11
     assert max(largest) <= 4.0 * (1 + 1e-3)  # in ideal steps, which the gain stretches
     assert min(largest) > 0.1
 
 
 def test_inl_is_its_sum_of_sines():
     made = dac(PROTOTYPE, GAIN_A_V, 1, 5)
-    share = (CODES + 2**15) / (2**16 - 1)
-    sines = sum(made.inl_lsb[0, n] * np.sin((n + 1) * np.pi * share) for n in range(3))
+    p = np.arccos((CODES + 2**15) / (2**16 - 1) * 2 - 1)
+    sines = np.sin(p) * sum(made.inl_lsb[0, n] * np.sin((n + 1) * p) for n in range(3))
     volts = made.lsb_V * (CODES * made.gain[0] + sines) + made.offset_V[0]
-    # The recurrence of sines and the sum: some roundings of 8 A.
+    # Some roundings of 8 A; the recurrence has those of 4 LSB alone.
     np.testing.assert_allclose(curve(made, 0), GAIN_A_V * volts, rtol=0, atol=1e-14)
 
 

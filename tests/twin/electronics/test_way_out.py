@@ -80,8 +80,8 @@ class SlowChain:
 
     def converted(self, command):
         codes = np.clip(np.round(command / 0.8 * 2**16 / 20), -(2**15), 2**15 - 1)
-        share = (codes + 2**15) / (2**16 - 1)
-        inl = sum(self.inl[:, n] * np.sin((n + 1) * np.pi * share) for n in range(self.inl.shape[1]))
+        p = np.arccos((codes + 2**15) / (2**16 - 1) * 2 - 1)
+        inl = np.sin(p) * sum(self.inl[:, n] * np.sin((n + 1) * p) for n in range(self.inl.shape[1]))
         return 0.8 * (20 / 2**16 * (codes * self.gain + inl) + self.offset_V)
 
     def stepped(self, group, R, target, emf):
