@@ -18,8 +18,8 @@ that the phase would settle at. What relaxes from u to u_last of the other sign 
 ends. A limit that is not reached costs no logarithm and no exponential: where the voltage at the start and
 the one at rest are both within the swing, so is every one between.
 
-Left out, as small beside a physics step of 0.5 ms: the slew rate (9 V/us: full swing in 5 us) and the drift
-of the offset (20 uV/K).
+Left out, as small beside a physics step of 0.5 ms: the slew rate (9 V/µs: full swing in 5 µs) and the drift
+of the offset (20 µV/K).
 """
 
 from __future__ import annotations

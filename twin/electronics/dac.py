@@ -7,10 +7,11 @@ INL(code)``, and the amplifier is asked for k times that.
 
 Integral nonlinearity is a smooth curve a channel, nothing at both ends of the codes, as INL is told against
 the straight line through them: ``sum(a_n sin(p) sin(n p))``, a bow, an S and so on, where the codes run from
-one end to the other as cos(p). Each term is a polynomial of the code, so that no sine is computed; it stays
-within a_n, and rises by no more than ``2 n a_n`` over half the codes, far too little to turn 16 bits back: the
-converter stays monotonic, as its sheet says. Settling (20 us) and glitches are left out: a few hundredths of a
-physics step.
+one end to the other as cos(p). Each term is a polynomial of the code, so that no sine is computed. It stays
+within a_n, with a slope of at most ``2 n a_n`` over half the codes: far too little to turn 16 bits back, so
+that the converter stays monotonic, as its sheet says.
+
+Settling (20 µs) and glitches are left out: a few hundredths of a physics step.
 """
 
 from __future__ import annotations
