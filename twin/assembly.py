@@ -30,7 +30,7 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
-from spheretwin.twin.electronics.sensing import Sensing, reckoned, sensing
+from spheretwin.twin.electronics.sensing.chain import Sensing, reckoned, sensing
 from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.drive import drive
 from spheretwin.twin.plant.engine import integrator_name

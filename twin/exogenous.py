@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.disturbances.draws import Draws, term_draws
-from spheretwin.twin.electronics.noise import noise_rows
-from spheretwin.twin.electronics.sensing import noise_width
+from spheretwin.twin.electronics.sensing.chain import noise_width
+from spheretwin.twin.electronics.sensing.noise import noise_rows
 from spheretwin.twin.loop import Inputs
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Sampled, checked

@@ -10,7 +10,7 @@ from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.copying import copy_into, copy_rows
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.twin.columns.registry import write_columns
-from spheretwin.twin.electronics.sensing import Sensing, sense
+from spheretwin.twin.electronics.sensing.chain import Sensing, sense
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
 
 Array = NDArray[np.float64]

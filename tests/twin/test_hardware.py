@@ -8,8 +8,8 @@ from spheretwin.control.estimation.registry import ESTIMATORS
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import assembly, cli
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.electronics.noise import noise_rows
-from spheretwin.twin.electronics.sensing import noise_width, sense, sensing
+from spheretwin.twin.electronics.sensing.chain import noise_width, sense, sensing
+from spheretwin.twin.electronics.sensing.noise import noise_rows
 from spheretwin.twin.scenario import flags
 from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.session import Session

@@ -14,7 +14,7 @@ from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
 from spheretwin.twin.disturbances.disturbance import Disturbance
-from spheretwin.twin.electronics.sections import SensorsSection
+from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.trajectories.registry import Trajectory

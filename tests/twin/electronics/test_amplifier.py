@@ -9,8 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from spheretwin.twin.electronics.amplifier import AmplifierSection, amplifier, clear, drive_coils, flow
-from spheretwin.twin.electronics.coil import CoilSection, coil
+from spheretwin.twin.electronics.driving.amplifier import (
+    AmplifierSection,
+    amplifier,
+    clear,
+    drive_coils,
+    flow,
+)
+from spheretwin.twin.electronics.driving.coil import CoilSection, coil
 from spheretwin.twin.plant.drive import advance, drive
 
 STEP_S = 5e-4

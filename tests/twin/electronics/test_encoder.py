@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.encoder import EncoderSection, counted, encoder
+from spheretwin.twin.electronics.sensing.encoder import EncoderSection, counted, encoder
 
 COUNTS = st.integers(1, 2**20)
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from spheretwin.twin.disturbances.draws import term_draws
-from spheretwin.twin.electronics.noise import STAGE, noise_rows
+from spheretwin.twin.electronics.sensing.noise import STAGE, noise_rows
 
 SEED, TICKS, WIDTH = 7, 400, 11
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from spheretwin.twin.electronics.potentiometer import (
+from spheretwin.twin.electronics.sensing.potentiometer import (
     HARMONICS,
     LARGEST_SHARE,
     PotentiometerSection,

@@ -12,9 +12,9 @@ from scipy.optimize import minimize_scalar
 from spheretwin.models.base.compiled import compiled
 from spheretwin.twin import electronics
 from spheretwin.twin.electronics.hardware import PROTOTYPE_SENSORS
-from spheretwin.twin.electronics.noise import noise_rows
-from spheretwin.twin.electronics.sections import SensorsSection
-from spheretwin.twin.electronics.sensing import noise_width, sense, sensing
+from spheretwin.twin.electronics.sensing.chain import noise_width, sense, sensing
+from spheretwin.twin.electronics.sensing.noise import noise_rows
+from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.scenario.fields import every_field
 
 NO_NOISE = np.empty(0)

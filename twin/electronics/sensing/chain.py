@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.electronics import adc as adcs
-from spheretwin.twin.electronics import potentiometer as potentiometers
-from spheretwin.twin.electronics.adc import Adc, adc, converted
-from spheretwin.twin.electronics.encoder import Encoder, counted, encoder
-from spheretwin.twin.electronics.potentiometer import Potentiometer, potentiometer, wiper_voltage
-from spheretwin.twin.electronics.sections import SensorsSection
+from spheretwin.twin.electronics.sensing import adc as adcs
+from spheretwin.twin.electronics.sensing import potentiometer as potentiometers
+from spheretwin.twin.electronics.sensing.adc import Adc, adc, converted
+from spheretwin.twin.electronics.sensing.encoder import Encoder, counted, encoder
+from spheretwin.twin.electronics.sensing.potentiometer import Potentiometer, potentiometer, wiper_voltage
+from spheretwin.twin.electronics.sensing.sections import SensorsSection
 
 CHANNELS = 2
 """Angles that are voltages on their way: α and β."""

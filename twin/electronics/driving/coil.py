@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.electronics.relaxation import relaxation
+from spheretwin.twin.electronics.driving.relaxation import relaxation
 
 # Temperature at which a resistance is told.
 REFERENCE_degC = 20.0

@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
-from spheretwin.twin.electronics.coil import Coil
-from spheretwin.twin.electronics.relaxation import Relaxation, relaxation
+from spheretwin.twin.electronics.driving.coil import Coil
+from spheretwin.twin.electronics.driving.relaxation import Relaxation, relaxation
 
 # What separates the draws of this stage from those of any other under the same seed.
 STAGE = 102

@@ -2,9 +2,9 @@
 
 from pydantic import BaseModel, Field
 
-from spheretwin.twin.electronics.adc import AdcSection
-from spheretwin.twin.electronics.encoder import EncoderSection
-from spheretwin.twin.electronics.potentiometer import PotentiometerSection
+from spheretwin.twin.electronics.sensing.adc import AdcSection
+from spheretwin.twin.electronics.sensing.encoder import EncoderSection
+from spheretwin.twin.electronics.sensing.potentiometer import PotentiometerSection
 from spheretwin.twin.trajectories.trajectory import CONFIG, Triple
 
 

@@ -1,0 +1,1 @@
+"""The way out: from commands to currents in the coils, one stage a file."""
