@@ -143,3 +143,21 @@ def generalised_torque(
     torque_q[0] = torque_S[0]
     torque_q[1] = ca * torque_S[1] + sa * torque_S[2]
     torque_q[2] = sb * torque_S[0] + cb * (ca * torque_S[2] - sa * torque_S[1])
+
+
+@allocation_free
+def angular_velocity(q: NDArray[np.float64], qdot: NDArray[np.float64], rate_S: NDArray[np.float64]) -> None:
+    """Angular velocity of the rotor in the stator frame: ``w_SR_S = E(q) qdot``.
+
+    Parameters
+    ----------
+    q, qdot : (3,) arrays, rad and rad/s
+        Pose and hinge rates.
+    rate_S : (3,) array, rad/s
+        Result.
+    """
+    ca, sa = cos(q[0]), sin(q[0])
+    cb, sb = cos(q[1]), sin(q[1])
+    rate_S[0] = qdot[0] + sb * qdot[2]
+    rate_S[1] = ca * qdot[1] - sa * cb * qdot[2]
+    rate_S[2] = sa * qdot[1] + ca * cb * qdot[2]

@@ -120,10 +120,10 @@ def write(row, controller, sensors, plant):
 
 
 SIGNALS = (Signal("largest_current_A", "A", 1, "largest group current at the end of the tick"),)
-COLUMNS = Columns(SIGNALS, lambda scenario: True, write)
+COLUMNS = Columns(lambda groups: SIGNALS, lambda scenario: True, write)
 """,
         "twin/columns/registry.py",
-        ("    friction.COLUMNS,\n", "    friction.COLUMNS,\n    largest.COLUMNS,\n"),
+        ("    drive.COLUMNS,\n", "    drive.COLUMNS,\n    largest.COLUMNS,\n"),
         "from spheretwin.twin.columns import largest\n",
     ),
     "plant": Addition(

@@ -30,6 +30,8 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
+from spheretwin.twin.electronics.driving.chain import driving
+from spheretwin.twin.electronics.driving.sections import DriveSection
 from spheretwin.twin.electronics.sensing.chain import Sensing, reckoned, sensing
 from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.drive import drive
@@ -39,7 +41,7 @@ from spheretwin.twin.plant.plant import Plant
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.plant.rotor import Rotor, Setting
 from spheretwin.twin.scenario.planned import planned
-from spheretwin.twin.scenario.sections import DriveSection, OwnController, OwnPath, Scenario
+from spheretwin.twin.scenario.sections import OwnController, OwnPath, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.trajectories.registry import SHAPES
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, Triple
@@ -87,6 +89,11 @@ def _with_curve(model: Mjcf, curve: str | None) -> Actuator:
     return actuators.from_model(model.described, read)
 
 
+def _lag_s(drive: DriveSection) -> float:
+    """Lag of the currents while no voltage is at its limit."""
+    return 1 / drive.bandwidth_rad_s if drive.supply_V is not None else drive.time_constant_s or 0.0
+
+
 def name_of_own(name: str) -> str:
     """Name of a law or trajectory of the user's, where it must not be taken for one that can be had."""
     return f"{name} of the user's" if name in LAWS or name in SHAPES or is_reference(name) else name
@@ -119,9 +126,17 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
     actuator, given, nominal, section = files.actuator, scenario.drive, scenario.nominal, scenario.plant
     group = actuator.group
     lag_s, limit_A = given.time_constant_s, given.current_limit_A
-    drive_section = DriveSection(
-        time_constant_s=group.inductance_H / group.resistance_ohm if lag_s is None else lag_s,
-        current_limit_A=group.current_limit_A if limit_A is None else limit_A,
+    resistance_ohm = group.resistance_ohm if given.resistance_ohm is None else given.resistance_ohm
+    inductance_H = group.inductance_H if given.inductance_H is None else given.inductance_H
+    if lag_s is None and given.supply_V is None:
+        lag_s = inductance_H / resistance_ohm
+    drive_section = given.model_copy(
+        update={
+            "time_constant_s": lag_s,
+            "current_limit_A": group.current_limit_A if limit_A is None else limit_A,
+            "resistance_ohm": resistance_ohm,
+            "inductance_H": inductance_H,
+        }
     )
     filled: dict[str, Any] = {
         "drive": drive_section,
@@ -130,10 +145,9 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
                 "inertia_kg_m2": nominal.inertia_kg_m2 or tuple(actuator.inertia.tolist()),
                 "current_limit_A": nominal.current_limit_A or drive_section.current_limit_A,
                 "time_constant_s": (
-                    drive_section.time_constant_s
-                    if nominal.time_constant_s is None
-                    else nominal.time_constant_s
+                    _lag_s(drive_section) if nominal.time_constant_s is None else nominal.time_constant_s
                 ),
+                "delay_s": given.delay_s if nominal.delay_s is None else nominal.delay_s,
             }
         ),
         "plant": section.model_copy(
@@ -188,7 +202,7 @@ def same_known(scenario: Scenario, other: Scenario) -> bool:
 
 def _known(scenario: Scenario) -> Known:
     nominal = scenario.nominal
-    return Known(scenario.controller.period_s, nominal.delay_s, np.array(nominal.inertia_kg_m2))
+    return Known(scenario.controller.period_s, nominal.delay_s or 0.0, np.array(nominal.inertia_kg_m2))
 
 
 def signals_of(scenario: Scenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
@@ -199,20 +213,21 @@ def signals_of(scenario: Scenario, actuator: Actuator, law: Law) -> tuple[Signal
     InputError
         The law has a signal under the name of a stage's.
     """
-    taken = {signal.name for columns in ALL for signal in columns.signals}
+    groups = len(actuator.groups)
+    taken = {signal.name for columns in ALL for signal in columns.signals(groups)}
     if twice := sorted(taken & {signal.name for signal in law.signals}):
         raise InputError(f"law {law.name}: expected new names of signals, received {', '.join(twice)}")
-    found = common_signals(len(actuator.groups))
+    found = common_signals(groups)
     for columns in ALL:
         if columns.logged(scenario):
-            found += columns.signals
+            found += columns.signals(groups)
     return found + law.signals
 
 
 def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
     """Where the loop finds the columns that not every run has."""
     first = offsets(signals)
-    of_stages = tuple(first.get(columns.signals[0].name, -1) for columns in ALL)
+    of_stages = tuple(first.get(columns.signals(1)[0].name, -1) for columns in ALL)
     return Places(of_stages, width(signals) - width(law.signals))
 
 
@@ -275,7 +290,7 @@ def controller_of(
     """Controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
     limit_A, lag_s = nominal.current_limit_A or 0.0, nominal.time_constant_s or 0.0
-    believed = belief(law.asks_torque, groups, scenario.controller.period_s, nominal.delay_s, lag_s)
+    believed = belief(law.asks_torque, groups, scenario.controller.period_s, nominal.delay_s or 0.0, lag_s)
     return controller(law, magnetics, kept, limit_A, width(law.signals), believed, estimator)
 
 
@@ -288,6 +303,7 @@ def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMat
         magnetics=torque_model(actuator),
         kept=kept,
         drive=drive(lag_s, section.step_s, limit_A),
+        driving=driving(scenario.drive, section.step_s, scenario.substeps, groups, scenario.seed),
         friction=_friction(section, actuator),
         group_gain=np.array(section.group_gain or (1.0,) * groups),
         unmodelled_torque=np.array(section.modelling_torque_Nm),

@@ -17,6 +17,7 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
 from spheretwin.twin.assembly import Files
+from spheretwin.twin.electronics.driving import chain as drivings
 from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.rotor import Rotor
 from spheretwin.twin.scenario.sections import Scenario
@@ -31,6 +32,7 @@ class State(NamedTuple):
 
     rotor: NDArray[np.float64]
     current: NDArray[np.float64]
+    driving: NDArray[np.float64]
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
     belief: NDArray[np.float64]
@@ -120,6 +122,7 @@ class Machine:
         law = own_law or self._law_for(scenario)
         made = Machine(scenario, files, law, moving)
         made._plant.current[:] = self._plant.current
+        drivings.carried_on(self._plant.driving, made._plant.driving)
         if made.law is self.law:
             made._controller.parameters[:] = self._controller.parameters
         memory = made._controller.memory
@@ -143,6 +146,7 @@ class Machine:
         return State(
             rotor=self._moving.rotor.state(),
             current=self._plant.current.copy(),
+            driving=drivings.state_of(self._plant.driving),
             parameters=controller.parameters.copy(),
             memory=controller.memory.copy(),
             belief=beliefs.state_of(controller.belief),
@@ -160,12 +164,14 @@ class Machine:
         own = self.state()
         _check_length("the engine's state", state.rotor, own.rotor)
         _check_length("currents", state.current, own.current)
+        _check_length("the drive's state", state.driving, own.driving)
         _check_length("the law's parameters", state.parameters, own.parameters)
         _check_length("the law's memory", state.memory, own.memory)
         _check_length("what the controller believes", state.belief, own.belief)
         _check_length("the estimator's memory", state.estimates, own.estimates)
         self._moving.rotor.restore(state.rotor)
         self._plant.current[:] = state.current
+        drivings.restore(self._plant.driving, state.driving)
         self._controller.parameters[:] = state.parameters
         self._controller.memory[:] = state.memory
         beliefs.restore(self._controller.belief, state.belief)

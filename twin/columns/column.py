@@ -12,7 +12,8 @@ from spheretwin.twin.scenario.sections import Scenario
 class Columns(NamedTuple):
     """What one stage logs."""
 
-    signals: tuple[Signal, ...]
+    signals: Callable[[int], tuple[Signal, ...]]
+    """For an actuator with a number of coil groups; the same tuple for the same number."""
     logged: Callable[[Scenario], bool]
     """Whether a run of a resolved scenario has them."""
     write: Any

@@ -26,4 +26,4 @@ def _logged(scenario: Scenario) -> bool:
     return any(scenario.plant.coulomb_Nm) or any(scenario.plant.viscous_Nm_s)
 
 
-COLUMNS = Columns(SIGNALS, _logged, write)
+COLUMNS = Columns(lambda groups: SIGNALS, _logged, write)

@@ -27,4 +27,4 @@ def _logged(scenario: Scenario) -> bool:
     return not scenario.sensors.ideal or scenario.estimator.kind != "ideal"
 
 
-COLUMNS = Columns(SIGNALS, _logged, write)
+COLUMNS = Columns(lambda groups: SIGNALS, _logged, write)

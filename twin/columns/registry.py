@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.twin.columns import friction, measured
+from spheretwin.twin.columns import drive, friction, measured
 from spheretwin.twin.columns.column import Columns
 
 ALL: tuple[Columns, ...] = (
     measured.COLUMNS,
     friction.COLUMNS,
+    drive.COLUMNS,
 )
 
 

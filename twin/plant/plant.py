@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.copying import copy_into
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
+from spheretwin.twin.electronics.driving.chain import Driving, begin, drive_groups, end
+from spheretwin.twin.electronics.driving.coil import overheated
+from spheretwin.twin.electronics.driving.delay import due
 from spheretwin.twin.plant.drive import Drive, advance
 from spheretwin.twin.plant.friction import Friction, friction_torque
 from spheretwin.twin.plant.stepping import step
 
-GOING, LEFT_WORKSPACE, DIVERGED = 0, 1, 2
+GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
 
 # The rotor's fastest move within the workspace is some hundred rad/s; far above it, and far below the
 # engine's own bound of 1e10, the motion is no longer one.
@@ -28,6 +31,7 @@ class Plant(NamedTuple):
     magnetics: TorqueModel  # true
     kept: KeptMatrix
     drive: Drive
+    driving: Driving
     friction: Friction
     group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
@@ -69,7 +73,7 @@ def plant_tick(
     Returns
     -------
     int
-        `GOING`, `LEFT_WORKSPACE` or `DIVERGED`.
+        `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, or `FAILSAFE` where a coil is too hot.
     """
     # Taken out of the tuple once: each time costs a count of references.
     rotor, magnetics, kept, drive = plant.rotor, plant.magnetics, plant.kept, plant.drive
@@ -82,9 +86,17 @@ def plant_tick(
         plant.friction,
         plant.friction_q,
     )
+    driving = plant.driving
+    begin(driving, command)
+    asked = driving.asked if driving.converts else command
     for substep in range(plant.substeps):
         keep_torque_matrix(q, magnetics, kept)
-        advance(drive, command, current, mean_current)
+        if driving.converts:
+            due(driving.delay, substep, asked)
+        if driving.supplied:
+            drive_groups(driving, asked, q, qdot, kept.G, gain, current, mean_current)
+        else:
+            advance(drive, asked, current, mean_current)
         for j in range(pulling.shape[0]):
             pulling[j] = gain[j] * mean_current[j]
         rotor_torque(kept.G, pulling, torque_S)
@@ -105,6 +117,9 @@ def plant_tick(
         for i in range(3):  # at every step: beyond its range a hinge would meet a stop that is not computed
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
+    end(driving)
+    if driving.supplied and overheated(driving.coil):
+        return FAILSAFE
     for kind in range(rotor.warnings.shape[0]):
         if rotor.warnings[kind] > 0:
             return DIVERGED

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from spheretwin.twin.electronics.hardware import PROTOTYPE_SENSORS
+from spheretwin.twin.electronics.hardware import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
 
 # Joint bearings: assumed, as no sheet is at hand (2 mN·m is the lighter of two guesses, 5 the heavier).
 PROTOTYPE_BEARINGS: dict[str, Any] = {
@@ -17,7 +17,7 @@ PROTOTYPE_ESTIMATOR: dict[str, Any] = {"estimator.kind": "kalman"}
 
 HARDWARE: dict[str, dict[str, Any]] = {
     "ideal": {},
-    "prototype": {**PROTOTYPE_SENSORS, **PROTOTYPE_BEARINGS, **PROTOTYPE_ESTIMATOR},
+    "prototype": {**PROTOTYPE_SENSORS, **PROTOTYPE_DRIVE, **PROTOTYPE_BEARINGS, **PROTOTYPE_ESTIMATOR},
 }
 """Fields by dotted name that a set gives a value to; each of them can be set alone as well."""
 

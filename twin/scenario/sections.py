@@ -14,6 +14,8 @@ from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
 from spheretwin.twin.disturbances.disturbance import Disturbance
+from spheretwin.twin.electronics.driving.delay import delay
+from spheretwin.twin.electronics.driving.sections import DriveSection
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.scenario.hardware import HARDWARE
@@ -135,8 +137,9 @@ class Nominal(_Section):
     time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
         None, description="current lag that the controller reckons with, s; the drive's unless given"
     )
-    delay_s: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.0, description="delay from measurement to currents that the controller reckons with, s"
+    delay_s: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None,
+        description="delay that the controller reckons with, s; the drive's unless given",
     )
 
     @field_validator("torque_scale")
@@ -145,15 +148,6 @@ class Nominal(_Section):
         if abs(scale) < LEAST_SCALE:
             raise PydanticCustomError("scale", f"Input should be at least {LEAST_SCALE:g} in magnitude")
         return scale
-
-
-class DriveSection(_Section):
-    """Amplifiers and coils; what is not given comes from the model file."""
-
-    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
-        None, description="current lag L/R, s; 0 for none"
-    )
-    current_limit_A: Positive | None = Field(None, description="largest group current of the amplifiers, A")
 
 
 class Scenario(_Section):
@@ -190,11 +184,12 @@ class Scenario(_Section):
                 f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
                 f" received {self.controller.period_s!r} and {self.plant.step_s!r} s"
             )
-        if self.nominal.delay_s > MOST_DELAY * self.controller.period_s:
+        if (self.nominal.delay_s or 0.0) > MOST_DELAY * self.controller.period_s:
             raise ValueError(
                 f"expected nominal.delay_s of at most {MOST_DELAY} control periods,"
                 f" received {self.nominal.delay_s!r} s"
             )
+        delay(self.drive, self.plant.step_s, self.substeps, 1)  # a whole number of physics steps
         if self.ticks < 1:
             raise ValueError(
                 f"expected a duration of at least one control period, received {self.duration!r} s"

@@ -1,0 +1,143 @@
+"""From commands to currents: the stages of all groups, one after the other, over a control period."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.kinematics import angular_velocity
+from spheretwin.twin.electronics.driving.amplifier import Amplifier, Flow, amplifier, clear, drive_coils, flow
+from spheretwin.twin.electronics.driving.coil import Coil, back_emf, coil, settle_resistance, warm
+from spheretwin.twin.electronics.driving.dac import Dac, convert, dac
+from spheretwin.twin.electronics.driving.delay import Delay, delay, latch
+from spheretwin.twin.electronics.driving.sections import DriveSection
+
+Array = NDArray[np.float64]
+
+
+class Driving(NamedTuple):
+    """All stages, for compiled code."""
+
+    converts: bool  # whether what is asked of the amplifiers is other than the command
+    supplied: bool  # whether the amplifiers have a supply, and the coils a voltage
+    supply_V: float
+    delay: Delay
+    dac: Dac
+    amplifier: Amplifier
+    coil: Coil
+    flow: Flow
+    asked: Array  # (n,) A of the amplifiers
+    emf: Array  # (n,) V
+    rate_S: Array  # (3,) rad/s of the rotor, stator frame
+    drawn_As: Array  # (1,) from the supply in this control period
+
+
+def driving(section: DriveSection, step_s: float, substeps: int, groups: int, seed: int) -> Driving:
+    """Stages at rest, with errors of their own.
+
+    Parameters
+    ----------
+    section : DriveSection
+        Resolved: current limit, resistance and inductance are given.
+    step_s : float, s
+        Physics step.
+    substeps : int
+        Physics steps in a control period.
+    groups : int
+    seed : int
+        Of the run: the same prototype for the same seed.
+
+    Raises
+    ------
+    ValueError
+        The delay is no whole number of physics steps.
+    """
+    resistance_ohm, inductance_H = section.resistance_ohm or 1.0, section.inductance_H or 1.0
+    return Driving(
+        converts=section.converts,
+        supplied=section.supply_V is not None,
+        supply_V=section.supply_V or 0.0,
+        delay=delay(section, step_s, substeps, groups),
+        dac=dac(section, section.transconductance_A_V, groups, seed),
+        amplifier=amplifier(section, section.current_limit_A or 0.0, step_s, groups, seed),
+        coil=coil(section, resistance_ohm, inductance_H, substeps * step_s, groups),
+        flow=flow(groups),
+        asked=np.zeros(groups),
+        emf=np.zeros(groups),
+        rate_S=np.zeros(3),
+        drawn_As=np.zeros(1),
+    )
+
+
+@allocation_free
+def begin(driving: Driving, command: Array) -> None:
+    """Take the commands of a control period, and begin its sums."""
+    if driving.converts:
+        convert(driving.dac, command, driving.asked)
+        latch(driving.delay, driving.asked)
+    if driving.supplied:
+        clear(driving.flow)
+        driving.drawn_As[0] = 0.0
+
+
+@allocation_free
+def drive_groups(
+    driving: Driving, asked: Array, q: Array, qdot: Array, G: Array, gain: Array, current: Array, mean: Array
+) -> None:
+    """Advance the currents of supplied amplifiers by one physics step.
+
+    Parameters
+    ----------
+    driving : Driving
+    asked : (n,) array, A
+        Of the amplifiers, held over the step.
+    q, qdot : (3,) arrays, rad and rad/s
+        At the start of the step.
+    G : (3, n) array, N·m/A
+        True torque matrix there.
+    gain : (n,) array
+        Of each group, over that matrix.
+    current : (n,) array, A
+        At the start of the step; on return, at its end.
+    mean : (n,) array, A
+        Result: over the step.
+    """
+    angular_velocity(q, qdot, driving.rate_S)
+    back_emf(G, gain, driving.rate_S, driving.emf)
+    drive_coils(driving.amplifier, driving.coil, asked, driving.emf, current, driving.flow)
+    for j in range(mean.shape[0]):
+        mean[j] = driving.flow.mean_current_A[j]
+        driving.drawn_As[0] += abs(mean[j]) * driving.amplifier.step_s
+
+
+@allocation_free
+def end(driving: Driving) -> None:
+    """End a control period: the coils have warmed by what they lost."""
+    if driving.supplied:
+        warm(driving.coil, driving.flow.copper_J)
+
+
+def state_of(driving: Driving) -> Array:
+    """All that the stages go on from."""
+    late = driving.delay
+    return np.concatenate([late.ring.ravel(), late.newest, driving.coil.temperature_degC])
+
+
+def restore(driving: Driving, state: Array) -> None:
+    """Go on from a state of stages of the same size."""
+    late, first = driving.delay, driving.delay.ring.size
+    late.ring[:] = state[:first].reshape(late.ring.shape)
+    late.newest[:] = state[first : first + 1]
+    driving.coil.temperature_degC[:] = state[first + 1 :]
+    settle_resistance(driving.coil)
+
+
+def carried_on(before: Driving, after: Driving) -> None:
+    """Go on as before with other figures; commands on their way stay where the delay does."""
+    if before.delay.ring.shape == after.delay.ring.shape:
+        after.delay.ring[:], after.delay.newest[:] = before.delay.ring, before.delay.newest
+    after.coil.temperature_degC[:] = before.coil.temperature_degC
+    settle_resistance(after.coil)
