@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
@@ -57,8 +58,24 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     """
     if not isinstance(function, Dispatcher):
         return uncompiled(function)
-    entry: Callable[..., Any] = function.compile(tuple(map(numba.typeof, arguments)))
-    return entry
+    key = function, *map(_kind_of, arguments)
+    if key not in _ENTRIES:
+        _ENTRIES[key] = function.compile(tuple(map(numba.typeof, arguments)))
+    return _ENTRIES[key]
+
+
+# Numba's own look at a hundred arrays in nested tuples takes half of what a session takes until it is ready.
+_ENTRIES: dict[tuple[Any, ...], Callable[..., Any]] = {}
+
+
+def _kind_of(value: Any) -> Any:
+    """All that numba's type of a value depends on."""
+    if isinstance(value, np.ndarray):
+        flags = value.flags
+        return value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned
+    if isinstance(value, tuple):
+        return type(value), *map(_kind_of, value)
+    return type(value)
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -115,7 +115,9 @@ def amplifier(
 
     Offsets are drawn uniformly within their bound, each from a stream of its own.
     """
-    drawn = [np.random.default_rng([seed, STAGE, channel]).uniform(-1, 1) for channel in range(groups)]
+    drawn = np.zeros(groups)
+    for channel in range(groups if section.amplifier_offset_V else 0):
+        drawn[channel] = np.random.default_rng([seed, STAGE, channel]).uniform(-1, 1)
     supply_V = inf if section.supply_V is None else section.supply_V
     return Amplifier(
         supplied=section.supply_V is not None,
@@ -125,9 +127,7 @@ def amplifier(
         current_limit_A=current_limit_A,
         step_s=step_s,
         following=relaxation(section.bandwidth_rad_s * step_s),
-        offset_A=section.amplifier_offset_V
-        * section.transconductance_A_V
-        * np.array(drawn, dtype=np.float64),
+        offset_A=section.amplifier_offset_V * section.transconductance_A_V * drawn,
     )
 
 

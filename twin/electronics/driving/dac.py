@@ -78,12 +78,9 @@ def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int
     A channel's errors are drawn uniformly within their bounds, INL such that its curve keeps to its bound
     whatever the code. Each channel has its own stream: no field, group or other stage moves what it draws.
     """
-    drawn = np.array(
-        [
-            np.random.default_rng([seed, STAGE, channel]).uniform(-1, 1, 2 + HARMONICS)
-            for channel in range(groups)
-        ]
-    ).reshape(groups, 2 + HARMONICS)
+    drawn = np.zeros((groups, 2 + HARMONICS))
+    for channel in range(groups if section.dac_bits else 0):  # errors of no converter are not drawn
+        drawn[channel] = np.random.default_rng([seed, STAGE, channel]).uniform(-1, 1, 2 + HARMONICS)
     harmonics = drawn[:, 2:] / np.maximum(1.0, np.abs(drawn[:, 2:]).sum(axis=1, keepdims=True))
     codes = 2.0**section.dac_bits
     return Dac(
