@@ -92,7 +92,9 @@ def compute_curve(
         Passes on the numbers of the angles, and may show progress.
     on_iron : bool
         Whether the pole's back stands on an infinite plane of iron: what a hoop behind the poles adds at
-        most. The curve then does not say what it was computed for, as no model file holds such a plane.
+        most, at angles that leave the coil wholly in front of that plane (for the shipped sizes up to 27
+        degrees); beyond, the image gives no answer, and what is returned bounds nothing. The curve then does
+        not say what it was computed for, as no model file holds such a plane.
 
     Returns
     -------
