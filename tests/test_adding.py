@@ -59,7 +59,7 @@ def step(t, reference, measurement, parameters, state, torque):
         "from spheretwin.control.laws.lazy import Lazy\n",
     ),
     "trajectory": Addition(
-        "twin/trajectories/ramp.py",
+        "twin/trajectories/shapes/ramp.py",
         """
 from typing import Literal
 
@@ -80,7 +80,7 @@ class Ramp(Shape):
 """,
         "twin/trajectories/registry.py",
         ("    | Waypoints,\n", "    | Waypoints\n    | Ramp,\n"),
-        "from spheretwin.twin.trajectories.ramp import Ramp\n",
+        "from spheretwin.twin.trajectories.shapes.ramp import Ramp\n",
     ),
     "disturbance": Addition(
         "twin/disturbances/kick.py",
@@ -180,7 +180,7 @@ UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
         "from spheretwin.twin.plant import stiff\n",
     ),
     "metric": Addition(
-        "twin/metrics/mean_load.py",
+        "twin/metrics/effort/mean_load.py",
         '''
 import numpy as np
 
@@ -205,7 +205,7 @@ class MeanLoad(Metric):
             '    "copper_loss_J": CopperLoss,\n',
             '    "copper_loss_J": CopperLoss,\n    "mean_load_Nm": MeanLoad,\n',
         ),
-        "from spheretwin.twin.metrics.mean_load import MeanLoad\n",
+        "from spheretwin.twin.metrics.effort.mean_load import MeanLoad\n",
     ),
     "check": Addition(
         "twin/crosscheck/units.py",

@@ -6,7 +6,7 @@ import pytest
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.exogenous import BLOCK_TICKS, Exogenous
-from spheretwin.twin.trajectories.nutation import Nutation
+from spheretwin.twin.trajectories.shapes.nutation import Nutation
 
 RANDOM_TERM = {"kind": "random", "bound_Nm": [0.01, 0.02, 0.03]}
 LENGTH = 2 * BLOCK_TICKS + 300

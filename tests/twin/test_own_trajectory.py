@@ -10,7 +10,7 @@ from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.facts import record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import simulate
-from spheretwin.twin.trajectories.sinusoid import Sinusoid
+from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
 
 
 class Spiral:

@@ -12,7 +12,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.commands.reporting import kept, print_json
-from spheretwin.twin.crosscheck import STATES
+from spheretwin.twin.crosscheck.part import STATES
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.checks import print_checks
 from spheretwin.viz.terminal.progress import parts

@@ -11,6 +11,9 @@ from spheretwin.models.base.check import Check
 
 F = TypeVar("F", bound="Finding")
 
+STATES = 10_000
+"""Random states at which the dynamics are compared, unless told otherwise."""
+
 
 class Subject(NamedTuple):
     """What is examined."""

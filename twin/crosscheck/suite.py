@@ -8,8 +8,8 @@ from pathlib import Path
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
-from spheretwin.twin.crosscheck import STATES, closed_loop, dynamics, free_rotor, identities, trajectories
-from spheretwin.twin.crosscheck.part import Evidence, Finding, Subject
+from spheretwin.twin.crosscheck import closed_loop, dynamics, free_rotor, identities, trajectories
+from spheretwin.twin.crosscheck.part import STATES, Evidence, Finding, Subject
 
 PARTS = (
     dynamics.PART,

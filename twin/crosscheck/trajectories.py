@@ -26,7 +26,7 @@ from spheretwin.twin.crosscheck.part import Part
 from spheretwin.twin.plant import lagrangian
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.trajectories.nutation import Nutation
+from spheretwin.twin.trajectories.shapes.nutation import Nutation
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""What a run comes to in a number or three: one metric a file, gathered while the run goes on."""
+"""What a run comes to in a number or three: what a metric is, gathered as the run goes, and their names."""

@@ -1,1 +1,1 @@
-"""Reference trajectories, one shape a file, and their names."""
+"""Reference trajectories: what one is, how its corners are rounded, and the names of the shapes."""

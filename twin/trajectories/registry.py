@@ -4,15 +4,15 @@ from typing import Annotated, get_args
 
 from pydantic import Field
 
-from spheretwin.twin.trajectories.chirp import Chirp
-from spheretwin.twin.trajectories.hold import Hold
-from spheretwin.twin.trajectories.multisine import Multisine
-from spheretwin.twin.trajectories.nutation import Nutation
-from spheretwin.twin.trajectories.sinusoid import Sinusoid
-from spheretwin.twin.trajectories.steps import Steps
-from spheretwin.twin.trajectories.tilt import Tilt
+from spheretwin.twin.trajectories.shapes.chirp import Chirp
+from spheretwin.twin.trajectories.shapes.hold import Hold
+from spheretwin.twin.trajectories.shapes.multisine import Multisine
+from spheretwin.twin.trajectories.shapes.nutation import Nutation
+from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
+from spheretwin.twin.trajectories.shapes.steps import Steps
+from spheretwin.twin.trajectories.shapes.tilt import Tilt
+from spheretwin.twin.trajectories.shapes.waypoints import Waypoints
 from spheretwin.twin.trajectories.trajectory import Shape
-from spheretwin.twin.trajectories.waypoints import Waypoints
 
 Trajectory = Annotated[
     Sinusoid  # one row each

@@ -12,8 +12,8 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.metrics.metric import Planned
 from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.metrics.rms_error import PIECE_TICKS
-from spheretwin.twin.metrics.settling_time import BAND_rad
+from spheretwin.twin.metrics.tracking.rms_error import PIECE_TICKS
+from spheretwin.twin.metrics.tracking.settling_time import BAND_rad
 from spheretwin.twin.records.summary import figures_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import simulate
@@ -67,7 +67,7 @@ PLAIN = {
 
 @pytest.fixture(scope="module")
 def runs():
-    """At the current limit, of an odd length at another rate, chattering, without lag, in small amplifiers."""
+    """At the limit, at another rate and of an odd length, chattering, without lag, with small amplifiers."""
     fast = {"duration": 0.7777, "controller.period_s": 5e-4, "controller.law": "pd"}
     return [
         simulate(scenarios.load("nutation", {"duration": 1.3})),

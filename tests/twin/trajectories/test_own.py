@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.trajectories.sinusoid import Sinusoid
+from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, checked
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
-from spheretwin.twin.metrics.rms_error import SquaresByPiece
+from spheretwin.twin.metrics.tracking.rms_error import SquaresByPiece
 
 
 class TailRmsError(Metric):

@@ -1,0 +1,68 @@
+"""The house: how full a folder may be, and what its `__init__` is."""
+
+import ast
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("models", "control", "viz", "twin", "tests")
+MOST_FILES = 12
+
+# The face of a package: what users import from there is defined there.
+FACES = {"twin/scenario"}
+
+CACHES = {"__pycache__", ".hypothesis", ".DS_Store"}
+
+
+def files():
+    """Every file of the house but what tools leave behind."""
+    paths = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.is_file())
+    return [path for path in paths if not CACHES & set(path.relative_to(ROOT).parts)]
+
+
+def folder_of(path):
+    return str(path.parent.relative_to(ROOT))
+
+
+INITS = [path for path in files() if path.name == "__init__.py"]
+
+
+def test_no_folder_is_crowded():
+    counts = {
+        folder: len(list(inside)) for folder, inside in groupby(sorted(files(), key=folder_of), folder_of)
+    }
+    assert sum(counts.values()) > 250
+    assert {folder: count for folder, count in counts.items() if count > MOST_FILES} == {}
+
+
+def test_every_folder_of_the_package_with_code_has_an_init():
+    code = {folder_of(path) for path in files() if path.suffix == ".py" and "tests" not in path.parts}
+    assert code == {folder_of(path) for path in INITS}
+
+
+@pytest.mark.parametrize("path", INITS, ids=folder_of)
+def test_an_init_says_in_one_sentence_what_its_folder_is(path):
+    said = ast.get_docstring(ast.parse(path.read_text()))
+    assert len(said.splitlines()) == 1
+    assert said.endswith(".")
+    assert ". " not in said
+
+
+@pytest.mark.parametrize("path", INITS, ids=folder_of)
+def test_an_init_re_exports_nothing(path):
+    _, *others = ast.parse(path.read_text()).body
+    if folder_of(path) not in FACES:
+        assert [ast.unparse(node) for node in others] == []
+    brought = {
+        alias.asname or alias.name
+        for node in others
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+    }
+    used = {node.id for each in others for node in ast.walk(each) if isinstance(node, ast.Name)}
+    assert brought - used <= {"annotations"}
+    assert not any(
+        isinstance(node, ast.Name) and node.id == "__all__" for node in ast.walk(ast.parse(path.read_text()))
+    )

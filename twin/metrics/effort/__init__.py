@@ -1,0 +1,1 @@
+"""What the motion took of coils and amplifiers, one metric a file."""

@@ -1,0 +1,1 @@
+"""How well the rotor followed, one metric a file."""

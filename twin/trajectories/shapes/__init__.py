@@ -1,0 +1,1 @@
+"""The shapes of reference trajectories, one a file."""
