@@ -1,9 +1,16 @@
-"""Shared by all tests: the shipped actuator, and reproducible property tests."""
+"""Shared by all tests: the shipped actuator, reproducible property tests, what parameters owe."""
+
+import copy
+from typing import get_args
 
 import hypothesis
+import numpy as np
 import pytest
+from pydantic import BaseModel
 
 from spheretwin.models import actuator as actuators
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
 
 # Derandomised: a failure on one machine is a failure on every machine. No deadline: machines are shared.
 hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=200)
@@ -13,3 +20,68 @@ hypothesis.settings.load_profile("reproducible")
 @pytest.fixture(scope="session")
 def actuator() -> actuators.Actuator:
     return actuators.load()
+
+
+def numbers_in(value, path=()):
+    """Paths to the numbers of what JSON holds."""
+    if isinstance(value, dict | list):
+        entries = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, inside in entries:
+            yield from numbers_in(inside, (*path, key))
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield path
+
+
+def may_be_a_number(annotation):
+    return annotation in (int, float) or any(map(may_be_a_number, get_args(annotation)))
+
+
+def with_another(fields, path, value):
+    """Fields with one of their values, however deep, replaced."""
+    fields = inside = copy.deepcopy(fields)
+    for key in path[:-1]:
+        inside = inside[key]
+    inside[path[-1]] = value
+    return fields
+
+
+def check_every_field_says_what_it_is(kind):
+    for field in kind.model_fields.values():
+        assert field.description
+        for inner in get_args(field.annotation):
+            if isinstance(inner, type) and issubclass(inner, BaseModel):
+                check_every_field_says_what_it_is(inner)
+
+
+def check_bad_fields_are_refused_by_name(member, section, overrides):
+    fields = member.model_dump(mode="json")
+    with pytest.raises(InputError) as refusal:
+        scenarios.load("hold", overrides({**fields, "no_such_field": 1.0}))
+    assert f"in {section}, received no_such_field" in str(refusal.value)
+    absent = [
+        (name,)
+        for name, field in type(member).model_fields.items()
+        if fields[name] is None and may_be_a_number(field.annotation)
+    ]
+    for path in [*numbers_in(fields), *absent]:
+        for bad in (np.nan, np.inf, "text"):
+            with pytest.raises(InputError) as refusal:
+                scenarios.load("hold", overrides(with_another(fields, path, bad)))
+            assert f"{section}.{'.'.join(map(str, path))}: expected" in str(refusal.value)
+
+
+@pytest.fixture(scope="session")
+def check_parameters():
+    """Hold a member of a family to what its parameters owe: said what they are, refused where they are none.
+
+    Called with the member, the name of its section in a scenario, and what makes the overrides of a scenario
+    from the section's fields.
+    """
+
+    def check(member, section, overrides):
+        check_every_field_says_what_it_is(type(member))
+        assert type(member).__doc__
+        scenarios.load("hold", overrides(member.model_dump(mode="json")))
+        check_bad_fields_are_refused_by_name(member, section, overrides)
+
+    return check

@@ -4,6 +4,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.disturbances.registry import KINDS
 from spheretwin.twin.scenario.flags import described
 from spheretwin.twin.session import Session
 
@@ -22,7 +23,7 @@ def loaded(tmp_path, text):
     [
         (
             HOLD + 'kind = "constan"',
-            "disturbance.terms.0.kind: expected one of constant, steps, sinusoidal, table, random,"
+            f"disturbance.terms.0.kind: expected one of {', '.join(KINDS)},"
             " received 'constan'; did you mean constant?",
         ),
         (HOLD + "torque_Nm = [1.0, 2.0, 3.0]", "disturbance.terms.0.kind: expected one of constant, steps"),

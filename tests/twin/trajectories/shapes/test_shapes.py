@@ -1,19 +1,16 @@
-"""Shapes: each one of the registry held to what a trajectory is, and each to its exact solution."""
-
-import pickle
-import typing
+"""Shapes: each held to its exact solution, and its own refusals."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import ValidationError
 from scipy import signal
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.simulation import simulate
-from spheretwin.twin.trajectories.registry import SHAPES, Trajectory
+from spheretwin.twin.trajectories.registry import SHAPES
 from spheretwin.twin.trajectories.shapes.chirp import Chirp
 from spheretwin.twin.trajectories.shapes.hold import Hold
 from spheretwin.twin.trajectories.shapes.multisine import Component, Multisine
@@ -22,111 +19,13 @@ from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
 from spheretwin.twin.trajectories.shapes.steps import Steps
 from spheretwin.twin.trajectories.shapes.tilt import Tilt
 
-STEP = 1e-5
 POSES = "t_s,alpha_rad,beta_rad,gamma_rad\n0.5,0,0,0\n1.25,0.2,-0.1,1\n3,0.1,0.3,-1\n4.5,0,0,0.5\n"
 
-# Beside every shape as it is when nothing is said of it.
-OTHERS = {
-    "chirp": {"sweep": "exponential", "sweep_s": 3.3, "amplitude_rad": (0.1, -0.2, 0.05)},
-    "multisine": {
-        "offset_rad": (0.1, 0.0, -0.2),
-        "components": (
-            Component(
-                amplitude_rad=(0.1, 0.0, 0.02), frequency_Hz=(0.5, 0.0, 3.0), phase_rad=(0.0, 1.0, 2.0)
-            ),
-            Component(amplitude_rad=(0.0, 0.3, 0.02), frequency_Hz=(0.0, 0.25, 1.5)),
-        ),
-    },
-    "waypoints": {"between": "cubic"},
-}
-ROUNDED = {"rounding_rad_s2": 40.0}
-CASES = [
-    *((name, {}) for name in SHAPES),
-    *OTHERS.items(),
-    *((name, ROUNDED) for name in SHAPES),
-    *((name, {**fields, **ROUNDED}) for name, fields in OTHERS.items()),
-]
 
-
-@pytest.fixture(scope="module")
-def poses(tmp_path_factory):
-    path = tmp_path_factory.mktemp("poses") / "poses.csv"
-    path.write_text(POSES)
-    return str(path)
-
-
-@pytest.fixture(params=CASES, ids=lambda case: "-".join([case[0], *case[1]]))
-def shape(request, poses):
-    name, fields = request.param
-    kind = SHAPES[name]
-    return kind(**({"file": poses} if "file" in kind.model_fields else {}), **fields)
-
-
-def test_samples_are_finite_wherever_and_as_many_as_asked_for(shape):
-    for t in (np.empty(0), np.zeros(1), np.linspace(0, 10, 1001), np.array([1e6])):
-        samples = shape.sample(t)
-        assert samples.shape == (len(t), 3, 3)
-        assert samples.dtype == np.float64
-        assert np.isfinite(samples).all()
-
-
-def test_rates_and_accelerations_are_derivatives(shape):
-    t = np.linspace(0.1, 4.9, 50)  # no corner and no end of a window within a step of any
-    before, now, after = (shape.sample(t + h) for h in (-STEP, 0, STEP))
-    # Central differences: h² times a third derivative below 2000, and rounding of 31 rad over h.
-    np.testing.assert_allclose(now[:, 1], (after - before)[:, 0] / (2 * STEP), atol=2e-7)
-    np.testing.assert_allclose(now[:, 2], (after - before)[:, 1] / (2 * STEP), atol=2e-7)
-
-
-def test_is_a_function_of_time_alone(shape):
-    t = 1e-3 * np.arange(6000.0)
-    whole = shape.sample(t)
-    cut = [shape.sample(part) for part in np.split(t, [1, 2, 7, 1000, 1003, 5999])]
-    assert np.concatenate(cut).tobytes() == whole.tobytes()
-    shuffled = np.random.default_rng(0).permutation(len(t))
-    assert shape.sample(t[shuffled]).tobytes() == whole[shuffled].tobytes()
-
-
-def test_is_known_by_what_is_said_of_it(shape):
-    t = np.linspace(0, 5, 101)
-    again = TypeAdapter(Trajectory).validate_json(shape.model_dump_json())
-    assert again == shape
-    for other in (again, shape.model_copy(), pickle.loads(pickle.dumps(shape))):
-        assert other == shape
-        assert hash(other) == hash(shape)
-        assert other.sample(t).tobytes() == shape.sample(t).tobytes()
-    assert shape != Hold(angle_rad=(9.0, 9.0, 9.0))
-
-
-def test_rounding_begins_at_rest_and_sharp_is_what_it_is(shape):
-    t = np.linspace(0, 5, 101)
-    if shape.rounding_rad_s2 is None:
-        assert shape.sample(t).tobytes() == shape.sharp(t).tobytes()
-    else:
-        np.testing.assert_array_equal(shape.sample(np.zeros(1))[0, 1], 0.0)
-
-
-def nested(kind):
-    yield kind
-    for field in kind.model_fields.values():
-        for inner in typing.get_args(field.annotation):
-            if isinstance(inner, type) and issubclass(inner, BaseModel):
-                yield from nested(inner)
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_every_field_says_what_it_is(name):
-    assert SHAPES[name].model_fields["shape"].default == name
-    for model in nested(SHAPES[name]):
-        assert all(field.description for field in model.model_fields.values())
-        assert model.__doc__
-
-
-def test_shapes_are_named():
-    assert list(SHAPES) == [
-        "sinusoid", "nutation", "tilt", "hold", "chirp", "multisine", "steps", "waypoints"
-    ]  # fmt: skip
-    assert Component in set(nested(Multisine))
+@pytest.fixture
+def poses(tmp_path):
+    (path := tmp_path / "poses.csv").write_text(POSES)
+    return path
 
 
 # --- exact solutions

@@ -1,0 +1,40 @@
+"""What every allocation of the registry owes, whichever it is."""
+
+import numpy as np
+import pytest
+
+from spheretwin.control.allocation.registry import ALLOCATIONS, SIGNATURE
+from spheretwin.models.base.compiled import compiled_callback
+from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.telemetry.status import Status
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.simulation import simulate
+
+LIMIT_A = 8.0
+
+
+@pytest.mark.parametrize("name", ALLOCATIONS)
+def test_every_allocation_gives_its_share_within_the_limit(name, actuator):
+    call = compiled_callback(SIGNATURE, ALLOCATIONS[name])
+    rng = np.random.default_rng(0)
+    groups = len(actuator.groups)
+    shares = []
+    for size_Nm in np.geomspace(1e-3, 10.0, 40):  # from what any currents give to what none do
+        G = np.ascontiguousarray(torque_matrix(rng.uniform(-1.0, 1.0, 3), actuator))
+        torque_S, current = rng.normal(size=3) * size_Nm, np.full(groups, np.nan)
+        share = call(G, torque_S, LIMIT_A, current, np.full((5, groups), np.nan))
+        assert 0 < share <= 1
+        assert np.abs(current).max() <= LIMIT_A * (1 + 1e-12)
+        # Solved with the inverse of G Gᵀ, whose condition number is below 30 here.
+        np.testing.assert_allclose(G @ current, share * torque_S, rtol=0, atol=1e-12 * size_Nm)
+        shares.append(share)
+    assert shares[0] == 1
+    assert shares[-1] < 1
+
+
+@pytest.mark.parametrize("name", ALLOCATIONS)
+def test_every_allocation_runs_and_says_what_it_is(name):
+    assert ALLOCATIONS[name].__doc__
+    run = simulate(scenarios.load("hold", {"allocation": name, "duration": 0.02}))
+    assert run.status == Status.COMPLETED
+    assert np.isfinite(run.telemetry.values).all()

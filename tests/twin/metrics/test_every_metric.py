@@ -1,0 +1,90 @@
+"""What every metric of the registry owes, whichever it is."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from spheretwin.models.telemetry.signals import width
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.metrics.metric import Planned
+from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.records.summary import figures_of
+from spheretwin.twin.simulation import simulate
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """One that meets the current limit, one that holds still, one that ends early."""
+    return [
+        simulate(scenarios.load("nutation", {"duration": 1.3})),
+        simulate(scenarios.load("hold", {"duration": 0.3})),
+        simulate(scenarios.load("sinusoid", {"controller.law": "pd", "disturbance.load": 5.0})),
+    ]
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_metric_says_what_it_is(name):
+    told = METRICS[name].__doc__.strip().splitlines()[0]
+    assert told.endswith(".")
+    assert METRICS[name].value.__doc__
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_metric_is_what_json_holds(runs, name):
+    for run in runs:
+        value = figures_of(run)[name]
+        assert json.loads(json.dumps(value, allow_nan=False)) == value
+
+
+def planned_for(run):
+    return Planned(run.scenario, run.actuator, run.scenario.ticks)
+
+
+def in_chunks(run, name, ends):
+    metric = METRICS[name](planned_for(run))
+    table = run.telemetry
+    for first, last in zip([0, *ends], [*ends, len(table)], strict=True):
+        if last > first:
+            metric.write(table.rows(first, last))
+    return metric.value()
+
+
+@pytest.mark.parametrize("name", METRICS)
+@settings(max_examples=25)
+@given(data=st.data())
+def test_every_metric_s_bits_are_those_of_any_chunks(runs, name, data):
+    run = data.draw(st.sampled_from(runs))
+    ends = sorted(data.draw(st.lists(st.integers(0, len(run.telemetry)), max_size=8)))
+    assert in_chunks(run, name, ends) == in_chunks(run, name, [])
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_metric_takes_ticks_one_by_one(runs, name):
+    run = runs[1]
+    assert in_chunks(run, name, list(range(len(run.telemetry)))) == in_chunks(run, name, [])
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_metric_is_none_without_a_row(runs, name):
+    assert METRICS[name](planned_for(runs[0])).value() is None
+    assert METRICS[name](planned_for(runs[0])).warnings() == []
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_every_metric_s_memory_does_not_hold_the_rows(runs, name):
+    """A kilobyte for 10,000 ticks at most, where the rows take 600."""
+    planned = planned_for(runs[0])
+    metric = METRICS[name](Planned(planned.scenario, planned.actuator, 40_000))
+    sizes = []
+    signals = runs[0].telemetry.signals
+    for _ in range(3):
+        metric.write(Table(signals, np.random.default_rng(0).normal(size=(10_000, width(signals)))))
+        state = {key: value for key, value in vars(metric).items() if key != "planned"}
+        sizes.append(len(pickle.dumps(state)))
+    # 40 pieces of three sums, and the bytes by which longer counts are written.
+    assert max(np.diff(sizes)) <= 1000
