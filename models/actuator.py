@@ -128,13 +128,13 @@ class Actuator:
     ----------
     inertia : (3,) array, kg·m²
         Principal inertias of the rotor about the joint centre.
-    pole_axes : (16, 3) array
+    pole_axes : (p, 3) array
         Unit vectors, rotor frame, pointing outward.
-    pole_polarity : (16,) array
+    pole_polarity : (p,) array
         +1 where the north pole points outward, -1 where the south pole does.
-    coil_axes : (36, 3) array
+    coil_axes : (2n, 3) array
         Unit vectors, stator frame, pointing outward.
-    groups : (18, 2) int array
+    groups : (n, 2) int array
         The two coils of each group, as indices into the coils.
     hinge_range_rad : (3, 2) array, rad
         Least and greatest angle of each hinge; infinite where the hinge turns freely.
@@ -161,7 +161,7 @@ class Actuator:
 
     @property
     def group_axes(self) -> NDArray[np.float64]:
-        """(18, 3) array: axis of the first coil of each group, stator frame."""
+        """(n, 3) array: axis of the first coil of each group, stator frame."""
         return self.coil_axes[self.groups[:, 0]]
 
 

@@ -1,4 +1,4 @@
-"""Torque matrix: from 18 group currents to the torque on the rotor (12)-(15)."""
+"""Torque matrix: from group currents to the torque on the rotor (12)-(15)."""
 
 from dataclasses import asdict
 from functools import lru_cache
@@ -35,13 +35,13 @@ class TorqueModel(NamedTuple):
 
     The two coils of a group have axes s and -s, so a pole axis r enters a group's column as
     ``h(r.s) r x s`` with the odd function ``h(c) = g(c) - g(-c)``, ``g = f_t / sin``. Because h is
-    odd, the poles at r and -r add: 16 poles are 8 *pole lines*, each with the sum of the two polarities
-    as its weight. 144 look-ups give what 576 pairs of coil and pole would.
+    odd, the poles at r and -r add: the shipped 16 poles are 8 *pole lines*, each with the sum of the two
+    polarities as its weight. 144 look-ups give what 576 pairs of coil and pole would.
     """
 
     line_axes: NDArray[np.float64]  # (n_lines, 3), rotor frame
     line_weights: NDArray[np.float64]  # (n_lines,)
-    group_axes: NDArray[np.float64]  # (3, 18), stator frame
+    group_axes: NDArray[np.float64]  # (3, n), stator frame
     table: NDArray[np.float64]  # (781, 4), cubic coefficients of h, N·m/A
 
 
@@ -57,7 +57,7 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
 
     Returns
     -------
-    (3, 18) array, N·m/A
+    (3, n) array, N·m/A
         Column j is the stator-frame torque of one ampere in group j.
 
     Raises
@@ -117,7 +117,13 @@ def place(cosine: float) -> float:
 
 
 def scratch_of(model: TorqueModel) -> NDArray[np.float64]:
-    """Working space of `fill_torque_matrix`: a number for each pair of pole line and group in five rows."""
+    """Working space of `fill_torque_matrix`.
+
+    Returns
+    -------
+    (5, lines × n) array
+        Rows of a number for each pair of pole line and group.
+    """
     return np.empty((5, len(model.line_weights) * model.group_axes.shape[1]))
 
 
@@ -125,15 +131,28 @@ def scratch_of(model: TorqueModel) -> NDArray[np.float64]:
 def fill_torque_matrix(
     q: NDArray[np.float64], model: TorqueModel, G: NDArray[np.float64], scratch: NDArray[np.float64]
 ) -> None:
-    """Compiled torque matrix, written into `G` (3, 18), N·m/A; `scratch` is of `scratch_of`.
+    """Compiled torque matrix, written into `G`.
 
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose; finite.
+    model : TorqueModel
+        Of n groups.
+    G : (3, n) array, N·m/A
+        Result.
+    scratch : (5, lines × n) array
+        Of `scratch_of`; what it holds does not matter.
+
+    Notes
+    -----
     `g(cos phi)` is looked up, never `f_t(phi)`: no arc cosine, and no singular case where a pole
-    stands in front of a coil. `q` must be finite.
+    stands in front of a coil.
 
-    One pose takes about 0.27 µs on a 2024 server core, where all 576 pairs in one plain loop took 1.1.
-    Pairs of opposite coils and of opposite poles leave 144 look-ups (see `TorqueModel`), which stand in one
-    loop of their own: the compiler does the arithmetic before and after the table's scattered reads on
-    several groups at once.
+    One pose of the shipped actuator takes about 0.27 µs on a 2024 server core, where all 576 pairs in one
+    plain loop took 1.1. Pairs of opposite coils and of opposite poles leave 144 look-ups (see
+    `TorqueModel`), which stand in one loop of their own: the compiler does the arithmetic before and after
+    the table's scattered reads on several groups at once.
     """
     R_x, R_y, R_z = rotation_rows(q)
     table, row, h = model.table, scratch[0], scratch[1]
@@ -172,8 +191,8 @@ class KeptMatrix(NamedTuple):
     """A torque matrix and the pose it belongs to: at the same pose it need not be filled again."""
 
     q: NDArray[np.float64]  # (3,) rad; NaN as long as nothing is kept
-    G: NDArray[np.float64]  # (3, 18) N·m/A
-    scratch: NDArray[np.float64]
+    G: NDArray[np.float64]  # (3, n) N·m/A
+    scratch: NDArray[np.float64]  # (5, lines × n), of `scratch_of`
 
 
 def kept_matrix(model: TorqueModel) -> KeptMatrix:
@@ -183,7 +202,17 @@ def kept_matrix(model: TorqueModel) -> KeptMatrix:
 
 @part_of_its_caller
 def keep_torque_matrix(q: NDArray[np.float64], model: TorqueModel, kept: KeptMatrix) -> None:
-    """Keep the torque matrix at a pose, filled anew only where the pose is another than the kept one."""
+    """Keep the torque matrix at a pose, filled anew only where the pose is another than the kept one.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose; finite.
+    model : TorqueModel
+        Of n groups.
+    kept : KeptMatrix
+        Changed in place.
+    """
     if not (q[0] == kept.q[0] and q[1] == kept.q[1] and q[2] == kept.q[2]):
         fill_torque_matrix(q, model, kept.G, kept.scratch)
         kept.q[0], kept.q[1], kept.q[2] = q[0], q[1], q[2]
@@ -191,7 +220,17 @@ def keep_torque_matrix(q: NDArray[np.float64], model: TorqueModel, kept: KeptMat
 
 @allocation_free
 def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S: NDArray[np.float64]) -> None:
-    """``torque_S = G current`` (15)."""
+    """``torque_S = G current`` (15).
+
+    Parameters
+    ----------
+    G : (3, n) array, N·m/A
+        Torque matrix.
+    current : (n,) array, A
+        Of each group.
+    torque_S : (3,) array, N·m
+        Result: on the rotor, stator frame.
+    """
     for i in range(3):
         total = 0.0
         for j in range(current.shape[0]):

@@ -1,4 +1,4 @@
-"""From a torque on the rotor to 18 group currents within their limit (16)."""
+"""From a torque on the rotor to group currents within their limit (16)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,13 @@ def allocate(
 
     Parameters
     ----------
-    G : (3, 18) array, N·m/A
+    G : (3, n) array, N·m/A
         Torque matrix at the present pose.
     torque_S : (3,) array, N·m
         Torque wanted on the rotor, stator frame.
     limit : float, A
         Largest magnitude of any current.
-    current : (18,) array, A
+    current : (n,) array, A
         Result.
 
     Returns

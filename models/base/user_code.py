@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
@@ -79,12 +80,18 @@ def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
         raise InputError(f"{what}: expected a readable file of Python, {error}") from None
     digest = hashlib.sha256(source).hexdigest()
-    defined = vars(_module(path, source, digest, what))
+    module = _module(path, source, digest, what)
+    defined = vars(module)
     if name not in defined:
-        known = [key for key, value in defined.items() if callable(value) and not key.startswith("__")]
+        known = [key for key, value in defined.items() if callable(value) and _is_of(module, value)]
         expected = f"one of {', '.join(known)}" if known else "a function"
         raise InputError(f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, known)}")
     return defined[name], digest
+
+
+def _is_of(module: ModuleType, value: Any) -> bool:
+    """Whether an object was defined in a module, not imported into it."""
+    return getattr(value, "__module__", None) == module.__name__
 
 
 @lru_cache(maxsize=32)
@@ -98,7 +105,8 @@ def _module(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses and pickles look their module up by its name
     try:
-        exec(compile(source, str(path), "exec"), vars(module))
+        with contextlib.redirect_stdout(sys.stderr):  # what it prints is none of the figures on stdout
+            exec(compile(source, str(path), "exec"), vars(module))
     except (Exception, SystemExit) as error:
         del sys.modules[module.__name__]
         raise InputError(

@@ -41,6 +41,8 @@ def shown(value: object) -> str:
         text = repr(value)
     except ValueError:  # an integer of more digits than Python writes
         return f"{type(value).__name__} of too many digits"
+    except Exception as error:  # an object of the user's, which may raise whatever it will
+        return f"{type(value).__name__}, which raises {type(error).__name__} when it is written"
     return shortened(" ".join(line.strip() for line in text.splitlines()), LONGEST_VALUE)
 
 

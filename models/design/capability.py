@@ -74,7 +74,7 @@ def capability(q: Array, actuator: Actuator, track: Callable[[range], Iterable[i
 
 
 def torque_matrices(q: Array, actuator: Actuator) -> Array:
-    """Torque matrices of many poses: (n, 3) in rad to (n, 3, 18) in N·m/A."""
+    """Torque matrices of many poses: (n, 3) in rad to (n, 3, groups) in N·m/A."""
     model, G = torque_model(actuator), np.empty((len(q), 3, len(actuator.groups)))
     _fill_torque_matrices(np.ascontiguousarray(q), model, G, scratch_of(model))
     return G
@@ -87,8 +87,8 @@ def _capability(q: Array, actuator: Actuator) -> Capability:
     sigma = np.sqrt(np.maximum(squared, 0.0))
     lost = sigma[:, 0] <= LOST * sigma[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = (G.transpose(0, 2, 1) @ U / squared[:, None]) @ U.transpose(0, 2, 1)  # (n, 18, 3)
-        rows = np.linalg.norm(inverse, axis=2)  # (n, 18)
+        inverse = (G.transpose(0, 2, 1) @ U / squared[:, None]) @ U.transpose(0, 2, 1)  # (n, groups, 3)
+        rows = np.linalg.norm(inverse, axis=2)  # (n, groups)
         condition = np.where(lost, np.inf, sigma[:, 2] / sigma[:, 0])
         copper = np.where(lost, np.inf, actuator.group.resistance_ohm / squared[:, 0])
     weak = U[:, :, 0]

@@ -77,9 +77,9 @@ class Comparison(NamedTuple):
 
     tilt_rad: Array  # (n,)
     q: Array  # (n, 3), rad
-    model: Array  # (n, 3, 18), N·m/A, by the torque curve
-    direct: Array  # (n, 3, 18), by direct summation
-    coarse: Array  # (n, 3, 18), the same with half the points in each direction
+    model: Array  # (n, 3, groups), N·m/A, by the torque curve
+    direct: Array  # (n, 3, groups), by direct summation
+    coarse: Array  # (n, 3, groups), the same with half the points in each direction
 
 
 class Errors(NamedTuple):
@@ -104,8 +104,8 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
 
     Returns
     -------
-    (3, 18) array, N·m/A
-        Torque on the rotor about the joint centre, stator frame, of one ampere in each group.
+    (3, n) array, N·m/A
+        Torque on the rotor about the joint centre, stator frame, of one ampere in each of n groups.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
     """
     quadrature = quadrature or _standard(actuator.magnet)
     near_angle = _rim_reaches_winding(actuator)
-    poles = actuator.pole_axes @ rotation(np.asarray(q, dtype=np.float64)).T  # (16, 3), stator frame
+    poles = actuator.pole_axes @ rotation(np.asarray(q, dtype=np.float64)).T  # (p, 3), stator frame
     torque = np.zeros((len(actuator.coil_axes), 3))
     for pole, polarity in zip(poles, actuator.pole_polarity, strict=True):
         near = np.arccos(np.clip(actuator.coil_axes @ pole, -1.0, 1.0)) < near_angle

@@ -64,7 +64,17 @@ class Convergence(NamedTuple):
 
 
 def sample_angles(step_deg: float = STEP_DEG) -> Array:
-    """Angles of the samples, rad: equal steps from 0 to pi."""
+    """Angles of the samples: equal steps from 0 to pi.
+
+    Parameters
+    ----------
+    step_deg : float, degrees
+        As near to it as a whole number of steps allows.
+
+    Returns
+    -------
+    (n,) array, rad
+    """
     return np.radians(np.linspace(0.0, 180.0, round(180.0 / step_deg) + 1))
 
 

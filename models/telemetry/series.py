@@ -54,16 +54,47 @@ class Series:
         return hash((self.t_s.tobytes(), self.values.tobytes()))
 
     def held(self, t: NDArray[np.float64], before: Sequence[float]) -> NDArray[np.float64]:
-        """Values that hold from their times on, and `before` the first time others: (n, k) for (n,) times."""
+        """Values that hold from their times on, and `before` the first time others.
+
+        Parameters
+        ----------
+        t : (n,) array, s
+            Times.
+        before : sequence of k float
+            What holds before the first time.
+
+        Returns
+        -------
+        (n, k) array
+        """
         return np.vstack([before, self.values])[np.searchsorted(reached(self.t_s), t, side="right")]
 
     def linear(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values on straight lines between the times, the first before and the last after them."""
+        """Values on straight lines between the times, the first before and the last after them.
+
+        Parameters
+        ----------
+        t : (n,) array, s
+            Times.
+
+        Returns
+        -------
+        (n, k) array
+        """
         return np.stack([np.interp(t, self.t_s, column) for column in self.values.T], axis=1)
 
 
 def reached(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From when on a time counts as reached: earlier by what rounding may take off a tick's time."""
+    """From when on times count as reached: earlier by what rounding may take off a tick's time.
+
+    Parameters
+    ----------
+    times : (n,) array, s
+
+    Returns
+    -------
+    (n,) array, s
+    """
     return times - ROUNDING * np.abs(times)
 
 

@@ -38,7 +38,7 @@ def add_to(verbs: Any) -> None:
         parts,
         "check",
         "check the torque matrix against the summed field of all poles on all windings",
-        "Compare G_t(q)·I with the exact field of the 16 magnets on the current of the 36 windings"
+        "Compare G_t(q)·I with the exact field of all magnets on the current of all windings"
         " (magpylib), in random poses and for random currents.",
     )
     _add_curve(check)

@@ -54,6 +54,8 @@ def _plots() -> ModuleType:
 
 
 def _draw(plots: ModuleType, folder: Path, surveyed: Survey) -> list[Path]:
+    from spheretwin.viz.figures.plots import save  # Matplotlib is optional
+
     workspace, on_grid, worst = surveyed.workspace, surveyed.on_grid, surveyed.worst
     limit_A = surveyed.actuator.group.current_limit_A
     by_tilt = {
@@ -66,5 +68,5 @@ def _draw(plots: ModuleType, folder: Path, surveyed: Survey) -> list[Path]:
         "capability_by_tilt.png": plots.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
     }
     for name, figure in drawn.items():
-        plots.save(figure, folder / name)
+        save(figure, folder / name)
     return [folder / name for name in drawn]

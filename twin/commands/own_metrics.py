@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -64,7 +66,8 @@ class OwnMetrics:
 
     def _value(self, name: str, metric: OwnMetric, run: Run) -> Any:
         try:
-            return own_value(name, metric, run)
+            with contextlib.redirect_stdout(sys.stderr):  # stdout is for the figures alone
+                return own_value(name, metric, run)
         except InputError as error:
             self.faults.append(f"{error}")
             return None

@@ -95,7 +95,22 @@ def check(mjcf: Path, actuator: Actuator) -> FreeRotor:
 
 
 def fly(mjcf: Path, inertia: Array, spin_rad_s: float) -> Motion:
-    """Motion without torque in MuJoCo, of a rotor with the given principal inertias."""
+    """Motion without torque in MuJoCo.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file.
+    inertia : (3,) array, kg·m²
+        Principal inertias that the rotor is given.
+    spin_rad_s : float, rad/s
+        Rate of γ at the start; those of α and β are shares of it.
+
+    Raises
+    ------
+    InputError
+        The model cannot be read.
+    """
     rotor = Rotor(read(mjcf), STEP_s, "RK4", 0.0, 0.0)
     rotor.model.body("rotor").inertia = inertia
     mujoco.mj_setConst(rotor.model, rotor.data)

@@ -89,7 +89,15 @@ class Rotor:
         mujoco.mj_setConst(self.model, self.data)
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Engine:
-        """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""
+        """Set pose and rates at time 0; return what compiled code steps.
+
+        Parameters
+        ----------
+        q : (3,) array, rad
+            Hinge angles.
+        qdot : (3,) array, rad/s
+            Their rates.
+        """
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = q, qdot
         return Engine(

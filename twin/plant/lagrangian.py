@@ -84,7 +84,15 @@ class LagrangianRotor:
         self.weight_moment = payload_kg * gravity_m_s2 * height
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Equations:
-        """Set pose (rad) and rates (rad/s) at time 0; return what compiled code steps."""
+        """Set pose and rates at time 0; return what compiled code steps.
+
+        Parameters
+        ----------
+        q : (3,) array, rad
+            Hinge angles.
+        qdot : (3,) array, rad/s
+            Their rates.
+        """
         pose, rates = np.array(q, dtype=np.float64), np.array(qdot, dtype=np.float64)
         self._state = pose, rates
         return Equations(

@@ -30,10 +30,20 @@ class Rotor(Protocol):
     """A rotor that has been set up for one run."""
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Any:
-        """Set pose (rad) and rates (rad/s); return the named tuple that compiled code steps.
+        """Set pose and rates; return the named tuple that compiled code steps.
 
-        It has `q`, `qdot` (3,), and takes `torque_S` (3,) on the rotor and `torque_q` (3,) on the hinges;
-        `warnings` (n,) are counts that end a run when one rises.
+        Parameters
+        ----------
+        q : (3,) array, rad
+            Hinge angles.
+        qdot : (3,) array, rad/s
+            Their rates.
+
+        Returns
+        -------
+        named tuple
+            It has `q`, `qdot` (3,), and takes `torque_S` (3,) on the rotor and `torque_q` (3,) on the
+            hinges; `warnings` (n,) are counts that end a run when one rises.
         """
         ...
 

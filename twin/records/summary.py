@@ -111,13 +111,13 @@ def own_value(name: str, metric: OwnMetric, run: Run) -> Any:
     """
     try:
         value = metric(run)
-    except Exception as error:  # the user's code, which may raise whatever it will
+    except (Exception, SystemExit) as error:  # the user's code, which may raise whatever it will
         raise InputError(
             f"metric {name}: expected a figure, it raised {type(error).__name__}: {without_breaks(error)}"
         ) from error
     try:
         return json.loads(json.dumps(value, default=_as_plain))
-    except (TypeError, ValueError, RecursionError):
+    except Exception:  # beside what is no JSON: objects of the user's that raise while they are looked into
         raise InputError(f"metric {name}: expected what JSON holds, received {shown(value)}") from None
 
 

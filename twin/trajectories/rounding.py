@@ -82,7 +82,20 @@ def rounded(sharp: Array, t: Array, start_rad_s: Array, corners: Corners, accele
 
 
 def least_acceleration(start_rad_s: Array, corners: Corners) -> float:
-    """Smallest acceleration (rad/s²) at which no window reaches into another, or to before the start."""
+    """Smallest acceleration at which no window reaches into another, or to before the start.
+
+    Parameters
+    ----------
+    start_rad_s : (3,) array, rad/s
+        Rates with which the motion begins.
+    corners : Corners
+        Its jumps.
+
+    Returns
+    -------
+    float, rad/s²
+        0 where there is nothing to round, infinite where no acceleration is enough.
+    """
     return max(_least(_windows(start_rad_s[axis], corners, axis)) for axis in range(3))
 
 

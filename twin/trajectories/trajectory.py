@@ -65,7 +65,18 @@ class Shape(BaseModel):
         return rounded(samples, t, self._start(), self.corners(), self.rounding_rad_s2)
 
     def sharp(self, t: NDArray[np.float64]) -> Samples:
-        """Desired motion as `sample` has it, its corners as they are."""
+        """Desired motion as `sample` has it, its corners as they are.
+
+        Parameters
+        ----------
+        t : (n,) array, s
+            Any times from 0 on.
+
+        Returns
+        -------
+        (n, 3, 3) array
+            Angle (rad), rate (rad/s) and acceleration (rad/s²) as rows, for each time.
+        """
         raise NotImplementedError
 
     def corners(self) -> Corners:

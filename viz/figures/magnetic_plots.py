@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.design.capability import Capability
 from spheretwin.models.design.workspace import Workspace
-from spheretwin.viz.figures.plots import INK, SERIES, WIDTH_in, save
-
-__all__ = ["capability_by_tilt", "capability_map", "save"]
+from spheretwin.viz.figures.plots import INK, SERIES, WIDTH_in
 
 Array = NDArray[np.float64]
 

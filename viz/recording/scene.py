@@ -90,6 +90,7 @@ def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]
 def _meshes(mjcf: Path, _: str) -> dict[str, rr.Mesh3D]:
     mujoco.mj_clearCache(mujoco.mj_getCache())  # it misses a mesh edited within a second
     try:
+        # Not `models.mjcf.read`: it leaves out what is only drawn, which is all that is wanted here.
         model = mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as error:
         raise InputError(

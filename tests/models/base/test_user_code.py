@@ -52,6 +52,12 @@ def test_a_dataclass_of_the_file_finds_its_module(tmp_path):
         ("", "mine.py:f", "law: expected a function in "),
         ("def double(x): pass\ndef half(x): pass", "mine.py:duble", "received duble; did you mean double?"),
         ("def double(x): pass\ndef half(x): pass", "mine.py:x", "expected one of double, half in "),
+        (
+            "from pathlib import Path\nimport numba\n@numba.njit\ndef step(): pass\nclass Mine(Path): pass",
+            "mine.py:x",
+            "expected one of step, Mine in ",
+        ),
+        ("from pathlib import Path", "mine.py:f", "law: expected a function in "),
         ("f = 3", "mine.py:f", "mine.py:f, 3"),
         ("\nx = (", "mine.py:f", "SyntaxError in line 2: '(' was never closed"),
         ("\n\nx = 1 / 0", "mine.py:f", "ZeroDivisionError in line 3: division by zero"),
@@ -69,6 +75,12 @@ def test_what_cannot_be_used_is_refused_on_one_line(tmp_path, text, spec, told):
         load_function(str(tmp_path / spec), "law")
     assert told in f"{refused.value}"
     assert "\n" not in f"{refused.value}"
+
+
+def test_what_a_file_prints_is_kept_off_stdout(tmp_path, capsys):
+    (path := tmp_path / "loud.py").write_text("print('loaded')\ndef f(): pass")
+    load_function(f"{path}:f", "law")
+    assert capsys.readouterr() == ("", "loaded\n")
 
 
 def test_ctrl_c_is_not_taken_for_a_fault_of_the_file(tmp_path):

@@ -23,6 +23,38 @@ def columns(run):
 
 def failing(run):
     return run.telemetry["eror_rad"]
+
+def leaving(run):
+    raise SystemExit(0)
+
+def a_set(run):
+    return {1, 2}
+
+def endless(run):
+    found = []
+    found.append(found)
+    return found
+
+def too_long(run):
+    return 10**5000
+
+class Unwritable:
+    def __repr__(self):
+        raise KeyError("nothing to see")
+
+def unwritable(run):
+    return Unwritable()
+
+class Sly(dict):
+    def items(self):
+        raise LookupError("no")
+
+def sly(run):
+    return Sly(a=1)
+
+def loud(run):
+    print("looking")
+    return 1
 """
 
 
@@ -66,6 +98,33 @@ def test_a_function_that_fails_costs_neither_figures_nor_files(file, tmp_path, c
     (line,) = [warning for warning in told["warnings"] if warning.startswith("metric failing: ")]
     assert "did you mean error_rad?" in line
     assert len(read_parquet(path)[0]) == 50
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("leaving", "it raised SystemExit: 0"),
+        ("a_set", "expected what JSON holds, received {1, 2}"),
+        ("endless", "expected what JSON holds, received [[...]]"),
+        ("too_long", "expected what JSON holds, received int of too many digits"),
+        ("unwritable", "received Unwritable, which raises KeyError when it is written"),
+        ("sly", "expected what JSON holds, received {'a': 1}"),
+    ],
+)
+def test_whatever_a_function_does_the_run_ends_as_it_would(file, name, told, capsys):
+    code, figures, stderr = simulated(capsys, *HOLD, "--metric", f"{file}:{name}")
+    assert (code, stderr) == (1, "")
+    assert figures[name] is None
+    assert figures["max_abs_error_rad"]
+    (line,) = [warning for warning in figures["warnings"] if warning.startswith(f"metric {name}: ")]
+    assert told in line
+
+
+def test_what_a_function_prints_is_not_among_the_figures(file, capsys):
+    file.write_text("print('loaded')\n" + FUNCTIONS)
+    code, figures, stderr = simulated(capsys, *HOLD, "--metric", f"{file}:loud")
+    assert (code, figures["loud"]) == (0, 1)
+    assert stderr == "loaded\nlooking\n"
 
 
 def test_a_replayed_run_shows_the_columns_that_came_on_its_way(file, tmp_path, capsys):

@@ -58,7 +58,18 @@ class Path:
         return hash(self._known_by)
 
     def sample(self, t: Array) -> Samples:
-        """Angle, rate and acceleration at times `t` (s), as a trajectory has them."""
+        """Motion as a trajectory has it.
+
+        Parameters
+        ----------
+        t : (n,) array, s
+            Any times.
+
+        Returns
+        -------
+        (n, 3, 3) array
+            Angle (rad), rate (rad/s) and acceleration (rad/s²) as rows, for each time.
+        """
         samples = np.zeros((len(t), 3, 3))
         samples[:, 0] = np.where((t < self._times[0])[:, None], self._poses[0], self._poses[-1])
         moving = (t >= self._times[0]) & (t < self._times[-1])
