@@ -40,7 +40,7 @@ def test_a_run_without_a_row_has_no_figures():
     told = followed(0)
     assert [told[name] for name in METRICS] == [None] * len(METRICS)
     assert told["realtime_factor"] is None
-    assert told["warnings"] == []
+    assert told["warnings"] == told["notes"] == []
 
 
 def test_a_function_of_the_user_s_is_one_more_figure(run):

@@ -28,6 +28,7 @@ BESIDE = (
     "wall_s",
     "realtime_factor",
     "versions",
+    "notes",
     "warnings",
 )
 
@@ -147,6 +148,7 @@ def summary(
         "wall_s": wall_s,
         "realtime_factor": simulated_s / wall_s if wall_s > 0 else None,
         "versions": versions(),
+        "notes": scenario.trajectory.notes(),
         "warnings": list(warnings),
     }
 

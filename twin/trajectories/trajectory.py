@@ -41,7 +41,8 @@ class Sampled(Protocol):
 class Shape(BaseModel):
     """A shape that a scenario can name: its parameters, and the motion that they make.
 
-    A subclass says its motion in `sharp`, and in `corners` where that jumps.
+    A subclass says its motion in `sharp`, in `corners` where that jumps, and in `notes` what its parameters
+    alone do not tell.
     """
 
     model_config = CONFIG
@@ -82,6 +83,10 @@ class Shape(BaseModel):
     def corners(self) -> Corners:
         """Where angle or rate jump after the start, which no shape needs to tell."""
         return no_corners()
+
+    def notes(self) -> list[str]:
+        """What a user may want to know of the motion beside its parameters; one line each."""
+        return []
 
     def _start(self) -> NDArray[np.float64]:
         """Rates (3,) with which it begins, where the rotor is at rest."""

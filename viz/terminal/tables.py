@@ -44,6 +44,8 @@ def print_run(scenario: str, law: str, summary: dict[str, Any], own: Sequence[st
             f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.3f} s:"
             f" {summary['realtime_factor']:.0f} times real time"
         )
+    for note in summary["notes"]:
+        console.print(escape(note), soft_wrap=True)
     for warning in summary["warnings"]:
         console.print(f"[yellow]warning[/yellow]  {escape(warning)}", soft_wrap=True)
 

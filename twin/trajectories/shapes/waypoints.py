@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import told_apart
 from spheretwin.models.telemetry.series import TIME, Series, read
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.twin.trajectories.trajectory import LARGEST, Samples, Shape
 
 AXES = ("alpha", "beta", "gamma")
@@ -128,6 +129,13 @@ class Waypoints(Shape):
     def peaks(self) -> tuple[Peak, Peak]:
         """Largest rate (rad/s) and largest acceleration (rad/s²) of the path, and where they are."""
         return self._path.peaks()
+
+    def notes(self) -> list[str]:  # noqa: D102
+        rate, acceleration = (
+            f"{peak.value:.4g} {unit} ({ANGLES[AXES.index(peak.axis)]} at {peak.t_s:.4g} s)"
+            for peak, unit in zip(self.peaks(), ("rad/s", "rad/s²"), strict=True)
+        )
+        return [f"waypoints {self.file}: largest rate {rate}, largest acceleration {acceleration}"]
 
     def _check(self) -> None:
         poses = read("waypoints", FilePath(self.file), COLUMNS, LARGEST)

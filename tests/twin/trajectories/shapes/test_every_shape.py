@@ -111,6 +111,7 @@ def test_every_shape_runs(shape):
     fields = {"trajectory": shape.model_dump(mode="json"), "duration": 0.02}
     run = simulate(scenarios.load("hold", fields))
     assert run.status in set(Status)
+    assert all(note and "\n" not in note for note in shape.notes())
     samples = shape.sample(run.telemetry["t_s"])
     np.testing.assert_array_equal(run.telemetry["q_ref_rad"], samples[:, 0])
     np.testing.assert_array_equal(run.telemetry["qdot_ref_rad_s"], samples[:, 1])

@@ -1,5 +1,6 @@
 """Waypoints: the path between poses against its own definition, its peaks, its limits, and its file."""
 
+import json
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.series import Series
+from spheretwin.twin import cli
 from spheretwin.twin.trajectories.shapes.waypoints import Path, Waypoints
 
 HEADER = "t_s,alpha_rad,beta_rad,gamma_rad"
@@ -118,6 +120,17 @@ def test_minimum_jerk_has_the_known_peaks(tmp_path):
     assert acceleration.value == pytest.approx(10 / np.sqrt(3) * 0.4 / 0.75**2)
     assert acceleration.axis == "beta"
     assert acceleration.t_s == pytest.approx(0.5 + 0.75 * (0.5 - np.sqrt(1 / 12)))
+
+
+def test_a_run_tells_its_peaks(tmp_path, capsys):
+    file = written(tmp_path / "one.csv", T[:2], [[0, 0, 0], [0.1, -0.4, 0.0]])
+    told = "largest rate 1 rad/s (β at 0.875 s), largest acceleration 4.106 rad/s² (β at 0.6585 s)"
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text('duration = 0.01\n[trajectory]\nshape = "waypoints"\nfile = "one.csv"\n')
+    assert cli.main(["simulate", str(scenario), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["notes"] == [f"waypoints {file}: {told}"]
+    assert cli.main(["simulate", str(scenario)]) == 0
+    assert f"waypoints {file}: {told}\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("between", KINDS)
