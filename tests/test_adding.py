@@ -264,6 +264,38 @@ def draw(evidence):
             '    BORED = "bored", Level.WARN, "nothing went on any more"\n    INTERRUPTED = "interrupted",',
         ),
     ),
+    "estimator": Addition(
+        "control/estimation/rough.py",
+        '''
+from typing import Literal
+
+import numpy as np
+
+from spheretwin.control.estimation.estimator import Derived, Estimator, EstimatorParameters, Sampling, named
+
+
+class Rough(EstimatorParameters):
+    """The backward difference as it is."""
+
+    kind: Literal["rough"] = named("rough")
+
+    def build(self, sampling: Sampling) -> Estimator:
+        return Estimator(self.kind, step, np.array([sampling.period_s]), np.full(3, np.nan))
+
+    def derived(self, sampling: Sampling) -> Derived:
+        T = sampling.period_s
+        return Derived(np.full(3, np.sqrt(2) / T), np.full(3, T / 2))
+
+
+def step(angle, parameters, state, rate):
+    for axis in range(3):
+        rate[axis] = (angle[axis] - state[axis]) / parameters[0] if state[axis] == state[axis] else 0.0
+        state[axis] = angle[axis]
+''',
+        "control/estimation/registry.py",
+        ("    | Differentiator,\n", "    | Differentiator\n    | Rough,\n"),
+        "from spheretwin.control.estimation.rough import Rough\n",
+    ),
     "allocation": Addition(
         "control/allocation/halved.py",
         '''
@@ -327,6 +359,8 @@ shape = "ramp"
 [controller]
 law = "lazy"
 slackness = [1.0, 2.0, 3.0]
+[estimator]
+kind = "rough"
 [plant]
 engine = "uncoupled"
 [[disturbance.terms]]
@@ -338,7 +372,7 @@ code = cli.main(["simulate", str(folder / "new.toml"), "--telemetry", str(parque
 scenario = scenarios.load(str(folder / "new.toml"))
 helped = {flag: text for flag, _, text in flags.described(scenario)}
 refused = {}
-for name in ("controller.law", "trajectory.shape", "plant.engine", "allocation"):
+for name in ("controller.law", "trajectory.shape", "plant.engine", "allocation", "estimator.kind"):
     try:
         scenarios.load("hold", {name: "nothing"})
     except Exception as error:
@@ -436,6 +470,11 @@ def test_a_telemetry_column(grown):
 def test_a_plant(grown):
     assert grown["summary"]["scenario"]["plant"]["engine"] == "uncoupled"
     assert "'uncoupled'" in grown["refused"]["plant.engine"]
+
+
+def test_an_estimator(grown):
+    assert "qdot_estimated_rad_s" in grown["columns"]
+    assert "kalman, differentiator, rough" in grown["refused"]["estimator.kind"]
 
 
 def test_an_allocation(grown):

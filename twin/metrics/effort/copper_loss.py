@@ -12,11 +12,13 @@ from spheretwin.twin.plant.drive import drive
 class CopperLoss(Metric):
     """Energy lost in the copper over the run, ∫ R i² dt added over the groups, J.
 
-    R is the model file's resistance of a group. Within a tick each current goes from where it was towards
+    Amplifiers with a supply tell it themselves, by ``copper_loss_W``, with R as warm as it is. Without one, R
+    is that of a cold group. Within a tick each current goes from where it was towards
     its command as the drive's exponential; ``current_A``, its mean over the physics step that begins at the
     tick, tells where it was, so that the integral over the tick is exact, however hard a law chatters.
-    Neglected is that R grows with temperature. Lag and limit of the drive are those at the start of the run:
-    the rows do not say where they change on the way. A tick in which a run ends counts whole.
+    Lag and limit of the drive are those at the start of the run: the rows do not say where they change on the
+    way. Behind a delay or a converter, which come between command and target, ``current_A`` is taken for the
+    whole tick. A tick in which a run ends counts whole.
     """
 
     def __init__(self, planned: Planned) -> None:
@@ -33,11 +35,20 @@ class CopperLoss(Metric):
                 (0.5 * lag_s, planned.period_s),
             )
         )
+        self._follows = not section.converts
+        self._resistance_ohm = section.resistance_ohm or planned.actuator.group.resistance_ohm
         self._rows, self._squares = 0, np.zeros(len(planned.actuator.groups))
+        self._told_W = np.zeros(len(planned.actuator.groups))
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, at least one."""
         self._rows += len(rows)
+        if any(signal.name == "copper_loss_W" for signal in rows.signals):
+            self._told_W = added(self._told_W, rows["copper_loss_W"])
+            return
+        if not self._follows:
+            self._squares = added(self._squares, rows["current_A"] ** 2)
+            return
         target = np.clip(rows["current_command_A"], -self._limit_A, self._limit_A)
         distance = np.zeros_like(target)  # at the start of the tick; without a lag there is none
         if self._first_step > 0:
@@ -49,5 +60,5 @@ class CopperLoss(Metric):
         """In J; None without a row."""
         if not self._rows:
             return None
-        resistance_ohm = self.planned.actuator.group.resistance_ohm
-        return float(np.sum(resistance_ohm * self._squares) * self.planned.period_s)
+        heat_W = np.sum(self._resistance_ohm * self._squares) + np.sum(self._told_W)
+        return float(heat_W * self.planned.period_s)

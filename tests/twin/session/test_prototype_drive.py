@@ -169,3 +169,12 @@ def test_neutral_stages_move_no_bit():
     }
     told = simulate(scenarios.load("hold", {"duration": 0.1, **neutral})).telemetry
     assert told.values.tobytes() == plain.values.tobytes()
+
+
+def test_copper_loss_is_what_the_coils_say_they_lost():
+    from spheretwin.twin.records.summary import figures_of
+
+    run = simulate(driven("nutation", duration=0.3))
+    told = run.telemetry["copper_loss_W"].sum() * 1e-3
+    # The same numbers, added in another order.
+    assert figures_of(run)["copper_loss_J"] == pytest.approx(told, rel=1e-12)
