@@ -25,10 +25,12 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
+from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.disturbances.draws import Draws
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.records.facts import facts_of
+from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz.recording.recorder import Recorder
@@ -84,6 +86,24 @@ def set_up_seconds() -> float:
     """Time until a session is ready, s."""
     scenario = scenarios.load(SCENARIO)
     return seconds_of(lambda: Session(scenario))
+
+
+def prototype_seconds(hardware: str) -> Callable[[], float]:
+    """Loop time of a physics step of the tilt on one kind of hardware, s.
+
+    Friction is the same on both, and rows are written into memory that is there already: the prototype's are
+    twice as wide, and a page of fresh memory takes longer than what is written into it.
+    """
+    bearings = {name: value for name, value in HARDWARE["prototype"].items() if name.startswith("plant.")}
+    scenario = scenarios.load("tilt", {"hardware": hardware, **bearings})
+    log = np.zeros((scenario.ticks, width(Session(scenario).signals)))
+
+    def work() -> float:
+        with Session(scenario) as session:
+            session.advance_into(log)
+            return session.loop_s / (scenario.ticks * scenario.substeps)
+
+    return work
 
 
 def brief_run_seconds() -> float:
@@ -229,6 +249,8 @@ def ratios() -> list[dict[str, object]]:
             "set-up": set_up_seconds,
             "brief run": brief_run_seconds,
             "brief loop": brief_loop_seconds,
+            "prototype": prototype_seconds("prototype"),
+            "ideal": prototype_seconds("ideal"),
         },
         rounds=9,
     )
@@ -249,6 +271,12 @@ def ratios() -> list[dict[str, object]]:
         _row("warm command with --record over without", processes["recorded"], processes["silent"]),
         _row(
             "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2
+        ),
+        _row(
+            "the prototype's whole chain over bare mj_step, a physics step",
+            inner["prototype"] - inner["ideal"],
+            bare,
+            at_most=0.17,
         ),
         _row("one torque matrix over bare mj_step", inner["G_t"], bare),
         _row("one bounded allocation at the limit over bare mj_step", inner["bounded"], bare),

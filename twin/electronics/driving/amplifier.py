@@ -136,7 +136,7 @@ def flow(groups: int) -> Flow:
     return Flow(*np.zeros((len(Flow._fields), groups)))
 
 
-@allocation_free
+@part_of_its_caller
 def clear(flow: Flow) -> None:
     """Begin the sums anew, as at the start of a control period."""
     for j in range(flow.copper_J.shape[0]):
@@ -153,7 +153,7 @@ class Phase(NamedTuple):
     work_J: float
 
 
-@allocation_free
+@part_of_its_caller
 def drive_coils(
     amplifier: Amplifier,
     coil: Coil,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.kinematics import angular_velocity
 from spheretwin.twin.electronics.driving.amplifier import Amplifier, Flow, amplifier, clear, drive_coils, flow
 from spheretwin.twin.electronics.driving.coil import Coil, back_emf, coil, settle_resistance, warm
@@ -72,7 +72,7 @@ def driving(section: DriveSection, step_s: float, substeps: int, groups: int, se
     )
 
 
-@allocation_free
+@part_of_its_caller
 def begin(driving: Driving, command: Array) -> None:
     """Take the commands of a control period, and begin its sums."""
     if driving.converts:
@@ -83,7 +83,7 @@ def begin(driving: Driving, command: Array) -> None:
         driving.drawn_As[0] = 0.0
 
 
-@allocation_free
+@part_of_its_caller
 def drive_groups(
     driving: Driving, asked: Array, q: Array, qdot: Array, G: Array, gain: Array, current: Array, mean: Array
 ) -> None:
@@ -113,7 +113,7 @@ def drive_groups(
         driving.drawn_As[0] += abs(mean[j]) * driving.amplifier.step_s
 
 
-@allocation_free
+@part_of_its_caller
 def end(driving: Driving) -> None:
     """End a control period: the coils have warmed by what they lost."""
     if driving.supplied:

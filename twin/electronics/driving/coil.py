@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.twin.electronics.driving.relaxation import relaxation
 
 # Temperature at which a resistance is told.
@@ -99,7 +99,7 @@ def coil(
     return made
 
 
-@allocation_free
+@part_of_its_caller
 def settle_resistance(coil: Coil) -> None:
     """``R = R20 (1 + a (T - 20 °C))`` at the present temperatures."""
     for j in range(coil.resistance_ohm.shape[0]):
@@ -107,7 +107,7 @@ def settle_resistance(coil: Coil) -> None:
         coil.resistance_ohm[j] = coil.cold_resistance_ohm * (1.0 + coil.resistance_per_K * rise)
 
 
-@allocation_free
+@part_of_its_caller
 def warm(coil: Coil, copper_J: NDArray[np.float64]) -> None:
     """Carry temperature and resistance over one control period, exactly for the mean power in it.
 
@@ -125,7 +125,7 @@ def warm(coil: Coil, copper_J: NDArray[np.float64]) -> None:
     settle_resistance(coil)
 
 
-@allocation_free
+@part_of_its_caller
 def overheated(coil: Coil) -> bool:
     """Whether a group is as hot as its amplifier lets it be, or its temperature is not a number."""
     for j in range(coil.temperature_degC.shape[0]):
@@ -134,7 +134,7 @@ def overheated(coil: Coil) -> bool:
     return False
 
 
-@allocation_free
+@part_of_its_caller
 def back_emf(
     torque_matrix: NDArray[np.float64],
     gain: NDArray[np.float64],

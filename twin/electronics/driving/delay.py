@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import part_of_its_caller
 
 # Clock times are built from decimal fractions; a delay and a step that fit do so to rounding only.
 WHOLE = 1e-9
@@ -67,7 +67,7 @@ def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> D
     return Delay(np.zeros((commands, groups)), np.zeros(1, dtype=np.int64), steps, substeps)
 
 
-@allocation_free
+@part_of_its_caller
 def latch(delay: Delay, command: NDArray[np.float64]) -> None:
     """Take the command (n,), A, that was computed from this control tick's sample."""
     ring = delay.ring
@@ -77,7 +77,7 @@ def latch(delay: Delay, command: NDArray[np.float64]) -> None:
         ring[newest, j] = command[j]
 
 
-@allocation_free
+@part_of_its_caller
 def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
     """Write the command in force at a physics step of the period.
 
