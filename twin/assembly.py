@@ -30,11 +30,12 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
-from spheretwin.twin.electronics.driving.chain import driving
+from spheretwin.twin.electronics.driving import stages
 from spheretwin.twin.electronics.driving.sections import DriveSection
-from spheretwin.twin.electronics.sensing.chain import Sensing, reckoned, sensing
+from spheretwin.twin.electronics.sensing import stages as senses
+from spheretwin.twin.electronics.sensing.chain import Sensing, reckoned
+from spheretwin.twin.electronics.sensing.stages import Exact
 from spheretwin.twin.loop import Places
-from spheretwin.twin.plant.drive import drive
 from spheretwin.twin.plant.engine import integrator_name
 from spheretwin.twin.plant.friction import Friction, friction
 from spheretwin.twin.plant.plant import Plant
@@ -231,9 +232,9 @@ def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
     return Places(of_stages, width(signals) - width(law.signals))
 
 
-def sensors_of(scenario: Scenario) -> Sensing:
+def sensors_of(scenario: Scenario) -> Exact | Sensing:
     """Sensors of a scenario, with the errors that its seed gives them."""
-    return sensing(scenario.sensors, scenario.seed)
+    return senses.made(scenario.sensors, scenario.seed)
 
 
 def warnings_of(scenario: Scenario, files: Files) -> list[str]:
@@ -297,13 +298,11 @@ def controller_of(
 def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix) -> Plant:
     """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
     section, groups = scenario.plant, len(actuator.groups)
-    lag_s, limit_A = scenario.drive.time_constant_s or 0.0, scenario.drive.current_limit_A or 0.0
     return Plant(
         rotor=stepped,
         magnetics=torque_model(actuator),
         kept=kept,
-        drive=drive(lag_s, section.step_s, limit_A),
-        driving=driving(scenario.drive, section.step_s, scenario.substeps, groups, scenario.seed),
+        driving=stages.made(scenario.drive, section.step_s, scenario.substeps, groups, scenario.seed),
         friction=_friction(section, actuator),
         group_gain=np.array(section.group_gain or (1.0,) * groups),
         unmodelled_torque=np.array(section.modelling_torque_Nm),

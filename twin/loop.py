@@ -10,7 +10,8 @@ from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.copying import copy_into, copy_rows
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.twin.columns.registry import write_columns
-from spheretwin.twin.electronics.sensing.chain import Sensing, sense
+from spheretwin.twin.electronics.sensing.chain import Sensing
+from spheretwin.twin.electronics.sensing.stages import Exact, sense
 from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
 
 Array = NDArray[np.float64]
@@ -52,7 +53,7 @@ def loop(
     allocate: Any,
     estimate: Any,
     controller: Controller,
-    sensors: Sensing,
+    sensors: Exact | Sensing,
     plant: Plant,
     places: Places,
     scratch: Scratch,
@@ -68,7 +69,7 @@ def loop(
         Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`.
     controller : Controller
         Changed in place, as is the plant; neither sees the other.
-    sensors : Sensing
+    sensors : Exact or Sensing
     plant : Plant
     places : Places
     scratch : Scratch

@@ -17,7 +17,7 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
 from spheretwin.twin.assembly import Files
-from spheretwin.twin.electronics.driving import chain as drivings
+from spheretwin.twin.electronics.driving import stages as drivings
 from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.rotor import Rotor
 from spheretwin.twin.scenario.sections import Scenario

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.twin.columns.column import Columns
+from spheretwin.twin.electronics.driving.stages import tell
 
 
 @cache
@@ -28,15 +29,7 @@ def signals(groups: int) -> tuple[Signal, ...]:
 
 @part_of_its_caller
 def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:  # noqa: D103
-    driving, groups = plant.driving, plant.current.shape[0]
-    flow, period_s = driving.flow, driving.coil.period_s
-    row[0] = driving.supply_V * driving.drawn_As[0] / period_s
-    for j in range(groups):
-        row[1 + j] = flow.work_J[j] / period_s
-        row[1 + groups + j] = flow.copper_J[j] / period_s
-        row[1 + 2 * groups + j] = driving.coil.temperature_degC[j]
-        row[1 + 3 * groups + j] = flow.voltage_limited_s[j] / period_s
-        row[1 + 4 * groups + j] = flow.current_limited_s[j] / period_s
+    tell(plant.driving, row)
 
 
 COLUMNS = Columns(signals, lambda scenario: scenario.drive.supply_V is not None, write)

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.copying import copy_into
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
-from spheretwin.twin.electronics.driving.chain import Driving, begin, drive_groups, end
-from spheretwin.twin.electronics.driving.coil import overheated
-from spheretwin.twin.electronics.driving.delay import due
-from spheretwin.twin.plant.drive import Drive, advance
+from spheretwin.twin.electronics.driving.chain import Driving
+from spheretwin.twin.electronics.driving.stages import Lag, advance_currents, begin, end
 from spheretwin.twin.plant.friction import Friction, friction_torque
 from spheretwin.twin.plant.stepping import step
 
@@ -30,8 +28,7 @@ class Plant(NamedTuple):
     rotor: Any  # what compiled code steps, as the engine's row says
     magnetics: TorqueModel  # true
     kept: KeptMatrix
-    drive: Drive
-    driving: Driving
+    driving: Lag | Driving
     friction: Friction
     group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
@@ -76,7 +73,7 @@ def plant_tick(
         `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, or `FAILSAFE` where a coil is too hot.
     """
     # Taken out of the tuple once: each time costs a count of references.
-    rotor, magnetics, kept, drive = plant.rotor, plant.magnetics, plant.kept, plant.drive
+    rotor, magnetics, kept = plant.rotor, plant.magnetics, plant.kept
     q, qdot, torque_S, torque_q = rotor.q, rotor.qdot, rotor.torque_S, rotor.torque_q
     hinge_range = plant.hinge_range
     current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
@@ -88,15 +85,9 @@ def plant_tick(
     )
     driving = plant.driving
     begin(driving, command)
-    asked = driving.asked if driving.converts else command
     for substep in range(plant.substeps):
         keep_torque_matrix(q, magnetics, kept)
-        if driving.converts:
-            due(driving.delay, substep, asked)
-        if driving.supplied:
-            drive_groups(driving, asked, q, qdot, kept.G, gain, current, mean_current)
-        else:
-            advance(drive, asked, current, mean_current)
+        advance_currents(driving, command, substep, q, qdot, kept.G, gain, current, mean_current)
         for j in range(pulling.shape[0]):
             pulling[j] = gain[j] * mean_current[j]
         rotor_torque(kept.G, pulling, torque_S)
@@ -117,8 +108,7 @@ def plant_tick(
         for i in range(3):  # at every step: beyond its range a hinge would meet a stop that is not computed
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
-    end(driving)
-    if driving.supplied and overheated(driving.coil):
+    if not end(driving):
         return FAILSAFE
     for kind in range(rotor.warnings.shape[0]):
         if rotor.warnings[kind] > 0:

@@ -17,7 +17,7 @@ from spheretwin.twin.electronics.driving.amplifier import (
     flow,
 )
 from spheretwin.twin.electronics.driving.coil import CoilSection, coil
-from spheretwin.twin.plant.drive import advance, drive
+from spheretwin.twin.electronics.driving.lag import advance, drive
 
 STEP_S = 5e-4
 SUPPLY = {"supply_V": 24.0, "drop_up_V": 4.8, "drop_down_V": 4.6}

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.kinematics import angular_velocity
 from spheretwin.twin.electronics.driving.amplifier import Amplifier, Flow, amplifier, clear, drive_coils, flow
-from spheretwin.twin.electronics.driving.coil import Coil, back_emf, coil, settle_resistance, warm
+from spheretwin.twin.electronics.driving.coil import Coil, back_emf, coil, overheated, settle_resistance, warm
 from spheretwin.twin.electronics.driving.dac import Dac, convert, dac
-from spheretwin.twin.electronics.driving.delay import Delay, delay, latch
+from spheretwin.twin.electronics.driving.delay import Delay, delay, due, latch
+from spheretwin.twin.electronics.driving.lag import Drive, drive
+from spheretwin.twin.electronics.driving.lag import advance as follow
 from spheretwin.twin.electronics.driving.sections import DriveSection
 
 Array = NDArray[np.float64]
@@ -24,6 +26,7 @@ class Driving(NamedTuple):
     converts: bool  # whether what is asked of the amplifiers is other than the command
     supplied: bool  # whether the amplifiers have a supply, and the coils a voltage
     supply_V: float
+    lag: Drive
     delay: Delay
     dac: Dac
     amplifier: Amplifier
@@ -60,6 +63,7 @@ def driving(section: DriveSection, step_s: float, substeps: int, groups: int, se
         converts=section.converts,
         supplied=section.supply_V is not None,
         supply_V=section.supply_V or 0.0,
+        lag=drive(section.time_constant_s or 0.0, step_s, section.current_limit_A or 0.0),
         delay=delay(section, step_s, substeps, groups),
         dac=dac(section, section.transconductance_A_V, groups, seed),
         amplifier=amplifier(section, section.current_limit_A or 0.0, step_s, groups, seed),
@@ -84,16 +88,26 @@ def begin(driving: Driving, command: Array) -> None:
 
 
 @part_of_its_caller
-def drive_groups(
-    driving: Driving, asked: Array, q: Array, qdot: Array, G: Array, gain: Array, current: Array, mean: Array
+def advance(
+    driving: Driving,
+    command: Array,
+    substep: int,
+    q: Array,
+    qdot: Array,
+    G: Array,
+    gain: Array,
+    current: Array,
+    mean: Array,
 ) -> None:
-    """Advance the currents of supplied amplifiers by one physics step.
+    """Advance the currents by one physics step.
 
     Parameters
     ----------
     driving : Driving
-    asked : (n,) array, A
-        Of the amplifiers, held over the step.
+    command : (n,) array, A
+        Of this control period.
+    substep : int
+        Physics step of the period, from 0.
     q, qdot : (3,) arrays, rad and rad/s
         At the start of the step.
     G : (3, n) array, N·m/A
@@ -105,19 +119,40 @@ def drive_groups(
     mean : (n,) array, A
         Result: over the step.
     """
-    angular_velocity(q, qdot, driving.rate_S)
-    back_emf(G, gain, driving.rate_S, driving.emf)
-    drive_coils(driving.amplifier, driving.coil, asked, driving.emf, current, driving.flow)
-    for j in range(mean.shape[0]):
-        mean[j] = driving.flow.mean_current_A[j]
-        driving.drawn_As[0] += abs(mean[j]) * driving.amplifier.step_s
+    asked = driving.asked if driving.converts else command
+    if driving.converts:
+        due(driving.delay, substep, asked)
+    if driving.supplied:
+        angular_velocity(q, qdot, driving.rate_S)
+        back_emf(G, gain, driving.rate_S, driving.emf)
+        drive_coils(driving.amplifier, driving.coil, asked, driving.emf, current, driving.flow)
+        for j in range(mean.shape[0]):
+            mean[j] = driving.flow.mean_current_A[j]
+            driving.drawn_As[0] += abs(mean[j]) * driving.amplifier.step_s
+    else:
+        follow(driving.lag, asked, current, mean)
 
 
 @part_of_its_caller
-def end(driving: Driving) -> None:
-    """End a control period: the coils have warmed by what they lost."""
+def end(driving: Driving) -> bool:
+    """End a control period: the coils have warmed by what they lost; whether none is too hot."""
     if driving.supplied:
         warm(driving.coil, driving.flow.copper_J)
+        return not overheated(driving.coil)
+    return True
+
+
+@part_of_its_caller
+def tell(driving: Driving, row: Array) -> None:
+    """Write power, losses, temperatures and limits of the control period into the beginning of `row`."""
+    flow, period_s, groups = driving.flow, driving.coil.period_s, driving.emf.shape[0]
+    row[0] = driving.supply_V * driving.drawn_As[0] / period_s
+    for j in range(groups):
+        row[1 + j] = flow.work_J[j] / period_s
+        row[1 + groups + j] = flow.copper_J[j] / period_s
+        row[1 + 2 * groups + j] = driving.coil.temperature_degC[j]
+        row[1 + 3 * groups + j] = flow.voltage_limited_s[j] / period_s
+        row[1 + 4 * groups + j] = flow.current_limited_s[j] / period_s
 
 
 def state_of(driving: Driving) -> Array:

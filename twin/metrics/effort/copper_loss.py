@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.electronics.driving.lag import drive
 from spheretwin.twin.metrics.metric import Metric, Planned, added
-from spheretwin.twin.plant.drive import drive
 
 
 class CopperLoss(Metric):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from spheretwin.twin.plant.drive import advance, drive
+from spheretwin.twin.electronics.driving.lag import advance, drive
 
 
 @pytest.mark.parametrize("time_constant_s", [1e-4, 6.9e-4, 5e-2])

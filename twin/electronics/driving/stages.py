@@ -1,0 +1,163 @@
+"""One name for what comes between commands and currents, whether it is a plain lag or the prototype's chain.
+
+As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.twin.electronics.driving import chain
+from spheretwin.twin.electronics.driving.chain import Driving
+from spheretwin.twin.electronics.driving.lag import Drive, advance, drive
+from spheretwin.twin.electronics.driving.sections import DriveSection
+
+
+class Lag(NamedTuple):
+    """Amplifiers without a supply, right behind their commands."""
+
+    drive: Drive
+
+
+@part_of_its_caller
+def _lag_begins(driving: Any, command: Any) -> None:
+    pass
+
+
+@part_of_its_caller
+def _lag_advances(
+    driving: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
+) -> None:
+    advance(driving.drive, command, current, mean)
+
+
+@part_of_its_caller
+def _lag_ends(driving: Any) -> bool:
+    return True
+
+
+@part_of_its_caller
+def _lag_tells(driving: Any, row: Any) -> None:
+    pass
+
+
+_BEGIN: dict[type, Any] = {Lag: _lag_begins, Driving: chain.begin}
+_ADVANCE: dict[type, Any] = {Lag: _lag_advances, Driving: chain.advance}
+_END: dict[type, Any] = {Lag: _lag_ends, Driving: chain.end}
+_TELL: dict[type, Any] = {Lag: _lag_tells, Driving: chain.tell}
+
+
+def made(section: DriveSection, step_s: float, substeps: int, groups: int, seed: int) -> Lag | Driving:
+    """What a resolved section asks for, at rest."""
+    if section.supply_V is None and not section.converts:
+        return Lag(drive(section.time_constant_s or 0.0, step_s, section.current_limit_A or 0.0))
+    return chain.driving(section, step_s, substeps, groups, seed)
+
+
+def state_of(driving: Lag | Driving) -> NDArray:
+    """All that it goes on from, beside the currents."""
+    return np.empty(0) if isinstance(driving, Lag) else chain.state_of(driving)
+
+
+def restore(driving: Lag | Driving, state: NDArray) -> None:
+    """Go on from a state of one of the same size."""
+    if isinstance(driving, Driving):
+        chain.restore(driving, state)
+
+
+def carried_on(before: Lag | Driving, after: Lag | Driving) -> None:
+    """Go on as before with other figures."""
+    if isinstance(before, Driving) and isinstance(after, Driving):
+        chain.carried_on(before, after)
+
+
+def begin(driving: Lag | Driving, command: NDArray) -> None:
+    """Take the commands (n,), A, of a control period."""
+    _BEGIN[type(driving)](driving, command)
+
+
+def advance_currents(
+    driving: Lag | Driving,
+    command: NDArray,
+    substep: int,
+    q: NDArray,
+    qdot: NDArray,
+    G: NDArray,
+    gain: NDArray,
+    current: NDArray,
+    mean: NDArray,
+) -> None:
+    """Advance the currents by one physics step, as `chain.advance` does."""
+    _ADVANCE[type(driving)](driving, command, substep, q, qdot, G, gain, current, mean)
+
+
+def end(driving: Lag | Driving) -> bool:
+    """End a control period; whether the amplifiers may go on."""
+    return bool(_END[type(driving)](driving))
+
+
+def tell(driving: Lag | Driving, row: NDArray) -> None:
+    """Write what the telemetry says of the control period; a lag says nothing."""
+    _TELL[type(driving)](driving, row)
+
+
+def _of_kind(table: dict[type, Any], driving: Any) -> Any:
+    return table.get(getattr(driving, "instance_class", object))
+
+
+@overload(begin, inline="always")
+def _compiled_begin(driving: Any, command: Any) -> Callable[..., Any] | None:
+    chosen = _of_kind(_BEGIN, driving)
+
+    def call(driving: Any, command: Any) -> None:
+        chosen(driving, command)
+
+    return chosen and call
+
+
+@overload(advance_currents, inline="always")
+def _compiled_advance(
+    driving: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
+) -> Callable[..., Any] | None:
+    chosen = _of_kind(_ADVANCE, driving)
+
+    def call(
+        driving: Any,
+        command: Any,
+        substep: Any,
+        q: Any,
+        qdot: Any,
+        G: Any,
+        gain: Any,
+        current: Any,
+        mean: Any,
+    ) -> None:
+        chosen(driving, command, substep, q, qdot, G, gain, current, mean)
+
+    return chosen and call
+
+
+@overload(end, inline="always")
+def _compiled_end(driving: Any) -> Callable[..., Any] | None:
+    chosen = _of_kind(_END, driving)
+
+    def call(driving: Any) -> Any:
+        return chosen(driving)
+
+    return chosen and call
+
+
+@overload(tell, inline="always")
+def _compiled_tell(driving: Any, row: Any) -> Callable[..., Any] | None:
+    chosen = _of_kind(_TELL, driving)
+
+    def call(driving: Any, row: Any) -> None:
+        chosen(driving, row)
+
+    return chosen and call

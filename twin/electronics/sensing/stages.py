@@ -1,0 +1,58 @@
+"""One name for what comes between the joints and the controller: nothing, or the prototype's sensors.
+
+As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.twin.electronics.sensing import chain
+from spheretwin.twin.electronics.sensing.chain import Sensing
+from spheretwin.twin.electronics.sensing.sections import SensorsSection
+
+
+class Exact(NamedTuple):
+    """Sensors that hand over the truth."""
+
+    rows: int  # that they write of a measurement
+
+
+@part_of_its_caller
+def _exactly(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> bool:
+    finite = True
+    for i in range(3):
+        measurement[0, i], measurement[1, i] = q[i], qdot[i]
+        finite = finite and isfinite(q[i]) and isfinite(qdot[i])
+    return finite
+
+
+_SENSE: dict[type, Any] = {Exact: _exactly, Sensing: chain.sense}
+
+
+def made(section: SensorsSection, seed: int) -> Exact | Sensing:
+    """What a section asks for, with the errors that the seed gives it."""
+    return Exact(2) if section.ideal else chain.sensing(section, seed)
+
+
+def sense(sensing: Exact | Sensing, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:
+    """Write measured angles and true rates into a measurement (3, 3), as `chain.sense` does."""
+    return bool(_SENSE[type(sensing)](sensing, q, qdot, noise, measurement))
+
+
+@overload(sense, inline="always")
+def _compiled_sense(
+    sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any
+) -> Callable[..., Any] | None:
+    chosen = _SENSE.get(getattr(sensing, "instance_class", object))
+
+    def call(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> Any:
+        return chosen(sensing, q, qdot, noise, measurement)
+
+    return chosen and call
