@@ -118,7 +118,7 @@ def _compiled_begin(driving: Any, command: Any) -> Callable[..., Any] | None:
     def call(driving: Any, command: Any) -> None:
         chosen(driving, command)
 
-    return chosen and call
+    return call if chosen else None
 
 
 @overload(advance_currents, inline="always")
@@ -140,7 +140,7 @@ def _compiled_advance(
     ) -> None:
         chosen(driving, command, substep, q, qdot, G, gain, current, mean)
 
-    return chosen and call
+    return call if chosen else None
 
 
 @overload(end, inline="always")
@@ -150,7 +150,7 @@ def _compiled_end(driving: Any) -> Callable[..., Any] | None:
     def call(driving: Any) -> Any:
         return chosen(driving)
 
-    return chosen and call
+    return call if chosen else None
 
 
 @overload(tell, inline="always")
@@ -160,4 +160,4 @@ def _compiled_tell(driving: Any, row: Any) -> Callable[..., Any] | None:
     def call(driving: Any, row: Any) -> None:
         chosen(driving, row)
 
-    return chosen and call
+    return call if chosen else None

@@ -50,9 +50,9 @@ def sense(sensing: Exact | Sensing, q: NDArray, qdot: NDArray, noise: NDArray, m
 def _compiled_sense(
     sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any
 ) -> Callable[..., Any] | None:
-    chosen = _SENSE.get(getattr(sensing, "instance_class", object))
+    chosen: Any = _SENSE.get(getattr(sensing, "instance_class", object))
 
     def call(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> Any:
         return chosen(sensing, q, qdot, noise, measurement)
 
-    return chosen and call
+    return call if chosen else None
