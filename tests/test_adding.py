@@ -337,6 +337,7 @@ from pathlib import Path
 
 folder = Path(sys.argv[1])
 
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import cli
@@ -375,7 +376,7 @@ refused = {}
 for name in ("controller.law", "trajectory.shape", "plant.engine", "allocation", "estimator.kind"):
     try:
         scenarios.load("hold", {name: "nothing"})
-    except Exception as error:
+    except InputError as error:
         refused[name] = str(error)
 
 class Bored:

@@ -29,6 +29,7 @@ of (1 − p) 0.18°/T, 0.44 rad/s, at each count, which decays in 1/ω).
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.control.estimation.estimator import (
     BandwidthEach,
@@ -40,6 +41,8 @@ from spheretwin.control.estimation.estimator import (
     named,
     usable,
 )
+
+Array = NDArray[np.float64]
 
 KEPT, GAIN = 0, 3  # layout of the parameters: p, and (1 - p) / T
 STARTED, ANGLE, RATE = 0, 3, 6  # layout of the memory
@@ -64,7 +67,8 @@ class Difference(EstimatorParameters):
         return Derived(rest * np.sqrt(2 / (2 - rest)) / T, 0.5 * T / np.tanh(0.5 * share))
 
 
-def step(angle, parameters, state, rate):  # type: ignore[no-untyped-def]  # noqa: D103
+def step(angle: Array, parameters: Array, state: Array, rate: Array) -> None:
+    """Write the rates of one control tick, as `estimator.Estimator` says."""
     for axis in range(3):
         measured = usable(angle[axis])
         if np.isnan(measured):

@@ -74,6 +74,8 @@ from spheretwin.control.estimation.estimator import (
 from spheretwin.control.parts.parameters import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
 
+Array = NDArray[np.float64]
+
 OUTER, MIDDLE, INNER = 2.0, 2.12, 1.1  # Levant's coefficients, from z0 to z2
 END_SLOPE = 1.5  # weight of the innermost term in z1: a parabola's slope at its end
 PERIOD, FILTERS, JERK = 0, 1, 2  # layout of the parameters
@@ -152,7 +154,8 @@ def root(rest: float) -> float:
         u = lower
 
 
-def step(angle, parameters, state, rate):  # type: ignore[no-untyped-def]  # noqa: D103
+def step(angle: Array, parameters: Array, state: Array, rate: Array) -> None:
+    """Write the rates of one control tick, as `estimator.Estimator` says."""
     T = parameters[PERIOD]
     for axis in range(3):
         measured = usable(angle[axis])

@@ -26,6 +26,7 @@ One seed:
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
@@ -100,13 +101,13 @@ class EstimatorParameters(BaseModel):
 
     kind: str
 
+    @abstractmethod
     def build(self, sampling: Sampling) -> Estimator | None:
         """Estimator with these parameters; None where the rates are handed over as they are."""
-        raise NotImplementedError
 
+    @abstractmethod
     def derived(self, sampling: Sampling) -> Derived:
         """Noise gain and lag."""
-        raise NotImplementedError
 
 
 def named(kind: str) -> Any:

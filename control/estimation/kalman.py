@@ -58,6 +58,8 @@ from spheretwin.control.estimation.estimator import (
 )
 from spheretwin.control.parts.parameters import NonNegativeEach, each
 
+Array = NDArray[np.float64]
+
 OF_ANGLE, OF_RATE, PERIOD, FILTERS = 0, 3, 6, 7  # layout of the parameters: alpha, beta / T
 STARTED, ANGLE, RATE = 0, 3, 6  # layout of the memory
 
@@ -136,7 +138,8 @@ def _inner(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return x / outer  # their product is x: no cancellation where x is large
 
 
-def step(angle, parameters, state, rate):  # type: ignore[no-untyped-def]  # noqa: D103
+def step(angle: Array, parameters: Array, state: Array, rate: Array) -> None:
+    """Write the rates of one control tick, as `estimator.Estimator` says."""
     period = parameters[PERIOD]
     for axis in range(3):
         measured = usable(angle[axis])

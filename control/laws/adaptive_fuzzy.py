@@ -3,6 +3,7 @@
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Known, Law
@@ -18,6 +19,8 @@ from spheretwin.control.parts.parameters import (
 )
 from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
 from spheretwin.models.telemetry.signals import ANGLES, Signal
+
+Array = NDArray[np.float64]
 
 SIGNALS = (
     SLIDING_SIGNAL,
@@ -43,7 +46,10 @@ class AdaptiveFuzzy(LawParameters):
         return Law(self.law, step, parameters, np.zeros(THETA + 3 * CONSEQUENTS), SIGNALS)
 
 
-def step(t, reference, measurement, parameters, state, torque):  # type: ignore[no-untyped-def]  # noqa: D103
+def step(
+    t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
+) -> None:
+    """Write the torque of one control tick, as `control.law.Law` says."""
     for axis in range(3):
         angle, rate = measurement[0, axis], measurement[1, axis]
         error, error_rate = angle - reference[0, axis], rate - reference[1, axis]

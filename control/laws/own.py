@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from inspect import isabstract
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -45,6 +46,8 @@ _CLASSES: dict[tuple[str, int], tuple[Any, type[LawParameters]]] = {}
 
 def _class_of(reference: str, found: Any, digest: str) -> type[LawParameters]:
     if isinstance(found, type) and issubclass(found, LawParameters):
+        if isabstract(found):
+            raise InputError(f"law {reference}: expected a class with build(known), received one without")
         base = found
     elif isinstance(found, Law):
         base = _of_law(found)

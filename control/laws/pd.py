@@ -3,6 +3,7 @@
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Known, Law
@@ -15,6 +16,8 @@ from spheretwin.control.parts.parameters import (
     named,
     torque_factor,
 )
+
+Array = NDArray[np.float64]
 
 STIFFNESS, DAMPING, FACTOR = 0, 3, 6  # layout of the parameters
 
@@ -33,7 +36,10 @@ class PD(LawParameters):
         return Law(self.law, step, np.array([*self.stiffness, *self.damping, *factor]), np.zeros(0))
 
 
-def step(t, reference, measurement, parameters, state, torque):  # type: ignore[no-untyped-def]  # noqa: D103
+def step(
+    t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
+) -> None:
+    """Write the torque of one control tick, as `control.law.Law` says."""
     for axis in range(3):
         error = measurement[0, axis] - reference[0, axis]
         error_rate = measurement[1, axis] - reference[1, axis]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -39,12 +40,8 @@ def named(law: str) -> Any:
     return Field(law, description=meaning, json_schema_extra={"path": "code"})
 
 
-class LawParameters(BaseModel):
-    """Parameters that every law has; each law's own add to them, each with its range and meaning.
-
-    A subclass makes the law in `build`, and a shipped one names itself in `law`. That is all that a law is,
-    here or in a file of its user's.
-    """
+class ControllerSection(BaseModel):
+    """What a scenario says of its controller, whatever law runs."""
 
     source: ClassVar[str] = ""
     """Digest of the file of one of the user's."""
@@ -56,9 +53,17 @@ class LawParameters(BaseModel):
         1e-3, description="control period, s; a whole number of physics steps"
     )
 
+
+class LawParameters(ControllerSection):
+    """Parameters that every law has; each law's own add to them, each with its range and meaning.
+
+    A subclass makes the law in `build`, and a shipped one names itself in `law`. That is all that a law is,
+    here or in a file of its user's.
+    """
+
+    @abstractmethod
     def build(self, known: Known) -> Law:
         """Law with these parameters, for what is known of the rotor."""
-        raise NotImplementedError
 
 
 def torque_factor(level: str, known: Known) -> NDArray[np.float64]:

@@ -28,7 +28,8 @@ def signals(groups: int) -> tuple[Signal, ...]:
 
 
 @part_of_its_caller
-def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:  # noqa: D103
+def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
     tell(plant.driving, row)
 
 

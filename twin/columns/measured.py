@@ -18,7 +18,8 @@ SIGNALS = (
 
 
 @part_of_its_caller
-def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:  # noqa: D103
+def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
     for i in range(3):
         row[i], row[3 + i] = controller.pose[i], controller.rates[i]
 

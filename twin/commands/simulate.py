@@ -153,7 +153,7 @@ def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
             yield
     except SpheretwinError:
         raise
-    except Exception as error:
+    except Exception as error:  # the law is the user's code, which may raise whatever it will
         if session.law.step.__module__.startswith("spheretwin."):
             raise
         told = without_breaks(error) or "no word of why"

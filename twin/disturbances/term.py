@@ -1,5 +1,6 @@
 """What a term of the disturbance is: a torque on the hinges by time, which adds to the others."""
 
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Annotated
 
@@ -26,6 +27,7 @@ class Term(BaseModel):
 
     model_config = CONFIG
 
+    @abstractmethod
     def sample(self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
         """Torque at control ticks, each held for a control period.
 
@@ -41,4 +43,3 @@ class Term(BaseModel):
         (n, 3) array, N·m
             Generalised torque on (α, β, γ), subtracted in (1).
         """
-        raise NotImplementedError

@@ -12,7 +12,7 @@ from spheretwin.control.estimation.ideal import Ideal
 from spheretwin.control.estimation.registry import AnyEstimator
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
-from spheretwin.control.parts.parameters import LARGEST, LawParameters, NonNegative, Positive
+from spheretwin.control.parts.parameters import LARGEST, ControllerSection, NonNegative, Positive
 from spheretwin.twin.disturbances.disturbance import Disturbance
 from spheretwin.twin.electronics.driving.delay import delay
 from spheretwin.twin.electronics.driving.sections import DriveSection
@@ -20,7 +20,7 @@ from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.trajectories.registry import Trajectory
-from spheretwin.twin.trajectories.trajectory import Bounded, Shape, Triple
+from spheretwin.twin.trajectories.trajectory import Bounded, Triple
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 
@@ -51,16 +51,20 @@ class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class OwnController(LawParameters):
+class OwnController(ControllerSection):
     """What a run under a law that its user made in Python says of it, in the place of a law's parameters."""
 
     parameters: tuple[float, ...] = Field(description="numbers handed to the law")
 
 
-class OwnPath(Shape):
+class OwnPath(_Section):
     """What a run along a trajectory that its user made in Python says of it, in a shape's place."""
 
     shape: str = Field(description="class of the object that is followed")
+
+    def notes(self) -> list[str]:
+        """Nothing is known of it."""
+        return []
 
 
 class Event(_Section):

@@ -1,5 +1,6 @@
 """What a trajectory is: angles, rates and accelerations of the three hinges as a function of time alone."""
 
+from abc import abstractmethod
 from typing import Annotated, Any, Protocol
 
 import numpy as np
@@ -65,6 +66,7 @@ class Shape(BaseModel):
             return samples
         return rounded(samples, t, self._start(), self.corners(), self.rounding_rad_s2)
 
+    @abstractmethod
     def sharp(self, t: NDArray[np.float64]) -> Samples:
         """Desired motion as `sample` has it, its corners as they are.
 
@@ -78,7 +80,6 @@ class Shape(BaseModel):
         (n, 3, 3) array
             Angle (rad), rate (rad/s) and acceleration (rad/s²) as rows, for each time.
         """
-        raise NotImplementedError
 
     def corners(self) -> Corners:
         """Where angle or rate jump after the start, which no shape needs to tell."""
