@@ -1,0 +1,74 @@
+"""What the tests of sessions share: scenarios, laws of a user's, and the bytes of a table."""
+
+import numba
+import numpy as np
+
+from spheretwin.control.law import Law
+from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.records.facts import record_of
+from spheretwin.twin.session import Session
+
+SHIPPED, ENGINES = ("pd", "adaptive_fuzzy", "afsm"), ("mujoco", "lagrangian")
+RANDOM = {"disturbance.random_bound_Nm": 0.05}
+WORN = {"plant.coulomb_Nm": [0.004, 0.003, 0.002], "plant.viscous_Nm_s": [1e-4, 1e-4, 2e-4]}
+ASKEW = {"sensors.angle_offset_rad": [0.01, -0.02, 0.005]}
+
+
+def scenario(name="sinusoid", **changes):
+    return scenarios.load(name, RANDOM | {key.replace("__", "."): value for key, value in changes.items()})
+
+
+def session(law=None, **changes):
+    return Session(scenario(**changes), law)
+
+
+def rows(table):
+    return table.values.tobytes()
+
+
+def proportional(t, reference, measurement, parameters, state, torque):
+    state[0] += 1.0  # calls
+    parameters[1] *= 1.001  # a law may change what it was given
+    for axis in range(3):
+        error, rate = measurement[0, axis] - reference[0, axis], measurement[1, axis] - reference[1, axis]
+        torque[axis] = -parameters[0] * error - parameters[1] * rate
+
+
+compiled_proportional = numba.njit(proportional)
+
+CALLS = (Signal("calls", "1", 1, "calls so far"),)
+
+
+def plain_law(name="mine"):
+    return Law(name, proportional, np.array([0.5, 0.05]), np.zeros(1), CALLS)
+
+
+def compiled_law(name="mine"):
+    return Law(name, compiled_proportional, np.array([0.5, 0.05]), np.zeros(1), CALLS)
+
+
+OWN = {"plain": plain_law, "compiled": compiled_law}
+
+
+def same_future(one, other, ticks=200):
+    assert (one.tick, one.journal, one.scenario, one.signals) == (
+        other.tick, other.journal, other.scenario, other.signals,
+    )  # fmt: skip
+    return rows(one.advance(ticks)) == rows(other.advance(ticks))
+
+
+def recorded(path, changes=(), law=None, ticks=600, **overrides):
+    """A run of a session with changes at their ticks, as its user would write it to a file."""
+    live = session(law, **overrides)
+    file = TelemetryFile(path, live.signals, record_of(live).metadata())
+    parts = []
+    for tick, name, value in [*changes, (ticks, None, None)]:
+        parts.append(live.advance(tick - live.tick))
+        file.write(parts[-1])
+        if name:
+            live.set(name, value)
+    file.finish("completed" if live.status == "running" else live.status)
+    file.close(record_of(live).metadata())
+    return live, parts

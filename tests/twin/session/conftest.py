@@ -1,0 +1,23 @@
+"""A model of a user's, for every test of sessions."""
+
+import pytest
+
+from spheretwin.models import actuator as actuators
+
+
+@pytest.fixture(scope="session")
+def sticky(tmp_path_factory):
+    """A model of the user's, in which the engine's solver is cut off at each step: where it began shows."""
+    text = actuators.MJCF_PATH.read_text()
+    for before, after in [
+        ('<option integrator="RK4"', '<option integrator="RK4" solver="Newton" iterations="1"'),
+        *[
+            (f'<joint name="{hinge}"', f'<joint frictionloss="0.2" name="{hinge}"')
+            for hinge in ("alpha", "beta", "gamma")
+        ],
+    ]:
+        assert text.count(before) == 1
+        text = text.replace(before, after)
+    path = tmp_path_factory.mktemp("model") / "sticky.xml"
+    path.write_text(text.replace('meshdir="', f'meshdir="{actuators.MJCF_PATH.parent}/'))
+    return str(path)

@@ -1,0 +1,79 @@
+"""The same bytes, whatever the chunks."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.exogenous import BLOCK_TICKS
+from spheretwin.twin.session import Session
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
+NAMES = (
+    "SHIPPED", "ENGINES", "WORN", "ASKEW", "scenario", "rows",
+)  # fmt: skip
+SHIPPED, ENGINES, WORN, ASKEW, scenario, rows = map(shared.get, NAMES)
+
+
+LENGTH = 2 * BLOCK_TICKS + 300
+VARIANTS = {"ideal": {}, "worn": WORN, "askew": ASKEW, "both": WORN | ASKEW}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Rows of one long call, made when first asked for."""
+    made = {}
+
+    def of(law, engine, variant):
+        key = law, engine, variant
+        if key not in made:
+            changes = {"controller.law": law, "plant.engine": engine} | VARIANTS[variant]
+            made[key] = rows(Session(scenario(**changes)).advance(LENGTH))
+        return made[key]
+
+    return of
+
+
+@settings(max_examples=60)
+@given(
+    law=st.sampled_from(SHIPPED),
+    engine=st.sampled_from(ENGINES),
+    variant=st.sampled_from(sorted(VARIANTS)),
+    cuts=st.lists(st.integers(0, LENGTH) | st.sampled_from([0, 1, 999, 1000, 1001, 1999, 2000]), max_size=12),
+)
+@example("afsm", "mujoco", "both", [0, 0, 1, 999, 1000, 1000, 1001, 2000])
+@example("pd", "lagrangian", "ideal", list(range(960, 1040)))
+def test_chunks_change_no_bit(whole, law, engine, variant, cuts):
+    changes = {"controller.law": law, "plant.engine": engine} | VARIANTS[variant]
+    ends = [*sorted(cuts), LENGTH]
+    chunked = Session(scenario(**changes))
+    parts = [chunked.advance(end - start) for start, end in zip([0, *ends], ends, strict=False)]
+    assert b"".join(map(rows, parts)) == whole(law, engine, variant)
+    assert chunked.tick == LENGTH
+
+
+def test_chunks_do_not_decide_where_a_disturbance_is_lost():
+    # exp(pi t) is infinite from 225.93 s on; the bound is small enough for the run to get there.
+    changes = {
+        "name": "hold", "controller.law": "pd", "controller.period_s": 0.02, "plant.step_s": 0.02,
+        "plant.engine": "lagrangian", "disturbance.random_bound_Nm": 1e-310,
+        "disturbance.gamma_envelope": "growing",
+    }  # fmt: skip
+    name = changes.pop("name")
+    last = int(np.log(np.finfo(float).max) / np.pi / 0.02) + 1
+    for chunk in (10 * BLOCK_TICKS, 700, 1):
+        long = Session(scenarios.load(name, changes))
+        long.advance(last - 50)
+        done = 0
+        while long.tick < last:
+            done += len(long.advance(chunk))
+        assert (long.status, long.tick, done) == ("running", last, 50)
+        with pytest.raises(InputError, match="finite disturbance"):
+            long.advance(chunk)
+        assert long.tick == last

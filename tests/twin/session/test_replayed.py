@@ -1,0 +1,142 @@
+"""A file replays to the same bytes, or says why it does not."""
+
+import json
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin.models.telemetry import file as telemetry_file
+from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin import cli
+from spheretwin.twin.records import replay
+from spheretwin.twin.records.facts import record_of
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
+NAMES = (
+    "ENGINES", "scenario", "session", "rows", "plain_law", "recorded",
+)  # fmt: skip
+ENGINES, scenario, session, rows, plain_law, recorded = map(shared.get, NAMES)
+
+
+CHANGES = [
+    (0, "disturbance.load", 1.0),
+    (100, "controller.surface_slope", 60.0),
+    (250, "plant.payload_kg", 0.05),
+    (250, "plant.group_gain", np.linspace(0.8, 1.2, 18)),
+    (333, "trajectory.amplitude_rad", (0.1, 0.2, 0.1)),
+    (400, "allocation", "bounded"),
+    (600, "nominal.torque_scale", np.float64(0.9)),  # after the last tick: it acts on none, but was made
+]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("changes", [[], CHANGES], ids=["none", "many"])
+def test_a_file_replays_to_the_same_bytes(engine, changes, tmp_path):
+    _, parts = recorded(first := tmp_path / "a.parquet", changes, **{"plant.engine": engine})
+    plan = replay.read(first)
+    again = Session(plan.scenario)
+    file = TelemetryFile(second := tmp_path / "b.parquet", again.signals, record_of(again).metadata())
+    assert follow(again, plan.ticks, [file], journal=plan.journal) == "completed"
+    file.close(record_of(again).metadata())
+    assert second.read_bytes() == first.read_bytes()
+    assert read_parquet(second)[0].values.tobytes() == b"".join(map(rows, parts))
+    assert again.journal == plan.journal
+
+
+@pytest.mark.parametrize("part_rows", [telemetry_file.PART_ROWS, 128])
+def test_the_command_replays_a_run_whose_columns_change(part_rows, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(telemetry_file, "PART_ROWS", part_rows)
+    changes = [
+        (200, "controller.law", "pd"), (300, "plant.coulomb_Nm", [0.001, 0.001, 0.001]),
+        (450, "controller.law", "adaptive_fuzzy"),
+    ]  # fmt: skip
+    _, parts = recorded(first := tmp_path / "a.parquet", changes)
+    second = tmp_path / "b.parquet"
+    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(second), "--json"]) == 0
+    assert second.read_bytes() == first.read_bytes()
+    assert json.loads(capsys.readouterr().out)["status"] == "completed"
+    table, _ = read_parquet(second)
+    assert len(table) == 600
+    present = {name: ~np.isnan(table[name].reshape(600, -1)).any(axis=1) for name in
+               ("q_rad", "sliding_s", "switching_gain", "friction_Nm")}  # fmt: skip
+    ticks = np.arange(600)
+    np.testing.assert_array_equal(present["q_rad"], True)
+    np.testing.assert_array_equal(present["sliding_s"], (ticks < 200) | (ticks >= 450))
+    np.testing.assert_array_equal(present["switching_gain"], ticks < 200)
+    np.testing.assert_array_equal(present["friction_Nm"], ticks >= 300)
+    bounds = np.cumsum([0, *map(len, parts)])
+    for part, start, end in zip(parts, bounds, bounds[1:], strict=False):
+        for signal in part.signals:
+            assert table[signal.name][start:end].tobytes() == part[signal.name].tobytes()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"controller.law": "pd", "disturbance.load": 5.0},
+        # A rotor of hardly any inertia is beyond every rate within a step.
+        {"plant.modelling_error": -0.99999999},
+    ],
+    ids=["left_workspace", "diverged"],
+)
+def test_a_run_that_ended_by_itself_replays_to_its_end(changes, tmp_path, request, capsys):
+    expected = request.node.callspec.id
+    live, _ = recorded(first := tmp_path / "a.parquet", ticks=3000, **changes)
+    assert live.status == expected
+    assert live.tick < 3000
+    second = tmp_path / "b.parquet"
+    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(second), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["status"] == expected
+    assert second.read_bytes() == first.read_bytes()
+
+
+def refused(path, capsys):
+    assert cli.main(["simulate", "--replay", str(path)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
+    assert line.startswith("spheretwin: ")
+    return line
+
+
+def test_what_holds_no_run_is_refused_on_one_line(tmp_path, capsys):
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    run = session().advance(10)
+    run.write_parquet(bare := tmp_path / "bare.parquet", {})
+    assert "expected scenario, journal and ticks" in refused(bare, capsys)
+    known = record_of(Session(scenario())).metadata()
+    run.write_parquet(path := tmp_path / "none.parquet", known)
+    assert "at least one tick, received 0" in refused(path, capsys)
+    for name, text in [
+        ("journal", "[[1, 2]]"), ("journal", "null"), ("journal", "[[1e999, \"a\", 1]]"),
+        ("scenario", "[]"), ("scenario", '"afsm"'), ("scenario", '{"controller": "afsm"}'), ("scenario", "{"),
+        ("ticks", "many"), ("journal", "[" * 100_000),
+    ]:  # fmt: skip
+        run.write_parquet(path := tmp_path / "odd.parquet", {**known, "ticks": "10", name: text})
+        assert "replay" in refused(path, capsys), (name, text)
+    pyarrow.parquet.write_table(pa.table({"a": [1.0]}), foreign := tmp_path / "foreign.parquet")
+    assert "expected a Parquet file of a run" in refused(foreign, capsys)
+    (text := tmp_path / "text.parquet").write_text("no parquet")
+    assert "expected a Parquet file of a run" in refused(text, capsys)
+    assert "missing.parquet" in refused(tmp_path / "missing.parquet", capsys)
+
+
+def test_a_law_that_a_file_does_not_hold_is_refused_on_one_line(tmp_path, capsys):
+    recorded(path := tmp_path / "mine.parquet", law=plain_law(), ticks=20)
+    assert "received one under mine" in refused(path, capsys)
+    recorded(path := tmp_path / "later.parquet", [(10, "controller.law", plain_law())], ticks=20)
+    assert "received one to mine at tick 10" in refused(path, capsys)
+    # One of the user's that has the name of a shipped one is still the user's.
+    for law in ("pd", "afsm"):
+        recorded(path := tmp_path / "named.parquet", law=plain_law(law), ticks=20)
+        refused(path, capsys)
+        recorded(path, [(10, "controller.law", plain_law(law))], ticks=20)
+        assert f"received one to {law} of the user's" in refused(path, capsys)

@@ -1,0 +1,277 @@
+"""What is set on the way acts from its tick on, or is refused and changes nothing."""
+
+import json
+import runpy
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from spheretwin.control.law import Law
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.telemetry.signals import common_signals
+from spheretwin.twin.exogenous import BLOCK_TICKS
+from spheretwin.twin.session import Change
+
+SIGNALS = common_signals(18)
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
+NAMES = (
+    "ENGINES", "WORN", "ASKEW", "scenario", "session", "rows", "plain_law", "compiled_law", "OWN",
+    "same_future",
+)  # fmt: skip
+ENGINES, WORN, ASKEW, scenario, session, rows, plain_law, compiled_law, OWN, same_future = map(
+    shared.get, NAMES
+)
+
+
+KINDS = [
+    ("controller.surface_slope", 70.0),
+    ("controller.law", "pd"),
+    ("controller.law", "adaptive_fuzzy"),
+    ("controller.level", "torque"),
+    ("disturbance.load", 1.5),
+    ("disturbance.random_bound_Nm", 0.2),
+    ("trajectory.amplitude_rad", [0.1, 0.2, 0.1]),
+    ("trajectory", {"shape": "hold", "angle_rad": [0.1, 0.0, 0.0]}),
+    ("nominal.torque_scale", 0.5),
+    ("nominal.inertia_kg_m2", [3e-3, 3e-3, 3e-3]),
+    ("nominal.current_limit_A", 0.5),
+    ("drive.current_limit_A", 0.5),
+    ("drive.time_constant_s", 0.0),
+    ("plant.payload_kg", 0.05),
+    ("plant.modelling_error", 0.3),
+    ("plant.modelling_torque_Nm", [0.01, 0.0, 0.0]),
+    ("plant.group_gain", [0.0] + 17 * [1.0]),
+    ("plant.coulomb_Nm", [0.004, 0.004, 0.004]),
+    ("sensors.angle_offset_rad", [0.0, 0.01, 0.0]),
+]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("name", "value"), KINDS, ids=[f"{name}-{i}" for i, (name, _) in enumerate(KINDS)])
+def test_a_change_acts_from_its_tick_on_and_not_before(engine, name, value):
+    at, changes = 340, {"plant.engine": engine, "disturbance.load": 1.0}
+    kept, changed = session(**changes), session(**changes)
+    before = changed.advance(at)
+    changed.set(name, value)
+    after, expected = changed.advance(60), kept.advance(at + 60)
+    assert rows(before) == rows(expected.rows(0, at))
+    assert after["t_s"][0] == expected["t_s"][at]
+    # Where the rotor is is what was before; what acts on it from this tick on, or the next, is not.
+    np.testing.assert_array_equal(after["q_rad"][0], expected["q_rad"][at])
+    np.testing.assert_array_equal(after["qdot_rad_s"][0], expected["qdot_rad_s"][at])
+    columns = [signal.name for signal in SIGNALS]
+    differ = [c for c in columns if not np.array_equal(after[c][:2], expected[c][at : at + 2])]
+    assert differ, name
+    assert changed.journal == (Change(at, name, value),)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_another_allocation_acts_from_its_tick_on(engine):
+    changes = {"plant.engine": engine, "nominal.current_limit_A": 0.4}  # where the limit acts, they differ
+    kept, changed = session(**changes), session(**changes)
+    before = changed.advance(40)
+    changed.set("allocation", "bounded")
+    after, expected = changed.advance(20), kept.advance(60)
+    assert expected["allocation_scale"][40] < 1
+    assert rows(before) == rows(expected.rows(0, 40))
+    np.testing.assert_array_equal(after["torque_command_Nm"][0], expected["torque_command_Nm"][40])
+    assert after["allocation_scale"][0] > expected["allocation_scale"][40]
+
+
+def test_gravity_acts_from_its_tick_on():
+    changes = {"plant.payload_kg": 0.05, "plant.engine": "lagrangian"}
+    kept, changed = session(**changes), session(**changes)
+    changed.advance(100)
+    changed.set("plant.gravity_m_s2", 0.0)
+    after, expected = changed.advance(50), kept.advance(150).rows(100, 150)
+    np.testing.assert_array_equal(after["q_rad"][0], expected["q_rad"][0])
+    assert not np.array_equal(after["q_rad"][1], expected["q_rad"][1])
+
+
+@pytest.mark.parametrize("kind", OWN)
+def test_a_law_object_may_replace_a_shipped_one_and_back(kind):
+    changed = session(name="hold")
+    changed.advance(100)
+    changed.set("controller.law", OWN[kind]())
+    table = changed.advance(50)
+    np.testing.assert_array_equal(table["calls"], np.arange(1, 51))
+    assert changed.scenario.controller.law == "mine"
+    assert changed.begun_as.controller.law == "afsm"
+    assert changed.journal == (Change(100, "controller.law", "mine"),)
+    with pytest.raises(InputError, match="shipped law"):
+        changed.set("controller.reaching_gain", 5.0)
+    changed.set("controller.law", "pd")
+    assert "calls" not in [signal.name for signal in changed.advance(5).signals]
+    assert changed.scenario.controller.law == "pd"
+
+
+def test_a_change_beside_the_law_keeps_what_the_law_remembers():
+    # What the law itself made of its parameters belongs to it as its memory does.
+    kept, changed = session(compiled_law(), name="hold"), session(compiled_law(), name="hold")
+    changed.advance(300)
+    changed.set("drive.current_limit_A", 7.0)  # never reached: the future is the same
+    expected = kept.advance(600)
+    assert np.abs(expected["current_command_A"]).max() < 7.0
+    assert rows(changed.advance(300)) == rows(expected.rows(300, 600))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_limit_that_is_never_met_may_move_without_a_trace(engine):
+    kept, changed = session(**{"plant.engine": engine} | WORN), session(**{"plant.engine": engine} | WORN)
+    for _ in range(4):
+        changed.advance(150)
+        changed.set("drive.current_limit_A", 7.0 + changed.tick / 1e3)
+    expected = kept.advance(1000)
+    assert np.abs(expected["current_command_A"]).max() < 7.0
+    assert rows(changed.advance(400)) == rows(expected.rows(600, 1000))
+
+
+def test_a_change_of_the_plant_keeps_the_solver_s_warm_start(sticky):
+    kept, changed = session(**{"plant.mjcf": sticky}), session(**{"plant.mjcf": sticky})
+    changed.advance(150)
+    changed.set("plant.group_gain", [1.0] * 18)  # what it is when not given
+    assert rows(changed.advance(200)) == rows(kept.advance(350).rows(150, 350))
+
+
+SAME = [
+    ("controller.law", "afsm"), ("controller.surface_slope", 50.0), ("disturbance.load", 1.0),
+    ("disturbance.load", 1), ("disturbance.random_bound_Nm", 0.05), ("trajectory.frequency_Hz", 0.5),
+    ("allocation", "least_norm"), ("nominal.torque_scale", 1.0), ("nominal.torque_curve", None),
+    ("drive.current_limit_A", 8.0), ("plant.payload_kg", 0.0), ("plant.modelling_error", 0.2),
+    ("plant.gravity_m_s2", 9.81), ("plant.gravity_m_s2", None), ("nominal.current_limit_A", None),
+    ("nominal.inertia_kg_m2", None), ("plant.coulomb_Nm", [0.004, 0.003, 0.002]),
+    ("plant.coulomb_Nm", np.array([0.004, 0.003, 0.002])), ("sensors.angle_offset_rad", (0.01, -0.02, 0.005)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_change_to_what_is_changes_no_bit(engine, sticky):
+    model = {"plant.mjcf": sticky} if engine == "mujoco" else {}
+    changes = {"plant.engine": engine, "disturbance.load": 1.0} | model | WORN | ASKEW
+    kept, changed = session(**changes), session(**changes)
+    table = [changed.advance(130)]
+    for name, value in SAME:
+        changed.set(name, value)
+        table.append(changed.advance(47))
+    assert b"".join(map(rows, table)) == rows(kept.advance(130 + 47 * len(SAME)))
+    assert [change.name for change in changed.journal] == [name for name, _ in SAME]
+    assert changed.scenario == kept.scenario
+
+
+def test_the_same_law_object_once_more_changes_no_bit():
+    law = compiled_law()
+    kept, changed = session(law, name="hold"), session(law, name="hold")
+    changed.advance(100)
+    changed.set("controller.law", law)
+    assert rows(changed.advance(100)) == rows(kept.advance(200).rows(100, 200))
+
+
+@pytest.mark.parametrize("at", [1, 500, BLOCK_TICKS, BLOCK_TICKS + 1])
+def test_a_change_of_the_disturbance_does_not_touch_the_random_stream(at):
+    kept, changed = session(), session()
+    changed.advance(at)
+    changed.set("disturbance.load", 2.0)
+    ticks = 2 * BLOCK_TICKS
+    after, expected = (
+        changed.advance(ticks)["disturbance_Nm"],
+        kept.advance(at + ticks)["disturbance_Nm"][at:],
+    )
+    # 0.05 N·m more, and the same draws: three sums up to 0.15 N·m, each of which rounds by 1.4e-17.
+    np.testing.assert_allclose(after - 0.05, expected, rtol=0, atol=4.2e-17)
+    changed.set("disturbance.load", 1.0)
+    np.testing.assert_array_equal(
+        changed.advance(ticks)["disturbance_Nm"], kept.advance(ticks)["disturbance_Nm"]
+    )
+
+
+def not_compilable(t, reference, measurement, parameters, state, torque):
+    torque[:] = {}.fromkeys("abc").popitem()
+
+
+REFUSED = [
+    ("disturbance.loud", 1.0, "did you mean load"),
+    ("disturbance.load", 1e9, "1000"),
+    ("disturbance.load", "much", "valid number"),
+    ("disturbance.load", float("nan"), "finite number"),
+    ("controller.law", "pdd", "did you mean pd"),
+    ("controller.law", 3, "expected one of pd, adaptive_fuzzy, afsm"),
+    ("disturbance.load", plain_law(), "a law for controller.law"),
+    ("controller.law", Law("broken", numba.njit(not_compilable), [], []), "that compiles"),
+    ("nominal.torque_scale", 0.0, "0.001 in magnitude"),
+    ("nominal.torque_curve", "/nowhere/curve.csv", "torque curve"),
+    ("plant.torque_curve", "/nowhere/curve.csv", "torque curve"),
+    ("plant.group_gain", [1.0, 1.0], "18 groups, received 2"),
+    ("plant.integrator", "Verlet", "'RK4'"),
+    ("", 1.0, "expected a field"),
+    ("disturbance", {"load": 1.0, "noise": 2.0}, "expected one of"),
+    (None, 1.0, "expected a field"),
+    *[(name, 1.0, "may change during a run") for name in ("name", "seed", "duration")],
+    *[
+        (name, value, "may change during a run")
+        for name, value in [
+            ("controller.period_s", 1e-3), ("plant.step_s", 1e-3), ("plant.engine", "mujoco"),
+            ("plant.mjcf", None), ("plant.initial_rad", None), ("plant.initial_rad_s", [0.0, 0.0, 0.0]),
+            # A section would bring its fixed fields with it.
+            ("plant", {"engine": "mujoco"}), ("plant", {}), ("controller", {"period_s": 2e-3}),
+        ]
+    ],
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("name", "value", "part"), REFUSED, ids=[f"{i}" for i in range(len(REFUSED))])
+def test_a_change_that_is_none_is_refused_and_nothing_changes(engine, name, value, part):
+    changed, kept = session(**{"plant.engine": engine}), session(**{"plant.engine": engine})
+    for each in (changed, kept):
+        each.advance(120)
+        each.set("disturbance.load", 1.0)
+    with pytest.raises(InputError) as caught:
+        changed.set(name, value)
+    assert part in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert same_future(changed, kept)
+    assert changed.law.name == "afsm"
+
+
+@pytest.mark.parametrize("name", ["plant.integrator"])
+def test_what_only_the_engine_refuses_changes_nothing_either(name):
+    changed, kept = session(**{"plant.engine": "lagrangian"}), session(**{"plant.engine": "lagrangian"})
+    changed.advance(100), kept.advance(100)
+    with pytest.raises(InputError, match="integrator RK4, received Euler"):
+        changed.set(name, "Euler")
+    assert same_future(changed, kept)
+
+
+def test_the_journal_keeps_the_value_that_was_given_then():
+    gains = [1.0] * 18
+    changed = session()
+    changed.set("plant.group_gain", gains)
+    gains[0] = 0.0
+    changed.set("trajectory", shape := {"shape": "hold", "angle_rad": np.array([0.1, 0.0, 0.0])})
+    shape["shape"] = "tilt"
+    assert changed.journal[0].value == [1.0] * 18
+    assert changed.journal[1].value == {"shape": "hold", "angle_rad": [0.1, 0.0, 0.0]}
+    json.dumps(changed.journal)
+
+
+def test_the_actuator_follows_a_change_of_its_torque_curve(actuator, tmp_path):
+    curve = actuator.torque_curve
+    lines = [
+        f"{phi!r},{torque!r}"
+        for phi, torque in zip(
+            np.degrees(curve.phi_rad).tolist(), (0.5 * curve.torque_Nm_per_A).tolist(), strict=True
+        )
+    ]
+    path = tmp_path / "weak.csv"
+    path.write_text("\n".join(["phi_deg,torque_Nm_per_A", *lines]))
+    changed = session()
+    changed.advance(10)
+    before = torque_matrix(changed.q_rad, changed.actuator)
+    changed.set("plant.torque_curve", str(path))
+    # Half of every sample, to the rounding of a spline's solution.
+    np.testing.assert_allclose(torque_matrix(changed.q_rad, changed.actuator), 0.5 * before, atol=1e-14)

@@ -1,0 +1,195 @@
+"""A snapshot goes on bit for bit: here, in another process, under laws of a user's."""
+
+import dataclasses
+import importlib
+import pickle
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin.control.law import Law
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin.exogenous import BLOCK_TICKS
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
+NAMES = (
+    "SHIPPED", "ENGINES", "WORN", "ASKEW", "scenario", "session", "rows", "proportional", "CALLS",
+    "plain_law", "OWN", "same_future",
+)  # fmt: skip
+SHIPPED, ENGINES, WORN, ASKEW, scenario, session, rows, proportional, CALLS, plain_law, OWN, same_future = (
+    map(shared.get, NAMES)
+)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("law", SHIPPED)
+@pytest.mark.parametrize("at", [0, 1, 437, BLOCK_TICKS, BLOCK_TICKS + 1])
+def test_a_restored_session_goes_on_bit_for_bit(law, engine, at):
+    changes = {"controller.law": law, "plant.engine": engine} | WORN | ASKEW
+    original = session(**changes)
+    original.advance(at)
+    taken = original.snapshot()
+    expected = rows(original.advance(BLOCK_TICKS + 100))
+    original.restore(taken)  # in place
+    assert original.tick == at
+    assert rows(original.advance(BLOCK_TICKS + 100)) == expected
+    other = session(name="hold", **{"controller.law": "pd"})  # nothing of it may remain
+    other.advance(77)
+    other.restore(pickle.loads(pickle.dumps(taken)))
+    assert rows(other.advance(BLOCK_TICKS + 100)) == expected
+    assert other.begun_as == original.begun_as
+
+
+def test_a_snapshot_is_not_moved_by_what_the_session_does_next():
+    original = session(**WORN)
+    original.advance(50)
+    taken = original.snapshot()
+    before = pickle.dumps(taken)
+    original.set("disturbance.load", 2.0)
+    original.advance(1200)
+    assert pickle.dumps(taken) == before
+    original.restore(taken)
+    original.advance(10)
+    assert pickle.dumps(taken) == before
+
+
+@pytest.mark.parametrize("kind", OWN)
+def test_a_user_s_law_is_restored_with_its_memory_and_its_parameters(kind):
+    original = session(OWN[kind](), name="hold")
+    original.advance(120)
+    taken = pickle.loads(pickle.dumps(original.snapshot()))
+    expected = original.advance(300)
+    assert expected["calls"][0] == 121
+    other = session(OWN[kind](), name="hold")
+    other.restore(taken)
+    assert rows(other.advance(300)) == rows(expected)
+
+
+def test_the_solver_s_warm_start_is_restored(sticky):
+    original = session(**{"plant.mjcf": sticky})
+    original.advance(237)
+    taken = original.snapshot()
+    expected = rows(original.advance(200))
+    other = session(**{"plant.mjcf": sticky})
+    other.restore(pickle.loads(pickle.dumps(taken)))
+    assert rows(other.advance(200)) == expected
+    # Without the warm start, which lies among the numbers of the state, the bits are others.
+    other.restore(taken)
+    data = other._machine._moving.rotor.data
+    assert np.any(data.qacc_warmstart)
+    data.qacc_warmstart[:] = 0.0
+    assert rows(other.advance(200)) != expected
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_session_that_was_changed_is_restored(engine):
+    original = session(**{"plant.engine": engine})
+    original.advance(200)
+    for name, value in [
+        ("disturbance.load", 1.5), ("plant.payload_kg", 0.05), ("controller.law", "adaptive_fuzzy"),
+        ("sensors.angle_offset_rad", [0.0, 0.01, 0.0]), ("plant.coulomb_Nm", [0.001, 0.001, 0.001]),
+        ("trajectory.amplitude_rad", [0.1, 0.2, 0.1]), ("allocation", "bounded"),
+    ]:  # fmt: skip
+        original.set(name, value)
+        original.advance(30)
+    taken = pickle.loads(pickle.dumps(original.snapshot()))
+    expected = original.advance(1000)
+    other = session(**{"plant.engine": engine})
+    other.restore(taken)
+    assert other.journal == original.journal
+    assert other.scenario == original.scenario
+    assert other.signals == expected.signals
+    assert rows(other.advance(1000)) == rows(expected)
+
+
+CONTINUED = """
+import pickle, sys
+from spheretwin.twin import scenario
+from spheretwin.twin.session import Session
+with open(sys.argv[1], "rb") as file:
+    taken = pickle.load(file)
+other = Session(scenario.load("hold"), law)
+other.restore(taken)
+sys.stdout.buffer.write(other.advance(1100).values.tobytes())
+"""
+
+
+def continued(path, law="law = None", **options):
+    """Rows of 1100 ticks from a pickled snapshot on, in a process of their own."""
+    command = [sys.executable, "-c", f"{law}\n{CONTINUED}", str(path)]
+    return subprocess.run(command, capture_output=True, check=True, **options).stdout
+
+
+@pytest.mark.parametrize("model", [*ENGINES, "sticky"])
+def test_another_process_goes_on_bit_for_bit(model, tmp_path, sticky):
+    changes = {"plant.mjcf": sticky} if model == "sticky" else {"plant.engine": model}
+    original = session(**changes | WORN)
+    original.advance(613)
+    original.set("disturbance.load", 1.0)
+    path = tmp_path / "taken.pickle"
+    path.write_bytes(pickle.dumps(original.snapshot()))
+    assert continued(path) == rows(original.advance(1100))
+
+
+MODULE = """
+import numba, numpy as np
+from spheretwin.control.law import Law
+
+def step(t, reference, measurement, parameters, state, torque):
+    for axis in range(3):
+        error = measurement[0, axis] - reference[0, axis]
+        state[axis] += error  # integral
+        torque[axis] = -parameters[0] * error - 0.05 * measurement[1, axis] - 1e-3 * state[axis]
+
+plain = Law("mine", step, np.array([0.5]), np.zeros(3))
+fast = Law("mine", numba.njit(step), np.array([0.5]), np.zeros(3))
+"""
+
+
+@pytest.mark.parametrize("kind", ["plain", "fast"])
+def test_another_process_goes_on_under_a_law_that_both_have(kind, tmp_path, monkeypatch):
+    (tmp_path / f"of_the_user_{kind}.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    law = getattr(importlib.import_module(f"of_the_user_{kind}"), kind)
+    original = session(law, name="hold")
+    original.advance(413)
+    path = tmp_path / "taken.pickle"
+    path.write_bytes(pickle.dumps(original.snapshot()))
+    law_there = f"from of_the_user_{kind} import {kind} as law"
+    assert continued(path, law_there, cwd=tmp_path) == rows(original.advance(1100))
+
+
+def test_a_snapshot_under_a_law_that_is_missing_is_refused_and_nothing_changes():
+    mine = session(plain_law(), name="hold")
+    mine.advance(10)
+    taken = mine.snapshot()
+    for law in (None, plain_law("yours")):
+        other, untouched = session(law, name="hold"), session(law, name="hold")
+        other.advance(5)
+        untouched.advance(5)
+        with pytest.raises(InputError, match="received one under mine"):
+            other.restore(taken)
+        assert same_future(other, untouched)
+
+
+def test_a_snapshot_that_does_not_fit_is_refused_and_nothing_changes(sticky):
+    mine = session(plain_law(), name="hold")
+    mine.advance(10)
+    taken = mine.snapshot()
+    longer = Law("mine", proportional, np.array([0.5, 0.05]), np.zeros(2), CALLS)
+    fitting = dataclasses.replace(taken, machine=taken.machine._replace(rotor=taken.machine.rotor[:-1]))
+    for law, snapshot, part in [
+        (longer, taken, "the law's memory, received 1"),
+        (plain_law(), fitting, "the engine's state"),
+    ]:
+        other, untouched = session(law, name="hold"), session(law, name="hold")
+        other.advance(5)
+        untouched.advance(5)
+        with pytest.raises(InputError, match=part):
+            other.restore(snapshot)
+        assert same_future(other, untouched)

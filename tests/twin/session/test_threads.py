@@ -1,0 +1,106 @@
+"""Sessions on threads, and one that two threads want."""
+
+import runpy
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from spheretwin.control.law import Law
+from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.twin.session import Session
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
+NAMES = (
+    "SHIPPED", "ENGINES", "scenario", "session", "rows", "same_future",
+)  # fmt: skip
+SHIPPED, ENGINES, scenario, session, rows, same_future = map(shared.get, NAMES)
+
+
+def test_runs_on_threads_are_those_made_one_after_the_other():
+    runs = [
+        {"controller.law": law, "disturbance.load": load, "seed": seed, "plant.engine": engine}
+        for law, load, seed, engine in product(SHIPPED, (0.0, 1.0, 2.0), (0, 1), ENGINES)
+    ]
+    assert len(runs) == 36
+
+    def made(changes):
+        return rows(Session(scenario(**changes)).advance(400))
+
+    serial = list(map(made, runs))
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(made, runs)) == serial
+    assert len(set(serial)) == 36
+
+
+class Held:
+    """A plain Python law that stays within its call until it is let go."""
+
+    def __init__(self):
+        self.entered, self.go = threading.Event(), threading.Event()
+
+    def law(self):
+        def step(t, reference, measurement, parameters, state, torque):
+            torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.05 * (measurement[1] - reference[1])
+            self.entered.set()
+            assert self.go.wait(30)
+
+        return Law("held", step, [], [])
+
+
+def test_a_second_thread_is_refused_while_the_first_is_at_work():
+    held = Held()
+    busy = session(held.law(), name="hold")
+    with ThreadPoolExecutor(1) as pool:
+        advancing = pool.submit(busy.advance, 20)
+        assert held.entered.wait(30)
+        try:
+            taken = [
+                lambda: busy.advance(1),
+                lambda: busy.advance(0),
+                lambda: busy.set("disturbance.load", 2.0),
+                lambda: busy.snapshot(),
+                lambda: busy.restore(None),
+            ]
+            for call in taken:
+                with pytest.raises(SpheretwinError, match="one thread at a time"):
+                    call()
+        finally:
+            held.go.set()
+        first = advancing.result()
+    alone = session(held.law(), name="hold")
+    assert rows(first) == rows(alone.advance(20))
+    assert busy.journal == ()
+    assert same_future(busy, alone)
+
+
+def test_a_law_cannot_call_the_session_that_calls_it():
+    inside = []
+
+    def step(t, reference, measurement, parameters, state, torque):
+        torque[:] = 0.0
+        try:
+            inside[0].snapshot()
+        except SpheretwinError as error:
+            inside.append(str(error))
+
+    inside.append(session(Law("curious", step, [], []), name="hold"))
+    inside[0].advance(1)
+    assert "one thread at a time" in inside[1]
+
+
+def test_a_closed_session_is_refused():
+    with session() as closed:
+        taken = closed.snapshot()
+    for call in (
+        lambda: closed.advance(1),
+        lambda: closed.set("disturbance.load", 1.0),
+        closed.snapshot,
+        lambda: closed.restore(taken),
+    ):
+        with pytest.raises(SpheretwinError, match="closed"):
+            call()
+    closed.close()  # a second time is nothing
