@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
@@ -20,38 +19,20 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.record import Change
-from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
-from spheretwin.twin.assembly import Files
 from spheretwin.twin.exogenous import Exogenous
-from spheretwin.twin.machine import Machine, State
-from spheretwin.twin.scenario.changing import changed, is_fixed
+from spheretwin.twin.in_force import at_start
+from spheretwin.twin.machine import Machine
+from spheretwin.twin.scenario.changing import is_fixed
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain, is_dotted
 from spheretwin.twin.scenario.sections import OwnPath, Scenario
-from spheretwin.twin.trajectories.trajectory import Sampled, checked
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """All that a session goes on from; it can be pickled."""
-
-    scenario: Scenario
-    begun_as: Scenario
-    own_law: str | None
-    files: str
-    """Digest of model and torque curves."""
-    law_source: str
-    """Digest of the file that the law is from, if it is one of the user's."""
-    tick: int
-    status: Status
-    machine: State
-    exogenous: dict[str, Any]
-    journal: tuple[Change, ...]
-    events: tuple[Change, ...]
+from spheretwin.twin.snapshot import Snapshot
+from spheretwin.twin.trajectories.trajectory import Sampled
 
 
 class Session:
@@ -68,10 +49,8 @@ class Session:
 
     Attributes
     ----------
-    scenario : Scenario
-        In force now: what was left open is filled in from the model and the trajectory.
     begun_as : Scenario
-        The same at tick 0; with the journal it says all that has happened.
+        The scenario at tick 0, resolved; with the journal it says all that has happened.
     signals : tuple of Signal
         Columns of the telemetry; a change of law, friction or sensors may change them.
     journal : tuple of Change
@@ -96,27 +75,29 @@ class Session:
     def __init__(self, scenario: Scenario, law: Law | None = None, trajectory: Sampled | None = None) -> None:
         self._busy = threading.Lock()
         self._closed = False
-        self._own_law = law
         self._own_laws = {law.name: law} if law else {}
-        self._seen: dict[str, Signal] = {}
-        self._own_trajectory = None if trajectory is None else checked(trajectory)
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
-        self._files = assembly.files_of(scenario)
-        self.scenario = self.begun_as = assembly.resolved(scenario, self._files, law, self._own_trajectory)
+        self._in_force = at_start(scenario, law, trajectory)
+        self.begun_as = self.scenario
         self._planned = planned(self.begun_as)
-        self._exogenous = Exogenous(self.scenario, self._own_trajectory)
-        self._machine = Machine(self.scenario, self._files, law or assembly.law_of(self.scenario))
-        self._seen = self._with(self._machine.signals)
+        self._exogenous = Exogenous(self.scenario, self._in_force.own_trajectory)
+        self._machine = Machine(self.scenario, self._in_force.files, self._in_force.law)
+        self._seen = with_more({}, self.signals)
         self._check_plan()
         self._make_planned()
 
     @property
     def actuator(self) -> Actuator:
         """What is simulated."""
-        return self._files.actuator
+        return self._in_force.files.actuator
+
+    @property
+    def scenario(self) -> Scenario:
+        """In force now: what was left open is filled in from the model and the trajectory."""
+        return self._in_force.scenario
 
     @property
     def status(self) -> Status:
@@ -214,13 +195,11 @@ class Session:
                 )
             if is_fixed(name):
                 raise InputError(f"session: expected a field that may change during a run, received {name}")
-            own = value if isinstance(value, Law) else None
-            if own and name != "controller.law":
+            if isinstance(value, Law) and name != "controller.law":
                 raise InputError(f"session: expected a law for controller.law, received one for {name}")
             with self._all_or_nothing():
-                self._change(name, value, own)
-            recorded = assembly.name_of_own(own.name) if own else _recorded(value)
-            self.journal += (Change(self.tick, name, recorded),)
+                self._change(name, value)
+            self.journal += (Change(self.tick, name, _recorded(value)),)
 
     def snapshot(self) -> Snapshot:
         """All that this session goes on from."""
@@ -228,8 +207,8 @@ class Session:
             return Snapshot(
                 self.scenario,
                 self.begun_as,
-                self._key_of_own(),
-                assembly.digest(self._files),
+                self._key_of(self._in_force.own_law),
+                assembly.digest(self._in_force.files),
                 self.scenario.controller.source,
                 self.tick,
                 self._status,
@@ -254,12 +233,11 @@ class Session:
                     f"session: expected a snapshot under one of the laws {known},"
                     f" received one under {snapshot.own_law}"
                 )
-            if isinstance(snapshot.scenario.trajectory, OwnPath) != (self._own_trajectory is not None):
+            if isinstance(snapshot.scenario.trajectory, OwnPath) != bool(self._in_force.own_trajectory):
                 raise InputError(
                     "session: expected a snapshot along the trajectory that it follows itself,"
                     f" received one along {snapshot.scenario.trajectory.shape}"
                 )
-            self._own_law = self._own_laws[snapshot.own_law] if snapshot.own_law is not None else None
             self._restore(snapshot)
 
     def close(self) -> None:
@@ -276,7 +254,7 @@ class Session:
 
     def warnings(self) -> list[str]:
         """What a user should know of model and scenario before believing the figures; one line each."""
-        return assembly.warnings_of(self.scenario, self._files)
+        return assembly.warnings_of(self.scenario, self._in_force.files)
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -334,7 +312,7 @@ class Session:
                 break
             with self._all_or_nothing():
                 try:
-                    self._change(change.name, change.value, None)
+                    self._change(change.name, change.value)
                 except InputError as error:
                     raise InputError(f"{error}, as the event at {self.t_s:g} s sets it") from None
                 self.events += (change,)
@@ -351,36 +329,18 @@ class Session:
         self._status = BY_CODE[code]
         return ticks
 
-    def _change(self, name: str, value: Any, own: Law | None) -> None:
-        self._own_law = own or (None if name == "controller.law" else self._own_law)
-        scenario, files = self._next(self.scenario, self._files, name, None if own else value)
-        before = self.scenario.model_copy(
-            update={"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
-        )
+    def _change(self, name: str, value: Any) -> None:
+        before, self._in_force = self._in_force, self._in_force.after(name, value)
+        scenario, own_law = self.scenario, self._in_force.own_law
         # What comes from outside is no part of the machine.
-        if before != scenario or files != self._files or self._own_law not in (None, self.law):
-            self._machine = self._machine.changed(scenario, files, self._own_law)
-            self._seen = self._with(self._machine.signals)
-        self.scenario, self._files = scenario, files
-        if own and own not in self._own_laws.values():
-            self._own_laws = {**self._own_laws, self._key_for(own): own}
+        outside = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
+        built = before._replace(scenario=before.scenario.model_copy(update=outside))
+        if built != self._in_force or own_law not in (None, self.law):
+            self._machine = self._machine.changed(scenario, self._in_force.files, own_law)
+            self._seen = with_more(self._seen, self.signals)
+        if own_law and self._key_of(own_law) is None:
+            self._own_laws = {**self._own_laws, self._key_for(own_law): own_law}
         self._exogenous.scenario = scenario  # last: it is altered, and what fails must have changed nothing
-
-    def _next(self, scenario: Scenario, files: Files, name: str, value: Any) -> tuple[Scenario, Files]:
-        """Scenario with one more change, resolved, and its files; without a value the law alone changes."""
-        if value is not None or name != "controller.law":
-            if self._own_trajectory and name.split(".")[0] == "trajectory":
-                raise InputError(
-                    "session: expected no field of a scenario's trajectory, as"
-                    f" {self._own_trajectory.name} is followed instead"
-                )
-            if self._own_law and name.startswith("controller."):
-                raise InputError(
-                    f"session: expected no field of a shipped law, as {self._own_law.name} is not one"
-                )
-            before, scenario = scenario, changed(scenario, name, value)
-            files = assembly.files_again(files, before, scenario)
-        return assembly.resolved(scenario, files, self._own_law, self._own_trajectory), files
 
     def _check_plan(self) -> None:
         """Find out before the first tick what an event would only be refused for at its own.
@@ -390,70 +350,41 @@ class Session:
         InputError
             An event sets what cannot be set under this law, along this trajectory, with these files.
         """
-        scenario, files, own, seen = self.scenario, self._files, self._own_law, self._seen
+        seen, made = self._seen, 0
         try:
-            for change in self._planned:
-                if change.name == "controller.law":
-                    self._own_law = None
-                scenario, files = self._next(scenario, files, change.name, change.value)
-                law = self._own_law or assembly.law_of(scenario)
-                self._seen = self._with(assembly.signals_of(scenario, files.actuator, law))
+            for in_force in self._in_force.after_each(self._planned):
+                seen, made = with_more(seen, in_force.signals), made + 1
         except InputError as error:
-            at_s = change.tick * self.scenario.controller.period_s
+            at_s = self._planned[made].tick * self.scenario.controller.period_s
             raise InputError(f"{error}, as the event at {at_s:g} s sets it") from None
-        finally:
-            self._own_law, self._seen = own, seen
-
-    def _with(self, signals: tuple[Signal, ...]) -> dict[str, Signal]:
-        """All signals of the session so far by name: a name means one thing throughout.
-
-        Raises
-        ------
-        InputError
-            One of them has the name of another.
-        """
-        for signal in signals:
-            known = self._seen.get(signal.name, signal)
-            if known != signal:
-                raise InputError(
-                    f"session: expected the signal {signal.name} as it was before,"
-                    f" {known.size} in {known.unit} ({known.meaning}),"
-                    f" received {signal.size} in {signal.unit} ({signal.meaning})"
-                )
-        return self._seen | {signal.name: signal for signal in signals}
 
     def _key_for(self, law: Law) -> str:
         """Key under which a snapshot knows a law of the user's: its name, told apart from others' of it."""
-        taken = [key for key in self._own_laws if key.split(" #")[0] == law.name]
+        taken = [key for key, other in self._own_laws.items() if other.name == law.name]
         return law.name if not taken else f"{law.name} #{len(taken) + 1}"
 
-    def _key_of_own(self) -> str | None:
-        return next((key for key, law in self._own_laws.items() if law is self._own_law), None)
+    def _key_of(self, law: Law | None) -> str | None:
+        return next((key for key, other in self._own_laws.items() if other is law), None)
 
     def _restore(self, snapshot: Snapshot) -> None:
-        files = assembly.files_again(self._files, self.scenario, snapshot.scenario)
-        if snapshot.scenario.controller.source != snapshot.law_source:
-            raise InputError(
-                f"session: expected {snapshot.scenario.controller.law} as it was when the snapshot was taken,"
-                " received a file that was changed since"
-            )
-        if assembly.digest(files) != snapshot.files:
-            raise InputError(
-                "session: expected a snapshot of the same model and torque curves, received one of others"
-            )
-        law = self._own_law or assembly.law_of(snapshot.scenario)
-        self._machine = Machine(snapshot.scenario, files, law)
-        self._seen = self._with(self._machine.signals)
+        files = assembly.files_again(self._in_force.files, self.scenario, snapshot.scenario)
+        snapshot.check_fits(files)
+        own_law = self._own_laws[snapshot.own_law] if snapshot.own_law is not None else None
+        self._in_force = self._in_force._replace(scenario=snapshot.scenario, files=files, own_law=own_law)
+        self._machine = Machine(self.scenario, files, self._in_force.law)
         self._machine.restore(snapshot.machine)
-        self._files, self.scenario, self.begun_as = files, snapshot.scenario, snapshot.begun_as
-        self.tick, self._status, self.journal = snapshot.tick, snapshot.status, snapshot.journal
-        self.events, self._planned = snapshot.events, planned(snapshot.begun_as)
-        self._exogenous = Exogenous(self.scenario, self._own_trajectory)
+        self._seen = with_more(self._seen, self.signals)
+        self.begun_as, self._planned = snapshot.begun_as, planned(snapshot.begun_as)
+        self.tick, self._status = snapshot.tick, snapshot.status
+        self.journal, self.events = snapshot.journal, snapshot.events
+        self._exogenous = Exogenous(self.scenario, self._in_force.own_trajectory)
         self._exogenous.restore(snapshot.exogenous)
 
 
 def _recorded(value: Any) -> Any:
     """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
+    if isinstance(value, Law):
+        return assembly.name_of_own(value.name)
     return json.loads(json.dumps(value, default=as_plain))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
@@ -118,3 +119,22 @@ def offsets(signals: tuple[Signal, ...]) -> dict[str, int]:
 def width(signals: tuple[Signal, ...]) -> int:
     """Numbers in one flat row."""
     return sum(signal.size for signal in signals)
+
+
+def with_more(known: Mapping[str, Signal], more: tuple[Signal, ...]) -> dict[str, Signal]:
+    """Signals by name, with more of them: a name means one thing throughout.
+
+    Raises
+    ------
+    InputError
+        One has the name of another.
+    """
+    for signal in more:
+        before = known.get(signal.name, signal)
+        if before != signal:
+            raise InputError(
+                f"session: expected the signal {signal.name} as it was before,"
+                f" {before.size} in {before.unit} ({before.meaning}),"
+                f" received {signal.size} in {signal.unit} ({signal.meaning})"
+            )
+    return {**known, **{signal.name: signal for signal in more}}

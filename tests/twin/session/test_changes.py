@@ -398,3 +398,9 @@ def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):
             recorder.write(session.advance(10))
     assert capfd.readouterr().err == ""
     assert os.path.getsize(path) > 0
+
+
+def test_no_law_is_no_change(file):
+    for own in (None, Law("own", lambda *_: None, [], [])):
+        with Session(hold(), own) as session, pytest.raises(InputError, match=r"controller\.law"):
+            session.set("controller.law", None)
