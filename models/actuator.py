@@ -15,14 +15,13 @@ from spheretwin.models import torque_curve
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import told_apart
 from spheretwin.models.mjcf import Mjcf, read
+from spheretwin.models.model_file.joint import check_bounded, check_joint, hinge_range
+from spheretwin.models.model_file.lookup import LARGEST_LENGTH_M, body, number, shared, site, sites
 from spheretwin.models.torque_curve import TorqueCurve
 
 FOLDER = Path(__file__).resolve().parent
 MJCF_PATH = FOLDER / "actuator.xml"
 TORQUE_CURVE_PATH = FOLDER / "torque_curve.csv"
-
-HINGES = ("alpha", "beta", "gamma")
-LOCKED_DEG = 90.0
 
 FRONT_RADIUS = "pole_front_radius_m"
 
@@ -32,10 +31,7 @@ COLLINEAR_TOLERANCE = 1e-9
 # A torque has three components.
 LEAST_GROUPS = 3
 
-# Beyond these a number is a slip of its unit; within them no product or quotient of theirs overflows, and
-# the drive takes all that the model file has.
-LEAST, LARGEST = 1e-9, 1e9
-LEAST_LENGTH_M, LARGEST_LENGTH_M = 1e-6, 1e3
+# Beyond this an inductance or a resistance is a slip of its unit.
 LONGEST_TIME_CONSTANT_S = 1e3
 
 
@@ -201,21 +197,21 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    _check_bounded(model)
-    _check_joint(model, data)
-    poles = _sites(model, "pole_")
-    coils = _sites(model, "coil_")
-    R_SR = data.body(_body(model, "rotor")).xmat.reshape(3, 3)
+    check_bounded(model)
+    check_joint(model, data)
+    poles = sites(model, "pole_")
+    coils = sites(model, "coil_")
+    R_SR = data.body(body(model, "rotor")).xmat.reshape(3, 3)
     coil_axes = _frozen(_outward_axes(data, coils))
     return Actuator(
-        inertia=_frozen(model.body_inertia[_body(model, "rotor")]),
+        inertia=_frozen(model.body_inertia[body(model, "rotor")]),
         pole_axes=_frozen(_outward_axes(data, poles) @ R_SR),
         pole_polarity=_frozen(_polarity(model, poles)),
         coil_axes=coil_axes,
         groups=_frozen(_collinear_pairs(model, coils, coil_axes)),
-        hinge_range_rad=_frozen(_hinge_range(model)),
-        shaft_tip_m=_frozen(model.site_pos[_site(model, "shaft_tip")]),
-        payload_mount_m=_frozen(model.body_pos[_body(model, "payload")]),
+        hinge_range_rad=_frozen(hinge_range(model)),
+        shaft_tip_m=_frozen(model.site_pos[site(model, "shaft_tip")]),
+        payload_mount_m=_frozen(model.body_pos[body(model, "payload")]),
         magnet=_magnet(model, poles),
         coil=_coil(model, coils),
         group=_group(model),
@@ -232,8 +228,8 @@ def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
         The file cannot be read, or the model lacks poles or coils.
     """
     model = read(mjcf).described
-    _check_bounded(model)
-    return _magnet(model, _sites(model, "pole_")), _coil(model, _sites(model, "coil_"))
+    check_bounded(model)
+    return _magnet(model, sites(model, "pole_")), _coil(model, sites(model, "coil_"))
 
 
 @cache
@@ -245,40 +241,6 @@ def _frozen(values: NDArray) -> NDArray:
     copy = np.array(values)
     copy.flags.writeable = False
     return copy
-
-
-def _named(model: mujoco.MjModel, kind: mujoco.mjtObj, label: str, name: str) -> int:
-    index = mujoco.mj_name2id(model, kind, name)
-    if index < 0:
-        raise InputError(f'model: expected a {label} named "{name}", received none')
-    return index
-
-
-def _body(model: mujoco.MjModel, name: str) -> int:
-    return _named(model, mujoco.mjtObj.mjOBJ_BODY, "body", name)
-
-
-def _site(model: mujoco.MjModel, name: str) -> int:
-    return _named(model, mujoco.mjtObj.mjOBJ_SITE, "site", name)
-
-
-def _number(model: mujoco.MjModel, name: str) -> float:
-    _named(model, mujoco.mjtObj.mjOBJ_NUMERIC, "custom numeric", name)
-    return _within(float(model.numeric(name).data[0]), LEAST, LARGEST, name)
-
-
-def _within(value: float, least: float, largest: float, what: str) -> float:
-    if not least <= value <= largest:
-        low, high, received = told_apart(least, largest, value)
-        raise InputError(f"model: expected {what} from {low} to {high}, received {received}")
-    return value
-
-
-def _sites(model: mujoco.MjModel, prefix: str) -> list[int]:
-    found = [i for i in range(model.nsite) if model.site(i).name.startswith(prefix)]
-    if not found:
-        raise InputError(f'model: expected sites named "{prefix}…", received none')
-    return found
 
 
 def _outward_axes(data: mujoco.MjData, sites: list[int]) -> NDArray[np.float64]:
@@ -315,10 +277,10 @@ def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.f
 
 def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
     blank = Magnet(
-        remanence_T=_number(model, "magnet_remanence_T"),
-        radius_m=_shared(model.site_size[poles, 0], "radius of the poles"),
-        length_m=2 * _shared(model.site_size[poles, 1], "length of the poles"),
-        distance_m=_shared(np.linalg.norm(model.site_pos[poles], axis=1), "distance of the poles"),
+        remanence_T=number(model, "magnet_remanence_T"),
+        radius_m=shared(model.site_size[poles, 0], "radius of the poles"),
+        length_m=2 * shared(model.site_size[poles, 1], "length of the poles"),
+        distance_m=shared(np.linalg.norm(model.site_pos[poles], axis=1), "distance of the poles"),
     )
     return replace(blank, front_radius_m=_front_radius(model, blank))
 
@@ -341,11 +303,11 @@ def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
 
 def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
     coil = Coil(
-        inner_radius_m=_number(model, "coil_inner_radius_m"),
-        outer_radius_m=_shared(model.site_size[coils, 0], "radius of the coils"),
-        length_m=2 * _shared(model.site_size[coils, 1], "length of the coils"),
-        distance_m=_shared(np.linalg.norm(model.site_pos[coils], axis=1), "distance of the coils"),
-        turns=_number(model, "coil_turns"),
+        inner_radius_m=number(model, "coil_inner_radius_m"),
+        outer_radius_m=shared(model.site_size[coils, 0], "radius of the coils"),
+        length_m=2 * shared(model.site_size[coils, 1], "length of the coils"),
+        distance_m=shared(np.linalg.norm(model.site_pos[coils], axis=1), "distance of the coils"),
+        turns=number(model, "coil_turns"),
     )
     if coil.inner_radius_m >= coil.outer_radius_m:
         outer, inner = told_apart(coil.outer_radius_m, coil.inner_radius_m)
@@ -357,9 +319,9 @@ def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
 
 def _group(model: mujoco.MjModel) -> Group:
     group = Group(
-        resistance_ohm=_number(model, "group_resistance_ohm"),
-        inductance_H=_number(model, "group_inductance_H"),
-        current_limit_A=_number(model, "group_current_limit_A"),
+        resistance_ohm=number(model, "group_resistance_ohm"),
+        inductance_H=number(model, "group_inductance_H"),
+        current_limit_A=number(model, "group_current_limit_A"),
     )
     time_constant_s = group.inductance_H / group.resistance_ohm
     if time_constant_s > LONGEST_TIME_CONSTANT_S:
@@ -369,66 +331,3 @@ def _group(model: mujoco.MjModel) -> Group:
             f" received {received}"
         )
     return group
-
-
-def _check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """The joint that the kinematics assume: hinges about x, y, z, in this order, through one point."""
-    if model.nv != 3 or model.nq != 3:
-        raise InputError(f"model: expected three degrees of freedom, received {model.nv}")
-    for i, (name, axis) in enumerate(zip(HINGES, "xyz", strict=True)):
-        joint = _named(model, mujoco.mjtObj.mjOBJ_JOINT, "joint", name)
-        is_hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
-        along = np.allclose(data.xaxis[joint], np.eye(3)[i], atol=COLLINEAR_TOLERANCE)
-        centred = np.allclose(data.xanchor[joint], 0.0, atol=COLLINEAR_TOLERANCE)
-        if not (joint == i and is_hinge and along and centred):
-            raise InputError(
-                f"model: expected joint {i + 1} to be hinge {name} about {axis} through the origin"
-            )
-    if np.any(model.qpos0):
-        raise InputError(f"model: expected hinges without ref, received {np.degrees(model.qpos0)} degrees")
-    payload = _body(model, "payload")
-    mass, inertia = model.body_mass[payload], model.body_inertia[payload].max()
-    if mass > 0 or inertia > 0:
-        raise InputError(
-            "model: expected an empty payload mount, whose mass a run sets by plant.payload_kg,"
-            f" received {mass:g} kg and {inertia:g} kg·m²"
-        )
-    rotor = _body(model, "rotor")
-    upright = abs(model.body_iquat[rotor][0]) > 1 - COLLINEAR_TOLERANCE
-    if not upright or np.any(np.abs(model.body_ipos[rotor]) > COLLINEAR_TOLERANCE):
-        raise InputError(
-            "model: expected the rotor's centre of mass at the origin and its principal axes along its own"
-        )
-    range_deg = np.degrees(_hinge_range(model)[1])
-    if np.any(np.abs(range_deg) >= LOCKED_DEG):
-        least, largest, low, high = told_apart(-LOCKED_DEG, LOCKED_DEG, *range_deg)
-        raise InputError(
-            f"model: expected a range of beta inside {least} to {largest} degrees, where the joint locks,"
-            f" received {low} to {high}"
-        )
-
-
-def _check_bounded(model: mujoco.MjModel) -> None:
-    arrays = {
-        name: getattr(model, name)
-        for name in ("body_mass", "body_inertia", "body_pos", "site_pos", "site_size", "jnt_range")
-    }
-    for name, numbers in {**arrays, "gravity": model.opt.gravity}.items():
-        if not np.all(np.isfinite(numbers)):
-            raise InputError(f"model: expected finite numbers, received NaN or infinity in {name}")
-        if np.any(np.abs(numbers) > LARGEST):
-            largest, received = told_apart(LARGEST, numbers.flat[np.argmax(np.abs(numbers))])
-            raise InputError(f"model: expected numbers of at most {largest}, received {received} in {name}")
-
-
-def _hinge_range(model: mujoco.MjModel) -> NDArray[np.float64]:
-    joints = [_named(model, mujoco.mjtObj.mjOBJ_JOINT, "joint", name) for name in HINGES]
-    limited = model.jnt_limited[joints].astype(bool)[:, None]
-    return np.where(limited, model.jnt_range[joints], [-np.inf, np.inf])
-
-
-def _shared(values: NDArray[np.float64], what: str) -> float:
-    if np.ptp(values) > COLLINEAR_TOLERANCE:
-        least, largest = told_apart(values.min(), values.max())
-        raise InputError(f"model: expected one {what}, received {least} to {largest} m")
-    return _within(float(values[0]), LEAST_LENGTH_M, LARGEST_LENGTH_M, f"a {what} in metres")

@@ -16,13 +16,14 @@ from spheretwin.control.law import Known, Law
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf, torque_curve
-from spheretwin.models.actuator import HINGES, Actuator
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.base.wording import shown, told_apart, without_breaks
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, disagreements, kept_matrix, torque_model
 from spheretwin.models.mjcf import Mjcf
+from spheretwin.models.model_file.joint import HINGES
 from spheretwin.models.telemetry.signals import (
     Signal,
     common_signals,
