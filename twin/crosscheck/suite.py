@@ -8,7 +8,7 @@ from pathlib import Path
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
-from spheretwin.twin.crosscheck import closed_loop, dynamics, free_rotor, identities, trajectories
+from spheretwin.twin.crosscheck import closed_loop, dynamics, free_rotor, friction, identities, trajectories
 from spheretwin.twin.crosscheck.part import STATES, Evidence, Finding, Subject
 
 PARTS = (
@@ -16,6 +16,7 @@ PARTS = (
     identities.PART,
     trajectories.PART,
     free_rotor.PART,
+    friction.PART,
     closed_loop.PART,
 )
 

@@ -8,6 +8,7 @@ from spheretwin.twin.crosscheck.figures import (
     closed_loop,
     convergence,
     differences,
+    friction,
     margins,
     torque_free,
     trajectory,
@@ -21,5 +22,6 @@ FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
     trajectory.draw,
     convergence.draw,
     torque_free.draw,
+    friction.draw,
     closed_loop.draw,
 )

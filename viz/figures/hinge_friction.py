@@ -1,0 +1,123 @@
+"""Figure of a hinge with friction: how each way of computing it sticks, breaks away, slides and stops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.plots import FAINT, INK, SERIES, WIDTH_in, save
+
+__all__ = ["Ramped", "Resting", "hinge_friction", "save"]
+
+Array = NDArray[np.float64]
+
+SLOWEST_rad_s = 1e-4  # the least rate that is drawn, on the logarithmic axes
+BEFORE_ms, AFTER_ms = 60.0, 140.0  # of the ideal stop
+
+
+class Ramped(NamedTuple):
+    """A ramp of torque up and back, a row a step, and the creep under a constant torque below the level."""
+
+    torque_Nm: Array  # (n,)
+    rates_rad_s: Mapping[str, Array]  # (n,) by way
+    ideal_rad_s: Array  # (n,)
+    level_Nm: float
+    push_Nm: float
+    creep_rad_s: Mapping[str, float]
+
+
+class Resting(NamedTuple):
+    """Coasting to rest; a row a step."""
+
+    t_s: Array  # (m,)
+    rates_rad_s: Mapping[str, Array]  # (m,) by way
+    ideal_rad_s: Array  # (m,)
+    ideal_stop_s: float
+
+
+def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -> Figure:
+    """A column a bearing: rate against a slow torque above, coasting in the middle, its end below.
+
+    Each way has one colour, ideal friction is dashed.
+
+    Parameters
+    ----------
+    bearings : mapping of bearing to Ramped and Resting
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 8.6), layout="constrained")
+    rows = figure.subplots(3, len(bearings), squeeze=False, sharey="row")
+    for column, (name, (ramped, resting)) in enumerate(bearings.items()):
+        _ramp(rows[0, column], ramped)
+        _coast(rows[1, column], resting)
+        _stop(rows[2, column], resting)
+        rows[0, column].set_title(f"{name}\nslow torque, up and back", fontsize="medium")
+        rows[1, column].set_title("coasting", fontsize="medium")
+        rows[2, column].set_title("coming to rest", fontsize="medium")
+    for axes in rows[:, 0]:
+        axes.set_ylabel("rate of the hinge, rad/s")
+    named: dict[str, Artist] = {}
+    for axes in rows.flat:
+        handles, labels = axes.get_legend_handles_labels()
+        named |= dict(zip(labels, handles, strict=True))
+    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=3)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _ramp(axes: Axes, ramped: Ramped) -> None:
+    torque_mNm = 1e3 * ramped.torque_Nm
+    axes.axvline(1e3 * ramped.level_Nm, color=FAINT, linewidth=1.2, label="Coulomb level")
+    for colour, way, rate in _ways(ramped.rates_rad_s):
+        axes.plot(torque_mNm, _drawn(rate), color=colour, label=way)
+        axes.plot(1e3 * ramped.push_Nm, ramped.creep_rad_s[way], "o", color=colour, markersize=5,
+                  label=f"{way}: settled at half the level")  # fmt: skip
+    _ideal(axes, torque_mNm, _drawn(ramped.ideal_rad_s))
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=SLOWEST_rad_s)
+    _finish(axes, "torque, mN·m")
+
+
+def _coast(axes: Axes, resting: Resting) -> None:
+    for colour, way, rate in _ways(resting.rates_rad_s):
+        axes.plot(resting.t_s, rate, color=colour, label=way)
+    _ideal(axes, resting.t_s, resting.ideal_rad_s)
+    _finish(axes, "time, s")
+
+
+def _stop(axes: Axes, resting: Resting) -> None:
+    after_ms = 1e3 * (resting.t_s - resting.ideal_stop_s)
+    shown = (after_ms >= -BEFORE_ms) & (after_ms <= AFTER_ms)
+    for colour, way, rate in _ways(resting.rates_rad_s):
+        axes.plot(after_ms[shown], _drawn(rate[shown]), color=colour, label=way)
+    _ideal(axes, after_ms[shown], _drawn(resting.ideal_rad_s[shown]))
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=SLOWEST_rad_s)
+    _finish(axes, "time after the ideal stop, ms")
+
+
+def _ways(rates_rad_s: Mapping[str, Array]) -> Iterator[tuple[str, str, Array]]:
+    for colour, (way, rate) in zip(SERIES, rates_rad_s.items(), strict=False):
+        yield colour, way, rate
+
+
+def _ideal(axes: Axes, x: Array, rate_rad_s: Array) -> None:
+    axes.plot(x, rate_rad_s, color=INK, linewidth=1.1, linestyle=(0, (4, 4)), label="ideal friction")
+
+
+def _drawn(rate_rad_s: Array) -> Array:
+    """Rates for a logarithmic axis: what is less than it shows lies on its edge, and rest below it."""
+    return np.maximum(rate_rad_s, 0.1 * SLOWEST_rad_s)
+
+
+def _finish(axes: Axes, x: str) -> None:
+    axes.set_xlabel(x)
+    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
