@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.check import Check
-from spheretwin.twin.crosscheck.bearing.hinge import STEP_s, Hinge
+from spheretwin.twin.crosscheck.bearing.hinge import Hinge, STEP_s
 from spheretwin.twin.crosscheck.bearing.moving import GAMMA, Mover, by_mujoco, by_stage
 from spheretwin.twin.crosscheck.bearing.runs import (
     PUSH,
+    Bearing,
     RAMP_s,
     START_rad_s,
-    Bearing,
     breakaway_rate_rad_s,
     inertia_torque_Nm,
     latest_breakaway_Nm,
@@ -106,8 +106,8 @@ def _creep(way: str, name: str, bearing: Bearing) -> Check:
         detail[f"{name}: limit of a small step, rad/s"] = limit
     return Check(
         name=f"friction: creep, {way}",
-        compares=f"γ pushed by {PUSH:g} of the Coulomb level, where ideal friction holds: torque that creeps at"
-        f" the rate v found, by {_CREEP[way]}, with that applied, relative",
+        compares=f"γ pushed by {PUSH:g} of the Coulomb level, where ideal friction holds: torque that creeps"
+        f" at the rate v found, by {_CREEP[way]}, with that applied, relative",
         states=bearing.settling,
         value=abs(float(_HELD[way](hinge, np.array(rate))) / (PUSH * hinge.coulomb_Nm) - 1),
         bound=1e-15 * (10 + hinge.relaxation_s() / STEP_s),
@@ -150,7 +150,7 @@ def _torque_at(rate_rad_s: float, torque_Nm: Array, rates_rad_s: Array) -> float
 _LATE = {
     OURS: "late by h/v a unit of rate, as a step is implicit, and by what the level lacks, 1 - v/√(v² +"
     " smoothing²) of it; both summed up over the motion",
-    MUJOCO: "below level/(d b J) its soft constraint no longer brakes by the level, but exponentially, by d b v",
+    MUJOCO: "below level/(d b J) its soft constraint no longer brakes by the level, but exponentially at d b",
 }
 
 
@@ -160,8 +160,8 @@ def _stopping_time(way: str, name: str, bearing: Bearing) -> Check:
     stopped = float(coast.t_s[np.argmax(coast.motions[way].qdot_rad_s <= REST_rad_s)])
     return Check(
         name=f"friction: stopping time, {way}",
-        compares=f"γ coasting from {START_rad_s:g} rad/s to a thousandth of that: time, with the exact solution"
-        " under ideal Coulomb and viscous friction",
+        compares=f"γ coasting from {START_rad_s:g} rad/s to a thousandth of that: time, with the exact"
+        " solution under ideal Coulomb and viscous friction",
         states=len(coast.t_s),
         value=abs(stopped - ideal),
         bound=_late_s(way, hinge, REST_rad_s) + STEP_s,
@@ -191,8 +191,8 @@ def _stopping_angle(way: str, name: str, bearing: Bearing) -> Check:
     ideal, turned = hinge.ideal_angle_rad(START_rad_s), float(coast.motions[way].q_rad[-1])
     return Check(
         name=f"friction: stopping angle, {way}",
-        compares=f"γ coasting from {START_rad_s:g} rad/s until nothing is left: angle, with the exact solution"
-        " under ideal Coulomb and viscous friction",
+        compares=f"γ coasting from {START_rad_s:g} rad/s until nothing is left: angle, with the exact"
+        " solution under ideal Coulomb and viscous friction",
         states=len(coast.t_s),
         value=abs(turned - ideal),
         bound=_far_rad(way, hinge),
@@ -244,14 +244,14 @@ def _viscous(way: str, move: Mover, hinge: Hinge) -> Check:
         MUJOCO: count * START_rad_s * share**5 / 120,
     }
     why = {
-        OURS: "a step leaves 1/(1 + x) of the rate, x = viscous h/J, which is exp(-x) times exp(x²/2) at most;"
-        " and rounding, 2e-16 a step",
+        OURS: "a step leaves 1/(1 + x) of the rate, x = viscous h/J, which is exp(-x) times exp(x²/2) at"
+        " most; and rounding, 2e-16 a step",
         MUJOCO: "rounding, 2e-16 a step, and truncation of RK4, x⁵/120 a step at x = viscous h/J",
     }
     return Check(
         name=f"friction: viscous alone, {way}",
-        compares=f"γ coasting for {VISCOUS_s:g} s from {START_rad_s:g} rad/s under viscous friction (in MuJoCo,"
-        " damping) alone: rate, with the exact decay",
+        compares=f"γ coasting for {VISCOUS_s:g} s from {START_rad_s:g} rad/s under viscous friction (in"
+        " MuJoCo, damping) alone: rate, with the exact decay",
         states=count,
         value=float(np.max(np.abs(move(hinge, START_rad_s, np.zeros(count)).qdot_rad_s - exact))),
         bound=truncation[way] + count * _EPSILON * START_rad_s,
@@ -268,7 +268,7 @@ def _worst(checks: Iterable[Check]) -> Check:
 
 
 def _share(check: Check) -> float:
-    """Value over bound, or least value over value where that is more; endless where the value is no number."""
+    """Value over bound, or least value over value where that is more; endless without a number."""
     value, bound = float(check.value or 0), float(check.bound or 0)
     share = max(value / bound, check.at_least / value if check.at_least is not None else 0.0)
     return share if isfinite(value) and isfinite(share) else float("inf")

@@ -17,8 +17,9 @@ __all__ = ["Ramped", "Resting", "hinge_friction", "save"]
 
 Array = NDArray[np.float64]
 
-SLOWEST_rad_s = 1e-4  # the least rate that is drawn, on the logarithmic axes
-BEFORE_ms, AFTER_ms = 60.0, 140.0  # of the ideal stop
+SLOWEST_rad_s, FASTEST_rad_s, FASTEST_AT_STOP_rad_s = 1e-4, 2.0, 0.3  # of the logarithmic axes
+UP, BACK = 0.06, 0.8  # shares of the largest rate at which arrows on the ideal curve say where the ramp goes
+AROUND_STOP_ms = 60.0
 
 
 class Ramped(NamedTuple):
@@ -42,9 +43,9 @@ class Resting(NamedTuple):
 
 
 def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -> Figure:
-    """A column a bearing: rate against a slow torque above, coasting in the middle, its end below.
+    """A column a bearing: rate against a slow torque, coasting beside ideal friction, coming to rest.
 
-    Each way has one colour, ideal friction is dashed.
+    Each way has one colour; ideal friction is dashed.
 
     Parameters
     ----------
@@ -53,17 +54,19 @@ def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -
     """
     figure = Figure(figsize=(WIDTH_in, 8.6), layout="constrained")
     rows = figure.subplots(3, len(bearings), squeeze=False, sharey="row")
-    for column, (name, (ramped, resting)) in enumerate(bearings.items()):
-        _ramp(rows[0, column], ramped)
-        _coast(rows[1, column], resting)
-        _stop(rows[2, column], resting)
-        rows[0, column].set_title(f"{name}\nslow torque, up and back", fontsize="medium")
-        rows[1, column].set_title("coasting", fontsize="medium")
-        rows[2, column].set_title("coming to rest", fontsize="medium")
-    for axes in rows[:, 0]:
-        axes.set_ylabel("rate of the hinge, rad/s")
+    for (above, middle, below), (name, (ramped, resting)) in zip(rows.T, bearings.items(), strict=True):
+        _ramp(above, ramped)
+        _coast(middle, resting)
+        _stop(below, resting)
+        above.set_title(f"{name}\nslow torque, up and back", fontsize="medium")
+        middle.set_title(f"coasting from {resting.ideal_rad_s[0]:g} rad/s", fontsize="medium")
+        below.set_title("coming to rest", fontsize="medium")
+    for axes, quantity in zip(
+        rows[:, 0], ("rate, rad/s", "rate less ideal, mrad/s", "rate, rad/s"), strict=True
+    ):
+        axes.set_ylabel(quantity)
     named: dict[str, Artist] = {}
-    for axes in rows.flat:
+    for axes in rows[0]:
         handles, labels = axes.get_legend_handles_labels()
         named |= dict(zip(labels, handles, strict=True))
     figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=3)
@@ -73,33 +76,51 @@ def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -
 
 def _ramp(axes: Axes, ramped: Ramped) -> None:
     torque_mNm = 1e3 * ramped.torque_Nm
-    axes.axvline(1e3 * ramped.level_Nm, color=FAINT, linewidth=1.2, label="Coulomb level")
     for colour, way, rate in _ways(ramped.rates_rad_s):
         axes.plot(torque_mNm, _drawn(rate), color=colour, label=way)
-        axes.plot(1e3 * ramped.push_Nm, ramped.creep_rad_s[way], "o", color=colour, markersize=5,
-                  label=f"{way}: settled at half the level")  # fmt: skip
+        axes.plot(1e3 * ramped.push_Nm, ramped.creep_rad_s[way], "o", color=colour, markersize=5)
     _ideal(axes, torque_mNm, _drawn(ramped.ideal_rad_s))
-    axes.set_yscale("log")
-    axes.set_ylim(bottom=SLOWEST_rad_s)
+    axes.axvline(1e3 * ramped.level_Nm, color=FAINT, linewidth=1.2, label="Coulomb level")
+    axes.plot([], [], "o", color=INK, markersize=5, label="settled at half the level")
+    ideal, fastest = ramped.ideal_rad_s, int(np.argmax(ramped.ideal_rad_s))
+    _arrow(axes, torque_mNm, ideal, int(np.argmax(ideal >= UP * ideal[fastest])))
+    _arrow(axes, torque_mNm, ideal, fastest + int(np.argmax(ideal[fastest:] <= BACK * ideal[fastest])))
+    _slow_rates(axes, FASTEST_rad_s)
     _finish(axes, "torque, mN·m")
 
 
 def _coast(axes: Axes, resting: Resting) -> None:
-    for colour, way, rate in _ways(resting.rates_rad_s):
-        axes.plot(resting.t_s, rate, color=colour, label=way)
-    _ideal(axes, resting.t_s, resting.ideal_rad_s)
+    for colour, _, rate in _ways(resting.rates_rad_s):
+        axes.plot(resting.t_s, 1e3 * (rate - resting.ideal_rad_s), color=colour)
+    axes.axhline(0, color=INK, linewidth=1.1, linestyle=(0, (4, 4)))
+    axes.axvline(resting.ideal_stop_s, color=FAINT, linewidth=0.8, linestyle=":")
     _finish(axes, "time, s")
 
 
 def _stop(axes: Axes, resting: Resting) -> None:
     after_ms = 1e3 * (resting.t_s - resting.ideal_stop_s)
-    shown = (after_ms >= -BEFORE_ms) & (after_ms <= AFTER_ms)
-    for colour, way, rate in _ways(resting.rates_rad_s):
-        axes.plot(after_ms[shown], _drawn(rate[shown]), color=colour, label=way)
+    shown = np.abs(after_ms) <= AROUND_STOP_ms
+    for colour, _, rate in _ways(resting.rates_rad_s):
+        axes.plot(after_ms[shown], _drawn(rate[shown]), color=colour)
     _ideal(axes, after_ms[shown], _drawn(resting.ideal_rad_s[shown]))
-    axes.set_yscale("log")
-    axes.set_ylim(bottom=SLOWEST_rad_s)
+    _slow_rates(axes, FASTEST_AT_STOP_rad_s)
     _finish(axes, "time after the ideal stop, ms")
+
+
+def _slow_rates(axes: Axes, fastest_rad_s: float) -> None:
+    axes.set_yscale("log")
+    axes.set_ylim(SLOWEST_rad_s, fastest_rad_s)
+
+
+def _arrow(axes: Axes, x: Array, y: Array, row: int) -> None:
+    """An arrow's head on a curve, towards the rows that follow."""
+    ahead = row + max(1, len(x) // 100)
+    axes.annotate(
+        "",
+        xy=(x[ahead], y[ahead]),
+        xytext=(x[row], y[row]),
+        arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 0, "mutation_scale": 14},
+    )
 
 
 def _ways(rates_rad_s: Mapping[str, Array]) -> Iterator[tuple[str, str, Array]]:

@@ -20,9 +20,9 @@ from spheretwin.twin.crosscheck.bearing.hinge import (
     IMPEDANCE,
     LARGEST_IMPEDANCE,
     RISE,
+    Hinge,
     STEP_s,
     TIME_CONSTANT_s,
-    Hinge,
 )
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.plant.friction import Friction, friction, friction_torque

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from spheretwin.twin.crosscheck.bearing.runs import PUSH, START_rad_s, Bearing
+from spheretwin.twin.crosscheck.bearing.runs import PUSH, Bearing, START_rad_s
 from spheretwin.twin.crosscheck.figures.drawing import Drawing
-from spheretwin.twin.crosscheck.friction import VISCOUS_Nm_s, HingeFriction
+from spheretwin.twin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
 from spheretwin.twin.crosscheck.part import Evidence
 
 
@@ -25,8 +25,11 @@ def draw(evidence: Evidence) -> Drawing:
 
     bearings = evidence.of(HingeFriction).bearings
     figure = hinge_friction.hinge_friction(
-        {f"Coulomb level {name}": drawn(bearing) for name, bearing in bearings.items()},
-        f"Friction of one hinge: our stage, and MuJoCo's friction loss and damping ({VISCOUS_Nm_s:g} N·m·s)",
+        {
+            f"Coulomb {name}, viscous {1e3 * VISCOUS_Nm_s:g} mN·m·s": drawn(bearing)
+            for name, bearing in bearings.items()
+        },
+        "Friction of one hinge: our stage, and MuJoCo's friction loss and damping",
     )
     caption = (
         "Sticking, breakaway, sliding and coming to rest of hinge γ under our stage of friction and under"

@@ -18,6 +18,5 @@ def draw(evidence: Evidence) -> Drawing:
         if check.value is not None and check.bound is not None and check.at_least is None
     }
     figure = plots.margins(shares, "How much of its bound each figure takes up")
-    return Drawing(
-        "margins.png", "Value over bound; the orders of convergence, which have two, are below.", figure
-    )
+    caption = "Value over bound; orders of convergence and breakaway torques, which have two, are below."
+    return Drawing("margins.png", caption, figure)
