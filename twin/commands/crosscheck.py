@@ -26,8 +26,8 @@ def add_to(verbs: Any) -> None:
         "crosscheck",
         help="hold the engine against the Lagrangian and Pinocchio",
         description="Hold the engine (MuJoCo) against the Lagrangian model and, where it is installed,"
-        " Pinocchio: state by state, along trajectories, without torque, and in the closed loop."
-        " Exit code 1 when a bound is broken.",
+        " Pinocchio: state by state, along trajectories, without torque, under friction, and in the closed"
+        " loop. Exit code 1 when a bound is broken.",
         allow_abbrev=False,
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="write a page with figures into this folder")

@@ -131,9 +131,8 @@ def _breakaway(way: str, name: str, bearing: Bearing) -> Check:
         value=passed / level,
         bound=(latest_breakaway_Nm(hinge) + rise) / level,
         at_least=(float(earliest) - rise) / level,
-        why="not after ideal friction, which takes √(2 J v dT/dt) above the level to reach the rate v;"
-        " not before a hinge would be that had crept at a lower rate, whichever, and met no more friction"
-        " from there on",
+        why="not after ideal friction, which takes √(2 J v dT/dt) above the level to reach the rate v; not"
+        " before a hinge that crept up to any lower rate, and from there on met no more friction than there",
         detail={
             f"{name}: N·m": passed,
             f"{name}: ideal, N·m": _torque_at(rate, ramp.torque_Nm, ramp.ideal_rad_s),

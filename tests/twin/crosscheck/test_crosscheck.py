@@ -18,6 +18,7 @@ from spheretwin.twin.crosscheck import (
     closed_loop,
     dynamics,
     free_rotor,
+    friction,
     identities,
     page,
     suite,
@@ -32,7 +33,7 @@ FEW = 50
 QUANTITIES = [quantity.name for quantity in dynamics.QUANTITIES]
 ENGINES = ("MuJoCo", "Pinocchio")
 COMMAND = [sys.executable, "-m", "spheretwin.twin.cli", "crosscheck"]
-FIGURES = ("margins", "dynamics", "trajectory", "convergence", "torque_free", "closed_loop")
+FIGURES = ("margins", "dynamics", "trajectory", "convergence", "torque_free", "friction", "closed_loop")
 
 
 def crosscheck(*arguments):
@@ -70,7 +71,7 @@ def test_every_bound_is_kept(told):
 
 def test_every_row_says_what_it_compares_and_why(told):
     rows = json.loads(told[0].stdout)["checks"]
-    assert len({row["name"] for row in rows}) == len(rows) >= 25
+    assert len({row["name"] for row in rows}) == len(rows) >= 36
     for row in rows:
         assert set(row) == {
             "name", "compares", "states", "value", "bound", "at_least", "unit", "ok", "why", "detail",
@@ -275,7 +276,7 @@ def test_without_pinocchio_its_rows_say_so(monkeypatch, actuator):
 
 def test_parts_are_announced_as_they_begin(monkeypatch):
     begun = []
-    for part in (dynamics, trajectories, closed_loop):
+    for part in (dynamics, trajectories, friction, closed_loop):
         monkeypatch.setattr(part, "compare", lambda *_: None)
     for part in (identities, free_rotor):
         monkeypatch.setattr(part, "check", lambda *_: None)
