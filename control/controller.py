@@ -12,6 +12,9 @@ from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
 from spheretwin.control.belief import Belief, believe
 from spheretwin.control.estimation.estimator import Estimator, estimator_at
+from spheretwin.control.supervision.detector import Detector, find
+from spheretwin.control.supervision.groups import Groups, leave_out
+from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.callbacks import function_at
 from spheretwin.models.base.compiled import compilable
 from spheretwin.models.kinematics import cartesian_torque
@@ -22,6 +25,8 @@ LARGEST_TORQUE_Nm = 1e100
 
 LOST = -1.0
 """Share of the torque that is returned where the law gave none."""
+
+_COMMAND = int(Reason.COMMAND)
 
 law_at = function_at(laws.SIGNATURE)
 allocation_at = function_at(allocations.SIGNATURE)
@@ -34,6 +39,14 @@ class Estimates(NamedTuple):
     """Whether there is an estimator; if not, the rates are handed over as they come."""
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
+
+
+class Supervision(NamedTuple):
+    """What looks after the actuator beside the law."""
+
+    groups: Groups
+    detector: Detector
+    watchdog: Watchdog
 
 
 class Controller(NamedTuple):
@@ -52,6 +65,7 @@ class Controller(NamedTuple):
     rates: NDArray[np.float64]  # (3,) rad/s, likewise
     scratch: NDArray[np.float64]  # of the allocation
     belief: Belief
+    supervision: Supervision
 
 
 def controller(
@@ -61,6 +75,7 @@ def controller(
     current_limit_A: float,
     logged: int,
     belief: Belief,
+    supervision: Supervision,
     estimator: Estimator | None = None,
 ) -> Controller:
     """Controller at the start of a run.
@@ -79,6 +94,7 @@ def controller(
         Numbers of the law's state that the telemetry logs.
     belief : Belief
         Of the torque that the law's commands led to.
+    supervision : Supervision
     estimator : Estimator, optional
         Of the rates; the law is handed those that are measured unless given.
     """
@@ -101,6 +117,7 @@ def controller(
         rates=np.zeros(3),
         scratch=np.empty((SCRATCH_ROWS, groups)),
         belief=belief,
+        supervision=supervision,
     )
 
 
@@ -138,27 +155,85 @@ def control_tick(
     -------
     float
         Share of the law's torque that `command` gives; `LOST` where the law gave no torque, or one beyond
-        `LARGEST_TORQUE_Nm`, or logs what is no number.
+        `LARGEST_TORQUE_Nm`, or logs what is no number, and no watchdog is there to take the currents away.
+        Where it does, nothing is asked for, and all of it is given.
     """
-    torque_q, pose, estimates = controller.torque_q, controller.pose, controller.estimates
+    pose, estimates = controller.pose, controller.estimates
     if estimates.made:
         estimator_at(estimate)(measurement[0], estimates.parameters, estimates.memory, measurement[1])
     for i in range(3):
-        torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         pose[i], controller.rates[i] = measurement[0, i], measurement[1, i]
+    watchdog = controller.supervision.watchdog
+    if watchdog.on:
+        watch(watchdog, pose, controller.rates)
+    keep_torque_matrix(pose, controller.magnetics, controller.kept)
+    _supervise(controller, t)
+    if watchdog.halt[0] == GO and not _ask_law(controller, law, t, reference, measurement):
+        if not watchdog.on:
+            return LOST
+        trip(watchdog, _COMMAND)
+    share = 1.0
+    if watchdog.halt[0] == GO:
+        share = _allocate(controller, allocate, command)
+    else:
+        _ask_nothing(controller, command)
+    if controller.belief.asked:
+        believe(controller.belief, pose, controller.kept.G, command)
+    return share
+
+
+@compilable
+def _ask_law(
+    controller: Controller,
+    law: Any,
+    t: float,
+    reference: NDArray[np.float64],
+    measurement: NDArray[np.float64],
+) -> bool:
+    """Let the law write its torque; whether that, and all that it logs, are numbers."""
+    torque_q = controller.torque_q
+    for i in range(3):
+        torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         measurement[2, i] = controller.belief.torque_q[i]
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
     for i in range(3):
         if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
-            return LOST
+            return False
+    finite = True
+    for i in range(controller.logged):
+        finite = finite and abs(controller.memory[i]) < np.inf
+    return finite
+
+
+@compilable
+def _supervise(controller: Controller, t: float) -> None:
+    """Look for groups that do not follow, where that is wanted."""
+    groups, detector, _ = controller.supervision
+    if detector.on:
+        G, believed = controller.kept.G, controller.belief.current
+        find(detector, groups, believed, G, controller.pose, controller.rates, t)
+
+
+@compilable
+def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64]) -> float:
+    """Currents for the law's torque, from the groups that may be used."""
+    groups, G = controller.supervision.groups, controller.kept.G
+    cartesian_torque(controller.pose, controller.torque_q, controller.torque_S)
+    if groups.some_out[0]:
+        leave_out(groups, G)
+        G = groups.G
+    return allocation_at(allocate)(
+        G, controller.torque_S, controller.current_limit_A, command, controller.scratch
+    )
+
+
+@compilable
+def _ask_nothing(controller: Controller, command: NDArray[np.float64]) -> None:
+    """No torque and no currents; what a law logs stays what it was, unless that is no number."""
+    for i in range(3):
+        controller.torque_q[i] = controller.torque_S[i] = 0.0
+    for j in range(command.shape[0]):
+        command[j] = 0.0
     for i in range(controller.logged):
         if not abs(controller.memory[i]) < np.inf:
-            return LOST
-    cartesian_torque(pose, torque_q, controller.torque_S)
-    keep_torque_matrix(pose, controller.magnetics, controller.kept)
-    share = allocation_at(allocate)(
-        controller.kept.G, controller.torque_S, controller.current_limit_A, command, controller.scratch
-    )
-    if controller.belief.asked:
-        believe(controller.belief, pose, controller.kept.G, command)
-    return share
+            controller.memory[i] = 0.0

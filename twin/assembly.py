@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.control.belief import belief
-from spheretwin.control.controller import Controller, controller
+from spheretwin.control.controller import Controller, Supervision, controller
 from spheretwin.control.estimation.estimator import Estimator, Sampling
 from spheretwin.control.law import Known, Law
 from spheretwin.control.laws.registry import LAWS
@@ -31,11 +32,10 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
-from spheretwin.twin.electronics.driving import stages
 from spheretwin.twin.electronics.driving.sections import DriveSection
-from spheretwin.twin.electronics.sensing import stages as senses
-from spheretwin.twin.electronics.sensing.chain import Sensing, reckoned
-from spheretwin.twin.electronics.sensing.stages import Exact
+from spheretwin.twin.electronics.sensing.chain import reckoned
+from spheretwin.twin.faults.fault import Fault
+from spheretwin.twin.faults.plan import part_names
 from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.engine import integrator_name
 from spheretwin.twin.plant.friction import Friction, friction
@@ -47,6 +47,9 @@ from spheretwin.twin.scenario.sections import OwnController, OwnPath, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.trajectories.registry import SHAPES
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, Triple
+from spheretwin.twin.wiring import Wires, driving_of
+
+Array = NDArray[np.float64]
 
 # What the engine's compiler takes where a file says nothing.
 UNWRITTEN_STEP_s = 0.002
@@ -170,6 +173,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
     made = scenario.model_copy(update=filled)
     _check_pose(made.plant.initial_rad or (0.0, 0.0, 0.0), actuator)
     _check_groups(section, actuator)
+    _check_faults(made.fault, actuator)
     return made
 
 
@@ -233,11 +237,6 @@ def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
     return Places(of_stages, width(signals) - width(law.signals))
 
 
-def sensors_of(scenario: Scenario) -> Exact | Sensing:
-    """Sensors of a scenario, with the errors that its seed gives them."""
-    return senses.made(scenario.sensors, scenario.seed)
-
-
 def warnings_of(scenario: Scenario, files: Files) -> list[str]:
     """What a user should know of model and scenario before believing the figures; one line each."""
     late = [change for change in planned(scenario) if change.tick >= scenario.ticks]
@@ -287,25 +286,31 @@ def estimator_of(scenario: Scenario) -> Estimator | None:
 
 
 def controller_of(
-    scenario: Scenario, law: Law, magnetics: TorqueModel, kept: KeptMatrix, estimator: Estimator | None
+    scenario: Scenario,
+    law: Law,
+    magnetics: TorqueModel,
+    kept: KeptMatrix,
+    estimator: Estimator | None,
+    supervision: Supervision,
 ) -> Controller:
     """Controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
     limit_A, lag_s = nominal.current_limit_A or 0.0, nominal.time_constant_s or 0.0
-    believed = belief(law.asks_torque, groups, scenario.controller.period_s, nominal.delay_s or 0.0, lag_s)
-    return controller(law, magnetics, kept, limit_A, width(law.signals), believed, estimator)
+    asked = law.asks_torque or scenario.detects
+    believed = belief(asked, groups, scenario.controller.period_s, nominal.delay_s or 0.0, lag_s)
+    return controller(law, magnetics, kept, limit_A, width(law.signals), believed, supervision, estimator)
 
 
-def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix) -> Plant:
+def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix, wires: Wires) -> Plant:
     """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
     section, groups = scenario.plant, len(actuator.groups)
     return Plant(
         rotor=stepped,
         magnetics=torque_model(actuator),
         kept=kept,
-        driving=stages.made(scenario.drive, section.step_s, scenario.substeps, groups, scenario.seed),
+        driving=driving_of(scenario, groups, wires),
         friction=_friction(section, actuator),
-        group_gain=np.array(section.group_gain or (1.0,) * groups),
+        group_gain=group_gain_of(section, groups),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
         hinge_range=actuator.hinge_range_rad,
         substeps=scenario.substeps,
@@ -314,7 +319,16 @@ def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMat
         pulling=np.zeros(groups),
         friction_q=np.zeros(3),
         first_friction_q=np.zeros(3),
+        draws=wires.draws,
+        current_noise_A=scenario.sensors.current.noise_A,
+        marks=np.zeros(len(part_names(groups))),
+        began_s=np.full(groups, -1.0),
     )
+
+
+def group_gain_of(section: PlantSection, groups: int) -> Array:
+    """Torque an ampere of each group over that of the torque curve, (n,), while none fails."""
+    return np.array(section.group_gain or (1.0,) * groups)
 
 
 def _friction(section: PlantSection, actuator: Actuator) -> Friction:
@@ -384,3 +398,12 @@ def _check_groups(section: PlantSection, actuator: Actuator) -> None:
         raise InputError(
             f"scenario: expected plant.group_gain for {groups} groups, received {len(section.group_gain)}"
         )
+
+
+def _check_faults(faults: tuple[Fault, ...], actuator: Actuator) -> None:
+    groups = len(actuator.groups)
+    for fault in faults:
+        if fault.kind.each_group and fault.place >= groups:
+            raise InputError(
+                f"scenario: expected a fault of a group from 0 to {groups - 1}, received {fault.target}"
+            )

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.disturbances.draws import Draws, term_draws
 from spheretwin.twin.electronics.sensing.chain import noise_width
-from spheretwin.twin.electronics.sensing.noise import noise_rows
+from spheretwin.twin.electronics.sensing.noise import FAULTS, noise_rows
+from spheretwin.twin.faults.plan import draws_width
 from spheretwin.twin.loop import Inputs
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Sampled, checked
@@ -33,6 +34,8 @@ class Exogenous:
         Trajectory, disturbance, control period and seed.
     trajectory : Sampled, optional
         Followed instead of the trajectory that the scenario names, whatever scenario is in force.
+    groups : int
+        Coil groups, each of which may have noise of its own.
 
     Raises
     ------
@@ -40,7 +43,8 @@ class Exogenous:
         The trajectory has no ``sample(t)``, or what that gives at the start is no finite motion.
     """
 
-    def __init__(self, scenario: Scenario, trajectory: Sampled | None = None) -> None:
+    def __init__(self, scenario: Scenario, trajectory: Sampled | None = None, groups: int = 0) -> None:
+        self._groups = groups
         self._own = None if trajectory is None else checked(trajectory)
         self._generator = np.random.default_rng(scenario.seed)
         self._before: Mapping[str, Any] = self._generator.bit_generator.state
@@ -82,12 +86,12 @@ class Exogenous:
             )
         first = tick - self._first
         last = min(first + most, BLOCK_TICKS)
-        t, reference, disturbance, noise = self._block
+        block = self._block
         if last > self._numbers:
             if first >= self._numbers:
                 self._refuse(self._block, first)
             last = self._numbers
-        return Inputs(t[first:last], reference[first:last], disturbance[first:last], noise[first:last])
+        return Inputs(*(column[first:last] for column in block))
 
     def check_horizon(self, tick: int) -> None:
         """Refuse before a run what would only be found out at its end.
@@ -122,8 +126,13 @@ class Exogenous:
         t = scenario.controller.period_s * ticks
         followed: Sampled = scenario.trajectory if self._own is None else self._own
         reference = np.ascontiguousarray(followed.sample(t))
-        noise = noise_rows(scenario.seed, int(ticks[0]), len(ticks), noise_width(scenario.sensors))
-        return Inputs(t, reference, scenario.disturbance.sample(t, draws), noise)
+        first, count, seed = int(ticks[0]), len(ticks), scenario.seed
+        noise = noise_rows(seed, first, count, noise_width(scenario.sensors))
+        of_faults = noise_rows(seed, first, count, self._width_of_faults(), FAULTS)
+        return Inputs(t, reference, scenario.disturbance.sample(t, draws), noise, of_faults)
+
+    def _width_of_faults(self) -> int:
+        return draws_width(self._groups) if self._scenario.draws_for_faults else 0
 
     def _refuse(self, rows: Inputs, row: int) -> NoReturn:
         name = "disturbance" if np.isfinite(rows.reference[row]).all() else "trajectory"

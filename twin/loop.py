@@ -6,13 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.controller import LOST, Controller, control_tick
+from spheretwin.control.supervision.watchdog import GO, Reason, mend, over, trip
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.copying import copy_into, copy_rows
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.twin.columns.registry import write_columns
-from spheretwin.twin.electronics.sensing.chain import Sensing
-from spheretwin.twin.electronics.sensing.stages import Exact, sense
-from spheretwin.twin.plant.plant import DIVERGED, GOING, Delivered, Plant, plant_tick
+from spheretwin.twin.electronics.sensing.current import sense_currents
+from spheretwin.twin.electronics.sensing.stages import Sensors, sense
+from spheretwin.twin.plant.plant import (
+    DIVERGED,
+    FAILSAFE,
+    GOING,
+    LEFT_WORKSPACE,
+    Delivered,
+    Plant,
+    plant_tick,
+)
 
 Array = NDArray[np.float64]
 
@@ -20,6 +29,7 @@ _OFFSETS = offsets(MOTION_SIGNALS)
 TIME, ANGLE, RATE = _OFFSETS["t_s"], _OFFSETS["q_rad"], _OFFSETS["qdot_rad_s"]
 ANGLE_REF, RATE_REF, ERROR = _OFFSETS["q_ref_rad"], _OFFSETS["qdot_ref_rad_s"], _OFFSETS["error_rad"]
 TORQUE_COMMAND, TORQUE = _OFFSETS["torque_command_Nm"], _OFFSETS["torque_Nm"]
+_TEMPERATURE = int(Reason.TEMPERATURE)
 DISTURBANCE, CURRENT_COMMAND = _OFFSETS["disturbance_Nm"], width(MOTION_SIGNALS)
 
 
@@ -30,6 +40,7 @@ class Inputs(NamedTuple):
     reference: NDArray[np.float64]  # (n, 3, 3) angle, rate, acceleration as rows
     disturbance: NDArray[np.float64]  # (n, 3) N·m, generalised, subtracted in (1)
     noise: NDArray[np.float64]  # (n, k) standard normal numbers of the sensors
+    fault_noise: NDArray[np.float64]  # (n, m) of faults, and of the sensors of currents
 
 
 class Places(NamedTuple):
@@ -53,7 +64,7 @@ def loop(
     allocate: Any,
     estimate: Any,
     controller: Controller,
-    sensors: Exact | Sensing,
+    sensors: Sensors,
     plant: Plant,
     places: Places,
     scratch: Scratch,
@@ -69,7 +80,7 @@ def loop(
         Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`.
     controller : Controller
         Changed in place, as is the plant; neither sees the other.
-    sensors : Exact or Sensing
+    sensors : Sensors
     plant : Plant
     places : Places
     scratch : Scratch
@@ -80,19 +91,24 @@ def loop(
     Returns
     -------
     tuple of int
-        Rows written, and `GOING`, `LEFT_WORKSPACE` or `DIVERGED`.
+        Rows written, and `GOING`, `LEFT_WORKSPACE`, `DIVERGED` or `FAILSAFE`.
     """
     reference, measurement = scratch.reference, scratch.measurement
+    watchdog, detector = controller.supervision.watchdog, controller.supervision.detector
     groups = plant.current.shape[0]
     first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 2 * groups
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
+        copy_into(plant.draws, 0, inputs.fault_noise[tick], plant.draws.shape[0])
         measured = sense(sensors, plant.rotor.q, plant.rotor.qdot, inputs.noise[tick], measurement)
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called: it may write into all that it is handed.
         write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
-        if not measured:
+        if not (measured or mend(watchdog, measurement)):
             return tick, DIVERGED
+        if detector.on:
+            first_draw = plant.draws.shape[0] - groups
+            sense_currents(plant.current_noise_A, plant.current, plant.draws, first_draw, detector.measured_A)
         command = row[CURRENT_COMMAND:first_current]
         share = control_tick(controller, law, allocate, estimate, t, reference, measurement, command)
         if share == LOST:
@@ -103,6 +119,12 @@ def loop(
         delivered = Delivered(row[first_current:scale], row[TORQUE : TORQUE + 3])
         status = plant_tick(plant, command, disturbance, delivered)
         write_columns(row, places.of_stages, controller, sensors, plant)
+        if status == FAILSAFE and watchdog.reason[0] == 0:
+            trip(watchdog, _TEMPERATURE)
+        if status == FAILSAFE and watchdog.on:
+            status = GOING  # the currents run down first
+        if over(watchdog) or (status == LEFT_WORKSPACE and watchdog.halt[0] != GO):
+            status = FAILSAFE
         if status != GOING:
             return tick + 1, status
     return log.shape[0], GOING

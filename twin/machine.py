@@ -9,22 +9,28 @@ from numpy.typing import NDArray
 
 from spheretwin.control import belief as beliefs
 from spheretwin.control.allocation.registry import ALLOCATIONS
+from spheretwin.control.controller import Supervision
 from spheretwin.control.law import Law
+from spheretwin.control.supervision import detector, groups, watchdog
+from spheretwin.control.supervision.watchdog import REASONS, Reason
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import torque_model
 from spheretwin.models.telemetry.signals import width
-from spheretwin.twin import assembly
+from spheretwin.twin import assembly, wiring
 from spheretwin.twin import loop as loops
 from spheretwin.twin.assembly import Files
 from spheretwin.twin.electronics.driving import stages as drivings
+from spheretwin.twin.electronics.sensing import stages as senses
 from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.rotor import Rotor
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Triple
 
 # For their types alone.
-NO_INPUTS = loops.Inputs(np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)))
+NO_INPUTS = loops.Inputs(
+    np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)), np.empty((0, 0))
+)
 
 
 class State(NamedTuple):
@@ -37,6 +43,10 @@ class State(NamedTuple):
     memory: NDArray[np.float64]
     belief: NDArray[np.float64]
     estimates: NDArray[np.float64]
+    sensing: NDArray[np.float64]
+    groups: NDArray[np.float64]
+    detector: NDArray[np.float64]
+    watchdog: NDArray[np.float64]
 
 
 class Moving(NamedTuple):
@@ -84,8 +94,14 @@ class Machine:
         magnetics = assembly.nominal_magnetics(scenario, files)
         kept = assembly.kept_matrices(magnetics, torque_model(files.actuator))
         estimator = assembly.estimator_of(scenario)
-        self._controller = assembly.controller_of(scenario, self.law, magnetics, kept[0], estimator)
-        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, kept[1])
+        wires = wiring.wires_of(scenario, len(files.actuator.groups))
+        supervision = wiring.supervision_of(scenario, files.nominal, wires)
+        self._controller = assembly.controller_of(
+            scenario, self.law, magnetics, kept[0], estimator, supervision
+        )
+        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, kept[1], wires)
+        self._sensors = wiring.sensors_of(scenario, wires)
+        self._faults = wiring.faults_of(scenario, self._plant, self._sensors, supervision.groups)
         # The loop has bare addresses of its functions: they are held for as long as it is.
         self._functions = matching(
             self.law, ALLOCATIONS[scenario.allocation], estimator.step if estimator else None
@@ -95,7 +111,7 @@ class Machine:
             self._functions.allocate,
             self._functions.estimate,
             self._controller,
-            assembly.sensors_of(scenario),
+            self._sensors,
             self._plant,
             assembly.places_of(self.signals, self.law),
             loops.Scratch(np.empty((3, 3)), np.empty((3, 3))),
@@ -106,6 +122,15 @@ class Machine:
     def q_rad(self) -> NDArray[np.float64]:
         """Hinge angles now, (3,) in rad."""
         return self._moving.stepped.q.copy()
+
+    @property
+    def reason(self) -> Reason:
+        """Why a watchdog has taken the currents away, if one has."""
+        return REASONS[int(self._controller.supervision.watchdog.reason[0])]
+
+    def strike(self, tick: int) -> int:
+        """Let the faults act that are due at a control tick; returns the next one at which others may."""
+        return self._faults.strike(tick)
 
     def run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
         """Run a control tick for each row of `log`: rows written, and the code of a status."""
@@ -122,7 +147,9 @@ class Machine:
         law = own_law or self._law_for(scenario)
         made = Machine(scenario, files, law, moving)
         made._plant.current[:] = self._plant.current
-        drivings.carried_on(self._plant.driving, made._plant.driving)
+        drivings.carried_on(self._plant.driving, made._plant.driving, self._plant.current)
+        senses.carried_on(self._sensors, made._sensors)
+        _supervised_on(self._controller.supervision, made._controller.supervision)
         if made.law is self.law:
             made._controller.parameters[:] = self._controller.parameters
         memory = made._controller.memory
@@ -151,6 +178,10 @@ class Machine:
             memory=controller.memory.copy(),
             belief=beliefs.state_of(controller.belief),
             estimates=controller.estimates.memory.copy(),
+            sensing=senses.state_of(self._sensors),
+            groups=groups.state_of(controller.supervision.groups),
+            detector=detector.state_of(controller.supervision.detector),
+            watchdog=watchdog.state_of(controller.supervision.watchdog),
         )
 
     def restore(self, state: State) -> None:
@@ -169,6 +200,8 @@ class Machine:
         _check_length("the law's memory", state.memory, own.memory)
         _check_length("what the controller believes", state.belief, own.belief)
         _check_length("the estimator's memory", state.estimates, own.estimates)
+        _check_length("the sensors' state", state.sensing, own.sensing)
+        _check_length("the groups", state.groups, own.groups)
         self._moving.rotor.restore(state.rotor)
         self._plant.current[:] = state.current
         drivings.restore(self._plant.driving, state.driving)
@@ -176,6 +209,10 @@ class Machine:
         self._controller.memory[:] = state.memory
         beliefs.restore(self._controller.belief, state.belief)
         self._controller.estimates.memory[:] = state.estimates
+        senses.restore(self._sensors, state.sensing)
+        groups.restore(self._controller.supervision.groups, state.groups)
+        detector.restore(self._controller.supervision.detector, state.detector)
+        watchdog.restore(self._controller.supervision.watchdog, state.watchdog)
 
 
 def _started(scenario: Scenario, files: Files) -> Moving:
@@ -190,6 +227,13 @@ def _carried_on(moving: Moving, scenario: Scenario, files: Files) -> Moving:
     if len(rotor.state()) == len(state):  # else a body has come or gone: pose and rates are what remains
         rotor.restore(state)
     return Moving(rotor, stepped)
+
+
+def _supervised_on(before: Supervision, after: Supervision) -> None:
+    """Go on with what was seen before, under other figures."""
+    groups.restore(after.groups, groups.state_of(before.groups))
+    detector.restore(after.detector, detector.state_of(before.detector))
+    watchdog.restore(after.watchdog, watchdog.state_of(before.watchdog))
 
 
 def _array(values: Triple | None) -> NDArray[np.float64]:

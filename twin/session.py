@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
 from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown
@@ -27,7 +28,7 @@ from spheretwin.twin import loop as loops
 from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.in_force import at_start
 from spheretwin.twin.machine import Machine
-from spheretwin.twin.scenario.changing import is_fixed
+from spheretwin.twin.scenario.changing import from_now_on, is_fixed
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain, is_dotted
 from spheretwin.twin.scenario.sections import OwnPath, Scenario
@@ -83,7 +84,7 @@ class Session:
         self._in_force = at_start(scenario, law, trajectory)
         self.begun_as = self.scenario
         self._planned = planned(self.begun_as)
-        self._exogenous = Exogenous(self.scenario, self._in_force.own_trajectory)
+        self._exogenous = self._outside()
         self._machine = Machine(self.scenario, self._in_force.files, self._in_force.law)
         self._seen = with_more({}, self.signals)
         self._check_plan()
@@ -103,6 +104,11 @@ class Session:
     def status(self) -> Status:
         """``running``, or why the run can go on no further, as ``left_workspace`` or ``diverged``."""
         return self._status
+
+    @property
+    def reason(self) -> Reason:
+        """Why the currents were taken away, by a watchdog or a coil that is too hot, if they were."""
+        return self._machine.reason
 
     @property
     def t_s(self) -> float:
@@ -178,7 +184,8 @@ class Session:
         Parameters
         ----------
         name : str
-            Dotted, as ``disturbance.load``.
+            Dotted, as ``disturbance.load``; ``fault`` with a mapping adds a fault, from now on unless it says
+            when.
         value : any
             Checked as a scenario is; for ``controller.law`` also a `Law`. A law that stays keeps its memory,
             also with other gains, unless these make the memory longer or shorter: then it begins anew.
@@ -197,6 +204,7 @@ class Session:
                 raise InputError(f"session: expected a field that may change during a run, received {name}")
             if isinstance(value, Law) and name != "controller.law":
                 raise InputError(f"session: expected a law for controller.law, received one for {name}")
+            value = from_now_on(name, value, self.t_s)
             with self._all_or_nothing():
                 self._change(name, value)
             self.journal += (Change(self.tick, name, _recorded(value)),)
@@ -283,7 +291,9 @@ class Session:
         done = 0
         while done < len(log) and self._status == Status.RUNNING:
             try:
-                inputs = self._exogenous.rows(self.tick, self._most(len(log) - done))
+                until = self._machine.strike(self.tick)
+                most = min(self._most(len(log) - done), until - self.tick)
+                inputs = self._exogenous.rows(self.tick, most)
             except InputError:
                 if done:  # first hand over what there is; the next call will say it
                     break
@@ -297,6 +307,9 @@ class Session:
             if self.signals != before:
                 break
         return done
+
+    def _outside(self) -> Exogenous:
+        return Exogenous(self.scenario, self._in_force.own_trajectory, len(self.actuator.groups))
 
     def _waiting(self) -> tuple[Change, ...]:
         return self._planned[len(self.events) :]
@@ -377,7 +390,7 @@ class Session:
         self.begun_as, self._planned = snapshot.begun_as, planned(snapshot.begun_as)
         self.tick, self._status = snapshot.tick, snapshot.status
         self.journal, self.events = snapshot.journal, snapshot.events
-        self._exogenous = Exogenous(self.scenario, self._in_force.own_trajectory)
+        self._exogenous = self._outside()
         self._exogenous.restore(snapshot.exogenous)
 
 

@@ -17,6 +17,7 @@ from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, allocated
+from spheretwin.twin.faults.told import FaultLines
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.session import Session
 from spheretwin.twin.trajectories.trajectory import Sampled
@@ -144,13 +145,16 @@ def follow(
     session.check_horizon(_known_to(ticks, waiting))
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
-    noted = _note_events(session, 0, sinks)
+    noted, told = _note_events(session, 0, sinks), FaultLines()
     while session.tick < ticks and session.status == Status.RUNNING and not stop_requested():
         _make(session, ticks, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
         rows = _advance(session, last, log)
+        lines = told.of(rows)
         for sink in sinks:
             sink.write(rows)
+            for t_s, text in lines:
+                sink.note(t_s, text)
         noted = _note_events(session, noted, sinks)
         if live:
             _sleep_until(started + session.t_s - first)

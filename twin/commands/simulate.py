@@ -187,4 +187,5 @@ def _ending(session: Session, status: str, planned_s: float) -> str:
         return f"the run ended before its first tick was complete: {status}"
     angles = np.degrees(session.q_rad)
     pose = ", ".join(f"{name} {angle:.1f}°" for name, angle in zip("αβγ", angles, strict=True))
-    return f"the run ended at {session.t_s:.3f} s of {planned_s:g} s: {status} ({pose})"
+    why = f", {session.reason.told}" if session.reason else ""
+    return f"the run ended at {session.t_s:.3f} s of {planned_s:g} s: {status}{why} ({pose})"

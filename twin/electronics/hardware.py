@@ -15,6 +15,7 @@ PROTOTYPE_SENSORS: dict[str, Any] = {
     "sensors.adc.noise_V": 5 / 2**16,  # 1 LSB
     "sensors.adc.oversampling": 1,
     "sensors.encoder.counts": 2000,
+    "sensors.current.noise_A": 0.02,  # assumed: a Hall sensor's
 }
 """Values by dotted name."""
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.copying import copy_into
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
-from spheretwin.twin.electronics.driving.chain import Driving
-from spheretwin.twin.electronics.driving.stages import Lag, advance_currents, begin, end
+from spheretwin.twin.electronics.driving.stages import Stages, advance_currents, begin, end
 from spheretwin.twin.plant.friction import Friction, friction_torque
 from spheretwin.twin.plant.stepping import step
 
@@ -28,7 +27,7 @@ class Plant(NamedTuple):
     rotor: Any  # what compiled code steps, as the engine's row says
     magnetics: TorqueModel  # true
     kept: KeptMatrix
-    driving: Lag | Driving
+    driving: Stages
     friction: Friction
     group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
@@ -39,6 +38,10 @@ class Plant(NamedTuple):
     pulling: NDArray[np.float64]  # (n,) A, the same times the gain
     friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, in the physics step
     first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
+    draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and of sensors of currents
+    current_noise_A: float
+    marks: NDArray[np.float64]  # of every part that may fail: the number of its mode, or 0
+    began_s: NDArray[np.float64]  # (n,) when the last fault of each group began, s; below 0 where none has
 
 
 class Delivered(NamedTuple):

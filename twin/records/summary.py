@@ -24,6 +24,7 @@ OwnMetric = Callable[[Run], Any]
 BESIDE = (
     "scenario",
     "status",
+    "reason",
     "simulated_s",
     "wall_s",
     "realtime_factor",
@@ -143,6 +144,7 @@ def summary(
     return {
         "scenario": scenario.model_dump(mode="json"),
         "status": status,
+        "reason": session.reason.told if session.reason else None,
         "simulated_s": simulated_s,
         **figures,
         "wall_s": wall_s,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -34,11 +35,25 @@ FIXED = (
 )
 
 
+FAULT = "fault"
+
+
+def is_one_fault(dotted: str, value: Any) -> bool:
+    """Whether a change adds a fault to those that are planned."""
+    return dotted == FAULT and isinstance(value, Mapping)
+
+
+def from_now_on(dotted: str, value: Any, t_s: float) -> Any:
+    """Value of a change at a time: a fault that does not say when it starts does so then."""
+    return {"start_s": t_s, **value} if is_one_fault(dotted, value) else value
+
+
 def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = None) -> Scenario:
     """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
 
     Another member of a family, as another law, keeps the fields that it has too; its own have their defaults.
-    What files of trajectories and disturbances held stays, unless it is they that are changed.
+    One table for the list of faults is one more of them. What files of trajectories and disturbances held
+    stays, unless it is they that are changed.
 
     Parameters
     ----------
@@ -65,7 +80,7 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
     # A user's law stays the one that was read, whatever has become of its file.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
     _keep_common(fields, dotted, value, kind, scenario)
-    override(fields, dotted, value)
+    override(fields, dotted, [*fields[FAULT], value] if is_one_fault(dotted, value) else value)
     chosen = None if dotted == "controller" else kind
     made = validated(beside("", fields), source or scenario.name, chosen)
     if "trajectory" in untouched:

@@ -15,9 +15,18 @@ PROTOTYPE_BEARINGS: dict[str, Any] = {
 # The prototype's software is not described: rates are estimated by the filter of least noise for its lag.
 PROTOTYPE_ESTIMATOR: dict[str, Any] = {"estimator.kind": "kalman"}
 
+# Assumed: a laboratory does not run such a machine without one.
+PROTOTYPE_WATCHDOG: dict[str, Any] = {"watchdog.on": True}
+
 HARDWARE: dict[str, dict[str, Any]] = {
     "ideal": {},
-    "prototype": {**PROTOTYPE_SENSORS, **PROTOTYPE_DRIVE, **PROTOTYPE_BEARINGS, **PROTOTYPE_ESTIMATOR},
+    "prototype": {
+        **PROTOTYPE_SENSORS,
+        **PROTOTYPE_DRIVE,
+        **PROTOTYPE_BEARINGS,
+        **PROTOTYPE_ESTIMATOR,
+        **PROTOTYPE_WATCHDOG,
+    },
 }
 """Fields by dotted name that a set gives a value to; each of them can be set alone as well."""
 

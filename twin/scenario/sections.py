@@ -13,10 +13,13 @@ from spheretwin.control.estimation.registry import AnyEstimator
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
 from spheretwin.control.parts.parameters import LARGEST, ControllerSection, NonNegative, Positive
+from spheretwin.control.supervision.detector import DetectorSection
+from spheretwin.control.supervision.watchdog import WatchdogSection
 from spheretwin.twin.disturbances.disturbance import Disturbance
 from spheretwin.twin.electronics.driving.delay import delay
 from spheretwin.twin.electronics.driving.sections import DriveSection
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
+from spheretwin.twin.faults.fault import Fault
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.trajectories.registry import Trajectory
@@ -178,6 +181,9 @@ class Scenario(_Section):
     plant: Plant = Plant()
     drive: DriveSection = DriveSection()
     disturbance: Disturbance = Disturbance()
+    fault: tuple[Fault, ...] = Field((), description="what fails, [[fault]] each")
+    detector: DetectorSection = DetectorSection()
+    watchdog: WatchdogSection = WatchdogSection()
     event: tuple[Event, ...] = Field((), description="changes on the way, [[event]] each")
 
     @model_validator(mode="after")
@@ -200,6 +206,34 @@ class Scenario(_Section):
             )
         return self
 
+    @model_validator(mode="after")
+    def _faults_fit(self) -> Scenario:
+        for place, fault in enumerate(self.fault):
+            if fault.kind.needs_supply and self.drive.supply_V is None:
+                raise ValueError(
+                    f"fault.{place}: expected drive.supply_V for a fault of {fault.target}, received none"
+                )
+            step_s = {"adc": self.controller.period_s, "controller": self.plant.step_s}.get(fault.kind.name)
+            if fault.mode == "delay" and step_s is not None:
+                _check_late(f"fault.{place}.value", fault.number, step_s, self.controller.period_s)
+        return self
+
+    @property
+    def detects(self) -> bool:
+        """Whether the controller looks for groups that do not follow."""
+        return self.detector.detect or any(fault.detect for fault in self.fault)
+
+    @property
+    def draws_for_faults(self) -> bool:
+        """Whether faults, or what looks for them, have noise."""
+        noisy = any(fault.mode == "noise" for fault in self.fault)
+        return noisy or (self.detects and self.sensors.current.noise_A > 0)
+
+    @property
+    def supervises_groups(self) -> bool:
+        """Whether groups may fail, or are looked after."""
+        return bool(self.fault) or self.detects
+
     @property
     def ticks(self) -> int:
         """Control ticks of the run."""
@@ -209,3 +243,12 @@ class Scenario(_Section):
     def substeps(self) -> int:
         """Physics steps in a control period."""
         return round(self.controller.period_s / self.plant.step_s)
+
+
+def _check_late(name: str, delay_s: float, step_s: float, period_s: float) -> None:
+    steps = delay_s / step_s
+    if abs(steps - round(steps)) > WHOLE * max(steps, 1) or delay_s > MOST_DELAY * period_s:
+        raise ValueError(
+            f"expected {name} a whole multiple of {step_s!r} s, at most {MOST_DELAY} control periods,"
+            f" received {delay_s!r} s"
+        )

@@ -171,8 +171,11 @@ def restore(driving: Driving, state: Array) -> None:
 
 
 def carried_on(before: Driving, after: Driving) -> None:
-    """Go on as before with other figures; commands on their way stay where the delay does."""
-    if before.delay.ring.shape == after.delay.ring.shape:
-        after.delay.ring[:], after.delay.newest[:] = before.delay.ring, before.delay.newest
+    """Go on as before with other figures; where more commands are kept now, the oldest repeats."""
+    was, now = before.delay, after.delay
+    rows = len(was.ring)
+    for ago in range(len(now.ring)):
+        now.ring[-1 - ago] = was.ring[(was.newest[0] - min(ago, rows - 1)) % rows]
+    now.newest[0] = len(now.ring) - 1
     after.coil.temperature_degC[:] = before.coil.temperature_degC
     settle_resistance(after.coil)

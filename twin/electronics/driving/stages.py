@@ -1,6 +1,6 @@
-"""One name for what comes between commands and currents, whether it is a plain lag or the prototype's chain.
+"""One name for what comes between commands and currents: a plain lag, the whole chain, or it with faults.
 
-As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
+As `plant.stepping` does for engines: the loop is compiled for one of them, and the others are not compiled.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.twin.electronics.driving import chain
+from spheretwin.twin.electronics.driving import chain, faulty
 from spheretwin.twin.electronics.driving.chain import Driving
+from spheretwin.twin.electronics.driving.faulty import DriveFaults, FaultyDriving
 from spheretwin.twin.electronics.driving.lag import Drive, advance, drive
 from spheretwin.twin.electronics.driving.sections import DriveSection
 
@@ -47,43 +48,79 @@ def _lag_tells(driving: Any, row: Any) -> None:
     pass
 
 
-_BEGIN: dict[type, Any] = {Lag: _lag_begins, Driving: chain.begin}
-_ADVANCE: dict[type, Any] = {Lag: _lag_advances, Driving: chain.advance}
-_END: dict[type, Any] = {Lag: _lag_ends, Driving: chain.end}
-_TELL: dict[type, Any] = {Lag: _lag_tells, Driving: chain.tell}
+Stages = Lag | Driving | FaultyDriving
+
+_BEGIN: dict[type, Any] = {Lag: _lag_begins, Driving: chain.begin, FaultyDriving: faulty.begin}
+_ADVANCE: dict[type, Any] = {Lag: _lag_advances, Driving: chain.advance, FaultyDriving: faulty.advance}
+_END: dict[type, Any] = {Lag: _lag_ends, Driving: chain.end, FaultyDriving: faulty.end}
+_TELL: dict[type, Any] = {Lag: _lag_tells, Driving: chain.tell, FaultyDriving: faulty.tell}
 
 
-def made(section: DriveSection, step_s: float, substeps: int, groups: int, seed: int) -> Lag | Driving:
-    """What a resolved section asks for, at rest."""
+def made(
+    section: DriveSection,
+    step_s: float,
+    substeps: int,
+    groups: int,
+    seed: int,
+    faults: DriveFaults | None = None,
+    most_late_steps: int = 0,
+) -> Stages:
+    """What a resolved section asks for, at rest.
+
+    Parameters
+    ----------
+    section, step_s, substeps, groups, seed
+        As `chain.driving` has them.
+    faults : DriveFaults, optional
+        Where something may fail.
+    most_late_steps : int
+        Physics steps that a fault may delay a command by.
+    """
+    if faults is not None:
+        return faulty.faulty_driving(
+            chain.driving(section, step_s, substeps, groups, seed), faults, most_late_steps
+        )
     if section.supply_V is None and not section.converts:
         return Lag(drive(section.time_constant_s or 0.0, step_s, section.current_limit_A or 0.0))
     return chain.driving(section, step_s, substeps, groups, seed)
 
 
-def state_of(driving: Lag | Driving) -> NDArray:
+def state_of(driving: Stages) -> NDArray:
     """All that it goes on from, beside the currents."""
-    return np.empty(0) if isinstance(driving, Lag) else chain.state_of(driving)
+    if isinstance(driving, Lag):
+        return np.empty(0)
+    return faulty.state_of(driving) if isinstance(driving, FaultyDriving) else chain.state_of(driving)
 
 
-def restore(driving: Lag | Driving, state: NDArray) -> None:
+def restore(driving: Stages, state: NDArray) -> None:
     """Go on from a state of one of the same size."""
-    if isinstance(driving, Driving):
+    if isinstance(driving, FaultyDriving):
+        faulty.restore(driving, state)
+    elif isinstance(driving, Driving):
         chain.restore(driving, state)
 
 
-def carried_on(before: Lag | Driving, after: Lag | Driving) -> None:
-    """Go on as before with other figures."""
-    if isinstance(before, Driving) and isinstance(after, Driving):
-        chain.carried_on(before, after)
+def carried_on(before: Stages, after: Stages, current: NDArray) -> None:
+    """Go on as before with other figures, from currents (n,), A."""
+    healthy, now = _healthy(before), _healthy(after)
+    if isinstance(healthy, Driving) and isinstance(now, Driving):
+        chain.carried_on(healthy, now)
+    if isinstance(after, FaultyDriving):
+        # What was asked for last, where that is known.
+        after.faults.last_A[:] = before.faults.last_A if isinstance(before, FaultyDriving) else current
 
 
-def begin(driving: Lag | Driving, command: NDArray) -> None:
+def _healthy(driving: Stages) -> Lag | Driving:
+    return driving.driving if isinstance(driving, FaultyDriving) else driving
+
+
+def begin(driving: Stages, command: NDArray) -> None:
     """Take the commands (n,), A, of a control period."""
     _BEGIN[type(driving)](driving, command)
 
 
 def advance_currents(
-    driving: Lag | Driving,
+    driving: Stages,
     command: NDArray,
     substep: int,
     q: NDArray,
@@ -97,12 +134,12 @@ def advance_currents(
     _ADVANCE[type(driving)](driving, command, substep, q, qdot, G, gain, current, mean)
 
 
-def end(driving: Lag | Driving) -> bool:
+def end(driving: Stages) -> bool:
     """End a control period; whether the amplifiers may go on."""
     return bool(_END[type(driving)](driving))
 
 
-def tell(driving: Lag | Driving, row: NDArray) -> None:
+def tell(driving: Stages, row: NDArray) -> None:
     """Write what the telemetry says of the control period; a lag says nothing."""
     _TELL[type(driving)](driving, row)
 

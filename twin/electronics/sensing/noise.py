@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-STAGE = 3
-"""Of the streams: ``SeedSequence([seed, STAGE, block of columns])``."""
+STAGE, FAULTS = 3, 4
+"""Of the streams, of the sensors and of faults: ``SeedSequence([seed, stage, block of columns])``."""
 
 # The generator counts in blocks of four numbers, of which a tick takes one.
 NUMBERS_A_COUNT = 4
 
 
-def noise_rows(seed: int, first: int, ticks: int, width: int) -> NDArray[np.float64]:
+def noise_rows(seed: int, first: int, ticks: int, width: int, stage: int = STAGE) -> NDArray[np.float64]:
     """Standard normal numbers at consecutive control ticks.
 
     A stream of its own for every four columns, counted by tick: each number depends on seed, tick and column
@@ -30,6 +30,8 @@ def noise_rows(seed: int, first: int, ticks: int, width: int) -> NDArray[np.floa
         How many.
     width : int
         Numbers a tick.
+    stage : int
+        Whose streams.
 
     Returns
     -------
@@ -38,7 +40,7 @@ def noise_rows(seed: int, first: int, ticks: int, width: int) -> NDArray[np.floa
     """
     rows = np.empty((ticks, width))
     for block, column in enumerate(range(0, width, NUMBERS_A_COUNT)):
-        counted = np.random.Philox(np.random.SeedSequence([seed, STAGE, block])).advance(first)
+        counted = np.random.Philox(np.random.SeedSequence([seed, stage, block])).advance(first)
         uniform = np.random.Generator(counted).random((ticks, NUMBERS_A_COUNT))
         rows[:, column : column + NUMBERS_A_COUNT] = _normal(uniform)[:, : width - column]
     return rows

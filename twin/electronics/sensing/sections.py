@@ -3,6 +3,7 @@
 from pydantic import BaseModel, Field
 
 from spheretwin.twin.electronics.sensing.adc import AdcSection
+from spheretwin.twin.electronics.sensing.current import CurrentSection
 from spheretwin.twin.electronics.sensing.encoder import EncoderSection
 from spheretwin.twin.electronics.sensing.potentiometer import PotentiometerSection
 from spheretwin.twin.trajectories.trajectory import CONFIG, Triple
@@ -19,6 +20,7 @@ class SensorsSection(BaseModel):
     potentiometer: PotentiometerSection = PotentiometerSection()
     adc: AdcSection = AdcSection()
     encoder: EncoderSection = EncoderSection()
+    current: CurrentSection = CurrentSection()
 
     @property
     def ideal(self) -> bool:

@@ -1,6 +1,6 @@
-"""One name for what comes between the joints and the controller: nothing, or the prototype's sensors.
+"""One name for what comes between the joints and the controller: nothing, sensors, or sensors with faults.
 
-As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
+As `plant.stepping` does for engines: the loop is compiled for one of them, and the others are not compiled.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from collections.abc import Callable
 from math import isfinite
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.twin.electronics.sensing import chain
+from spheretwin.twin.electronics.sensing import chain, faulty
 from spheretwin.twin.electronics.sensing.chain import Sensing
+from spheretwin.twin.electronics.sensing.faulty import FaultySensing, SensorFaults
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
 
 
@@ -33,15 +35,36 @@ def _exactly(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> b
     return finite
 
 
-_SENSE: dict[type, Any] = {Exact: _exactly, Sensing: chain.sense}
+Sensors = Exact | Sensing | FaultySensing
+
+_SENSE: dict[type, Any] = {Exact: _exactly, Sensing: chain.sense, FaultySensing: faulty.sense}
 
 
-def made(section: SensorsSection, seed: int) -> Exact | Sensing:
-    """What a section asks for, with the errors that the seed gives it."""
+def made(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> Sensors:
+    """What a section asks for, with the errors that the seed gives it, and the faults that may come."""
+    if faults is not None:
+        return FaultySensing(chain.sensing(section, seed), faults)
     return Exact(2) if section.ideal else chain.sensing(section, seed)
 
 
-def sense(sensing: Exact | Sensing, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:
+def state_of(sensing: Sensors) -> NDArray:
+    """All that they go on from."""
+    return faulty.state_of(sensing) if isinstance(sensing, FaultySensing) else np.empty(0)
+
+
+def restore(sensing: Sensors, state: NDArray) -> None:
+    """Go on from a state of sensors of the same size."""
+    if isinstance(sensing, FaultySensing):
+        faulty.restore(sensing, state)
+
+
+def carried_on(before: Sensors, after: Sensors) -> None:
+    """Go on as before with other figures."""
+    if isinstance(before, FaultySensing) and isinstance(after, FaultySensing):
+        faulty.carried_on(before, after)
+
+
+def sense(sensing: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:
     """Write measured angles and true rates into a measurement (3, 3), as `chain.sense` does."""
     return bool(_SENSE[type(sensing)](sensing, q, qdot, noise, measurement))
 

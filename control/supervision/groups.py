@@ -1,0 +1,61 @@
+"""Coil groups that the allocation leaves out: those it was told of, and those that a detector found."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import allocation_free
+
+IN_USE, TOLD, FOUND_OPEN, FOUND_SHORTED = 0, 1, 2, 3
+"""How a group stands."""
+
+
+class Groups(NamedTuple):
+    """Which groups may be used, for compiled code."""
+
+    some_out: NDArray[np.bool_]  # (1,)
+    out: NDArray[np.int64]  # (n,) `IN_USE`, or why it is not
+    out_s: NDArray[np.float64]  # (n,) since when, s; without meaning for a group in use
+    G: NDArray[np.float64]  # (3, n) N·m/A, torque matrix without the columns of those that are out
+
+
+def groups(count: int) -> Groups:
+    """All in use."""
+    return Groups(
+        np.zeros(1, dtype=np.bool_), np.zeros(count, dtype=np.int64), np.zeros(count), np.zeros((3, count))
+    )
+
+
+def tell(groups: Groups, told: NDArray[np.bool_], t_s: float) -> None:
+    """Leave out the groups (n,) that are known to fail, from a time on, and use again those that no more do.
+
+    What a detector has found stays out: it cannot tell that a group works which it does not use.
+    """
+    new, healed = told & (groups.out == IN_USE), ~told & (groups.out == TOLD)
+    groups.out[new], groups.out_s[new] = TOLD, t_s
+    groups.out[healed] = IN_USE
+    groups.some_out[0] = np.any(groups.out != IN_USE)
+
+
+@allocation_free
+def leave_out(groups: Groups, G: NDArray[np.float64]) -> None:
+    """Copy a torque matrix (3, n), with nothing in the columns of the groups that are out."""
+    for j in range(groups.out.shape[0]):
+        used = groups.out[j] == IN_USE
+        for i in range(3):
+            groups.G[i, j] = G[i, j] if used else 0.0
+
+
+def state_of(groups: Groups) -> NDArray[np.float64]:
+    """All that they go on from."""
+    return np.concatenate([groups.out.astype(np.float64), groups.out_s])
+
+
+def restore(groups: Groups, state: NDArray[np.float64]) -> None:
+    """Go on from a state of as many."""
+    count = len(groups.out)
+    groups.out[:], groups.out_s[:] = state[:count].astype(np.int64), state[count:]
+    groups.some_out[0] = np.any(groups.out != IN_USE)

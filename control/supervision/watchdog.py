@@ -1,0 +1,217 @@
+"""The watchdog: looks at each measurement and command, and takes the currents away where one cannot be true.
+
+It trips for one of the reasons below, once. From then on all commands are 0 A, or the drive shorts the coils
+so that their back-EMF brakes the rotor; after a stated time more the run ends. The law is not called again.
+
+*Jump.* No angle moves further in a control period than the largest rate takes it, plus what noise and
+resolution of its sensor add: six standard deviations of the difference of two samples, and one step. Where
+samples were missing, the time since the last one counts.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from math import isfinite, sqrt
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin.models.base.compiled import allocation_free
+
+Array = NDArray[np.float64]
+
+DEVIATIONS = 6.0
+
+
+class Reason(IntEnum):
+    """Why it tripped; the telemetry has the number, a summary the text."""
+
+    told: str
+
+    def __new__(cls, code: int, told: str) -> Reason:
+        """Number with its text."""
+        reason = int.__new__(cls, code)
+        reason._value_ = code
+        reason.told = told
+        return reason
+
+    NONE = 0, "nothing"
+    STALE = 1, "no fresh measurement"
+    JUMP = 2, "a measurement jumped further than the rotor can"
+    MEASUREMENT = 3, "a measurement is no number"
+    COMMAND = 4, "a command is no number"
+    TEMPERATURE = 5, "a coil is too hot"
+    SPEED = 6, "the rotor is too fast"
+    EDGE = 7, "the rotor is at the edge of its workspace"
+
+
+REASONS = {int(reason): reason for reason in Reason}
+"""By number."""
+
+GO, RELEASE, SHORT = 0, 1, 2
+"""What the drive is told: go on, no currents, shorted coils."""
+
+_STALE, _JUMP, _MEASUREMENT, _SPEED, _EDGE = (
+    int(Reason.STALE),
+    int(Reason.JUMP),
+    int(Reason.MEASUREMENT),
+    int(Reason.SPEED),
+    int(Reason.EDGE),
+)
+
+
+class WatchdogSection(BaseModel):
+    """Watchdog of the controller; off unless asked for."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    on: bool = Field(False, description="whether there is one (prototype: assumed)")
+    action: Literal["release", "short"] = Field(
+        "release",
+        description="what it does: release the rotor (currents to zero), or short the coils (brake)",
+    )
+    rundown_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        0.05, description="time that the run goes on afterwards, s (assumed)"
+    )
+    stale_ticks: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
+        5, description="control ticks in a row without a fresh measurement of an angle (assumed)"
+    )
+    largest_rate_rad_s: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
+        60.0, description="rate of a hinge that the rotor cannot have, rad/s (assumed; the nutation has 7)"
+    )
+    edge_margin_rad: Annotated[float, Field(ge=-10, le=10)] = Field(
+        0.02, description="how far from the end of a hinge's range it must stay, rad (assumed)"
+    )
+
+
+class Watchdog(NamedTuple):
+    """Watchdog of a run, for compiled code."""
+
+    on: bool
+    action: int
+    rundown_ticks: int
+    stale_ticks: int
+    largest_rate_rad_s: float
+    step_rad: float  # that the largest rate takes an angle in a control period
+    noise_rad: Array  # (3,) that two samples may differ by besides
+    lowest_rad: Array  # (3,)
+    highest_rad: Array  # (3,)
+    fresh: Array  # (3,) 1 where the measurement of an angle is new, 0 where it is the last one again
+    last_rad: Array  # (3,) last fresh measurement; no number before the first
+    missing: NDArray[np.int64]  # (3,) ticks since then
+    halt: NDArray[np.int64]  # (1,) `GO`, `RELEASE` or `SHORT`: the drive reads it
+    reason: NDArray[np.int64]  # (1,)
+    since: NDArray[np.int64]  # (1,) ticks since it tripped
+
+
+class Watched(NamedTuple):
+    """What a watchdog reckons with of the sensors and the rotor."""
+
+    period_s: float
+    noise_rad: Array  # (3,) standard deviation of each measured angle
+    quantum_rad: Array  # (3,)
+    hinge_range_rad: Array  # (3, 2) nominal
+
+
+def watchdog(section: WatchdogSection, watched: Watched, fresh: Array, halt: NDArray[np.int64]) -> Watchdog:
+    """Watchdog that has seen nothing yet.
+
+    Parameters
+    ----------
+    section : WatchdogSection
+    watched : Watched
+    fresh : (3,) array
+        The sensors write into it.
+    halt : (1,) array
+        The drive reads it.
+    """
+    low, high = watched.hinge_range_rad.T
+    return Watchdog(
+        on=section.on,
+        action=SHORT if section.action == "short" else RELEASE,
+        rundown_ticks=round(section.rundown_s / watched.period_s),
+        stale_ticks=section.stale_ticks,
+        largest_rate_rad_s=section.largest_rate_rad_s,
+        step_rad=section.largest_rate_rad_s * watched.period_s,
+        noise_rad=DEVIATIONS * sqrt(2) * watched.noise_rad + watched.quantum_rad,
+        lowest_rad=low + section.edge_margin_rad,
+        highest_rad=high - section.edge_margin_rad,
+        fresh=fresh,
+        last_rad=np.full(3, np.nan),
+        missing=np.zeros(3, dtype=np.int64),
+        halt=halt,
+        reason=np.zeros(1, dtype=np.int64),
+        since=np.zeros(1, dtype=np.int64),
+    )
+
+
+@allocation_free
+def watch(watchdog: Watchdog, angle: Array, rate: Array) -> None:
+    """Look at the finite angles (3,), rad, and the rates (3,), rad/s, that the law is to be handed."""
+    for i in range(3):
+        if watchdog.fresh[i] == 0.0:
+            watchdog.missing[i] += 1
+            if watchdog.missing[i] >= watchdog.stale_ticks:
+                trip(watchdog, _STALE)
+            continue
+        if not isfinite(rate[i]):
+            rate[i] = 0.0  # telemetry holds numbers
+            trip(watchdog, _MEASUREMENT)
+        # A first measurement is compared with no number, which nothing exceeds.
+        moved = abs(angle[i] - watchdog.last_rad[i])
+        if moved > watchdog.step_rad * (watchdog.missing[i] + 1) + watchdog.noise_rad[i]:
+            trip(watchdog, _JUMP)
+        if abs(rate[i]) > watchdog.largest_rate_rad_s:
+            trip(watchdog, _SPEED)
+        if angle[i] < watchdog.lowest_rad[i] or angle[i] > watchdog.highest_rad[i]:
+            trip(watchdog, _EDGE)
+        watchdog.last_rad[i], watchdog.missing[i] = angle[i], 0
+
+
+@allocation_free
+def mend(watchdog: Watchdog, measurement: Array) -> bool:
+    """Put the last angle, and no rate, in the places of a measurement (3, 3) that hold no number, and trip.
+
+    Returns
+    -------
+    bool
+        Whether there is a watchdog to do so.
+    """
+    if not watchdog.on:
+        return False
+    for i in range(3):
+        if not (isfinite(measurement[0, i]) and isfinite(measurement[1, i])):
+            measurement[0, i] = watchdog.last_rad[i] if isfinite(watchdog.last_rad[i]) else 0.0
+            measurement[1, i] = 0.0
+            trip(watchdog, _MEASUREMENT)
+    return True
+
+
+@allocation_free
+def trip(watchdog: Watchdog, reason: int) -> None:
+    """Take the currents away for a reason; a second one changes nothing."""
+    if watchdog.halt[0] == GO:
+        watchdog.halt[0], watchdog.reason[0] = watchdog.action, reason
+
+
+@allocation_free
+def over(watchdog: Watchdog) -> bool:
+    """Whether a tick was the last one, as it has tripped so long ago; counts the tick."""
+    if watchdog.halt[0] == GO:
+        return False
+    watchdog.since[0] += 1
+    return watchdog.since[0] > watchdog.rundown_ticks
+
+
+def state_of(watchdog: Watchdog) -> Array:
+    """All that it goes on from."""
+    counts = [watchdog.missing, watchdog.halt, watchdog.reason, watchdog.since]
+    return np.concatenate([watchdog.last_rad, *counts], dtype=np.float64)
+
+
+def restore(watchdog: Watchdog, state: Array) -> None:
+    """Go on from a state."""
+    watchdog.last_rad[:], watchdog.missing[:] = state[:3], state[3:6].astype(np.int64)
+    watchdog.halt[0], watchdog.reason[0], watchdog.since[0] = state[6:].astype(np.int64)

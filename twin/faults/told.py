@@ -1,0 +1,60 @@
+"""What a log says of faults: when parts fail and work again, when groups are left out, and why a run stops."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD
+from spheretwin.control.supervision.watchdog import REASONS
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.faults.fault import MODES
+
+Line = tuple[float, str]
+"""Simulated time in s, text."""
+
+_OUT = {
+    IN_USE: "in use again",
+    TOLD: "known to be out",
+    FOUND_OPEN: "found open",
+    FOUND_SHORTED: "found shorted",
+}
+
+
+class FaultLines:
+    """Finds these events in a run's telemetry, chunk by chunk."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, NDArray[np.float64]] = {}
+
+    def of(self, rows: Table) -> list[Line]:
+        """Events of one chunk, in the order of time."""
+        names = {signal.name: signal for signal in rows.signals}
+        found: list[Line] = []
+        if len(rows) and "fault" in names:
+            labels = names["fault"].labels
+            for t_s, part, mode in self._changes(rows, "fault"):
+                found.append(
+                    (t_s, f"{labels[part]} {MODES[mode - 1]}" if mode else f"{labels[part]} works again")
+                )
+            delays = rows["time_to_detection_s"]
+            for t_s, group, out in self._changes(rows, "group_out"):
+                after_s = delays[np.searchsorted(rows["t_s"], t_s), group]
+                after = f", {1e3 * after_s:.0f} ms after it failed" if out > TOLD and after_s >= 0 else ""
+                found.append((t_s, f"group {group} {_OUT[out]}{after}"))
+        if len(rows) and "failsafe_reason" in names:
+            for t_s, _, reason in self._changes(rows, "failsafe_reason"):
+                found.append((t_s, f"watchdog: {REASONS[reason].told}"))
+        return sorted(found, key=lambda line: line[0])
+
+    def _changes(self, rows: Table, name: str) -> list[tuple[float, int, int]]:
+        """Time, place and new value where a column differs from the row before; before the first it is 0."""
+        values = rows[name].reshape(len(rows), -1)
+        last = self._last.get(name, np.zeros(values.shape[1]))
+        self._last[name] = values[-1].copy()
+        before = np.concatenate([last[None], values[:-1]])
+        ticks, places = np.nonzero(values != before)
+        return [
+            (float(rows["t_s"][tick]), int(place), int(values[tick, place]))
+            for tick, place in zip(ticks, places, strict=True)
+        ]

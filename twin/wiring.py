@@ -1,0 +1,132 @@
+"""What both sides of a loop touch, and the stages that a fault can strike or that look after it."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.control.controller import Supervision
+from spheretwin.control.supervision.detector import Followed, detector
+from spheretwin.control.supervision.groups import Groups
+from spheretwin.control.supervision.groups import groups as all_in_use
+from spheretwin.control.supervision.watchdog import Watched, watchdog
+from spheretwin.models.actuator import Actuator
+from spheretwin.twin.electronics.driving import stages
+from spheretwin.twin.electronics.driving.faulty import FaultyDriving, drive_faults
+from spheretwin.twin.electronics.driving.stages import Stages
+from spheretwin.twin.electronics.sensing import stages as senses
+from spheretwin.twin.electronics.sensing.chain import reckoned
+from spheretwin.twin.electronics.sensing.faulty import FaultySensing, sensor_faults
+from spheretwin.twin.electronics.sensing.stages import Sensors
+from spheretwin.twin.faults.plan import FaultPlan, draws_width
+from spheretwin.twin.faults.target import Effects
+from spheretwin.twin.faults.work import FaultsAtWork
+from spheretwin.twin.plant.plant import Plant
+from spheretwin.twin.scenario.sections import Scenario
+
+Array = NDArray[np.float64]
+
+
+class Wires(NamedTuple):
+    """What the near and the far side of the loop both touch, beside measurements and commands."""
+
+    fresh: Array
+    """(3,) the sensors write which angles are new, a watchdog reads it."""
+    halt: NDArray[np.int64]
+    """(1,) a watchdog writes whether there shall be currents, the drive reads it."""
+    draws: Array
+    """Standard normal numbers of a tick, for faults and for the sensors of currents."""
+
+
+def wires_of(scenario: Scenario, groups: int) -> Wires:
+    """Wires of a scenario's loop."""
+    width = draws_width(groups) if scenario.draws_for_faults else 0
+    return Wires(np.ones(3), np.zeros(1, dtype=np.int64), np.zeros(width))
+
+
+def sensors_of(scenario: Scenario, wires: Wires) -> Sensors:
+    """Sensors of a scenario, with the errors that its seed gives them."""
+    if not scenario.fault:
+        return senses.made(scenario.sensors, scenario.seed)
+    most_late = sum(_delays_s(scenario, "adc")) / scenario.controller.period_s
+    faults = sensor_faults(round(most_late), wires.fresh, wires.draws)
+    return senses.made(scenario.sensors, scenario.seed, faults)
+
+
+def _delays_s(scenario: Scenario, target: str) -> list[float]:
+    """Delays that faults of a part may bring, all at once."""
+    return [each.number for each in scenario.fault if each.mode == "delay" and each.kind.name == target]
+
+
+def driving_of(scenario: Scenario, groups: int, wires: Wires) -> Stages:
+    """Drive of a resolved scenario, at rest; with what may fail where faults are planned, or a brake is."""
+    step_s, faults, most_late = scenario.plant.step_s, None, 0
+    if scenario.fault or (scenario.watchdog.on and scenario.watchdog.action == "short"):
+        faults = drive_faults(groups, wires.halt, wires.draws)
+        most_late = round(sum(_delays_s(scenario, "controller")) / step_s)
+    return stages.made(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, most_late)
+
+
+def supervision_of(scenario: Scenario, actuator: Actuator, wires: Wires) -> Supervision:
+    """What looks after the groups, the measurements and the commands.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Resolved.
+    actuator : Actuator
+        As the controller has it.
+    wires : Wires
+    """
+    groups, period_s = len(actuator.groups), scenario.controller.period_s
+    noise_rad, quantum_rad = reckoned(scenario.sensors)
+    watched = Watched(period_s, noise_rad, quantum_rad, actuator.hinge_range_rad)
+    return Supervision(
+        all_in_use(groups),
+        detector(scenario.detector, scenario.detects, groups, _followed(scenario)),
+        watchdog(scenario.watchdog, watched, wires.fresh, wires.halt),
+    )
+
+
+def _followed(scenario: Scenario) -> Followed:
+    """How well healthy currents follow, as the sheets of the drive tell it to the controller."""
+    drive, limit_A = scenario.drive, scenario.nominal.current_limit_A or 0.0
+    volts = drive.amplifier_offset_V
+    if drive.dac_bits:
+        lsb_V = 2 * drive.dac_range_V / 2**drive.dac_bits
+        volts += drive.dac_offset_V + (drive.dac_inl_lsb + 0.5) * lsb_V
+        volts += drive.dac_gain_error * limit_A / drive.transconductance_A_V
+    swing_V = inf if drive.supply_V is None else drive.supply_V - max(drive.drop_up_V, drive.drop_down_V)
+    return Followed(
+        period_s=scenario.controller.period_s,
+        current_limit_A=limit_A,
+        static_error_A=drive.transconductance_A_V * volts,
+        noise_A=scenario.sensors.current.noise_A,
+        time_constant_s=scenario.nominal.time_constant_s or 0.0,
+        swing_V=swing_V,
+        resistance_ohm=drive.resistance_ohm or 1.0,
+        inductance_H=drive.inductance_H or 1.0,
+    )
+
+
+def faults_of(scenario: Scenario, plant: Plant, sensors: Sensors, groups: Groups) -> FaultsAtWork:
+    """Faults of a scenario, and the parts of its loop that they strike."""
+    period_s, count = scenario.controller.period_s, len(plant.current)
+    plan = FaultPlan(scenario.fault, count, period_s, scenario.seed)
+    effects = None
+    if isinstance(plant.driving, FaultyDriving) and isinstance(sensors, FaultySensing):
+        track = scenario.sensors.potentiometer
+        effects = Effects(
+            drive=plant.driving.faults,
+            sensors=sensors.faults,
+            group_gain=plant.group_gain,
+            transconductance_A_V=scenario.drive.transconductance_A_V,
+            volts_per_rad=track.volts_per_rad,
+            track_V=track.supply_V,
+            period_s=period_s,
+            step_s=scenario.plant.step_s,
+        )
+    return FaultsAtWork(plan, effects, groups, plant.marks, plant.began_s)
