@@ -47,7 +47,7 @@ from spheretwin.twin.scenario.sections import OwnController, OwnPath, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.trajectories.registry import SHAPES
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, Triple
-from spheretwin.twin.wiring import Wires, driving_of
+from spheretwin.twin.wiring.wires import Wires, driving_of
 
 Array = NDArray[np.float64]
 

@@ -17,15 +17,16 @@ from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import torque_model
 from spheretwin.models.telemetry.signals import width
-from spheretwin.twin import assembly, wiring
+from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
 from spheretwin.twin.assembly import Files
 from spheretwin.twin.electronics.driving import stages as drivings
 from spheretwin.twin.electronics.sensing import stages as senses
-from spheretwin.twin.matching import matching
 from spheretwin.twin.plant.rotor import Rotor
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Triple
+from spheretwin.twin.wiring import wires as wiring
+from spheretwin.twin.wiring.matching import matching
 
 # For their types alone.
 NO_INPUTS = loops.Inputs(
@@ -94,13 +95,13 @@ class Machine:
         magnetics = assembly.nominal_magnetics(scenario, files)
         kept = assembly.kept_matrices(magnetics, torque_model(files.actuator))
         estimator = assembly.estimator_of(scenario)
-        wires = wiring.wires_of(scenario, len(files.actuator.groups))
-        supervision = wiring.supervision_of(scenario, files.nominal, wires)
+        joined = wiring.wires_of(scenario, len(files.actuator.groups))
+        supervision = wiring.supervision_of(scenario, files.nominal, joined)
         self._controller = assembly.controller_of(
             scenario, self.law, magnetics, kept[0], estimator, supervision
         )
-        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, kept[1], wires)
-        self._sensors = wiring.sensors_of(scenario, wires)
+        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, kept[1], joined)
+        self._sensors = wiring.sensors_of(scenario, joined)
         self._faults = wiring.faults_of(scenario, self._plant, self._sensors, supervision.groups)
         # The loop has bare addresses of its functions: they are held for as long as it is.
         self._functions = matching(

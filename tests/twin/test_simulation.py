@@ -13,9 +13,9 @@ from spheretwin.twin import loop as loops
 from spheretwin.twin import machine as machines
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin import simulation as simulations
-from spheretwin.twin.matching import Functions
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
+from spheretwin.twin.wiring.matching import Functions
 
 
 def run(name, law=None, **overrides):

@@ -1,4 +1,4 @@
-"""What a log says of faults: when parts fail and work again, when groups are left out, and why a run stops."""
+"""What a log says of faults: when parts fail and work again, when groups are left out, why a run stops."""
 
 from __future__ import annotations
 
