@@ -12,6 +12,9 @@ from spheretwin.models.base.compiled import allocation_free
 IN_USE, TOLD, FOUND_OPEN, FOUND_SHORTED = 0, 1, 2, 3
 """How a group stands."""
 
+STATES = ("in use", "known to be out", "found open", "found shorted")
+"""The same in words."""
+
 
 class Groups(NamedTuple):
     """Which groups may be used, for compiled code."""

@@ -27,11 +27,14 @@ class Signal:
         What it says, for tables and figures.
     labels : tuple of str
         A short name for each entry of a vector, without commas; or none.
+    states : tuple of str
+        Where its values 0, 1, 2 and so on are states, their names, without commas; or none.
 
     Raises
     ------
     InputError
-        The name is no text or empty, the size no whole number above 0, or the labels do not fit it.
+        The name is no text or empty, the size no whole number above 0, the labels do not fit it, or a state
+        has no name.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Signal:
     size: int
     meaning: str
     labels: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not _is_text(self.name) or not self.name:
@@ -54,15 +58,17 @@ class Signal:
             raise InputError(
                 f"signal {self.name}: expected size as a whole number above 0, received {shown(self.size)}"
             )
-        if not isinstance(self.labels, tuple | list) or not all(map(_is_label, self.labels)):
-            raise InputError(
-                f"signal {self.name}: expected labels as texts without commas, received {shown(self.labels)}"
-            )
+        for field in ("labels", "states"):
+            named = getattr(self, field)
+            if not isinstance(named, tuple | list) or not all(map(_is_label, named)):
+                raise InputError(
+                    f"signal {self.name}: expected {field} as texts without commas, received {shown(named)}"
+                )
+            object.__setattr__(self, field, tuple(named))
         if len(self.labels) not in (0, self.size):
             raise InputError(
                 f"signal {self.name}: expected {self.size} labels or none, received {len(self.labels)}"
             )
-        object.__setattr__(self, "labels", tuple(self.labels))
 
 
 def _is_text(value: object) -> bool:

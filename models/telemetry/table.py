@@ -112,6 +112,8 @@ class Table:
             flat = pa.array(np.ascontiguousarray(self[signal.name]).ravel())
             column = flat if signal.size == 1 else pa.FixedSizeListArray.from_arrays(flat, signal.size)
             described = {"unit": signal.unit, "meaning": signal.meaning, "labels": ",".join(signal.labels)}
+            if signal.states:
+                described["states"] = ",".join(signal.states)
             fields.append(pa.field(signal.name, column.type, nullable=False, metadata=described))
             columns.append(column)
         return pa.table(columns, schema=pa.schema(fields, metadata=dict(metadata)))
@@ -154,8 +156,12 @@ def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str
 def _signal(field) -> Signal:  # type: ignore[no-untyped-def]
     described = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
     size = getattr(field.type, "list_size", 1)
-    labels = tuple(filter(None, described["labels"].split(",")))
-    return Signal(field.name, described["unit"], size, described["meaning"], labels)
+    labels, states = (tuple(filter(None, text.split(","))) for text in _named(described))
+    return Signal(field.name, described["unit"], size, described["meaning"], labels, states)
+
+
+def _named(described: Mapping[str, str]) -> tuple[str, str]:
+    return described["labels"], described.get("states", "")
 
 
 def _flat(column, size: int) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]

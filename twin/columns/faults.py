@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from spheretwin.control.supervision.groups import IN_USE
+from spheretwin.control.supervision.groups import IN_USE, STATES
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.twin.columns.column import Columns
@@ -23,10 +23,9 @@ def signals(groups: int) -> tuple[Signal, ...]:
     """Columns for a number of coil groups."""
     each = tuple(f"group {j}" for j in range(groups))
     names = part_names(groups)
-    modes = "; ".join(f"{number} {mode}" for number, mode in enumerate(MODES, 1))
     return (
-        Signal("fault", "1", len(names), f"how a part fails: 0 not at all; {modes}", names),
-        Signal("group_out", "1", groups, "1 known to be out, 2 found open, 3 found shorted, 0 in use", each),
+        Signal("fault", "1", len(names), "how a part fails", names, ("works", *MODES)),
+        Signal("group_out", "1", groups, "whether the allocation leaves a group out", each, STATES),
         Signal(
             "time_to_detection_s",
             "s",

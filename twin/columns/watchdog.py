@@ -11,9 +11,15 @@ from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.twin.columns.column import Columns
 
-_TOLD = "; ".join(f"{number} {reason.told}" for number, reason in REASONS.items())
-
-SIGNALS = (Signal("failsafe_reason", "1", 1, f"why there are no currents: {_TOLD}"),)
+SIGNALS = (
+    Signal(
+        "failsafe_reason",
+        "1",
+        1,
+        "why the watchdog has taken the currents away",
+        states=tuple(reason.told for reason in REASONS.values()),
+    ),
+)
 
 
 @part_of_its_caller

@@ -5,20 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD
+from spheretwin.control.supervision.groups import STATES, TOLD
 from spheretwin.control.supervision.watchdog import REASONS
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin.faults.fault import MODES
 
 Line = tuple[float, str]
 """Simulated time in s, text."""
-
-_OUT = {
-    IN_USE: "in use again",
-    TOLD: "known to be out",
-    FOUND_OPEN: "found open",
-    FOUND_SHORTED: "found shorted",
-}
 
 
 class FaultLines:
@@ -32,16 +24,16 @@ class FaultLines:
         names = {signal.name: signal for signal in rows.signals}
         found: list[Line] = []
         if len(rows) and "fault" in names:
-            labels = names["fault"].labels
+            labels, modes = names["fault"].labels, names["fault"].states
             for t_s, part, mode in self._changes(rows, "fault"):
                 found.append(
-                    (t_s, f"{labels[part]} {MODES[mode - 1]}" if mode else f"{labels[part]} works again")
+                    (t_s, f"{labels[part]} {modes[mode]}" if mode else f"{labels[part]} works again")
                 )
             delays = rows["time_to_detection_s"]
             for t_s, group, out in self._changes(rows, "group_out"):
                 after_s = delays[np.searchsorted(rows["t_s"], t_s), group]
                 after = f", {1e3 * after_s:.0f} ms after it failed" if out > TOLD and after_s >= 0 else ""
-                found.append((t_s, f"group {group} {_OUT[out]}{after}"))
+                found.append((t_s, f"group {group} {STATES[out]}{after}"))
         if len(rows) and "failsafe_reason" in names:
             for t_s, _, reason in self._changes(rows, "failsafe_reason"):
                 found.append((t_s, f"watchdog: {REASONS[reason].told}"))

@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
 from spheretwin.viz import palette
 from spheretwin.viz.recording import scene
+from spheretwin.viz.recording.states import ROOT as STATES
 
 TIMELINE = "sim_time"
 TELEMETRY = "telemetry"
@@ -58,7 +59,7 @@ def application(view: View) -> str:
     would be shown in the first one's, with its length and its tabs. Of letters, digits and dashes only, else
     the viewer changes it.
     """
-    names = [signal.name for signal in view.own]
+    names = [(signal.name, bool(signal.states)) for signal in view.own]
     key = repr((view.duration_s, view.current_limit_A, view.groups, names, view.live))
     return f"spheretwin-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
 
@@ -94,8 +95,9 @@ def layout(view: View) -> rrb.Blueprint:
     tabs = [
         plot(f"{signal.name} [{signal.unit}]", signal.name)
         for signal in view.own
-        if signal.name != "sliding_s"
+        if signal.name != "sliding_s" and not signal.states
     ]
+    may_fail = any(signal.states for signal in view.own)
     plots = rrb.Grid(
         plot("tilt α red, β green, desired muted [rad]", *angles, legend=False, overrides=tilt),
         plot("tracking error [rad]", "error_rad"),
@@ -108,9 +110,10 @@ def layout(view: View) -> rrb.Blueprint:
     texts = rrb.Tabs(
         rrb.TextDocumentView(origin=f"/{SCENARIO}", name="scenario"),
         rrb.TextLogView(origin=f"/{EVENTS}", name="events"),
+        *([rrb.StateTimelineView(origin=f"/{STATES}", name="states", time_view=time)] if may_fail else []),
         *([torques] if slides else []),
         *tabs,
-        active_tab="scenario",
+        active_tab="states" if any(signal.name == "fault" for signal in view.own) else "scenario",
     )
     return rrb.Blueprint(
         rrb.Horizontal(

@@ -28,6 +28,7 @@ from spheretwin.viz.recording.blueprint import View
 from spheretwin.viz.recording.events import Event, Events
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.live import Viewer
+from spheretwin.viz.recording.states import StateChanges
 
 Index = list[rr.TimeColumn]
 
@@ -91,6 +92,7 @@ class Recorder:
         self._next_frame = self._handed_over = 0
         self._waiting: list[Table] = []
         self._last_tips: dict[str, NDArray[np.float64]] = {}
+        self._states = StateChanges()
         own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
         view = View(facts.duration_s, facts.current_limit_A, len(actuator.groups), own, live)
         self._recording = rr.RecordingStream(blueprint.application(view))
@@ -218,6 +220,8 @@ class Recorder:
                 column = _scalars(rows[signal.name], signal.size)
                 self._recording.send_columns(blueprint.entity(signal.name), index, [column])
         self._write_frames(rows)
+        for entity, t_s, states in self._states.of(rows):
+            self._recording.send_columns(entity, _time_index(t_s), rr.StateChange.columns(state=states))
         self._log(self._events.of(rows))
         if not self.viewer:
             self._recording.flush()  # encode it here, beside the loop, rather than all at the end
