@@ -39,7 +39,7 @@ class StateChanges:
         self._last[signal.name] = values[-1].copy()
         return [
             Lane(
-                _entity(signal, place),
+                _entity(signal, int(place)),
                 rows["t_s"][changed[:, place]],
                 [signal.states[int(value)] for value in values[changed[:, place], place]],
             )
