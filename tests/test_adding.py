@@ -241,7 +241,7 @@ PART = Part("units", examine)
     "figure": Addition(
         "twin/crosscheck/figures/names.py",
         """
-from spheretwin.twin.crosscheck.figures.drawing import Drawing
+from spheretwin.viz.figures.drawing import Drawing
 
 
 def draw(evidence):
