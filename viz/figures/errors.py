@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -120,7 +120,7 @@ def _spread(panel: Axes, y: float, values: Array, colour: str, inside: str) -> N
     panel.plot(middle, y, "o", color=colour, markerfacecolor=inside, markersize=5)
 
 
-def _on_logarithmic(panel: Axes, which: str) -> None:
+def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
     """A logarithmic axis in plain numbers, a faint grid behind, no box."""
     axis = panel.yaxis if which == "y" else panel.xaxis
     (panel.set_yscale if which == "y" else panel.set_xscale)("log")

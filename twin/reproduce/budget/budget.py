@@ -37,7 +37,7 @@ def case(law: str, stage: Stage) -> Case:
         name=f"{law}: {stage.name}",
         scenario="tilt",
         fields={"controller.law": law, **stage.overrides},
-        told={"stage": stage.name},
+        told={"stage": stage.name, "compared_with": stage.base},
         draws=stage.draws,
     )
 
@@ -66,13 +66,22 @@ def _found(outcomes: Outcomes, law: str, stage: Stage) -> Sequence[Outcome]:
 def _drawing(outcomes: Outcomes, laws: Sequence[str]) -> Drawing:
     from spheretwin.viz.figures import heat as figures
 
-    medians = np.array([[_medians_deg(_found(outcomes, law, stage)) for law in laws] for stage in STAGES])
-    by_axis = {f"|error| of {name}, degrees": medians[:, :, axis] for axis, name in enumerate(ANGLES)}
-    figure = figures.heat(
-        by_axis, [stage.name for stage in STAGES], laws, "One part of the prototype at a time"
+    by_stage = {
+        stage.name: np.array([_medians_deg(_found(outcomes, law, stage)) for law in laws]) for stage in STAGES
+    }
+    values = np.array([by_stage[stage.name] for stage in STAGES])  # (stages, laws, 3)
+    changes = values - np.array([by_stage[stage.base] for stage in STAGES])
+    panels = {
+        f"|error| of {name}, degrees": figures.Panel(values[:, :, axis], changes[:, :, axis])
+        for axis, name in enumerate(ANGLES)
+    }
+    names = [stage.name for stage in STAGES]
+    title, change = "One part of the prototype at a time", "change against its base, degrees"
+    caption = (
+        "Largest true |error|, median over the seeds. Colours: what the part changes, against ideal, or for"
+        " single errors of the sensors against the estimator alone."
     )
-    caption = "Largest true |error| of each hinge, median over the seeds, by what is switched on and law."
-    return Drawing("budget.png", caption, figure)
+    return Drawing("budget.png", caption, figures.heat(panels, names, laws, title, change))
 
 
 def _medians_deg(found: Sequence[Outcome]) -> NDArray[np.float64]:

@@ -32,6 +32,8 @@ COILS = (
 )
 ESTIMATOR = ("estimator.kind",)
 
+IDEAL, WITH_RATES, ALL = "ideal", "estimator", "all"
+
 NO_LAG: dict[str, Any] = {"drive.time_constant_s": 0.0}
 AMPLE_V = 1e4  # drives 8 A through 0.9 mH in less than a microsecond
 WIDE_rad_s = 1e7  # a ten-thousandth of a control period
@@ -49,6 +51,12 @@ class Stage(NamedTuple):
     """Whether anything in it is drawn from the seed."""
 
     @property
+    def base(self) -> str:
+        """Name of the stage that it is compared with."""
+        single = self.name not in (WITH_RATES, ALL)
+        return WITH_RATES if single and set(ESTIMATOR) <= set(self.fields) else IDEAL
+
+    @property
     def overrides(self) -> dict[str, Any]:
         """Fields of the scenario."""
         values = {dotted: PROTOTYPE[dotted] for dotted in self.fields}
@@ -56,10 +64,10 @@ class Stage(NamedTuple):
 
 
 STAGES = (
-    Stage("ideal"),
+    Stage(IDEAL),
     Stage("coil lag L/R, plain", beside={"drive.time_constant_s": None}),
     Stage("delay", ("drive.delay_s",)),
-    Stage("estimator", ESTIMATOR),
+    Stage(WITH_RATES, ESTIMATOR),
     Stage(
         "quantisation",
         (
@@ -105,5 +113,5 @@ STAGES = (
         ("drive.bandwidth_rad_s", *COILS),
         beside={"drive.supply_V": AMPLE_V},
     ),
-    Stage("all", tuple(PROTOTYPE), draws=True),
+    Stage(ALL, tuple(PROTOTYPE), draws=True),
 )  # fmt: skip
