@@ -44,12 +44,17 @@ class Outcome(NamedTuple):
     @property
     def max_abs_error(self) -> Array:
         """(3,) largest error of the rotor itself."""
-        return np.array(self.figures["max_abs_error_rad"])
+        return _three(self.figures["max_abs_error_rad"])
 
     @property
     def tail_rms_error(self) -> Array:
         """(3,) root mean square of the error over the second half of the run."""
-        return np.array(self.figures["tail_rms_error_rad"])
+        return _three(self.figures["tail_rms_error_rad"])
+
+
+def _three(figure: Sequence[float] | None) -> Array:
+    """A figure of each hinge; no numbers where a run ended before its first tick was over."""
+    return np.full(3, np.nan) if figure is None else np.array(figure)
 
 
 Outcomes = Mapping[str, Sequence[Outcome]]

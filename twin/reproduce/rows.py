@@ -66,6 +66,8 @@ def _status(case: Case, outcomes: Sequence[Outcome]) -> Status:
 
 def spread_deg(values: NDArray[np.float64] | Sequence[float], digits: int = 3) -> str:
     """Angles in rad as degrees: their median, and lowest to highest where these differ."""
+    if not np.all(np.isfinite(values)):
+        return "–"
     low, middle, high = (f"{np.degrees(value):.{digits}f}" for value in np.quantile(values, [0, 0.5, 1]))
     return middle if low == high else f"{middle} ({low} to {high})"
 

@@ -8,12 +8,15 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.summary import figures_of
 from spheretwin.twin.reproduce.experiment import Case, Experiment, Outcome, Outcomes
 from spheretwin.twin.simulation import Run, simulate
+
+Array = NDArray[np.float64]
 
 
 class Plan(NamedTuple):
@@ -88,11 +91,12 @@ def _outcome(experiment: Experiment, case: Case, seed: int) -> Outcome:
     return Outcome(run.status, figures_of(run), _measured_largest(run), experiment.keep(run))
 
 
-def _measured_largest(run: Run) -> np.ndarray:
-    return np.max(np.abs(measured_error(run)), axis=0)
+def _measured_largest(run: Run) -> Array:
+    error = np.abs(measured_error(run))
+    return error.max(axis=0) if len(error) else np.full(3, np.nan)
 
 
-def measured_error(run: Run) -> np.ndarray:
+def measured_error(run: Run) -> Array:
     """Tracking error as the sensors tell it, (n, 3) in rad; the true one where they tell the truth."""
     table = run.telemetry
     if "q_measured_rad" in {signal.name for signal in table.signals}:
