@@ -72,18 +72,21 @@ def test_a_run_that_ends_early_is_told_unless_it_may():
     assert failed(may, carried_out(may)) == []
 
 
-def test_a_run_without_a_tick_has_no_figures(monkeypatch):
-    # A torque that is no number ends the run within its first tick.
-    law = "from spheretwin.control.law import Law"
-    assert law
-    plan = planned(experiment(IDEAL), seeds=1)
-    (outcome,) = carried_out(plan)["ideal"]
-    without = outcome._replace(
-        status=Status.DIVERGED,
-        figures={**outcome.figures, "max_abs_error_rad": None, "tail_rms_error_rad": None},
+def test_a_run_without_a_tick_has_no_numbers(tmp_path):
+    law = tmp_path / "none.py"
+    law.write_text(
+        "def step(t, reference, measurement, parameters, state, torque):\n    torque[:] = float('nan')\n"
     )
-    assert np.isnan(without.max_abs_error).all()
-    assert np.isnan(without.tail_rms_error).all()
+    none = IDEAL._replace(name="none", fields={**IDEAL.fields, "controller.law": f"{law}:step"})
+    plan = planned(experiment(none), seeds=1)
+    outcomes = carried_out(plan)
+    (outcome,) = outcomes["none"]
+    assert outcome.status == Status.DIVERGED
+    for error in (outcome.max_abs_error, outcome.measured_max_abs_error, outcome.tail_rms_error):
+        assert np.isnan(error).all()
+    assert failed(plan, outcomes) == ["none (diverged)"]
+    (row,) = rows(plan, outcomes)
+    assert row["status"] == "diverged"
 
 
 def test_a_case_that_cannot_be_run_is_bad_input():
