@@ -1,5 +1,7 @@
 """The error budget: its stages are the prototype part by part, and the whole of it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,20 @@ def test_table_has_every_stage_and_law_and_says_what_was_not_run():
     for table in section.tables:
         assert [row[0] for row in table.rows] == [stage.name for stage in STAGES]
         assert [row[1] == "not run" for row in table.rows] == [False, False] + [True] * (len(STAGES) - 2)
+
+
+def test_the_part_that_changes_most_is_named():
+    """Outcomes made up: the estimator takes 0.01 rad off α, and friction, on β, is the worst by itself."""
+
+    def outcome(error):
+        return [SimpleNamespace(max_abs_error=np.array(error), figures={})]
+
+    errors = {stage.name: [0.3, 0.0, 0.0] for stage in STAGES}
+    errors["friction"] = [0.3, np.radians(2.0), 0.0]
+    errors[ALL] = [1.0, 1.0, 1.0]
+    errors[WITH_RATES] = [0.29, 0.0, 0.0]
+    errors |= {stage.name: errors[WITH_RATES] for stage in STAGES if stage.base == WITH_RATES}
+    outcomes = {budget.case("pd", stage).name: outcome(errors[stage.name]) for stage in STAGES}
+    assert budget._most(outcomes, "pd") == "pd, friction (β +2.000°)"
+    del outcomes["pd: delay"]
+    assert budget._most(outcomes, "pd") == ""

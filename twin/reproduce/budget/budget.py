@@ -9,20 +9,22 @@ from numpy.typing import NDArray
 
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.twin.reproduce.budget.stages import STAGES, Stage
+from spheretwin.twin.reproduce.budget.stages import ALL, STAGES, Stage
 from spheretwin.twin.reproduce.experiment import Case, Experiment, Outcome, Outcomes, Section, Table
 from spheretwin.twin.reproduce.rows import of_axis, spread_deg
 from spheretwin.viz.figures.drawing import Drawing
 
 HOW = (
-    "The largest *true* error, as none of the parts may hide behind another. *Ideal* is the motion and the"
-    " mass alone: true angles and rates, no delay, no friction, and currents that are their commands at once."
-    " The plain lag L/R of the coils, which runs without amplifiers have, is no part of the prototype, whose"
-    " amplifiers drive the current: it is a row of its own. The voltage limit has amplifiers of no lag of"
-    " their own on ±24 V less their drops; the bandwidth has 2 kHz on ample voltage. No sensor measures a"
-    " rate: the rows of single sensor errors have the estimator too, and are to be compared with its row."
-    " Parts do not add up, and may help: noise and lag shake a rotor loose that friction would hold, or feed"
-    " an adaptation. All laws have their default gains."
+    "The largest *true* error, which nothing can hide. *Ideal* is the motion and the mass alone: true angles"
+    " and rates, no delay, no friction, and currents that are their commands at once. The plain lag L/R of"
+    " the coils, which runs without amplifiers have, is no part of the prototype, whose amplifiers drive the"
+    " current: it is a row of its own. The voltage limit has amplifiers of no lag of their own on ±24 V less"
+    " their drops; the bandwidth has 2 kHz on ample voltage. No sensor measures a rate: the rows of single"
+    " sensor errors have the estimator too, and are to be compared with its row. All laws have their default"
+    " gains.\n\n"
+    "Parts do not add up. A rate that lags pushes harder at a corner, and noise feeds AFSM's adaptation (ξ̂"
+    " grows with |s|): both take from its error. γ's takes two parts, offsets that push it and a sensor that"
+    " sees nothing within a count."
 )
 
 
@@ -46,7 +48,20 @@ def tell(outcomes: Outcomes) -> list[Section]:
     """A table for each hinge, and one figure."""
     laws = [law for law in LAWS if any(case(law, stage).name in outcomes for stage in STAGES)]
     tables = [_table(outcomes, laws, axis) for axis in range(len(ANGLES))]
-    return [Section("One part at a time", HOW, tables, [lambda: _drawing(outcomes, laws)])]
+    most = "; ".join(filter(None, (_most(outcomes, law) for law in laws)))
+    text = f"{HOW} By itself changes most: {most}." if most else HOW
+    return [Section("One part at a time", text, tables, [lambda: _drawing(outcomes, laws)])]
+
+
+def _most(outcomes: Outcomes, law: str) -> str:
+    """The single part that changes the error of any hinge the most; empty where not all were run."""
+    medians = {stage.name: _medians_deg(_found(outcomes, law, stage)) for stage in STAGES}
+    parts = [stage for stage in STAGES if stage.fields and stage.name != ALL]
+    changes = np.array([medians[stage.name] - medians[stage.base] for stage in parts])
+    if not np.all(np.isfinite(changes)):
+        return ""
+    part, axis = np.unravel_index(np.argmax(np.abs(changes)), changes.shape)
+    return f"{law}, {parts[part].name} ({ANGLES[axis]} {changes[part, axis]:+.3f}°)"
 
 
 def _table(outcomes: Outcomes, laws: Sequence[str], axis: int) -> Table:

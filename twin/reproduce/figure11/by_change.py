@@ -16,11 +16,13 @@ from spheretwin.twin.reproduce.rows import of_axis, spread_deg
 Array = NDArray[np.float64]
 
 ONE_THING = (
-    "Everything is as above but for one thing. *Reached* means that the median over the seeds is at most"
-    f" {REACHED:g} times the paper's figure, which is read from a plot; where only the true error gets there,"
-    " it says so. On ideal hardware (true angles and rates, no delay, no friction, coils behind their lag L/R"
-    " alone) the printed gains leave what the corners of the reference cost: its rate jumps, and none of the"
-    " laws feeds an acceleration forward. Neither a better estimator nor true rates take that away."
+    "Everything is as above but for one thing. The values come from scans: of a gain the one whose error is"
+    " the paper's, or where none is, as of corners and estimators, the one with the least. *Reached* means"
+    f" that the median over the seeds is at most {REACHED:g} times the paper's figure, which is read from a"
+    " plot; where only the true error gets there, it says so. On ideal hardware (true angles and rates, no"
+    " delay, no friction, coils behind their lag L/R alone) the printed gains leave what the corners of the"
+    " reference cost: its rate jumps, and none of the laws feeds an acceleration forward. Neither a better"
+    " estimator nor true rates take that away."
 )
 HEAD = ("law", "changed alone", "paper's reached", "paper", "α measured", "α true")
 

@@ -1,7 +1,8 @@
 """Single changes, each of which might bring a law to the error that the paper's figure shows.
 
 The values were found by scans of 20 seeds each: of a gain, the one whose median of the largest measured error
-of α is the paper's, or where none is, the one with the least; of the rounding and the estimator, the best.
+of α is the paper's, or where none is, the one with the least; of the rounding (0.16 to 0.3 rad/s²) and of the
+estimator (each kind, 100 to 1500 1/s) the one with the least. Neighbours are told where the gain matters.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def _rounding(law: str, rad_s2: float) -> Change:
 
 def _estimator(law: str, kind: str, rad_s: float) -> Change:
     fields = {"estimator.kind": kind, "estimator.bandwidth_rad_s": rad_s}
-    return Change(law, f"rates by {kind} of", f"{rad_s:g} 1/s", fields)
+    return Change(law, f"estimator {kind},", f"{rad_s:g} 1/s", fields)
 
 
 def _true_rates(law: str) -> Change:
