@@ -32,6 +32,9 @@ COILS = (
 )
 ESTIMATOR = ("estimator.kind",)
 
+WITHOUT_ERROR = ("sensors.current.noise_A", "watchdog.on")
+"""Fields of the set that move nothing: no law is handed the currents, and the watchdog does not trip."""
+
 IDEAL, WITH_RATES, ALL = "ideal", "estimator", "all"
 
 NO_LAG: dict[str, Any] = {"drive.time_constant_s": 0.0}
