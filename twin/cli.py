@@ -16,7 +16,7 @@ from typing import NoReturn
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import is_plain, one_line, shown
-from spheretwin.twin.commands import crosscheck, magnetics, simulate
+from spheretwin.twin.commands import crosscheck, magnetics, reproduce, simulate
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -84,6 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(metavar="VERB", required=True)
     simulate.add_to(verbs)
     crosscheck.add_to(verbs)
+    reproduce.add_to(verbs)
     magnetics.add_to(verbs)
     return parser
 

@@ -1,4 +1,4 @@
-"""Colours: one for each axis, one for each coil group, and a scale for signed currents."""
+"""Colours: one for each axis, each law and each coil group, and a scale for signed currents."""
 
 import colorsys
 
@@ -17,7 +17,22 @@ BACKGROUND: Colour = (20, 22, 26)
 TRACE: Colour = (255, 190, 60)
 DESIRED_TRACE: Colour = (130, 136, 146)
 
+LAW_COLOURS: dict[str, str] = {
+    "pd": "#0072b2",
+    "pid": "#e69f00",
+    "adaptive_fuzzy": "#009e73",
+    "afsm": "#d55e00",
+}
+"""Of the shipped laws, by name; Okabe and Ito's, told apart by the colour-blind too."""
+
+OTHER_LAW = "#8a5a9e"
+
 _NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)
+
+
+def law_colour(law: str) -> str:
+    """Colour of a law, as a page writes it; one for all that have none of their own."""
+    return LAW_COLOURS.get(law, OTHER_LAW)
 
 
 def group_colours(count: int) -> list[Colour]:

@@ -7,10 +7,12 @@ from pydantic import Field
 from spheretwin.control.laws.adaptive_fuzzy import AdaptiveFuzzy
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.pd import PD
+from spheretwin.control.laws.pid import PID
 from spheretwin.control.parts.parameters import LawParameters
 
 AnyLaw = Annotated[
     PD  # one row each
+    | PID
     | AdaptiveFuzzy
     | AFSM,
     Field(discriminator="law"),

@@ -13,6 +13,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.commands.reporting import kept, print_json
 from spheretwin.twin.crosscheck.part import STATES
+from spheretwin.viz.page.folder import prepare
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.checks import print_checks
 from spheretwin.viz.terminal.progress import parts
@@ -55,7 +56,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     from spheretwin.twin.crosscheck import page, suite  # their libraries are slow to import
 
     if options.out:
-        page.prepare(options.out)
+        prepare(options.out)
     started = time.perf_counter()
     with parts("crosscheck", len(suite.PARTS)) as begun:
         evidence = suite.run(options.mjcf, options.states, begun)

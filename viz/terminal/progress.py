@@ -31,6 +31,14 @@ def parts(label: str, count: int) -> Iterator[Callable[[str], None]]:
         yield lambda name: bars.update(task, description=name, advance=1)
 
 
+@contextmanager
+def runs(label: str, count: int) -> Iterator[Callable[[str], None]]:
+    """A bar for many runs, to be told what each was of when it is done; gone at the end."""
+    with _bars(transient=True) as bars:
+        task = bars.add_task(f"{label}: getting ready", total=count)
+        yield lambda name: bars.update(task, description=f"{label}, {name}", advance=1)
+
+
 class Progress:
     """A bar for the control ticks of a run, which stays and tells how it ended."""
 

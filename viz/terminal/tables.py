@@ -66,6 +66,16 @@ def print_written(paths: Sequence[Path]) -> None:
         style.console().print(f"written  {escape(str(path))}", soft_wrap=True)
 
 
+def print_rows(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], texts: int) -> None:
+    """Print a table whose first `texts` columns are words."""
+    table = style.table(title, head[0], *head[1:])
+    for column in table.columns[1:texts]:
+        column.justify = "left"
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    style.console().print(table)
+
+
 def print_fields(scenario: str, rows: Sequence[tuple[str, str, str]]) -> None:
     """Print every field of a scenario with its value and meaning."""
     table = style.table(f"fields of {scenario}", "flag")

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spheretwin.viz.terminal.progress import Progress, parts, tracked
+from spheretwin.viz.terminal.progress import Progress, parts, runs, tracked
 
 ESCAPES = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 LOOK = r"{} +[━╸╺]+ +100% {}0:00:00"
@@ -20,6 +20,12 @@ def follow_parts():
     with parts("crosscheck", 2) as begun:
         begun("dynamics")
         begun("closed loop")
+
+
+def follow_runs():
+    with runs("reproduce", 2) as done:
+        done("pd: ideal")
+        done("pd: all")
 
 
 class Chunk(SimpleNamespace):
@@ -38,7 +44,7 @@ def follow_a_run():
         progress.finish("completed")
 
 
-@pytest.mark.parametrize("follow", [follow_steps, follow_parts, follow_a_run])
+@pytest.mark.parametrize("follow", [follow_steps, follow_parts, follow_runs, follow_a_run])
 def test_nothing_is_printed_where_stderr_is_no_terminal(capsys, follow):
     follow()
     assert capsys.readouterr() == ("", "")
@@ -72,6 +78,14 @@ def test_parts_are_counted_as_they_begin(capsys):
     # The last to begin has half the parts behind it, and is not done.
     assert told[-1] == ("closed loop", 50)
     assert all(share >= 0 for _, share in told)
+
+
+@pytest.mark.usefixtures("watched")
+def test_runs_are_counted_as_they_are_done(capsys):
+    follow_runs()
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert re.search(LOOK.format("reproduce, pd: all", ""), ESCAPES.sub("", err))
 
 
 @pytest.mark.usefixtures("watched")

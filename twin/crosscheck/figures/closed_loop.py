@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from spheretwin.twin.crosscheck import closed_loop
-from spheretwin.twin.crosscheck.figures.drawing import Drawing
 from spheretwin.twin.crosscheck.part import Evidence
+from spheretwin.viz.figures.drawing import Drawing
 
 
 def draw(evidence: Evidence) -> Drawing:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from spheretwin.twin.crosscheck.figures.drawing import Drawing
 from spheretwin.twin.crosscheck.part import Evidence
 from spheretwin.twin.crosscheck.trajectories import Trajectories
+from spheretwin.viz.figures.drawing import Drawing
 
 
 def draw(evidence: Evidence) -> Drawing:

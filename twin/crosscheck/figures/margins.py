@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from spheretwin.twin.crosscheck.figures.drawing import Drawing
 from spheretwin.twin.crosscheck.part import Evidence
+from spheretwin.viz.figures.drawing import Drawing
 
 
 def draw(evidence: Evidence) -> Drawing:

@@ -13,8 +13,8 @@ from spheretwin.twin.crosscheck.figures import (
     torque_free,
     trajectory,
 )
-from spheretwin.twin.crosscheck.figures.drawing import Drawing
 from spheretwin.twin.crosscheck.part import Evidence
+from spheretwin.viz.figures.drawing import Drawing
 
 FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
     margins.draw,

@@ -1,4 +1,4 @@
-"""A figure of the cross-check's page."""
+"""A figure of a page."""
 
 from __future__ import annotations
 

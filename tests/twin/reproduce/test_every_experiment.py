@@ -1,0 +1,50 @@
+"""What every experiment of the registry owes, whichever it is."""
+
+import json
+
+import pytest
+
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.reproduce import page
+from spheretwin.twin.reproduce.page import Chapter
+from spheretwin.twin.reproduce.registry import EXPERIMENTS
+from spheretwin.twin.reproduce.rows import rows
+from spheretwin.twin.reproduce.running import carried_out, failed, planned
+
+FACE = {
+    "figure", "case", "scenario", "controller", "m", "L", "hardware", "fields", "seeds", "status", "statuses",
+    "paper", "max_abs_error_rad", "max_abs_error_range_rad", "measured_max_abs_error_rad",
+    "measured_max_abs_error_range_rad", "tail_rms_error_rad", "tail_rms_error_range_rad",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_can_be_loaded_and_its_cases_told_apart(name):
+    experiment = EXPERIMENTS[name]
+    assert experiment.name == name
+    assert experiment.title
+    assert experiment.shows.endswith(".")
+    cases = experiment.cases()
+    assert len({case.name for case in cases}) == len(cases) > 0
+    assert len({json.dumps([case.scenario, dict(case.fields)]) for case in cases}) == len(cases)
+    for case in cases:
+        scenarios.load(case.scenario, case.fields)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_runs_and_tells_of_what_it_ran(name, tmp_path):
+    plan = planned(EXPERIMENTS[name], seeds=1, limit=2)
+    outcomes = carried_out(plan)
+    assert failed(plan, outcomes) == []
+    told = rows(plan, outcomes)
+    json.dumps(told, allow_nan=False)
+    assert len(told) == min(2, len(EXPERIMENTS[name].cases()))
+    assert all(set(row) >= FACE for row in told)
+    sections = plan.experiment.tell(outcomes)
+    assert all(
+        len(row) == len(table.head) for section in sections for table in section.tables for row in table.rows
+    )
+    written = page.write(tmp_path, [Chapter(plan.experiment, sections)], 1, {})
+    markdown = written[0].read_text(encoding="utf-8")
+    for figure in tmp_path.glob("*.png"):
+        assert f"({figure.name})" in markdown

@@ -1,0 +1,86 @@
+"""Figures of tracking errors: a colour a law, the paper's figures, gaps where runs have ended."""
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.image import imread
+
+from spheretwin.control.laws.registry import LAWS
+from spheretwin.viz import palette
+from spheretwin.viz.figures import errors, heat, plots
+
+WINDOWS = 0.1 + np.linspace(0, 1, 40)[None, :, None] + 0.1 * np.arange(3)[:, None, None] * np.ones((1, 1, 2))
+SIZES = np.array([0.1, 0.3, 0.2])
+ROWS, COLUMNS = ["ideal", "all"], ["pd", "afsm"]
+
+
+def courses(windows=WINDOWS):
+    by_label = {
+        "AFSM": errors.Course("afsm", windows, 0.12, (0,)),
+        "PID": errors.Course("pid", windows, 0.0, ()),
+    }
+    return errors.courses(by_label, 0.02, ("α", "β"), "courses")
+
+
+def lines():
+    line = errors.Line("as printed", SIZES, 0.5 * SIZES)
+    groups = [errors.Group("afsm", "AFSM", [line, line], 0.12), errors.Group("pid", "PID", [line], None)]
+    return errors.lines(groups, "largest |error|, degrees", "lines")
+
+
+def heated():
+    values = np.array([[0.1, 9.0], [np.nan, 0.3]])
+    panels = {"α": heat.Panel(values, values - 0.2), "β": heat.Panel(values, 0 * values)}
+    return heat.heat(panels, ROWS, COLUMNS, "heat", "change, degrees")
+
+
+@pytest.mark.parametrize("draw", [courses, lines, heated])
+def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw):
+    paths = [tmp_path / "a.png", tmp_path / "b.png"]
+    for path in paths:
+        plots.save(draw(), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    inked = np.any(imread(paths[0])[:, :, :3] < 0.9, axis=2)
+    assert 0.003 < inked.mean() < 0.8
+
+
+def test_courses_show_the_median_in_the_colour_of_the_law():
+    above, below = courses().axes
+    (median,) = [line for line in above.get_lines() if line.get_label() == "AFSM"]
+    assert median.get_color() == palette.law_colour("afsm")
+    np.testing.assert_allclose(median.get_ydata(), np.median(WINDOWS[:, :, 0], axis=0))
+    np.testing.assert_allclose(median.get_xdata()[:2], [0.01, 0.03])  # middles of the windows
+    dotted = [[line for line in axes.get_lines() if line.get_linestyle() == ":"] for axes in (above, below)]
+    assert [len(each) for each in dotted] == [1, 0]
+    assert set(dotted[0][0].get_ydata()) == {0.12}
+
+
+def test_courses_end_where_the_first_run_has_ended():
+    ended = WINDOWS.copy()
+    ended[1, 25:] = np.nan
+    (median,) = [line for line in courses(ended).axes[0].get_lines() if line.get_label() == "AFSM"]
+    assert len(median.get_xdata()) == 25
+
+
+def test_lines_show_median_and_range():
+    figure = lines()
+    dots = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o"]
+    assert [float(dot.get_xdata()[0]) for dot in dots] == pytest.approx([0.2, 0.1, 0.2, 0.1])
+    ranges = [
+        line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 2 and line.get_marker() != "o"
+    ]
+    assert list(ranges[0].get_xdata()) == [0.1, 0.3]
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["as printed"] * 2
+
+
+def test_heat_writes_what_is_a_number():
+    written = [text.get_text() for text in heated().axes[0].texts]
+    assert written == ["0.100", "9.00", "0.300"]
+
+
+def test_laws_have_colours_of_their_own_or_share_the_last():
+    assert set(palette.LAW_COLOURS) <= set(LAWS)
+    colours = [palette.law_colour(law) for law in palette.LAW_COLOURS]
+    assert len(set(colours)) == len(colours)
+    assert all(to_hex(colour) == colour for colour in colours)
+    assert palette.law_colour("one of the user's") == palette.OTHER_LAW not in colours

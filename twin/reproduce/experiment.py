@@ -1,0 +1,97 @@
+"""What an experiment is: cases to run, what to keep of each run, and what is told of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.telemetry.status import Status
+from spheretwin.twin.simulation import Run
+from spheretwin.viz.figures.drawing import Drawing
+
+Array = NDArray[np.float64]
+
+
+class Case(NamedTuple):
+    """One condition: a scenario with some of its fields changed, run once for each seed."""
+
+    name: str
+    """Within its experiment; no two have the same."""
+    scenario: str
+    fields: Mapping[str, Any]
+    told: Mapping[str, Any] = {}
+    """What its row in the JSON says besides the figures."""
+    draws: bool = True
+    """Whether anything in it is drawn from the seed; if not, one run is all."""
+    ends: tuple[Status, ...] = (Status.COMPLETED,)
+    """Statuses that are no failure."""
+
+
+class Outcome(NamedTuple):
+    """What remains of one run; angles in rad."""
+
+    status: Status
+    figures: Mapping[str, Any]
+    """Every metric of the registry, by name."""
+    measured_max_abs_error: Array
+    """(3,) largest error as the sensors tell it, which is what a laboratory can report."""
+    kept: Any
+    """What the experiment keeps of the run itself."""
+
+    @property
+    def max_abs_error(self) -> Array:
+        """(3,) largest error of the rotor itself."""
+        return _three(self.figures["max_abs_error_rad"])
+
+    @property
+    def tail_rms_error(self) -> Array:
+        """(3,) root mean square of the error over the second half of the run."""
+        return _three(self.figures["tail_rms_error_rad"])
+
+
+def _three(figure: Sequence[float] | None) -> Array:
+    """A figure of each hinge; no numbers where a run ended before its first tick was over."""
+    return np.full(3, np.nan) if figure is None else np.array(figure)
+
+
+Outcomes = Mapping[str, Sequence[Outcome]]
+"""By the name of its case, the outcome of each seed; a case that was not run is absent."""
+
+
+class Table(NamedTuple):
+    """Rows of text under headings; `texts` columns at the left are words, the others figures."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    texts: int = 1
+
+
+class Section(NamedTuple):
+    """A piece of the page: what is shown, in words, tables and figures."""
+
+    title: str
+    text: str
+    """Paragraphs in Markdown."""
+    tables: Sequence[Table] = ()
+    draw: Sequence[Callable[[], Drawing]] = ()
+    """Figures, drawn only where a page is written."""
+
+
+class Experiment(NamedTuple):
+    """One row of the registry."""
+
+    name: str
+    title: str
+    shows: str
+    """What it shows, in a sentence or two."""
+    cases: Callable[[], list[Case]]
+    """In the order of the JSON's rows; the first of them are what a limit leaves."""
+    tell: Callable[[Outcomes], list[Section]]
+    keep: Callable[[Run], Any] = lambda run: None
+    """What `tell` needs of a run beside its figures; the telemetry is let go."""
+    more: Callable[[Sequence[Outcome]], Mapping[str, Any]] = lambda outcomes: {}
+    """What the JSON says of a case's outcomes beside what it says of all."""

@@ -1,0 +1,54 @@
+"""The folder of a page: found fit before the work, filled after it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import Path
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import make_folder, whole_file
+from spheretwin.viz.figures.drawing import Drawing
+
+
+def prepare(folder: Path) -> None:
+    """Find out before a run whether a page can be drawn and written, and leave an empty folder.
+
+    Raises
+    ------
+    InputError
+        matplotlib is not installed, or the folder cannot be made or written to.
+    """
+    if find_spec("matplotlib") is None:
+        raise InputError(
+            "output: expected the extra `spheretwin[plots]` to draw figures,"
+            " received an installation without matplotlib"
+        )
+    make_folder(folder)
+
+
+def save_drawings(folder: Path, drawings: Iterable[Drawing]) -> None:
+    """Write figures into a folder that exists.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written there.
+    """
+    from spheretwin.viz.figures import plots
+
+    for drawing in drawings:
+        plots.save(drawing.figure, folder / drawing.file)
+
+
+def save_text(path: Path, text: str) -> Path:
+    """Write a file, whole or not at all; returns its path.
+
+    Raises
+    ------
+    InputError
+        It cannot be written there.
+    """
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path

@@ -1,0 +1,89 @@
+"""A page of Markdown as HTML that stands alone: no script, no font, no request to any host."""
+
+from __future__ import annotations
+
+from collections.abc import MutableMapping, Sequence
+from html import escape
+from typing import Any
+
+from markdown_it import MarkdownIt
+from markdown_it.renderer import RendererHTML
+from markdown_it.token import Token
+from markdown_it.utils import OptionsDict
+
+# Figures are drawn on white, so they keep it in the dark; what is wide is moved within its own box.
+STYLE = """
+:root { color-scheme: light dark; --ink: #24282d; --faint: #d5d9de; --paper: #fff; --soft: #f4f6f8; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #dfe3e8; --faint: #3b424b; --paper: #15181c; --soft: #1d2127; }
+}
+* { box-sizing: border-box; }
+body { margin: 0 auto; padding: 1.2rem; max-width: 62rem; color: var(--ink); background: var(--paper);
+  font: 1rem/1.55 system-ui, sans-serif; overflow-wrap: break-word; }
+h1, h2, h3 { line-height: 1.2; margin: 2em 0 0.6em; }
+h1 { margin-top: 0.4em; }
+p { max-width: 46rem; }
+.wide { overflow-x: auto; margin: 1.2rem 0; }
+table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.35rem 0.7rem; border-bottom: 1px solid var(--faint); text-align: left;
+  vertical-align: top; }
+th { background: var(--soft); }
+th:first-child, td:first-child { padding-left: 0.4rem; }
+img { display: block; max-width: 100%; height: auto; background: #fff; border-radius: 4px; }
+code { font-family: ui-monospace, monospace; font-size: 0.92em; background: var(--soft); padding: 0 0.2em; }
+em { color: inherit; opacity: 0.85; }
+@media (max-width: 40rem) { body { padding: 0.8rem; } th, td { padding: 0.3rem 0.45rem; } }
+"""
+
+
+def page(title: str, markdown: str) -> str:
+    """Whole page.
+
+    Parameters
+    ----------
+    title : str
+        As it is, without markup.
+    markdown : str
+        CommonMark with tables; tags in it are shown, not obeyed.
+    """
+    reader = MarkdownIt("commonmark", {"html": False}).enable("table")
+    reader.add_render_rule("table_open", _table_opens)
+    reader.add_render_rule("table_close", _table_closes)
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en">',
+            "<head>",
+            '<meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{escape(title)}</title>",
+            f"<style>{STYLE}</style>",
+            "</head>",
+            "<body>",
+            "<main>",
+            f"{reader.render(markdown)}</main>",
+            "</body>",
+            "</html>",
+            "",
+        ]
+    )
+
+
+def _table_opens(
+    renderer: RendererHTML,
+    tokens: Sequence[Token],
+    at: int,
+    options: OptionsDict,
+    environment: MutableMapping[str, Any],
+) -> str:
+    return '<div class="wide">\n<table>\n'
+
+
+def _table_closes(
+    renderer: RendererHTML,
+    tokens: Sequence[Token],
+    at: int,
+    options: OptionsDict,
+    environment: MutableMapping[str, Any],
+) -> str:
+    return "</table>\n</div>\n"
