@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     wall_s = time.perf_counter() - started
     pairs = list(zip(plans, found, strict=True))
     chapters = [Chapter(plan.experiment, plan.experiment.tell(outcomes)) for plan, outcomes in pairs]
-    written = page.write(options.out, chapters, options.seeds, versions()) if options.out else []
+    written = page.write(options.out, chapters, _command(options), versions()) if options.out else []
     if options.json:
         told = [row for plan, outcomes in pairs for row in rows(plan, outcomes)]
         print_json({"rows": told, "seeds": options.seeds, "wall_s": wall_s, "versions": versions()})
@@ -92,6 +92,12 @@ def _named(names: Sequence[str]) -> list[str]:
                 f"reproduce: expected {', '.join(valid)}, received {shown(name)}{did_you_mean(name, valid)}"
             )
     return [name for name in EXPERIMENTS if name in names or ALL in names]
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What makes the same page again."""
+    limit = f" --limit {options.limit}" if options.limit else ""
+    return f"spheretwin reproduce {' '.join(_named(options.names))} --seeds {options.seeds}{limit}"
 
 
 def _print(chapters: Sequence[Chapter]) -> None:

@@ -23,8 +23,18 @@ class Chapter(NamedTuple):
     sections: Sequence[Section]
 
 
-def write(folder: Path, chapters: Sequence[Chapter], seeds: int, versions: Mapping[str, str]) -> list[Path]:
-    """Write the page and its figures into a folder that exists; returns both forms of the page.
+def write(folder: Path, chapters: Sequence[Chapter], command: str, versions: Mapping[str, str]) -> list[Path]:
+    """Write the page and its figures into a folder; returns both forms of the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    chapters : sequence of Chapter
+    command : str
+        What makes the page again, for its foot.
+    versions : mapping
+        Version by package, for the same.
 
     Raises
     ------
@@ -33,7 +43,7 @@ def write(folder: Path, chapters: Sequence[Chapter], seeds: int, versions: Mappi
     """
     drawn = [[[draw() for draw in section.draw] for section in chapter.sections] for chapter in chapters]
     save_drawings(folder, (drawing for chapter in drawn for section in chapter for drawing in section))
-    text = markdown(chapters, drawn, seeds, versions)
+    text = markdown(chapters, drawn, command, versions)
     return [
         save_text(folder / MARKDOWN, text),
         save_text(folder / HTML, html.page(TITLE, text)),
@@ -43,18 +53,17 @@ def write(folder: Path, chapters: Sequence[Chapter], seeds: int, versions: Mappi
 def markdown(
     chapters: Sequence[Chapter],
     drawn: Sequence[Sequence[Sequence[Drawing]]],
-    seeds: int,
+    command: str,
     versions: Mapping[str, str],
 ) -> str:
     """Text of the page."""
-    names = " ".join(chapter.experiment.name for chapter in chapters)
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
     lines = [f"# {TITLE}", ""]
     for chapter, drawings in zip(chapters, drawn, strict=True):
         lines += [f"## {chapter.experiment.title}", "", chapter.experiment.shows, ""]
         for section, of_section in zip(chapter.sections, drawings, strict=True):
             lines += _section(section, of_section)
-    lines += [f"Made by `spheretwin reproduce {names} --seeds {seeds}` with {used}.", ""]
+    lines += [f"Made by `{command}` with {used}.", ""]
     return "\n".join(lines)
 
 

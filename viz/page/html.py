@@ -27,6 +27,7 @@ p { max-width: 46rem; }
 table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.35rem 0.7rem; border-bottom: 1px solid var(--faint); text-align: left;
   vertical-align: top; }
+td[style*="right"] { white-space: nowrap; }
 th { background: var(--soft); }
 th:first-child, td:first-child { padding-left: 0.4rem; }
 img { display: block; max-width: 100%; height: auto; background: #fff; border-radius: 4px; }
@@ -76,7 +77,7 @@ def _table_opens(
     options: OptionsDict,
     environment: MutableMapping[str, Any],
 ) -> str:
-    return '<div class="wide">\n<table>\n'
+    return '<div class="wide" tabindex="0">\n<table>\n'
 
 
 def _table_closes(

@@ -33,6 +33,8 @@ def test_json_stands_alone_and_the_page_is_written(tmp_path):
     assert {"reproduce.md", "reproduce.html", "figure11_errors.png"} <= {
         path.name for path in folder.iterdir()
     }
+    text = (folder / "reproduce.md").read_text(encoding="utf-8")
+    assert "`spheretwin reproduce figure11 --seeds 2 --limit 4`" in text
 
 
 def test_people_get_tables(capsys, monkeypatch):

@@ -44,7 +44,7 @@ def test_every_experiment_runs_and_tells_of_what_it_ran(name, tmp_path):
     assert all(
         len(row) == len(table.head) for section in sections for table in section.tables for row in table.rows
     )
-    written = page.write(tmp_path, [Chapter(plan.experiment, sections)], 1, {})
+    written = page.write(tmp_path, [Chapter(plan.experiment, sections)], "", {})
     markdown = written[0].read_text(encoding="utf-8")
     for figure in tmp_path.glob("*.png"):
         assert f"({figure.name})" in markdown

@@ -40,7 +40,9 @@ def written(tmp_path_factory):
     made = experiment(IDEAL._replace(name="one | two"))
     sections = made.tell(carried_out(planned(made, 1)))
     sections = [section._replace(draw=[drawing]) for section in sections]
-    paths = page.write(folder, [Chapter(made, sections)], 3, {"python": "3"})
+    paths = page.write(
+        folder, [Chapter(made, sections)], "spheretwin reproduce short --seeds 3", {"python": "3"}
+    )
     return folder, *(path.read_text(encoding="utf-8") for path in paths)
 
 
@@ -65,8 +67,8 @@ def test_both_forms_have_the_same_content(written):
         assert text in said
     cells = [tag for tag, _ in reader.tags if tag in ("td", "th")]
     assert len(cells) == 4
-    assert "--seeds 3" in markdown
-    assert "--seeds 3" in said
+    assert "Made by `spheretwin reproduce short --seeds 3` with python 3." in markdown
+    assert "spheretwin reproduce short --seeds 3" in said
 
 
 def test_html_asks_nobody_for_anything(written):

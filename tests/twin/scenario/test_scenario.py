@@ -55,8 +55,8 @@ def test_flags_reach_every_field():
     ("overrides", "parts"),
     [
         (
-            {"controller.law": "pid"},
-            ["controller.law", "pd, adaptive_fuzzy, afsm", "'pid'", "did you mean pd?"],
+            {"controller.law": "pdd"},
+            ["controller.law", "pd, pid, adaptive_fuzzy, afsm", "'pdd'", "did you mean pd?"],
         ),
         ({"controler.law": "pd"}, ["controller", "plant", "controler"]),
         ({"plant.colour": 1}, ["modelling_error", "plant", "colour"]),

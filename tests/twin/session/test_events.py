@@ -112,7 +112,7 @@ def test_flags_write_the_same_list(planned):
         ("--event.0.t-s 0.1", "event.0.set: expected a value, received none"),
         ("--event.0.t-s -1 --event.0.set seed --event.0.value 1", "event.0.t_s: expected greater than"),
         ("--event.0.t-s 0 --event.0.set seed --event.0.value 1", "event.0.set: expected a field that may"),
-        ("--event.0.t-s 0 --event.0.set controller.law --event.0.value pid", "as event.0 sets it"),
+        ("--event.0.t-s 0 --event.0.set controller.law --event.0.value pdd", "as event.0 sets it"),
         ("--event.0.t-s 0 --event.0.set disturbance.lod --event.0.value 1", "did you mean load"),
         ("--event.0.t-s 0 --event.0.set seed --event.0.value 1 --event.0.at 0", "in event.0, received at"),
         ("--event 3", "event: expected"),
