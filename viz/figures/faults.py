@@ -64,7 +64,7 @@ def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: flo
     values = np.concatenate([panel[np.isfinite(panel)] for panel in panels.values()])
     highest = max(float(values.max(initial=0.0)), 2 * bound)
     scale = LogNorm(vmin=min(float(values.min(initial=1.0)), 1.0), vmax=highest)
-    figure = Figure(figsize=(1.4 * WIDTH_in, 4.6), layout="constrained")
+    figure = Figure(figsize=(1.4 * WIDTH_in, 4.1), layout="constrained")
     sides = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (name, panel) in zip(sides, panels.items(), strict=True):
         image = axes.imshow(panel, norm=scale, cmap=COLOURS)

@@ -20,8 +20,9 @@ HOW = (
     " tick on at which they open. *Detecting*: it leaves out what the detector has found by itself.\n\n"
     f"A run *tracks* where it completes and its largest error of any hinge after the fault, at {FAULT_s:g} s,"
     f" is at most {TWICE:g} times that of the healthy run of the same seed. The fault is not at the start:"
-    " there the rotor is at rest and the reference is not, and that first error, larger than all that follow,"
-    " would hide what the fault does. The column *whole run* has it in.\n\n"
+    " there the rotor is at rest and the reference is not, and that first error, larger than all that"
+    " follow, would hide what the fault does. The column *whole run* has it in; bounded currents make less of"
+    " it, with or without a fault.\n\n"
     f"Every group and every pair runs with every seed; {DRAWN} larger sets, drawn once, run with one each."
 )
 HEAD = (

@@ -18,10 +18,10 @@ from spheretwin.twin.reproduce.rows import ended
 HOW = (
     "The prototype, as nothing else has these parts. There are no groups to leave out, so the ways are"
     " others: *no watchdog*; one that takes the currents away (*release*); one that shorts the coils, which"
-    " brakes (*short*). The number is the largest error of any hinge from the fault to the end of the run over"
-    " that of the healthy prototype with the same seed, median over the seeds. A run that is stopped is soon"
-    " over, and its error is small for that reason alone. What is intermittent fails in every other stretch of"
-    " 10 ms, by a coin; what is stuck stays where it was."
+    " brakes (*short*). The number is the largest error of any hinge from the fault to the end of the run"
+    " over that of the healthy prototype with the same seed, median over the seeds. A run that is stopped is"
+    " soon over, and its error is small for that reason alone. What is intermittent fails in every other"
+    " stretch of 10 ms, by a coin; what is stuck stays where it was."
 )
 HEAD = ("part and mode", *(way.name for way in OF_PARTS), "stopped for", "after the fault, ms")
 

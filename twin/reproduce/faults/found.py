@@ -37,6 +37,8 @@ class Found(NamedTuple):
     """When; no number where it did not."""
     told: bool
     """Whether the allocation was told what is open, or could find it."""
+    least_norm: bool
+    """Whether the allocation is that of least norm."""
     left: Left | None
     """None where no groups are open."""
     found_s: tuple[float | None, ...]
@@ -62,6 +64,7 @@ def keep(run: Run) -> Found:
         stopped=stopped,
         stopped_s=stopped_s,
         told=run.scenario.detects or any(fault.known for fault in run.scenario.fault),
+        least_norm=run.scenario.allocation == "least_norm",
         left=left_by(base, opened) if opened else None,
         found_s=tuple(detected.get(group) for group in opened),
         wrongly_found=len(set(detected) - set(opened)),
@@ -83,7 +86,8 @@ def reason(outcome: Outcome) -> str | None:
     if kept.left.rank < 3:
         return f"rank {kept.left.rank}"
     if kept.told:
-        return f"{kept.left.torque:.2f} of the torque needed is left"
+        by_least_norm = f", {kept.left.least_norm:.2f} by least norm" if kept.least_norm else ""
+        return f"{kept.left.torque:.2f} of the torque needed is left{by_least_norm}"
     return f"{kept.left.comes:.3f} of the torque asked for comes"
 
 
@@ -107,6 +111,7 @@ def more(outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
         ],
         "wrongly_found": sum(each.wrongly_found for each in kept),
         "torque_left_over_needed": min((each.torque for each in sets), default=None),
+        "least_norm_torque_over_needed": min((each.least_norm for each in sets), default=None),
         "share_that_comes_untold": min((each.comes for each in sets), default=None),
         "least_singular_value_Nm_per_A": min((each.singular_value_Nm_per_A for each in sets), default=None),
         "rank": min((each.rank for each in sets), default=None),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
+from spheretwin.control.allocation.least_norm import allocate
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.design.capability import LOST
 
@@ -24,6 +25,8 @@ class Left(NamedTuple):
     torque: float
     """Largest torque in the direction that was needed, currents within the limit, over what was needed; 0
     where a direction is lost. At most `MOST`."""
+    least_norm: float
+    """The same of least-norm currents, scaled as a whole."""
     comes: float
     """Of a torque that all groups are asked for, least norm, the share that those left give, in the worst
     direction."""
@@ -58,10 +61,11 @@ def left(G: Array, torque_S: Array, limit_A: float, opened: Sequence[int]) -> Le
     sigma = np.sqrt(np.maximum(np.linalg.eigvalsh(squared), 0.0))  # (n, 3) rising
     whole = np.linalg.inv(np.linalg.cholesky(G @ G.transpose(0, 2, 1)))
     comes = np.linalg.eigvalsh(whole @ squared @ whole.transpose(0, 2, 1))[:, 0]
-    most = np.empty(len(G))
-    _fill_most(kept, np.ascontiguousarray(torque_S), limit_A, most)
+    most, scaled = np.empty(len(G)), np.empty(len(G))
+    _fill_most(kept, np.ascontiguousarray(torque_S), limit_A, most, scaled)
     return Left(
         torque=float(most.min()),
+        least_norm=float(scaled.min()),
         comes=float(np.clip(comes.min(), 0.0, 1.0)),
         singular_value_Nm_per_A=float(sigma[:, 0].min()),
         rank=int(np.sum(sigma > LOST * sigma[:, 2:], axis=1).min()),
@@ -69,9 +73,10 @@ def left(G: Array, torque_S: Array, limit_A: float, opened: Sequence[int]) -> Le
 
 
 @compiled
-def _fill_most(G: Array, torque_S: Array, limit: float, most: Array) -> None:
+def _fill_most(G: Array, torque_S: Array, limit: float, most: Array, scaled: Array) -> None:
     groups = G.shape[2]
     wanted, current, scratch = np.empty(3), np.empty(groups), np.empty((SCRATCH_ROWS, groups))
     for i in range(G.shape[0]):
         wanted[:] = MOST * torque_S[i]
         most[i] = MOST * allocate_bounded(G[i], wanted, limit, current, scratch)
+        scaled[i] = MOST * allocate(G[i], wanted, limit, current)

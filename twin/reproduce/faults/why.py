@@ -11,7 +11,7 @@ from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Tab
 from spheretwin.twin.reproduce.faults import drawing
 from spheretwin.twin.reproduce.faults.by_groups import found_of
 from spheretwin.twin.reproduce.faults.conditions import sets
-from spheretwin.twin.reproduce.faults.found import reason, tracks
+from spheretwin.twin.reproduce.faults.found import tracks
 from spheretwin.twin.reproduce.faults.sets import Groups
 from spheretwin.twin.reproduce.faults.ways import BOUNDED, DETECTING, NOT_TOLD, OF_GROUPS, TOLD, Way
 
@@ -19,9 +19,9 @@ HOW = (
     "Along the path of the healthy run, every 10 ms from the fault on: the *rank* and least singular value of"
     " the torque matrix without the open groups; the *torque left over the torque needed*, that is, the"
     " largest torque that any currents within the limit give in the direction of the torque that the healthy"
-    " run needed there, over that torque; and, for those who are not told, the *share that comes* of a torque"
-    " that all groups are asked for, in the worst direction (the least eigenvalue of"
-    " G_left G_leftᵀ (G Gᵀ)⁻¹). The least along the path is told."
+    " run needed there, over that torque, and the same of least-norm currents; and, for those who are not"
+    " told, the *share that comes* of a torque that all groups are asked for, in the worst direction (the"
+    " least eigenvalue of G_left G_leftᵀ (G Gᵀ)⁻¹). The least along the path is told."
 )
 HEAD = (
     "way",
@@ -34,10 +34,20 @@ HEAD = (
     "told rightly",
 )
 SMALL = (
-    "open groups", "way", "seeds that do not track", "how they ended", "error / healthy",
-    "rank", "least singular value, N·m/A", "torque left / needed", "share that comes", "reason",
+    "open groups", "way", "seeds that do not track", "how the worst ended", "error / healthy",
+    "rank", "least singular value, N·m/A", "torque left / needed", "by least norm",
 )  # fmt: skip
-LISTED = 12
+JUDGED = (
+    (TOLD, ("torque", "torque left / needed")),
+    (TOLD, ("least_norm", "the same by least norm")),
+    (DETECTING, ("torque", "torque left / needed")),
+    (DETECTING, ("least_norm", "the same by least norm")),
+    (BOUNDED, ("torque", "torque left / needed")),
+    (NOT_TOLD, ("comes", "share that comes")),
+)
+"""Figures that may tell which runs of a way track."""
+
+LISTED = 10
 """Sets of each way in the table of the smallest."""
 
 
@@ -52,12 +62,9 @@ class Split(NamedTuple):
 def section(outcomes: Outcomes) -> Section:
     """How well rank and torque tell the sets that track, and the smallest sets that do not."""
     by_way = {way.name: found_of(outcomes, sets(), way) for way in OF_GROUPS}
-    told = [way for way in (TOLD, DETECTING, BOUNDED) if by_way[way.name]]
-    rows = [_row(by_way[way.name], way, "torque", "torque left / needed") for way in told]
-    rows += [
-        _row(by_way[way.name], way, "comes", "share that comes") for way in (NOT_TOLD,) if by_way[way.name]
-    ]
-    small = [row for way in (TOLD, DETECTING, BOUNDED) for row in _smallest(by_way[way.name], way)]
+    figures = [(way, *figure) for way, figure in JUDGED if by_way[way.name]]
+    rows = [_row(by_way[way.name], way, name, label) for way, name, label in figures]
+    small = [row for way in (TOLD, BOUNDED) for row in _smallest(by_way[way.name], way)]
     points = {way.name: _points(by_way[way.name]) for way in (TOLD, BOUNDED) if by_way[way.name]}
     return Section(
         "Why some sets do not track",
@@ -151,7 +158,7 @@ def _listed(groups: Groups, runs: Sequence[Outcome], way: Way) -> tuple[str, ...
     return (
         " ".join(map(str, groups)), way.name, f"{len(bad)} of {len(runs)}", str(worst.status),
         f"{worst.kept.after:.2f}", str(left.rank), f"{left.singular_value_Nm_per_A:.4f}",
-        f"{left.torque:.2f}", f"{left.comes:.3f}", reason(worst) or "–",
+        f"{left.torque:.2f}", f"{left.least_norm:.2f}",
     )  # fmt: skip
 
 
