@@ -62,8 +62,8 @@ def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: flo
     title : str
     """
     values = np.concatenate([panel[np.isfinite(panel)] for panel in panels.values()])
-    highest = max(float(values.max(initial=0.0)), 2 * bound)
-    scale = LogNorm(vmin=min(float(values.min(initial=1.0)), 1.0), vmax=highest)
+    lowest, highest = min(float(values.min(initial=1.0)), 1.0), max(float(values.max(initial=0.0)), 2 * bound)
+    scale = LogNorm(vmin=lowest, vmax=highest)
     figure = Figure(figsize=(1.4 * WIDTH_in, 4.1), layout="constrained")
     sides = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (name, panel) in zip(sides, panels.items(), strict=True):
@@ -81,7 +81,7 @@ def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: flo
         axes.spines[:].set_visible(False)
     sides[0].set_ylabel(label)
     bar = figure.colorbar(image, ax=list(sides), shrink=0.85, aspect=28, label=quantity)
-    ticks_at = [tick for tick in (1, 1.5, 2, 3, 4, 6, 8, 10, 20, 50, 100) if scale.vmin <= tick <= highest]
+    ticks_at = [tick for tick in (1, 1.5, 2, 3, 4, 6, 8, 10, 20, 50, 100) if lowest <= tick <= highest]
     bar.set_ticks(ticks_at, labels=[f"{tick:g}" for tick in ticks_at])
     bar.ax.minorticks_off()
     figure.suptitle(title, fontsize="medium")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from spheretwin.twin.crosscheck.bearing.runs import PUSH, Bearing, START_rad_s
-from spheretwin.twin.crosscheck.figures.drawing import Drawing
 from spheretwin.twin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
 from spheretwin.twin.crosscheck.part import Evidence
+from spheretwin.viz.figures.drawing import Drawing
 
 
 def draw(evidence: Evidence) -> Drawing:

@@ -122,11 +122,11 @@ def _goal(outcomes: Outcomes) -> str:
 
 def _shares(outcomes: Outcomes) -> dict[str, dict[int, float]]:
     """By way and number of open groups, share of the runs that track."""
-    shares: dict[str, dict[int, float]] = {way.name: {} for way in OF_GROUPS}
-    for way in OF_GROUPS:
-        for groups, each in found_of(outcomes, sets(), way):
-            shares[way.name].setdefault(len(groups), []).extend(map(tracks, each))  # type: ignore[arg-type]
-    return {
-        way: {number: float(np.mean(of)) for number, of in sorted(by_number.items())}
-        for way, by_number in shares.items()
-    }
+    return {way.name: _share_by_number(found_of(outcomes, sets(), way)) for way in OF_GROUPS}
+
+
+def _share_by_number(found: Sequence[tuple[Groups, Sequence[Outcome]]]) -> dict[int, float]:
+    tracked: dict[int, list[bool]] = {}
+    for groups, runs in found:
+        tracked.setdefault(len(groups), []).extend(tracks(run) for run in runs)
+    return {number: float(np.mean(tracked[number])) for number in sorted(tracked)}

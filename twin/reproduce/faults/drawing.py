@@ -15,7 +15,7 @@ from spheretwin.twin.reproduce.faults.sets import pairs as all_pairs
 from spheretwin.twin.reproduce.faults.ways import DETECTING, NOT_TOLD, TOLD, Way
 from spheretwin.viz.figures.drawing import Drawing
 
-ERROR = f"largest error after {FAULT_s:g} s over the healthy run's"
+ERROR = f"error after {FAULT_s:g} s over the healthy run's"
 
 
 def shares(by_way: Mapping[str, Mapping[int, float]]) -> Drawing:

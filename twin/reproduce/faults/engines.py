@@ -10,7 +10,7 @@ from spheretwin.twin.reproduce.faults.conditions import SAMPLE, of_groups, on_ot
 from spheretwin.twin.reproduce.faults.found import tracks
 from spheretwin.twin.reproduce.faults.ways import OF_GROUPS, Way
 
-BOUND_rad = 1e-6
+BOUND_rad = 1e-9
 """Largest errors of the two engines differ by no more in runs that track: 10,000 steps round otherwise, and a
 closed loop holds the difference small."""
 

@@ -26,7 +26,7 @@ HOW = (
 HEAD = (
     "way",
     "figure",
-    "runs",
+    "sets",
     "do not track",
     "track: least",
     "do not: largest",
@@ -70,7 +70,7 @@ def section(outcomes: Outcomes) -> Section:
         "Why some sets do not track",
         f"{HOW}{_ranks(by_way)}{_verdict(by_way[TOLD.name], TOLD)}{_verdict(by_way[BOUNDED.name], BOUNDED)}",
         [
-            Table("How well one figure tells the runs that track", HEAD, rows, 2),
+            Table("How well one figure tells the sets that track, each with the first seed", HEAD, rows, 2),
             Table(f"The smallest sets that do not track, at most {LISTED} of each way", SMALL, small, 4),
         ],
         [lambda: drawing.torque_left(points)] if points else [],
@@ -94,7 +94,7 @@ def split(good: Sequence[float], bad: Sequence[float]) -> Split:
 def _row(
     found: Sequence[tuple[Groups, Sequence[Outcome]]], way: Way, figure: str, label: str
 ) -> tuple[str, ...]:
-    good, bad = _parted(found, figure)
+    good, bad = _parted([(groups, runs[:1]) for groups, runs in found], figure)
     best = split(good, bad)
     return (
         way.name, label, str(len(good) + len(bad)), str(len(bad)),

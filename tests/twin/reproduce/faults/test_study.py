@@ -142,7 +142,7 @@ def test_the_other_engine_agrees(found):
     ((one, other),) = engines.compared(outcomes, TOLD)
     assert engines.agree(one, other)
     assert engines.difference_rad(one, other) < 1e-12  # 10,000 steps that round otherwise
-    apart = other._replace(kept=other.kept._replace(after_rad=other.kept.after_rad + 2e-6))
+    apart = other._replace(kept=other.kept._replace(after_rad=other.kept.after_rad + 2e-9))
     assert not engines.agree(one, apart)
 
 
