@@ -9,10 +9,10 @@ import numpy as np
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Table
 from spheretwin.twin.reproduce.faults import drawing
-from spheretwin.twin.reproduce.faults.conditions import FAULT_s, of_groups, sets
+from spheretwin.twin.reproduce.faults.conditions.cases import FAULT_s, of_groups, sets
+from spheretwin.twin.reproduce.faults.conditions.sets import DRAWN, SIZES, Groups, drawn, pairs, singles
+from spheretwin.twin.reproduce.faults.conditions.ways import DETECTING, OF_GROUPS, TOLD, Way
 from spheretwin.twin.reproduce.faults.found import TWICE, tracks
-from spheretwin.twin.reproduce.faults.sets import DRAWN, SIZES, Groups, drawn, pairs, singles
-from spheretwin.twin.reproduce.faults.ways import DETECTING, OF_GROUPS, TOLD, Way
 
 HOW = (
     "Coils on ideal hardware, the least-norm allocation with its limit of 8 A unless it says *bounded* (all"

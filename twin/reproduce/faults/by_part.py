@@ -9,10 +9,10 @@ import numpy as np
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Table
-from spheretwin.twin.reproduce.faults.conditions import HEALTHY_PROTOTYPE, FAULT_s, of_part
+from spheretwin.twin.reproduce.faults.conditions.cases import HEALTHY_PROTOTYPE, FAULT_s, of_part
+from spheretwin.twin.reproduce.faults.conditions.parts import Failure, failures
+from spheretwin.twin.reproduce.faults.conditions.ways import ALONE, BRAKE, OF_PARTS, RELEASE
 from spheretwin.twin.reproduce.faults.found import tracks
-from spheretwin.twin.reproduce.faults.parts import Failure, failures
-from spheretwin.twin.reproduce.faults.ways import ALONE, BRAKE, OF_PARTS, RELEASE
 from spheretwin.twin.reproduce.rows import ended
 
 HOW = (

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.twin.reproduce.experiment import Outcomes
-from spheretwin.twin.reproduce.faults.conditions import FAULT_s, of_groups
+from spheretwin.twin.reproduce.faults.conditions.cases import FAULT_s, of_groups
+from spheretwin.twin.reproduce.faults.conditions.sets import count, singles
+from spheretwin.twin.reproduce.faults.conditions.sets import pairs as all_pairs
+from spheretwin.twin.reproduce.faults.conditions.ways import DETECTING, NOT_TOLD, TOLD, Way
 from spheretwin.twin.reproduce.faults.found import TWICE
-from spheretwin.twin.reproduce.faults.sets import count, singles
-from spheretwin.twin.reproduce.faults.sets import pairs as all_pairs
-from spheretwin.twin.reproduce.faults.ways import DETECTING, NOT_TOLD, TOLD, Way
 from spheretwin.viz.figures.drawing import Drawing
 
 ERROR = f"error after {FAULT_s:g} s over the healthy run's"

@@ -6,9 +6,9 @@ import numpy as np
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Table
-from spheretwin.twin.reproduce.faults.conditions import SAMPLE, of_groups, on_other_engine, sample
+from spheretwin.twin.reproduce.faults.conditions.cases import SAMPLE, of_groups, on_other_engine, sample
+from spheretwin.twin.reproduce.faults.conditions.ways import OF_GROUPS, Way
 from spheretwin.twin.reproduce.faults.found import tracks
-from spheretwin.twin.reproduce.faults.ways import OF_GROUPS, Way
 
 BOUND_rad = 1e-9
 """Largest errors of the two engines differ by no more in runs that track: 10,000 steps round otherwise, and a

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from spheretwin.twin.reproduce.experiment import Experiment, Outcomes, Section
 from spheretwin.twin.reproduce.faults import by_groups, by_part, engines, why
-from spheretwin.twin.reproduce.faults.conditions import FAULT_s, cases
+from spheretwin.twin.reproduce.faults.conditions.cases import FAULT_s, cases
 from spheretwin.twin.reproduce.faults.found import keep, more
 
 

@@ -14,7 +14,7 @@ from spheretwin.control.supervision.watchdog import WatchdogSection
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.design.capability import torque_matrices
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin.reproduce.faults.conditions import FAULT_s
+from spheretwin.twin.reproduce.faults.conditions.cases import FAULT_s
 from spheretwin.twin.reproduce.faults.left import Left, left
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.simulation import simulate

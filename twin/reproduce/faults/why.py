@@ -10,10 +10,17 @@ import numpy as np
 from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Table
 from spheretwin.twin.reproduce.faults import drawing
 from spheretwin.twin.reproduce.faults.by_groups import found_of
-from spheretwin.twin.reproduce.faults.conditions import sets
+from spheretwin.twin.reproduce.faults.conditions.cases import sets
+from spheretwin.twin.reproduce.faults.conditions.sets import Groups
+from spheretwin.twin.reproduce.faults.conditions.ways import (
+    BOUNDED,
+    DETECTING,
+    NOT_TOLD,
+    OF_GROUPS,
+    TOLD,
+    Way,
+)
 from spheretwin.twin.reproduce.faults.found import tracks
-from spheretwin.twin.reproduce.faults.sets import Groups
-from spheretwin.twin.reproduce.faults.ways import BOUNDED, DETECTING, NOT_TOLD, OF_GROUPS, TOLD, Way
 
 HOW = (
     "Along the path of the healthy run, every 10 ms from the fault on: the *rank* and least singular value of"

@@ -10,7 +10,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.reproduce.experiment import Outcome
 from spheretwin.twin.reproduce.faults import by_groups, drawing, engines, faults, why
-from spheretwin.twin.reproduce.faults.conditions import (
+from spheretwin.twin.reproduce.faults.conditions.cases import (
     BASE,
     HEALTHY,
     HEALTHY_PROTOTYPE,
@@ -19,9 +19,8 @@ from spheretwin.twin.reproduce.faults.conditions import (
     of_part,
     on_other_engine,
 )
-from spheretwin.twin.reproduce.faults.found import Found, keep, more, reason, tracks
-from spheretwin.twin.reproduce.faults.parts import failures
-from spheretwin.twin.reproduce.faults.ways import (
+from spheretwin.twin.reproduce.faults.conditions.parts import failures
+from spheretwin.twin.reproduce.faults.conditions.ways import (
     ALONE,
     BOUNDED,
     DETECTING,
@@ -31,6 +30,7 @@ from spheretwin.twin.reproduce.faults.ways import (
     RELEASE,
     TOLD,
 )
+from spheretwin.twin.reproduce.faults.found import Found, keep, more, reason, tracks
 from spheretwin.twin.reproduce.rows import rows
 from spheretwin.twin.reproduce.running import carried_out, failed, planned
 from spheretwin.twin.simulation import simulate

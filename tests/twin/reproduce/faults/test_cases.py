@@ -7,8 +7,8 @@ import pytest
 
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.faults.targets.registry import TARGETS
-from spheretwin.twin.reproduce.faults import sets
-from spheretwin.twin.reproduce.faults.conditions import (
+from spheretwin.twin.reproduce.faults.conditions import sets
+from spheretwin.twin.reproduce.faults.conditions.cases import (
     SAMPLE,
     FAULT_s,
     cases,
@@ -16,8 +16,8 @@ from spheretwin.twin.reproduce.faults.conditions import (
     of_part,
     sample,
 )
-from spheretwin.twin.reproduce.faults.parts import VALUES, failures
-from spheretwin.twin.reproduce.faults.ways import (
+from spheretwin.twin.reproduce.faults.conditions.parts import VALUES, failures
+from spheretwin.twin.reproduce.faults.conditions.ways import (
     BOUNDED,
     DETECTING,
     NOT_TOLD,

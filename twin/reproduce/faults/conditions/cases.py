@@ -8,9 +8,9 @@ from typing import Any
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Case
-from spheretwin.twin.reproduce.faults.parts import Failure, failures
-from spheretwin.twin.reproduce.faults.sets import Groups, drawn, pairs, singles
-from spheretwin.twin.reproduce.faults.ways import OF_GROUPS, OF_PARTS, Way
+from spheretwin.twin.reproduce.faults.conditions.parts import Failure, failures
+from spheretwin.twin.reproduce.faults.conditions.sets import Groups, drawn, pairs, singles
+from spheretwin.twin.reproduce.faults.conditions.ways import OF_GROUPS, OF_PARTS, Way
 
 FAULT_s = 1.0
 """When everything fails: in mid-flight. By then the error of a start from rest, which is larger than all that
