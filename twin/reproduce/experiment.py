@@ -26,6 +26,8 @@ class Case(NamedTuple):
     """What its row in the JSON says besides the figures."""
     draws: bool = True
     """Whether anything in it is drawn from the seed; if not, one run is all."""
+    once: bool = False
+    """Whether one run is all in any case, as of one of many that are drawn themselves."""
     ends: tuple[Status, ...] = (Status.COMPLETED,)
     """Statuses that are no failure."""
 

@@ -2,6 +2,7 @@
 
 from spheretwin.twin.reproduce.budget import budget
 from spheretwin.twin.reproduce.experiment import Experiment
+from spheretwin.twin.reproduce.faults import faults
 from spheretwin.twin.reproduce.figure11 import figure11
 
 EXPERIMENTS: dict[str, Experiment] = {
@@ -9,5 +10,6 @@ EXPERIMENTS: dict[str, Experiment] = {
     for experiment in (
         figure11.EXPERIMENT,
         budget.EXPERIMENT,
+        faults.EXPERIMENT,
     )
 }

@@ -39,7 +39,7 @@ def planned(experiment: Experiment, seeds: int, limit: int | None = None) -> Pla
 
 def seeds_of(case: Case, seeds: int) -> int:
     """Runs of a case."""
-    return seeds if case.draws else 1
+    return seeds if case.draws and not case.once else 1
 
 
 def carried_out(

@@ -1,0 +1,111 @@
+"""The cases of the fault study: every set and mode that it promises, and some of each kind under a limit."""
+
+from collections import Counter
+from itertools import combinations
+
+import pytest
+
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.faults.targets.registry import TARGETS
+from spheretwin.twin.reproduce.faults.conditions import sets
+from spheretwin.twin.reproduce.faults.conditions.cases import (
+    SAMPLE,
+    FAULT_s,
+    cases,
+    of_groups,
+    of_part,
+    sample,
+)
+from spheretwin.twin.reproduce.faults.conditions.parts import VALUES, failures
+from spheretwin.twin.reproduce.faults.conditions.ways import (
+    BOUNDED,
+    DETECTING,
+    NOT_TOLD,
+    OF_GROUPS,
+    OF_PARTS,
+    TOLD,
+)
+
+ALL = cases()
+
+
+def test_every_group_and_pair_is_there():
+    assert list(sets.singles()) == [(group,) for group in range(18)]
+    assert list(sets.pairs()) == list(combinations(range(18), 2))
+    assert len(sets.pairs()) == 153
+
+
+def test_drawn_sets_are_even_in_size_all_different_and_the_same_each_time():
+    drawn = sets.drawn()
+    assert len(drawn) == len(set(drawn)) == 2000
+    sizes = Counter(map(len, drawn))
+    assert set(sizes) == set(range(3, 10))
+    assert max(sizes.values()) - min(sizes.values()) <= 1
+    assert all(list(groups) == sorted(set(groups)) and groups[0] >= 0 and groups[-1] < 18 for groups in drawn)
+    sets.drawn.cache_clear()
+    assert sets.drawn() == drawn
+
+
+def test_drawn_sets_take_every_group_about_as_often():
+    counted = Counter(group for groups in sets.drawn() for group in groups)
+    # Each group is in a third of the sets, but for six standard deviations of 2,000 coins.
+    assert all(abs(counted[group] - 2000 / 3) < 6 * (2000 * 2 / 9) ** 0.5 for group in range(18))
+
+
+def test_every_set_has_its_ways_and_a_sample_runs_on_the_other_engine():
+    kinds = Counter(case.told["kind"] for case in ALL)
+    ways = len(OF_GROUPS)
+    assert kinds == {
+        "healthy": 2,
+        "single": 18 * ways,
+        "pair": 153 * ways,
+        "drawn": 2000 * ways,
+        "part": len(failures()) * len(OF_PARTS),
+        "MuJoCo": len(sample()) * ways,
+    }
+    assert len(sample()) == -(-2171 // SAMPLE)
+
+
+def test_ways_change_nothing_but_what_they_say():
+    loaded = {
+        way.name: scenarios.load("nutation", of_groups((3, 11), way).fields).model_dump() for way in OF_GROUPS
+    }
+    base = loaded[NOT_TOLD.name]
+    assert (base["plant"]["modelling_error"], base["disturbance"]["load"]) == (0.2, 1.0)
+    assert [fault["target"] for fault in base["fault"]] == ["coil.03", "coil.11"]
+    for way, field in ((TOLD, "known"), (DETECTING, "detect")):
+        changed = tuple({**fault, field: True} for fault in base["fault"])
+        assert loaded[way.name] == {**base, "fault": changed}
+    assert loaded[BOUNDED.name] == {**loaded[TOLD.name], "allocation": "bounded"}
+
+
+def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_one():
+    there = {(failure.part, failure.mode) for failure in failures()}
+    wanted = {
+        (part, mode)
+        for target in TARGETS.values()
+        if not target.each_group
+        for part in target.names(18)
+        for mode in target.modes
+    }
+    assert there == wanted
+    assert {kind for kind, _ in VALUES} <= set(TARGETS)
+    for failure in failures():
+        for way in OF_PARTS:
+            scenario = scenarios.load("nutation", of_part(failure, way).fields)  # refuses what lacks a value
+            assert scenario.hardware == "prototype"
+            assert scenario.fault[0].start_s == FAULT_s
+
+
+@pytest.mark.parametrize("limit", [25, 60])
+def test_a_limit_leaves_some_of_each_kind(limit):
+    kinds = Counter(case.told["kind"] for case in ALL[:limit])
+    assert set(kinds) == {"healthy", "single", "pair", "drawn", "part", "MuJoCo"}
+    named = {case.name for case in ALL[:limit]}
+    other = [case.name.removesuffix(", MuJoCo") for case in ALL[:limit] if case.told["kind"] == "MuJoCo"]
+    assert named & set(other)
+
+
+def test_only_what_is_drawn_or_a_sample_runs_once():
+    assert {case.told["kind"] for case in ALL if case.once} == {"drawn", "MuJoCo"}
+    assert all(case.draws for case in ALL)  # the disturbance is drawn

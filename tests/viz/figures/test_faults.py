@@ -1,0 +1,77 @@
+"""Figures of the fault study: shares, pairs and points where they should be, and crosses above the bound."""
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from spheretwin.viz.figures import faults, plots
+
+SHARES = {"told": {1: 1.0, 2: 0.9, 9: 0.4}, "not told": {1: 0.6, 2: 0.3}}
+TRIANGLE = np.array([[1.0, np.nan, np.nan], [2.5, 1.5, np.nan], [np.nan, 8.0, 2.0]])
+POINTS = {"told": [(0.5, 3.0, 9), (1.5, 1.0, 1), (np.nan, 1.0, 2)], "bounded": [(0.5, 1.2, 9)]}
+
+
+def shares():
+    return faults.shares(SHARES, "open groups", "runs that track, %", "shares")
+
+
+def triangles():
+    return faults.triangles({"told": TRIANGLE, "not told": TRIANGLE}, "group", "ratio", 2.0, "pairs")
+
+
+def clouds():
+    return faults.clouds(POINTS, ("torque", "error", "groups"), (1.0, 2.0), "clouds")
+
+
+@pytest.mark.parametrize("draw", [shares, triangles, clouds])
+def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw):
+    paths = [tmp_path / "a.png", tmp_path / "b.png"]
+    for path in paths:
+        plots.save(draw(), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    inked = np.any(imread(paths[0])[:, :, :3] < 0.9, axis=2)
+    assert 0.003 < inked.mean() < 0.8
+
+
+def test_shares_are_in_percent_over_the_numbers_that_were_run():
+    (axes,) = shares().axes
+    lines = {line.get_label(): line for line in axes.get_lines()}
+    np.testing.assert_allclose(lines["told"].get_ydata(), [100, 90, 40])
+    assert list(lines["not told"].get_xdata()) == [1, 2]
+    assert list(axes.get_xticks()) == [1, 2, 9]
+    assert len({line.get_color() for line in lines.values()}) == 2
+
+
+def test_crosses_are_above_the_bound_and_on_no_empty_square():
+    left, right, _ = triangles().axes
+    for axes in (left, right):
+        (crosses,) = axes.collections
+        assert sorted(map(tuple, crosses.get_offsets().tolist())) == [(0.0, 1.0), (1.0, 2.0)]
+        shown = axes.images[0].get_array()
+        np.testing.assert_array_equal(np.ma.getmaskarray(shown), np.isnan(TRIANGLE))
+
+
+def test_one_scale_of_colours_for_all_panels_that_begins_at_one():
+    left, right, _ = triangles().axes
+    assert left.images[0].norm is right.images[0].norm
+    assert (left.images[0].norm.vmin, left.images[0].norm.vmax) == (1.0, 8.0)
+    small = faults.triangles({"told": TRIANGLE / 8}, "group", "ratio", 2.0, "pairs").axes[0].images[0].norm
+    assert (small.vmin, small.vmax) == (1 / 8, 4.0)  # twice the bound is always on it
+
+
+def test_points_without_numbers_are_left_out_and_bounds_are_dashed():
+    left, right, _ = clouds().axes
+    assert left.collections[0].get_offsets().tolist() == [[0.5, 3.0], [1.5, 1.0]]
+    assert len(right.collections[0].get_offsets()) == 1
+    for axes in (left, right):
+        dashed = [line for line in axes.get_lines() if line.get_linestyle() == "--"]
+        assert len(dashed) == 2
+        assert (dashed[0].get_xdata()[0], dashed[1].get_ydata()[0]) == (1.0, 2.0)
+        assert axes.get_xscale() == axes.get_yscale() == "log"
+
+
+def test_panels_without_a_point_or_a_square_are_drawn_too(tmp_path):
+    empty = faults.triangles({"told": np.full((3, 3), np.nan)}, "group", "ratio", 2.0, "pairs")
+    plots.save(empty, tmp_path / "empty.png")
+    cloud = faults.clouds({"told": [(0.5, 3.0, 9)]}, ("torque", "error", "groups"), (1.0, 2.0), "clouds")
+    plots.save(cloud, tmp_path / "cloud.png")

@@ -1,0 +1,139 @@
+"""Figures of a study of faults: shares by number, a triangle of pairs, and errors against what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, LogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.plots import FAINT, INK, SERIES, WIDTH_in
+
+Array = NDArray[np.float64]
+
+MARKERS = ("o", "s", "^", "D", "v")
+COLOURS = "cividis"  # told apart by the colour-blind, and in grey
+EVERY = 3  # one group number in so many is written
+
+
+def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: str) -> Figure:
+    """Lines of shares in percent over a number.
+
+    Parameters
+    ----------
+    by_name : mapping of name to mapping of number to share, 0 to 1
+    x, y, title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 4.2), layout="constrained")
+    axes = figure.subplots()
+    for (name, by_number), colour, marker in zip(by_name.items(), SERIES, MARKERS, strict=False):
+        percent = [100 * share for share in by_number.values()]
+        axes.plot(
+            list(by_number), percent, marker=marker, color=colour, linewidth=1.4, markersize=5, label=name
+        )
+    numbers = sorted({number for by_number in by_name.values() for number in by_number})
+    axes.set_xticks(numbers)
+    axes.set_ylim(-3, 103)
+    axes.grid(visible=True, axis="y", color=FAINT, alpha=0.4, linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.set_title(title, fontsize="medium")
+    axes.legend(frameon=False)
+    return figure
+
+
+def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: float, title: str) -> Figure:
+    """Triangles side by side, a square a pair, on one logarithmic scale; a cross above the bound.
+
+    Parameters
+    ----------
+    panels : mapping of title to (n, n) array
+        What is no number stays empty.
+    label : str
+        Of both axes.
+    quantity : str
+        What the colours are.
+    bound : float
+    title : str
+    """
+    values = np.concatenate([panel[np.isfinite(panel)] for panel in panels.values()])
+    lowest, highest = min(float(values.min(initial=1.0)), 1.0), max(float(values.max(initial=0.0)), 2 * bound)
+    scale = LogNorm(vmin=lowest, vmax=highest)
+    figure = Figure(figsize=(1.4 * WIDTH_in, 4.1), layout="constrained")
+    sides = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for axes, (name, panel) in zip(sides, panels.items(), strict=True):
+        image = axes.imshow(panel, norm=scale, cmap=COLOURS)
+        rows, columns = np.nonzero(panel > bound)
+        # White on the dark half of the scale, black on the light one.
+        ink = ["white" if scale(panel[at]) < 0.5 else "black" for at in zip(rows, columns, strict=True)]
+        axes.scatter(columns, rows, marker="x", c=ink, s=14, linewidths=0.9)
+        ticks = range(0, len(panel), EVERY)
+        axes.set_xticks(ticks)
+        axes.set_yticks(ticks)
+        axes.set_title(name, fontsize="medium")
+        axes.set_xlabel(label)
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+    sides[0].set_ylabel(label)
+    bar = figure.colorbar(image, ax=list(sides), shrink=0.85, aspect=28, label=quantity)
+    ticks_at = [tick for tick in (1, 1.5, 2, 3, 4, 6, 8, 10, 20, 50, 100) if lowest <= tick <= highest]
+    bar.set_ticks(ticks_at, labels=[f"{tick:g}" for tick in ticks_at])
+    bar.ax.minorticks_off()
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def clouds(
+    panels: Mapping[str, Sequence[tuple[float, float, int]]],
+    labels: tuple[str, str, str],
+    bounds: tuple[float, float],
+    title: str,
+) -> Figure:
+    """Points side by side on logarithmic axes, coloured by a number, with a dashed line on each axis.
+
+    Parameters
+    ----------
+    panels : mapping of title to points (x, y, number)
+    labels : tuple of str
+        Of x, y and the number.
+    bounds : tuple of float
+        Of x and y.
+    title : str
+    """
+    numbers = sorted({point[2] for points in panels.values() for point in points})
+    scale = BoundaryNorm([*numbers, numbers[-1] + 1], 256)
+    figure = Figure(figsize=(1.25 * WIDTH_in, 4.6), layout="constrained")
+    sides = figure.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, (name, points) in zip(sides, panels.items(), strict=True):
+        x, y, number = np.array([point for point in points if np.all(np.isfinite(point))]).T
+        cloud = axes.scatter(x, y, c=number, norm=scale, cmap=COLOURS, s=7, linewidths=0, rasterized=True)
+        _dashed(axes, bounds)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_title(name, fontsize="medium")
+        axes.set_xlabel(labels[0])
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(NullFormatter())
+        axes.spines[["top", "right"]].set_visible(False)
+    sides[0].set_ylabel(labels[1])
+    middles = [
+        number + 0.5 * (after - number)
+        for number, after in zip(numbers, [*numbers[1:], numbers[-1] + 1], strict=True)
+    ]
+    bar = figure.colorbar(cloud, ax=list(sides), label=labels[2])
+    bar.set_ticks(middles, labels=[str(number) for number in numbers])
+    bar.ax.tick_params(length=0)
+    bar.ax.minorticks_off()
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _dashed(axes: Axes, bounds: tuple[float, float]) -> None:
+    axes.axvline(bounds[0], color=INK, linestyle="--", linewidth=0.9, zorder=0)
+    axes.axhline(bounds[1], color=INK, linestyle="--", linewidth=0.9, zorder=0)
