@@ -11,7 +11,10 @@ account is further than twice the threshold from the driven one: it could not be
 current is near neither undriven account speaks for health, and what was counted before is forgotten. Ticks at
 which little is commanded say nothing. So many ticks that speak for a fault, with none between that speaks
 against, and the group is taken to be out, as open or as shorted, whichever account was closer (the mean
-square of the difference).
+square of the difference). Where the rotor is slow the two accounts are one but for noise, and the first name is
+a guess. So both go on being held against the current of a group that is out, which nothing drives any more, and
+the name changes where the sum of squares of the other one has become less by the square of the threshold.
+Whatever the account of a shorted coil, noise does that to the true name at six standard deviations of it.
 
 *Threshold.* A healthy group that is believed to carry more than twice the threshold must not be measured
 below it: the threshold is at least the largest static error of command and measurement together, and six
@@ -32,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, Groups
+from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, Groups
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.kinematics import angular_velocity
 
@@ -161,13 +164,17 @@ def find(
         settled = -emf / detector.resistance_ohm
         shorted = settled + (detector.shorted_A[j] - settled) * detector.decay
         detector.shorted_A[j] = shorted
-        if groups.out[j] != IN_USE:
-            continue
-        measured, driven = detector.measured_A[j], believed[j]
+        measured, driven, out = detector.measured_A[j], believed[j], groups.out[j]
         as_open, as_shorted = abs(measured), abs(measured - shorted)
+        if out == TOLD:
+            _forget(detector, j)
+            continue
+        if out != IN_USE:
+            _compare(detector, j, as_open, as_shorted)
+            groups.out[j] = _name(detector, j, out)
+            continue
         if not min(as_open, as_shorted) <= threshold:
-            detector.counted[j] = 0
-            detector.open_A2[j] = detector.shorted_A2[j] = 0.0
+            _forget(detector, j)
             continue
         speaks = (as_open <= threshold and abs(driven) > 2.0 * threshold) or (
             as_shorted <= threshold and abs(driven - shorted) > 2.0 * threshold
@@ -175,13 +182,35 @@ def find(
         if not speaks:
             continue
         detector.counted[j] += 1
-        detector.open_A2[j] += as_open * as_open
-        detector.shorted_A2[j] += as_shorted * as_shorted
+        _compare(detector, j, as_open, as_shorted)
         if detector.counted[j] >= detector.ticks:
             opened = detector.open_A2[j] <= detector.shorted_A2[j]
             groups.out[j] = FOUND_OPEN if opened else FOUND_SHORTED
             groups.out_s[j] = t
             groups.some_out[0] = True
+
+
+@allocation_free
+def _forget(detector: Detector, group: int) -> None:
+    """Begin anew with a group."""
+    detector.counted[group] = 0
+    detector.open_A2[group] = detector.shorted_A2[group] = 0.0
+
+
+@allocation_free
+def _compare(detector: Detector, group: int, as_open: float, as_shorted: float) -> None:
+    """Add the differences (A) of one tick to what speaks against either account."""
+    detector.open_A2[group] += as_open * as_open
+    detector.shorted_A2[group] += as_shorted * as_shorted
+
+
+@allocation_free
+def _name(detector: Detector, group: int, name: int) -> int:
+    """How a group that was found stands: as before, unless the other account has become closer by far."""
+    closer = detector.open_A2[group] - detector.shorted_A2[group]
+    if abs(closer) <= detector.threshold_A * detector.threshold_A:
+        return name
+    return FOUND_SHORTED if closer > 0.0 else FOUND_OPEN
 
 
 def state_of(detector: Detector) -> Array:
