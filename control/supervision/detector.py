@@ -11,10 +11,10 @@ account is further than twice the threshold from the driven one: it could not be
 current is near neither undriven account speaks for health, and what was counted before is forgotten. Ticks at
 which little is commanded say nothing. So many ticks that speak for a fault, with none between that speaks
 against, and the group is taken to be out, as open or as shorted, whichever account was closer (the mean
-square of the difference). Where the rotor is slow the two accounts are one but for noise, and the first name is
-a guess. So both go on being held against the current of a group that is out, which nothing drives any more, and
-the name changes where the sum of squares of the other one has become less by the square of the threshold.
-Whatever the account of a shorted coil, noise does that to the true name at six standard deviations of it.
+square of the difference). Where the rotor is slow the two accounts are one but for noise, and the first name
+is a guess. So both go on being held against the current of a group that is out, which nothing drives any
+more, and the name changes where the sum of squares of the other one has become less by the square of the
+threshold. Whatever the account of a shorted coil, noise does that to a true name at six standard deviations.
 
 *Threshold.* A healthy group that is believed to carry more than twice the threshold must not be measured
 below it: the threshold is at least the largest static error of command and measurement together, and six

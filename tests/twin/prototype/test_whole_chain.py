@@ -5,6 +5,8 @@ commands that a run has logged, tick by tick, and tells what else the run must h
 control period are one, so that the logged mean current is that of the whole period.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
@@ -12,6 +14,7 @@ from scipy.optimize import brentq, minimize_scalar
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.faults.targets.registry import TARGETS
 from spheretwin.twin.session import Session
 
 PERIOD_S, GROUPS, SEED, TICKS, CONVERSIONS = 1e-3, 18, 21, 400, 3
@@ -56,6 +59,21 @@ FAULTS = [
     ("controller", "stuck", 0.17, 0.175, None),
     ("controller", "dropout", 0.19, 0.194, None),
 ]
+
+
+# What a part does while it fails, where it comes and goes.
+COMES_AND_GOES = {
+    "coil": "open", "amplifier": "dropout", "dac": "dropout", "pot": "open", "encoder": "dropout",
+    "adc": "dropout", "supply": "dropout", "controller": "stuck",
+}  # fmt: skip
+
+VALUES = {
+    "gain": 0.5, "delay": 3e-3, "intermittent": 7e-3, ("pot", "open"): 0.4, ("supply", "offset"): -18.0,
+    ("supply", "noise"): 8.0, ("amplifier", "offset"): 0.3, ("amplifier", "noise"): 0.2,
+    ("dac", "offset"): 0.3, ("dac", "noise"): 0.2, ("adc", "offset"): 0.01, ("adc", "noise"): 1e-3,
+    "offset": 0.01, "noise": 1e-3,
+}  # fmt: skip
+STUCK = {"amplifier": 0.7, "dac": -0.7, "pot": 0.1, "encoder": -0.1, "adc": 0.1}
 
 
 def as_tables(faults):
@@ -131,11 +149,17 @@ class Copy:
             name, _, where = target.partition(".")
             number = PLACES.get(target, int(where) if where.isdecimal() else 0)
             first, last = round(start / PERIOD_S), np.inf if end is None else round(end / PERIOD_S)
+            part = FIRST_PART[name] + number
             if name == kind and place in (None, number) and first <= self.tick_number < last:
-                yield mode, value, 2 * (FIRST_PART[name] + number)
+                if mode == "intermittent":
+                    stretch = self.tick_number // round(value / PERIOD_S)
+                    if np.random.default_rng([SEED, 201, part, stretch]).random() < 0.5:
+                        yield COMES_AND_GOES[name], None, 2 * part
+                else:
+                    yield mode, value, 2 * part
 
     def through(self, faults, value, last, unit, channel=0):
-        """A value behind what is wrong with a line, fault by fault; `unit` takes what is stated to its own."""
+        """A value behind what is wrong with a line, fault by fault; `unit` takes what is stated to it."""
         for mode, stated, column in faults:
             if mode == "offset":
                 value = value + unit * stated
@@ -147,6 +171,10 @@ class Copy:
                 value = last if stated is None else unit * stated
             elif mode == "dropout":
                 value = 0.0
+            elif mode in ("open", "short"):  # of a potentiometer: its input floats, or lies at an end
+                value = 2.5 if mode == "short" else stated or 0.0
+            else:
+                raise KeyError(mode)
         return value
 
     def sense(self, q):
@@ -163,7 +191,7 @@ class Copy:
                 seen = (1 + 1e-3 * self.adc[channel][1]) * seen + 1e-3 * self.adc[channel][0]
                 codes.append(np.clip(np.round(seen / (5 / 2**16)), -(2**15), 2**15 - 1))
             volts = np.mean(codes) * 5 / 2**16
-            lines = [fault for fault in self.acting("adc") if fault[0] in ("noise", "stuck")]
+            lines = [fault for fault in self.acting("adc") if fault[0] not in ("dropout", "delay")]
             volts = self.through(lines, volts, self.converted[channel], 1.0, channel)
             self.converted[channel] = volts
         self.voltages.append(self.converted[:2].copy())
@@ -201,6 +229,8 @@ class Copy:
                 leaving = TRANSCONDUCTANCE_A_V * self.volts_asked(np.zeros(GROUPS))
             elif mode == "delay":
                 late += round(value / PERIOD_S)
+            else:
+                raise KeyError(mode)
         self.sent.append(leaving)
         asked = self.sent[max(len(self.sent) - 1 - late, 0)].copy()
         for j in range(GROUPS):
@@ -212,17 +242,17 @@ class Copy:
     def drive(self, q, qdot):
         supply = 24.0
         for mode, value, column in self.acting("supply"):
-            if mode == "noise":
-                supply += value * draw(4, column, self.tick_number)
-            else:
-                supply *= value if mode == "gain" else 0.0
+            supply = self.through([(mode, value, column)], supply, None, 1.0)
         supply = max(supply, 0.0)
         G = torque_matrix(q, self.actuator)
         turns = np.ones(GROUPS)
         R = R20_OHM * (1 + 0.0039 * (self.temperature - 20))
         mean, copper, drawn = np.zeros((3, GROUPS))
         for j in range(GROUPS):
-            wrong = {mode for mode, *_ in [*self.acting("coil", j), *self.acting("amplifier", j)]}
+            wrong = {mode for mode, *_ in self.acting("coil", j)}
+            if wrong - {"open", "short", "gain"}:
+                raise KeyError(wrong)
+            wrong |= {mode for mode, *_ in self.acting("amplifier", j)}
             for mode, value, _ in self.acting("coil", j):
                 turns[j] *= value if mode == "gain" else 1.0
             emf = turns[j] * (G[:, j] @ (rate_jacobian(q) @ qdot))
@@ -297,16 +327,16 @@ class Copy:
         }
 
 
-def run_and_copy(faults, engine):
+def run_and_copy(faults, engine="lagrangian", ticks=TICKS):
     scenario = scenarios.load(
-        "tilt",
+        "nutation",
         {
             "hardware": "prototype", "seed": SEED, "plant.engine": engine, "plant.step_s": PERIOD_S,
             "sensors.adc.oversampling": CONVERSIONS, "watchdog.on": False, "fault": as_tables(faults),
         },
     )  # fmt: skip
     with Session(scenario) as session:
-        table, actuator = session.advance(TICKS), session.actuator
+        table, actuator = session.advance(ticks), session.actuator
         assert session.status == "running"
     copy = Copy(faults, actuator)
     rows = [
@@ -316,6 +346,14 @@ def run_and_copy(faults, engine):
     return table, rows
 
 
+def check(table, rows):
+    for name in rows[0]:
+        expected = np.array([row[name] for row in rows]).reshape(table[name].shape)
+        # Rounding of all products and sums, 1e-16 each, on either side; a flipped code would be 1e-5.
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(table[name], expected, rtol=0, atol=1e-12 * size, err_msg=name)
+
+
 @pytest.mark.parametrize(
     ("faults", "engine"),
     [([], "lagrangian"), ([], "mujoco"), (FAULTS, "lagrangian"), (FAULTS, "mujoco")],
@@ -323,15 +361,38 @@ def run_and_copy(faults, engine):
 )
 def test_the_prototype_is_its_plain_copy(faults, engine):
     table, rows = run_and_copy(faults, engine)
-    for name in rows[0]:
-        expected = np.array([row[name] for row in rows]).reshape(table[name].shape)
-        # Rounding of all products and sums, 1e-16 each, on either side; a flipped code would be 1e-5.
-        np.testing.assert_allclose(
-            table[name], expected, rtol=0, atol=1e-12 * np.abs(expected).max(), err_msg=name
-        )
+    check(table, rows)
     if faults:
         marks = table["fault"]
         assert np.count_nonzero(marks.any(axis=0)) == len({target for target, *_ in faults})
         # It went through the limits of the voltage, in and out within a period.
         shares = table["voltage_limited"]
         assert np.count_nonzero((shares > 0) & (shares < 1)) > 50
+
+
+EVERY = [(target.name, mode) for target in TARGETS.values() for mode in target.modes]
+
+
+@pytest.mark.parametrize(("kind", "mode"), EVERY)
+def test_every_way_to_fail_acts_where_it_belongs(kind, mode):
+    """Each alone, and what it acts on is told apart from a healthy run; a mode that is new has no copy."""
+    part = TARGETS[kind].names(GROUPS)[-1]
+    value = VALUES.get((kind, mode), VALUES.get(mode))
+    faults = [(part, mode, 0.03, 0.07, value)]
+    if mode == "stuck" and kind in STUCK:
+        faults.append((part, mode, 0.08, 0.09, STUCK[kind]))
+    table, rows = run_and_copy(faults, ticks=110)
+    check(table, rows)
+    failing = np.flatnonzero(table["fault"].any(axis=1))
+    assert failing[0] >= 30
+    assert failing[-1] < 90
+    seen = [np.concatenate([np.ravel(value) for value in row.values()]) for row in rows]
+    without = [np.concatenate([np.ravel(value) for value in row.values()]) for row in healthy_rows()]
+    differ = [np.any(a != b) for a, b in zip(seen, without, strict=True)]
+    assert not any(differ[: failing[0]])
+    assert any(differ)
+
+
+@cache
+def healthy_rows():
+    return run_and_copy([], ticks=110)[1]
