@@ -2,7 +2,8 @@
 
 Each tick the measured current of a group is held against three accounts of it:
 
-- *driven*: what the controller believes, its command through the nominal delay and lag;
+- *driven*: what the controller believes, its command through the nominal delay and lag, as far as the swing
+  of the amplifier carries it through the coil;
 - *open*: nothing;
 - *shorted*: what the back-EMF drives through the coil alone, ``L di/dt = -R i - e`` with ``e = G^T w``.
 
@@ -86,6 +87,7 @@ class Detector(NamedTuple):
     ticks: int
     decay: float  # of the current of a shorted coil, over a control period
     resistance_ohm: float
+    reach_A: float  # that the swing carries through the coil
     measured_A: Array  # (n,) what the sensors of the currents say
     shorted_A: Array  # (n,) what a shorted coil would carry
     counted: NDArray[np.int64]  # (n,) ticks that speak for a fault
@@ -128,6 +130,7 @@ def detector(section: DetectorSection, on: bool, groups: int, followed: Followed
         ticks=section.ticks or derived_ticks(followed),
         decay=exp(-followed.period_s * followed.resistance_ohm / followed.inductance_H),
         resistance_ohm=followed.resistance_ohm,
+        reach_A=followed.swing_V / followed.resistance_ohm,
         measured_A=np.zeros(groups),
         shorted_A=np.zeros(groups),
         counted=np.zeros(groups, dtype=np.int64),
@@ -164,7 +167,8 @@ def find(
         settled = -emf / detector.resistance_ohm
         shorted = settled + (detector.shorted_A[j] - settled) * detector.decay
         detector.shorted_A[j] = shorted
-        measured, driven, out = detector.measured_A[j], believed[j], groups.out[j]
+        measured, out = detector.measured_A[j], groups.out[j]
+        driven = min(max(believed[j], -detector.reach_A), detector.reach_A)
         as_open, as_shorted = abs(measured), abs(measured - shorted)
         if out == TOLD:
             _forget(detector, j)
