@@ -118,9 +118,9 @@ def loop(
         copy_into(row, places.of_the_law, controller.memory, controller.logged)
         delivered = Delivered(row[first_current:scale], row[TORQUE : TORQUE + 3])
         status = plant_tick(plant, command, disturbance, delivered)
-        write_columns(row, places.of_stages, controller, sensors, plant)
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)
+        write_columns(row, places.of_stages, controller, sensors, plant)
         if status == FAILSAFE and watchdog.on:
             status = GOING  # the currents run down first
         if over(watchdog) or (status == LEFT_WORKSPACE and watchdog.halt[0] != GO):

@@ -254,8 +254,9 @@ def _carried_on(moving: Moving, scenario: Scenario, files: Files) -> Moving:
 def _supervised_on(before: Supervision, after: Supervision) -> None:
     """Go on with what was seen before, under other figures."""
     groups.restore(after.groups, groups.state_of(before.groups))
-    detector.restore(after.detector, detector.state_of(before.detector))
-    watchdog.restore(after.watchdog, watchdog.state_of(before.watchdog))
+    if before.detector.on:
+        detector.restore(after.detector, detector.state_of(before.detector))
+    watchdog.carried_on(before.watchdog, after.watchdog)
 
 
 def _array(values: Triple | None) -> NDArray[np.float64]:

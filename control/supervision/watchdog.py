@@ -215,3 +215,10 @@ def restore(watchdog: Watchdog, state: Array) -> None:
     """Go on from a state."""
     watchdog.last_rad[:], watchdog.missing[:] = state[:3], state[3:6].astype(np.int64)
     watchdog.halt[0], watchdog.reason[0], watchdog.since[0] = state[6:].astype(np.int64)
+
+
+def carried_on(before: Watchdog, after: Watchdog) -> None:
+    """Go on as before with other figures; what one has seen that was off since is too old to compare with."""
+    restore(after, state_of(before))
+    if not before.on:
+        after.last_rad[:], after.missing[:] = np.nan, 0
