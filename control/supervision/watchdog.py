@@ -1,7 +1,8 @@
 """The watchdog: looks at each measurement and command, and takes the currents away where one cannot be true.
 
-It trips for one of the reasons below, once. From then on all commands are 0 A, or the drive shorts the coils
-so that their back-EMF brakes the rotor; after a stated time more the run ends. The law is not called again.
+It trips for one of the reasons below, once. From then on the drive is asked for nothing, whatever is on its
+way, or it shorts the coils so that their back-EMF brakes the rotor; after a stated time more the run ends.
+The law is not called again.
 
 *Jump.* No angle moves further in a control period than the largest rate takes it, plus what noise and
 resolution of its sensor add: six standard deviations of the difference of two samples, and one step. Where
