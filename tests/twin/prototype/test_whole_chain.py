@@ -37,6 +37,7 @@ FAULTS = [
     ("amplifier.11", "stuck", 0.10, 0.25, None),
     ("amplifier.12", "dropout", 0.15, 0.28, None),
     ("amplifier.14", "open", 0.15, 0.22, None),
+    ("dac.02", "offset", 0.09, 0.30, -0.4),  # which its amplifier's gain, above, multiplies all the same
     ("dac.04", "gain", 0.05, 0.18, 0.5),
     ("dac.13", "stuck", 0.12, 0.24, 0.5),
     ("dac.15", "offset", 0.07, None, -0.2),
