@@ -207,9 +207,9 @@ def _ask_law(
 
 @compilable
 def _supervise(controller: Controller, t: float) -> None:
-    """Look for groups that do not follow, where that is wanted."""
-    groups, detector, _ = controller.supervision
-    if detector.on:
+    """Look for groups that do not follow, where that is wanted, and while they are driven."""
+    groups, detector, watchdog = controller.supervision
+    if detector.on and watchdog.halt[0] == GO:
         G, believed = controller.kept.G, controller.belief.current
         find(detector, groups, believed, G, controller.pose, controller.rates, t)
 

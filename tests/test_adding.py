@@ -318,6 +318,24 @@ def step(angle, parameters, state, rate):
         ("    | Differentiator,\n", "    | Differentiator\n    | Rough,\n"),
         "from spheretwin.control.estimation.rough import Rough\n",
     ),
+    "fault": Addition(
+        "twin/faults/targets/fuse.py",
+        """
+from spheretwin.twin.electronics.driving.undriven import OPEN
+from spheretwin.twin.faults.target import Mode, Target
+
+
+def _blow(effects, strike):
+    effects.drive.acts[0] = True
+    effects.drive.contact[strike.place] = OPEN
+
+
+TARGET = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
+""",
+        "twin/faults/targets/registry.py",
+        ("        supply.TARGET,\n", "        supply.TARGET,\n        fuse.TARGET,\n"),
+        "from spheretwin.twin.faults.targets import fuse\n",
+    ),
     "allocation": Addition(
         "control/allocation/halved.py",
         '''
@@ -389,6 +407,10 @@ engine = "uncoupled"
 [[disturbance.terms]]
 kind = "kick"
 torque_Nm = 0.02
+[[fault]]
+target = "fuse.03"
+mode = "blown"
+start_s = 0.03
 ''')
 parquet = folder / "new.parquet"
 code = cli.main(["simulate", str(folder / "new.toml"), "--telemetry", str(parquet), "--json"])
@@ -423,6 +445,7 @@ table = read_parquet(parquet)[0]
 print("RESULT" + json.dumps({
     "code": code, "helped": helped, "refused": refused, "status": str(Status("bored")),
     "columns": [signal.name for signal in table.signals],
+    "blown": table["current_A"][:, 3].tolist(), "marks": sorted(set(table["fault"].ravel().tolist())),
     "largest": table["largest_current_A"].tolist(), "q_ref": table["q_ref_rad"][-1].tolist(),
     "disturbance": table["disturbance_Nm"][:, 1].tolist(), "current": abs(table["current_command_A"]).max(),
     "page": (folder / page.PAGE).read_text(), "figure": (folder / "names.png").stat().st_size,
@@ -503,6 +526,12 @@ def test_an_estimator(grown):
     assert "kalman, differentiator, rough" in grown["refused"]["estimator.kind"]
 
 
+def test_a_fault(grown):
+    assert all(grown["blown"][1:30])
+    assert not any(grown["blown"][30:])
+    assert len(grown["marks"]) == 2
+
+
 def test_an_allocation(grown):
     assert 0 < grown["current"] <= 4.0
     assert "'halved'" in grown["refused"]["allocation"]
@@ -543,6 +572,7 @@ EVERY = {
     "twin/metrics/test_every_metric.py": "mean_load_Nm",
     "twin/plant/test_every_engine.py": "uncoupled",
     "twin/reproduce/test_every_experiment.py": "holding",
+    "twin/faults/test_every_target.py": "fuse",
 }
 
 

@@ -1,5 +1,6 @@
 """The closed loop, tick by tick: measure, control, move the plant, keep a row. Compiled, or in Python."""
 
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,9 +119,11 @@ def loop(
         copy_into(row, places.of_the_law, controller.memory, controller.logged)
         delivered = Delivered(row[first_current:scale], row[TORQUE : TORQUE + 3])
         status = plant_tick(plant, command, disturbance, delivered)
-        write_columns(row, places.of_stages, controller, sensors, plant)
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)
+        write_columns(row, places.of_stages, controller, sensors, plant)
+        if not all_finite(row):  # nor is there a state to go on from
+            return tick, DIVERGED
         if status == FAILSAFE and watchdog.on:
             status = GOING  # the currents run down first
         if over(watchdog) or (status == LEFT_WORKSPACE and watchdog.halt[0] != GO):
@@ -128,6 +131,15 @@ def loop(
         if status != GOING:
             return tick + 1, status
     return log.shape[0], GOING
+
+
+@allocation_free
+def all_finite(row: Array) -> bool:
+    """Whether a row holds numbers alone."""
+    finite = True
+    for column in range(row.shape[0]):
+        finite = finite and isfinite(row[column])
+    return finite
 
 
 @allocation_free

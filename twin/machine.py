@@ -34,6 +34,14 @@ NO_INPUTS = loops.Inputs(
 )
 
 
+class Last(NamedTuple):
+    """The last tick, as far as what begins to be held needs it; nothing in it before the first."""
+
+    q: NDArray[np.float64]  # (3,) rad
+    noise: NDArray[np.float64]  # (k,) of the sensors
+    command: NDArray[np.float64]  # (n,) A
+
+
 class State(NamedTuple):
     """All that the parts go on from."""
 
@@ -48,6 +56,7 @@ class State(NamedTuple):
     groups: NDArray[np.float64]
     detector: NDArray[np.float64]
     watchdog: NDArray[np.float64]
+    last: Last
 
 
 class Moving(NamedTuple):
@@ -89,6 +98,7 @@ class Machine:
     def __init__(self, scenario: Scenario, files: Files, law: Law, moving: Moving | None = None) -> None:
         self._scenario = scenario
         self._moving = moving or _started(scenario, files)
+        self._last = Last(np.empty(0), np.empty(0), np.zeros(len(files.actuator.groups)))
         self.law = law
         self.signals = assembly.signals_of(scenario, files.actuator, self.law)
         self.columns = width(self.signals)
@@ -135,7 +145,15 @@ class Machine:
 
     def run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
         """Run a control tick for each row of `log`: rows written, and the code of a status."""
-        return self._loop(inputs, *self._parts, log)
+        ticks, code = self._loop(inputs, *self._parts, log)
+        if ticks:
+            row, first = log[ticks - 1], loops.CURRENT_COMMAND
+            self._last = Last(
+                row[loops.ANGLE : loops.ANGLE + 3].copy(),
+                inputs.noise[ticks - 1].copy(),
+                row[first : first + len(self._plant.current)].copy(),
+            )
+        return ticks, code
 
     def changed(self, scenario: Scenario, files: Files, own_law: Law | None) -> Machine:
         """Machine of another scenario that carries on what this one is in the midst of.
@@ -148,8 +166,9 @@ class Machine:
         law = own_law or self._law_for(scenario)
         made = Machine(scenario, files, law, moving)
         made._plant.current[:] = self._plant.current
-        drivings.carried_on(self._plant.driving, made._plant.driving, self._plant.current)
-        senses.carried_on(self._sensors, made._sensors)
+        made._last = self._last
+        drivings.carried_on(self._plant.driving, made._plant.driving, self._last.command)
+        senses.carried_on(self._sensors, made._sensors, self._last.q, self._last.noise)
         _supervised_on(self._controller.supervision, made._controller.supervision)
         if made.law is self.law:
             made._controller.parameters[:] = self._controller.parameters
@@ -183,6 +202,7 @@ class Machine:
             groups=groups.state_of(controller.supervision.groups),
             detector=detector.state_of(controller.supervision.detector),
             watchdog=watchdog.state_of(controller.supervision.watchdog),
+            last=self._last,
         )
 
     def restore(self, state: State) -> None:
@@ -214,6 +234,7 @@ class Machine:
         groups.restore(self._controller.supervision.groups, state.groups)
         detector.restore(self._controller.supervision.detector, state.detector)
         watchdog.restore(self._controller.supervision.watchdog, state.watchdog)
+        self._last = state.last
 
 
 def _started(scenario: Scenario, files: Files) -> Moving:
@@ -233,8 +254,9 @@ def _carried_on(moving: Moving, scenario: Scenario, files: Files) -> Moving:
 def _supervised_on(before: Supervision, after: Supervision) -> None:
     """Go on with what was seen before, under other figures."""
     groups.restore(after.groups, groups.state_of(before.groups))
-    detector.restore(after.detector, detector.state_of(before.detector))
-    watchdog.restore(after.watchdog, watchdog.state_of(before.watchdog))
+    if before.detector.on:
+        detector.restore(after.detector, detector.state_of(before.detector))
+    watchdog.carried_on(before.watchdog, after.watchdog)
 
 
 def _array(values: Triple | None) -> NDArray[np.float64]:

@@ -2,7 +2,8 @@
 
 Each tick the measured current of a group is held against three accounts of it:
 
-- *driven*: what the controller believes, its command through the nominal delay and lag;
+- *driven*: what the controller believes, its command through the nominal delay and lag, as far as the swing
+  of the amplifier carries it through the coil;
 - *open*: nothing;
 - *shorted*: what the back-EMF drives through the coil alone, ``L di/dt = -R i - e`` with ``e = G^T w``.
 
@@ -11,7 +12,10 @@ account is further than twice the threshold from the driven one: it could not be
 current is near neither undriven account speaks for health, and what was counted before is forgotten. Ticks at
 which little is commanded say nothing. So many ticks that speak for a fault, with none between that speaks
 against, and the group is taken to be out, as open or as shorted, whichever account was closer (the mean
-square of the difference).
+square of the difference). Where the rotor is slow the two accounts are one but for noise, and the first name
+is a guess. So both go on being held against the current of a group that is out, which nothing drives any
+more, and the name changes where the sum of squares of the other one has become less by the square of the
+threshold. Whatever the account of a shorted coil, noise does that to a true name at six standard deviations.
 
 *Threshold.* A healthy group that is believed to carry more than twice the threshold must not be measured
 below it: the threshold is at least the largest static error of command and measurement together, and six
@@ -32,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, Groups
+from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, Groups
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.kinematics import angular_velocity
 
@@ -83,6 +87,7 @@ class Detector(NamedTuple):
     ticks: int
     decay: float  # of the current of a shorted coil, over a control period
     resistance_ohm: float
+    reach_A: float  # that the swing carries through the coil
     measured_A: Array  # (n,) what the sensors of the currents say
     shorted_A: Array  # (n,) what a shorted coil would carry
     counted: NDArray[np.int64]  # (n,) ticks that speak for a fault
@@ -125,6 +130,7 @@ def detector(section: DetectorSection, on: bool, groups: int, followed: Followed
         ticks=section.ticks or derived_ticks(followed),
         decay=exp(-followed.period_s * followed.resistance_ohm / followed.inductance_H),
         resistance_ohm=followed.resistance_ohm,
+        reach_A=followed.swing_V / followed.resistance_ohm,
         measured_A=np.zeros(groups),
         shorted_A=np.zeros(groups),
         counted=np.zeros(groups, dtype=np.int64),
@@ -161,13 +167,18 @@ def find(
         settled = -emf / detector.resistance_ohm
         shorted = settled + (detector.shorted_A[j] - settled) * detector.decay
         detector.shorted_A[j] = shorted
-        if groups.out[j] != IN_USE:
-            continue
-        measured, driven = detector.measured_A[j], believed[j]
+        measured, out = detector.measured_A[j], groups.out[j]
+        driven = min(max(believed[j], -detector.reach_A), detector.reach_A)
         as_open, as_shorted = abs(measured), abs(measured - shorted)
+        if out == TOLD:
+            _forget(detector, j)
+            continue
+        if out != IN_USE:
+            _compare(detector, j, as_open, as_shorted)
+            groups.out[j] = _name(detector, j, out)
+            continue
         if not min(as_open, as_shorted) <= threshold:
-            detector.counted[j] = 0
-            detector.open_A2[j] = detector.shorted_A2[j] = 0.0
+            _forget(detector, j)
             continue
         speaks = (as_open <= threshold and abs(driven) > 2.0 * threshold) or (
             as_shorted <= threshold and abs(driven - shorted) > 2.0 * threshold
@@ -175,13 +186,35 @@ def find(
         if not speaks:
             continue
         detector.counted[j] += 1
-        detector.open_A2[j] += as_open * as_open
-        detector.shorted_A2[j] += as_shorted * as_shorted
+        _compare(detector, j, as_open, as_shorted)
         if detector.counted[j] >= detector.ticks:
             opened = detector.open_A2[j] <= detector.shorted_A2[j]
             groups.out[j] = FOUND_OPEN if opened else FOUND_SHORTED
             groups.out_s[j] = t
             groups.some_out[0] = True
+
+
+@allocation_free
+def _forget(detector: Detector, group: int) -> None:
+    """Begin anew with a group."""
+    detector.counted[group] = 0
+    detector.open_A2[group] = detector.shorted_A2[group] = 0.0
+
+
+@allocation_free
+def _compare(detector: Detector, group: int, as_open: float, as_shorted: float) -> None:
+    """Add the differences (A) of one tick to what speaks against either account."""
+    detector.open_A2[group] += as_open * as_open
+    detector.shorted_A2[group] += as_shorted * as_shorted
+
+
+@allocation_free
+def _name(detector: Detector, group: int, name: int) -> int:
+    """How a group that was found stands: as before, unless the other account has become closer by far."""
+    closer = detector.open_A2[group] - detector.shorted_A2[group]
+    if abs(closer) <= detector.threshold_A * detector.threshold_A:
+        return name
+    return FOUND_SHORTED if closer > 0.0 else FOUND_OPEN
 
 
 def state_of(detector: Detector) -> Array:

@@ -1,7 +1,8 @@
 """The watchdog: looks at each measurement and command, and takes the currents away where one cannot be true.
 
-It trips for one of the reasons below, once. From then on all commands are 0 A, or the drive shorts the coils
-so that their back-EMF brakes the rotor; after a stated time more the run ends. The law is not called again.
+It trips for one of the reasons below, once. From then on the drive is asked for nothing, whatever is on its
+way, or it shorts the coils so that their back-EMF brakes the rotor; after a stated time more the run ends.
+The law is not called again.
 
 *Jump.* No angle moves further in a control period than the largest rate takes it, plus what noise and
 resolution of its sensor add: six standard deviations of the difference of two samples, and one step. Where
@@ -215,3 +216,10 @@ def restore(watchdog: Watchdog, state: Array) -> None:
     """Go on from a state."""
     watchdog.last_rad[:], watchdog.missing[:] = state[:3], state[3:6].astype(np.int64)
     watchdog.halt[0], watchdog.reason[0], watchdog.since[0] = state[6:].astype(np.int64)
+
+
+def carried_on(before: Watchdog, after: Watchdog) -> None:
+    """Go on as before with other figures; what one has seen that was off since is too old to compare with."""
+    restore(after, state_of(before))
+    if not before.on:
+        after.last_rad[:], after.missing[:] = np.nan, 0

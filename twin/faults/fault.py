@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import inf
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from spheretwin.models.base.wording import did_you_mean, shown
 from spheretwin.models.telemetry.series import LONGEST_s
-from spheretwin.twin.faults.target import Mode, Target
+from spheretwin.twin.faults.target import LARGEST, Mode, Target
 from spheretwin.twin.faults.targets.registry import TARGETS
 
 MODES = tuple(dict.fromkeys(mode for target in TARGETS.values() for mode in target.modes))
@@ -95,6 +97,28 @@ class Fault(BaseModel):
         if self.value is not None:
             return self.value
         return self.way.value.default or 0.0 if self.way.value else 0.0
+
+
+def check_gains(faults: Sequence[Fault]) -> None:
+    """See to it that gains of one part, one behind the other, remain numbers that squares can be taken of.
+
+    Raises
+    ------
+    ValueError
+        Those that act on one part at a time multiply to more than `LARGEST`.
+    """
+    gains = [fault for fault in faults if fault.mode == "gain"]
+    for last in gains:
+        product = 1.0
+        for fault in gains:
+            at_work = fault.start_s <= last.start_s < (inf if fault.end_s is None else fault.end_s)
+            if at_work and found(fault.target) == found(last.target):
+                product *= max(abs(fault.number), 1.0)
+            if product > LARGEST:
+                raise ValueError(
+                    f"expected gains of at most {LARGEST:g} in all for faults of {last.target} at"
+                    f" {last.start_s:g} s, received a product beyond"
+                )
 
 
 def found(name: str) -> tuple[Target, int]:

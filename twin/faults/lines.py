@@ -1,6 +1,7 @@
 """Faults of what an amplifier is asked for: one line, ``gain · asked + offset + noise``, or a held value.
 
-Several on one group act one behind the other, in the order of the plan.
+Several on one group act one behind the other: those of the converter, then those of the amplifier, each in
+the order of the plan.
 """
 
 from __future__ import annotations

@@ -25,6 +25,8 @@ NEVER = 2**62
 # Times and periods are decimal fractions: a tick that falls on a start does so to rounding only.
 ROUNDING = 1e-6
 
+_KINDS = tuple(TARGETS)
+
 COLUMNS_A_PART = 2
 """Random numbers a tick."""
 
@@ -70,8 +72,11 @@ class FaultPlan:
         return min((self._next(planned, tick) for planned in self._planned), default=NEVER)
 
     def strike(self, at_work: tuple[int, ...], effects: Effects) -> None:
-        """Let some faults of the plan act, in its order."""
-        for i in at_work:
+        """Let some faults of the plan act: what is further from the coils first, of one kind in its order.
+
+        What is wrong with a converter passes through its amplifier, whatever the order of the two in a plan.
+        """
+        for i in sorted(at_work, key=self._distance_from_the_coils, reverse=True):
             planned = self._planned[i]
             column = COLUMNS_A_PART * planned.part
             planned.fault.way.strike(effects, Strike(planned.fault.place, planned.fault.number, column))
@@ -99,6 +104,9 @@ class FaultPlan:
                 place = planned.fault.place
                 began[place] = max(began[place], planned.first * self.period_s)
         return began
+
+    def _distance_from_the_coils(self, i: int) -> int:
+        return _KINDS.index(self._planned[i].fault.kind.name)
 
     def _in_ticks(self, fault: Fault) -> Planned:
         stretch = max(1, round(fault.number / self.period_s)) if fault.way.intermittent else 0

@@ -19,7 +19,7 @@ from spheretwin.twin.disturbances.disturbance import Disturbance
 from spheretwin.twin.electronics.driving.delay import delay
 from spheretwin.twin.electronics.driving.sections import DriveSection
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
-from spheretwin.twin.faults.fault import Fault
+from spheretwin.twin.faults.fault import Fault, check_gains
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.trajectories.registry import Trajectory
@@ -32,6 +32,9 @@ LEAST_SCALE = 1e-3
 
 # A tick must end before its user does: 10,000 physics steps take some 50 ms.
 MOST_SUBSTEPS = 10_000
+
+# A slip of the pen must not take for ever: which of them act is asked of each.
+MOST_FAULTS = 1000
 
 # Commands on their way are kept, and moved on at every tick.
 MOST_DELAY = 1000
@@ -181,7 +184,9 @@ class Scenario(_Section):
     plant: Plant = Plant()
     drive: DriveSection = DriveSection()
     disturbance: Disturbance = Disturbance()
-    fault: tuple[Fault, ...] = Field((), description="what fails, [[fault]] each")
+    fault: Annotated[tuple[Fault, ...], Field(max_length=MOST_FAULTS)] = Field(
+        (), description="what fails, [[fault]] each"
+    )
     detector: DetectorSection = DetectorSection()
     watchdog: WatchdogSection = WatchdogSection()
     event: tuple[Event, ...] = Field((), description="changes on the way, [[event]] each")
@@ -216,6 +221,7 @@ class Scenario(_Section):
             step_s = {"adc": self.controller.period_s, "controller": self.plant.step_s}.get(fault.kind.name)
             if fault.mode == "delay" and step_s is not None:
                 _check_late(f"fault.{place}.value", fault.number, step_s, self.controller.period_s)
+        check_gains(self.fault)
         return self
 
     @property

@@ -62,9 +62,12 @@ def _delays_s(scenario: Scenario, target: str) -> list[float]:
 
 
 def driving_of(scenario: Scenario, groups: int, wires: Wires) -> Stages:
-    """Drive of a resolved scenario, at rest; with what may fail where faults are planned, or a brake is."""
+    """Drive of a resolved scenario, at rest; with what may fail where faults are planned.
+
+    A watchdog acts on the drive itself: it would else wait for commands that are on their way.
+    """
     step_s, faults, most_late = scenario.plant.step_s, None, 0
-    if scenario.fault or (scenario.watchdog.on and scenario.watchdog.action == "short"):
+    if scenario.fault or scenario.watchdog.on:
         faults = drive_faults(groups, wires.halt, wires.draws)
         most_late = round(sum(_delays_s(scenario, "controller")) / step_s)
     return stages.made(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, most_late)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.twin.electronics.driving import chain, faulty
 from spheretwin.twin.electronics.driving.chain import Driving
+from spheretwin.twin.electronics.driving.delay import due
 from spheretwin.twin.electronics.driving.faulty import DriveFaults, FaultyDriving
 from spheretwin.twin.electronics.driving.lag import Drive, advance, drive
 from spheretwin.twin.electronics.driving.sections import DriveSection
@@ -100,14 +101,18 @@ def restore(driving: Stages, state: NDArray) -> None:
         chain.restore(driving, state)
 
 
-def carried_on(before: Stages, after: Stages, current: NDArray) -> None:
-    """Go on as before with other figures, from currents (n,), A."""
+def carried_on(before: Stages, after: Stages, command: NDArray) -> None:
+    """Go on as before with other figures, from the last commands (n,), A."""
     healthy, now = _healthy(before), _healthy(after)
     if isinstance(healthy, Driving) and isinstance(now, Driving):
         chain.carried_on(healthy, now)
     if isinstance(after, FaultyDriving):
-        # What was asked for last, where that is known.
-        after.faults.last_A[:] = before.faults.last_A if isinstance(before, FaultyDriving) else current
+        if isinstance(before, FaultyDriving):
+            after.faults.last_A[:] = before.faults.last_A
+        elif isinstance(before, Driving) and before.converts:
+            due(before.delay, before.delay.substeps - 1, after.faults.last_A)
+        else:  # right behind its commands, of which it kept none
+            after.faults.last_A[:] = after.driving.delay.ring[:] = command
 
 
 def _healthy(driving: Stages) -> Lag | Driving:

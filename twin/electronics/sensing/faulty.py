@@ -121,12 +121,12 @@ def _sense_channel(faulty: FaultySensing, q: Array, noise: Array, measurement: A
     ring = faults.on_the_way_V
     place = (faults.newest[0] + 1) % ring.shape[0]
     faults.fresh[channel] = 1.0
+    volts = _at_wiper(sensing, q, channel)
     if not faults.acts[0]:
+        faults.wiper_V[channel] = volts
         healthy_V = measurement[0, channel] * potentiometer.volts_per_rad
-        faults.wiper_V[channel] = faults.converted_V[channel] = ring[place, channel] = healthy_V
+        faults.converted_V[channel] = ring[place, channel] = healthy_V
         return
-    angle = q[channel] + sensing.offset_rad[channel]
-    volts = wiper_voltage(potentiometer, angle) if sensing.in_volts else potentiometer.volts_per_rad * angle
     volts = _through(faults, channel, volts, faults.wiper_V[channel], 0)
     faults.wiper_V[channel] = volts
     if sensing.in_volts:
@@ -140,6 +140,13 @@ def _sense_channel(faulty: FaultySensing, q: Array, noise: Array, measurement: A
     measurement[0, channel] = volts / potentiometer.volts_per_rad
     if faults.silent[0] and faults.begun[0]:
         measurement[0, channel], faults.fresh[channel] = faults.handed_rad[channel], 0.0
+
+
+@allocation_free
+def _at_wiper(sensing: Sensing, q: Array, channel: int) -> float:
+    """Voltage (V) that a healthy wiper has, without its noise."""
+    potentiometer, angle = sensing.potentiometers[channel], q[channel] + sensing.offset_rad[channel]
+    return wiper_voltage(potentiometer, angle) if sensing.in_volts else potentiometer.volts_per_rad * angle
 
 
 @allocation_free
@@ -192,3 +199,17 @@ def carried_on(before: FaultySensing, after: FaultySensing) -> None:
     now.newest[0] = len(now.on_the_way_V) - 1
     now.begun[0], now.turned_rad[:], now.handed_rad[:] = was.begun[0], was.turned_rad, was.handed_rad
     now.wiper_V[:], now.converted_V[:] = was.wiper_V, was.converted_V
+
+
+def begun(faulty: FaultySensing, q: Array, measured_rad: Array) -> None:
+    """Go on from sensors without faults, of which the last pose (3,) and what they made of it are known.
+
+    What is on its way repeats the last value: those before it were not kept.
+    """
+    sensing, faults = faulty.sensing, faulty.faults
+    for channel in range(CHANNELS):
+        volts = measured_rad[channel] * sensing.potentiometers[channel].volts_per_rad
+        faults.wiper_V[channel] = _at_wiper(sensing, q, channel)
+        faults.converted_V[channel] = faults.on_the_way_V[:, channel] = volts
+    faults.begun[0], faults.turned_rad[0] = True, q[2] + sensing.offset_rad[2]
+    faults.handed_rad[:] = measured_rad

@@ -58,10 +58,19 @@ def restore(sensing: Sensors, state: NDArray) -> None:
         faulty.restore(sensing, state)
 
 
-def carried_on(before: Sensors, after: Sensors) -> None:
-    """Go on as before with other figures."""
-    if isinstance(before, FaultySensing) and isinstance(after, FaultySensing):
+def carried_on(before: Sensors, after: Sensors, q: NDArray, noise: NDArray) -> None:
+    """Go on as before with other figures, from the pose (3,), rad, and the noise of the last tick; none yet.
+
+    What may be held from now on is then what it would have been, had it been kept all the time.
+    """
+    if not isinstance(after, FaultySensing):
+        return
+    if isinstance(before, FaultySensing):
         faulty.carried_on(before, after)
+    elif len(q):
+        measurement = np.empty((3, 3))
+        sense(before, q, np.zeros(3), noise, measurement)
+        faulty.begun(after, q, measurement[0])
 
 
 def sense(sensing: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:

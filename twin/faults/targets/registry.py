@@ -1,4 +1,7 @@
-"""All kinds of parts that can fail, in the order of the telemetry: a new one is a file and a row."""
+"""All kinds of parts that can fail, in the order of the telemetry, and on the way out from the coils on.
+
+A new one is a file and a row.
+"""
 
 from spheretwin.twin.faults.target import Target
 from spheretwin.twin.faults.targets import adc, amplifier, coil, controller, dac, encoder, pot, supply

@@ -1,0 +1,109 @@
+"""Groups that are left out: no current in them, and the whole torque from the others."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.control.allocation.bounded import SCRATCH_ROWS
+from spheretwin.control.allocation.registry import ALLOCATIONS
+from spheretwin.control.supervision.groups import (
+    FOUND_OPEN,
+    FOUND_SHORTED,
+    IN_USE,
+    TOLD,
+    groups,
+    leave_out,
+    restore,
+    state_of,
+    tell,
+)
+from spheretwin.models.magnetics import torque_matrix
+
+COUNT, LIMIT_A = 18, 8.0
+
+
+def told(*places):
+    return np.isin(np.arange(COUNT), places)
+
+
+def without(places):
+    made = groups(COUNT)
+    tell(made, told(*places), 0.5)
+    return made
+
+
+def allocated(name, G, torque, limit=LIMIT_A):
+    current = np.full(COUNT, 7.0)
+    share = ALLOCATIONS[name](G, torque, limit, current, np.empty((SCRATCH_ROWS, COUNT)))
+    return current, share
+
+
+@pytest.mark.parametrize("name", list(ALLOCATIONS))
+@given(
+    st.sets(st.integers(0, COUNT - 1), max_size=9),
+    st.tuples(*[st.floats(-1.2, 1.2)] * 3),
+    st.tuples(*[st.floats(-1, 1)] * 3),
+)
+def test_the_others_give_the_whole_torque(actuator, name, out, pose, torque):
+    """Of the columns of the others, G I is the share of what is wanted, and I the smallest that gives it."""
+    G, wanted = torque_matrix(np.array(pose), actuator), 0.2 * np.array(torque)
+    made = without(out)
+    leave_out(made, G)
+    current, share = allocated(name, made.G, wanted)
+    used = ~told(*out)
+    assert not current[~used].any()
+    if share == 0.0:  # what is left has lost a direction
+        sizes = np.linalg.svd(G[:, used], compute_uv=False)
+        assert sizes[2] < 1e-5 * sizes[0]
+        return
+    # Rounding of eighteen products, each a millionth of the strongest direction at worst: the condition of
+    # G G^T. Where the matrix is well off, 1e-12.
+    condition = np.linalg.cond(G[:, used]) ** 2
+    bound = 1e-14 * condition * (np.abs(G) @ np.abs(current)).max() + 1e-300
+    np.testing.assert_allclose(G @ current, share * wanted, rtol=0, atol=bound)
+    if share == 1.0 and np.abs(np.linalg.pinv(G[:, used]) @ wanted).max() <= LIMIT_A * (1 - 1e-9):
+        expected = np.linalg.pinv(G[:, used]) @ wanted
+        bound = 1e-14 * condition * np.abs(expected).max() + 1e-300
+        np.testing.assert_allclose(current[used], expected, rtol=0, atol=bound)
+
+
+@pytest.mark.parametrize("name", list(ALLOCATIONS))
+def test_with_too_few_left_there_is_no_torque_and_no_current(actuator, name):
+    G = torque_matrix(np.array([0.2, -0.1, 0.3]), actuator)
+    for left in (0, 1, 2):
+        made = without(range(left, COUNT))
+        leave_out(made, G)
+        current, share = allocated(name, made.G, np.array([0.1, 0.2, 0.3]))
+        assert share == 0.0
+        assert not current.any()
+
+
+def test_what_was_told_is_taken_back_and_what_was_found_is_not():
+    made = groups(COUNT)
+    made.out[5], made.out[6], made.some_out[0] = FOUND_OPEN, FOUND_SHORTED, True
+    tell(made, told(2, 5), 1.0)
+    assert made.out[[2, 5, 6]].tolist() == [TOLD, FOUND_OPEN, FOUND_SHORTED]
+    assert made.out_s[2] == 1.0
+    tell(made, told(2, 5), 2.0)
+    assert made.out_s[2] == 1.0  # since when, not until when
+    tell(made, told(), 3.0)
+    assert made.out[[2, 5, 6]].tolist() == [IN_USE, FOUND_OPEN, FOUND_SHORTED]
+    assert made.some_out[0]
+
+
+def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
+    G, made = torque_matrix(np.array([0.5, 0.3, -0.2]), actuator), groups(COUNT)
+    leave_out(made, G)
+    assert made.G.tobytes() == np.ascontiguousarray(G).tobytes()
+    assert not made.some_out[0]
+
+
+@given(st.lists(st.integers(0, 3), min_size=COUNT, max_size=COUNT), st.floats(0, 1e9))
+def test_a_state_is_all_there_is(out, t_s):
+    made, other = groups(COUNT), groups(COUNT)
+    made.out[:], made.out_s[:] = out, t_s
+    restore(other, state_of(made))
+    assert other.out.tolist() == out
+    assert other.out_s.tolist() == [t_s] * COUNT
+    assert other.some_out[0] == any(out)

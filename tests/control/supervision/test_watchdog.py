@@ -1,0 +1,148 @@
+"""The watchdog alone: what each reason needs, to the tick and to the last bit below it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.control.supervision.watchdog import (
+    GO,
+    REASONS,
+    RELEASE,
+    SHORT,
+    Reason,
+    WatchdogSection,
+    Watched,
+    carried_on,
+    mend,
+    over,
+    restore,
+    state_of,
+    trip,
+    watch,
+    watchdog,
+)
+
+PERIOD_S, NOISE_RAD, QUANTUM_RAD = 1e-3, np.array([3e-4, 3e-4, 0.0]), np.array([8e-5, 8e-5, 3e-3])
+RANGE_RAD = np.array([[-1.4, 1.4], [-1.4, 1.4], [-np.inf, np.inf]])
+WATCHED = Watched(PERIOD_S, NOISE_RAD, QUANTUM_RAD, RANGE_RAD)
+STILL = np.zeros(3)
+
+
+def made(**section):
+    fresh, halt = np.ones(3), np.zeros(1, dtype=np.int64)
+    return watchdog(WatchdogSection(on=True, **section), WATCHED, fresh, halt)
+
+
+def looked(watcher, angle, rate=STILL):
+    watch(watcher, np.array(angle, float), np.array(rate, float))
+    return Reason(int(watcher.reason[0]))
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("missing", [0, 1, 3])
+def test_a_jump_is_more_than_the_largest_rate_noise_and_resolution_allow(axis, missing):
+    most = 60 * PERIOD_S * (missing + 1) + 6 * np.sqrt(2) * NOISE_RAD[axis] + QUANTUM_RAD[axis]
+    for share, reason in ((1 - 1e-9, Reason.NONE), (1 + 1e-9, Reason.JUMP)):
+        for sign in (-1, 1):
+            watcher = made()
+            assert looked(watcher, STILL) == Reason.NONE
+            watcher.fresh[axis] = 0.0
+            for _ in range(missing):
+                looked(watcher, STILL)
+            watcher.fresh[axis] = 1.0
+            angle = np.zeros(3)
+            angle[axis] = sign * share * most
+            assert looked(watcher, angle) == reason
+
+
+def test_a_first_measurement_is_no_jump():
+    assert looked(made(), [1.3, -1.3, 400.0]) == Reason.NONE
+
+
+@pytest.mark.parametrize("ticks", [1, 5, 8])
+def test_stale_is_so_many_ticks_in_a_row(ticks):
+    watcher = made(stale_ticks=ticks)
+    looked(watcher, STILL)
+    for _ in range(3):  # now and then one is missing: nothing happens
+        watcher.fresh[1] = 0.0
+        for _ in range(ticks - 1):
+            assert looked(watcher, STILL) == Reason.NONE
+        watcher.fresh[1] = 1.0
+        assert looked(watcher, STILL) == Reason.NONE
+    watcher.fresh[1] = 0.0
+    for tick in range(ticks):
+        assert looked(watcher, STILL) == (Reason.STALE if tick == ticks - 1 else Reason.NONE)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_speed_and_edge(axis):
+    for rate, reason in ((60.0, Reason.NONE), (np.nextafter(60, 61), Reason.SPEED), (-61.0, Reason.SPEED)):
+        rates = np.zeros(3)
+        rates[axis] = rate
+        assert looked(made(), STILL, rates) == reason
+    for angle, reason in ((1.38, Reason.NONE), (1.3801, Reason.EDGE), (-1.3801, Reason.EDGE)):
+        angles = np.zeros(3)
+        angles[axis] = angle
+        assert looked(made(edge_margin_rad=0.02), angles) == (reason if axis < 2 else Reason.NONE)
+    assert looked(made(edge_margin_rad=-0.1), [1.45, 0, 0]) == Reason.NONE  # outside, if that is wanted
+
+
+@given(st.tuples(*[st.sampled_from([0.1, np.nan, np.inf, -np.inf])] * 6))
+def test_what_is_no_number_is_mended_and_trips(numbers):
+    watcher = made()
+    looked(watcher, [0.2, 0.3, 0.4])
+    measurement = np.array([numbers[:3], numbers[3:], [7.0] * 3])
+    lost = ~np.isfinite(measurement[:2]).all(axis=0)
+    assert mend(watcher, measurement)
+    assert np.isfinite(measurement).all()
+    np.testing.assert_array_equal(measurement[0], np.where(lost, [0.2, 0.3, 0.4], 0.1))
+    np.testing.assert_array_equal(measurement[1], np.where(lost, 0.0, 0.1))
+    assert watcher.reason[0] == (Reason.MEASUREMENT if lost.any() else Reason.NONE)
+    off = watchdog(WatchdogSection(), WATCHED, np.ones(3), np.zeros(1, dtype=np.int64))
+    assert not mend(off, np.full((3, 3), np.nan))
+
+
+def test_a_rate_that_is_no_number_trips_and_is_none():
+    watcher, rates = made(), np.array([0.0, np.inf, np.nan])
+    watch(watcher, np.zeros(3), rates)
+    assert watcher.reason[0] == Reason.MEASUREMENT
+    assert not rates.any()
+
+
+@pytest.mark.parametrize("action", ["release", "short"])
+def test_the_first_reason_stays_and_the_run_goes_on_for_its_time(action):
+    watcher = made(action=action, rundown_s=0.004)
+    assert not over(watcher)
+    trip(watcher, int(Reason.SPEED))
+    trip(watcher, int(Reason.EDGE))
+    assert REASONS[int(watcher.reason[0])] == Reason.SPEED
+    assert watcher.halt[0] == (SHORT if action == "short" else RELEASE) != GO
+    assert [over(watcher) for _ in range(6)] == [False] * 4 + [True] * 2
+    at_once = made(rundown_s=0.0)
+    trip(at_once, int(Reason.SPEED))
+    assert over(at_once)
+
+
+@given(st.lists(st.tuples(st.floats(-1.3, 1.3), st.floats(-50, 50), st.integers(0, 1)), max_size=20))
+def test_a_state_is_all_it_goes_on_from(samples):
+    one, other = made(), made()
+    for place, (angle, rate, fresh) in enumerate(samples):
+        if place == len(samples) // 2:
+            restore(other, state_of(one))
+        one.fresh[0] = other.fresh[0] = fresh
+        for each in (one, other) if place >= len(samples) // 2 else (one,):
+            looked(each, [angle, 0, 0], [rate, 0, 0])
+            over(each)
+    if samples:
+        assert state_of(other).tobytes() == state_of(one).tobytes()
+
+
+def test_one_that_was_off_begins_anew():
+    before, after = made(), made(largest_rate_rad_s=10.0)
+    looked(before, [0.3, 0, 0])
+    carried_on(before, after)
+    assert looked(after, STILL) == Reason.JUMP
+    after = made()
+    carried_on(before._replace(on=False), after)
+    assert looked(after, [-0.9, 0, 0]) == Reason.NONE

@@ -1,0 +1,150 @@
+"""The detector in a run: every open and every shorted group found and named, and no healthy one ever."""
+
+import numpy as np
+import pytest
+
+from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, TOLD
+from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.faults.told import FaultLines
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import simulate
+
+GROUPS = 18
+START_S = 1.0
+
+
+def scenario(name="nutation", hardware="prototype", **changes):
+    detecting = {"hardware": hardware, "plant.engine": "lagrangian", "detector.detect": True, "seed": 8}
+    return scenarios.load(name, {**detecting, **changes})
+
+
+@pytest.mark.parametrize(("mode", "name"), [("open", FOUND_OPEN), ("short", FOUND_SHORTED)])
+@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+def test_every_group_that_fails_is_found_and_named_and_no_other(hardware, mode, name):
+    """In nutation, which asks every group for more than twice the threshold within a tenth of a second."""
+    took_s = []
+    for group in range(GROUPS):
+        fault = {"target": f"coil.{group:02d}", "mode": mode, "start_s": START_S}
+        run = simulate(scenario(hardware=hardware, fault=[fault], duration=1.8))
+        assert run.status == "completed"
+        out, delays = run.telemetry["group_out"], run.telemetry["time_to_detection_s"]
+        assert out[-1].nonzero()[0].tolist() == [group]
+        assert out[-1, group] == name
+        took_s.append(delays[-1, group])
+        found = np.flatnonzero(out[:, group])[0]
+        assert run.telemetry["t_s"][found] == pytest.approx(START_S + took_s[-1], abs=1e-9)
+        # From the tick at which it is found on, it is asked for nothing.
+        assert run.telemetry["current_command_A"][:found, group].any()
+        assert not run.telemetry["current_command_A"][found:, group].any()
+    assert max(took_s) <= 0.1
+    assert min(took_s) >= 3e-3  # no sooner than the ticks that a healthy current may look like none
+
+
+MINUTES = 600_000
+HOT = {"drive.shutdown_degC": 1e4}  # the sinusoid takes the coils past 155 °C within minutes
+LONG = [
+    ("ideal-afsm", "sinusoid", "ideal", MINUTES, {}),
+    ("prototype-afsm", "sinusoid", "prototype", MINUTES, HOT),
+]
+SHORT = [
+    ("pd", "sinusoid", "prototype", 60_000, {"controller.law": "pd"}),
+    ("fuzzy", "sinusoid", "prototype", 60_000, {"controller.law": "adaptive_fuzzy"}),
+    ("nutation", "nutation", "prototype", 5_000, {}),
+    ("weak supply", "sinusoid", "prototype", 60_000, {"drive.supply_V": 8.0, **HOT}),
+    ("hardly a supply", "sinusoid", "prototype", 20_000, {"drive.supply_V": 5.1, **HOT}),
+    ("none to speak of", "hold", "prototype", 5_000, {"drive.supply_V": 4.9, "controller.law": "pd"}),
+    ("bounded", "sinusoid", "prototype", 20_000, {"allocation": "bounded", **HOT}),
+    ("slow amplifiers", "sinusoid", "prototype", 20_000, {"drive.bandwidth_rad_s": 300.0, **HOT}),
+    ("half a period late", "sinusoid", "prototype", 20_000, {"drive.delay_s": 5e-4, **HOT}),
+    (
+        "fast clock", "sinusoid", "prototype", 60_000,
+        {"controller.period_s": 2e-4, "plant.step_s": 1e-4, "drive.supply_V": 12.0, **HOT},
+    ),
+    ("far off zero", "sinusoid", "prototype", 20_000, {"drive.dac_offset_V": 0.5, **HOT}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("label", "name", "hardware", "ticks", "changes"), LONG + SHORT)
+def test_no_healthy_group_is_ever_found(label, name, hardware, ticks, changes):
+    """Under each law, through voltage-limited swings, and where AFSM chatters, for ten minutes."""
+    busy, limited, last = 0, 0, 0
+    watching = scenario(name, hardware, **{"watchdog.on": False, **changes})
+    with Session(watching) as session:
+        while session.tick < ticks and session.status == "running":
+            table = session.advance(min(2000, ticks - session.tick))
+            assert not table["group_out"].any(), f"{label} at {session.t_s:g} s"
+            threshold_A = session._machine._controller.supervision.detector.threshold_A
+            busy += np.count_nonzero(np.abs(table["current_command_A"]) > 2 * threshold_A)
+            if hardware == "prototype":
+                limited += np.count_nonzero(table["voltage_limited"])
+        last = session.tick
+    assert busy > 18 * last / 20  # it had something to look at
+    if label == "weak supply":
+        assert limited > 18 * last / 4
+    if label not in ("hardly a supply", "none to speak of"):  # with which the rotor may fall over
+        assert last == ticks
+
+
+def test_what_is_known_is_left_out_from_its_tick_on_and_taken_back():
+    """All the torque that is wanted comes from the others, by the true torque matrix of an ideal run."""
+    faults = [
+        {"target": f"coil.{group:02d}", "mode": "open", "known": True, "start_s": 0.1, "end_s": 0.2}
+        for group in (2, 9)
+    ]
+    for allocation in ("least_norm", "bounded"):
+        changes = {"duration": 0.3, "allocation": allocation, "detector.detect": False}
+        run = simulate(scenario("sinusoid", "ideal", fault=faults, **changes))
+        table, out = run.telemetry, run.telemetry["group_out"]
+        assert set(np.flatnonzero(out.any(axis=0)).tolist()) == {2, 9}
+        assert np.flatnonzero(out[:, 2]).tolist() == list(range(100, 200))
+        assert set(out[100:200, 2].tolist()) == {TOLD}
+        assert not table["current_command_A"][100:200][:, [2, 9]].any()
+        assert table["current_command_A"][:100, 2].any()
+        assert table["current_command_A"][200:, 2].any()
+        assert table["time_to_detection_s"][150, 2] == 0.0
+        for tick in range(100, 200, 9):
+            if table["allocation_scale"][tick] < 1:
+                continue
+            used = np.delete(np.arange(GROUPS), [2, 9])
+            G = torque_matrix(table["q_rad"][tick], run.actuator)
+            current = table["current_command_A"][tick]
+            smallest = np.linalg.pinv(G[:, used]) @ (G @ current)
+            # Rounding, 1e-15 of some amperes, times the condition of G G^T, which is below 1e3.
+            np.testing.assert_allclose(current[used], smallest, rtol=0, atol=1e-11)
+
+
+def test_a_find_is_told_once_with_its_time():
+    fault = {"target": "coil.07", "mode": "open", "start_s": 0.5, "end_s": 1.2}
+    run = simulate(scenario(fault=[fault], duration=1.5))
+    lines = FaultLines()
+    signals, values = run.telemetry.signals, run.telemetry.values
+    told = []
+    for first in range(0, len(values), 333):
+        told += lines.of(Table(signals, values[first : first + 333]))
+    after_ms = 1e3 * run.telemetry["time_to_detection_s"][-1, 7]
+    assert [text for _, text in told] == [
+        "coil.07 open",
+        f"group 7 found open, {after_ms:.0f} ms after it failed",
+        "coil.07 works again",
+    ]
+    assert [t_s for t_s, _ in told] == pytest.approx([0.5, 0.5 + 1e-3 * after_ms, 1.2], abs=1e-9)
+
+
+def test_detect_of_a_fault_is_the_detector():
+    fault = {"target": "coil.07", "mode": "open", "start_s": 0.5}
+    asked = scenario(fault=[{**fault, "detect": True}], duration=1.0, **{"detector.detect": False})
+    general = scenario(fault=[fault], duration=1.0)
+    one, other = simulate(asked).telemetry, simulate(general).telemetry
+    assert one.values.tobytes() == other.values.tobytes()
+    assert one["group_out"][-1, 7] == FOUND_OPEN
+
+
+def test_a_detector_that_finds_nothing_moves_no_bit():
+    """Nor does its noise move any other."""
+    for hardware in ("prototype", "ideal"):
+        plain = scenario(hardware=hardware, duration=1.0, **{"detector.detect": False})
+        one, other = simulate(plain).telemetry, simulate(scenario(hardware=hardware, duration=1.0)).telemetry
+        for signal in one.signals:
+            assert one[signal.name].tobytes() == other[signal.name].tobytes()

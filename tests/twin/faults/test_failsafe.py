@@ -1,0 +1,260 @@
+"""The watchdog in a run: each reason by what provokes it, the rundown, and how it ends; else, nothing."""
+
+import json
+
+import numpy as np
+import pytest
+
+from spheretwin.control.law import Law
+from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.models.kinematics import rate_jacobian
+from spheretwin.models.lagrangian import inertia_matrix
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin import cli
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario.reading import shipped
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import simulate
+
+RUNDOWN = 30
+WATCHED = {"plant.engine": "lagrangian", "watchdog.on": True, "watchdog.rundown_s": RUNDOWN * 1e-3, "seed": 4}
+
+
+def scenario(name="nutation", hardware="prototype", **changes):
+    return scenarios.load(name, {"hardware": hardware, **WATCHED, **changes})
+
+
+def fault(target, mode, value=None, start_s=0.1, **more):
+    return {"target": target, "mode": mode, "start_s": start_s, **({"value": value} if value else {}), **more}
+
+
+# What provokes each reason, and the tick at which it must trip, where that is exact.
+PROVOKED = {
+    "adc is silent": (Reason.STALE, {"fault": [fault("adc", "dropout")]}, 104),
+    "encoder is silent": (Reason.STALE, {"fault": [fault("encoder.gamma", "dropout")]}, 104),
+    "ticks are three": (
+        Reason.STALE, {"fault": [fault("adc", "dropout")], "watchdog.stale_ticks": 3}, 102,
+    ),
+    "track slips": (Reason.JUMP, {"fault": [fault("pot.alpha", "offset", 0.2)]}, 100),
+    "wiper lifts": (Reason.JUMP, {"fault": [fault("pot.beta", "open", 2.0)]}, 100),
+    "counts are lost": (Reason.JUMP, {"fault": [fault("encoder.gamma", "offset", 0.5)]}, 100),
+    "coil is hot": (Reason.TEMPERATURE, {"drive.shutdown_degC": 20.3}, None),
+    "rotor is fast": (Reason.SPEED, {"watchdog.largest_rate_rad_s": 3.0, "hardware": "ideal"}, None),
+    "starts too fast": (
+        Reason.SPEED, {"plant.initial_rad_s": (0.0, 0.0, 90.0), "hardware": "ideal"}, 0,
+    ),
+    "edge is near": (Reason.EDGE, {"watchdog.edge_margin_rad": 1.3}, None),
+}  # fmt: skip
+
+
+def failed_safely(run, reason, at=None):
+    """Hold a run to what every one owes that a watchdog ended; returns the tick at which it tripped."""
+    table = run.telemetry
+    reasons = table["failsafe_reason"]
+    tripped = int(np.flatnonzero(reasons)[0])
+    assert run.status == "failsafe"
+    assert set(reasons[tripped:].tolist()) == {float(reason)}
+    assert at is None or tripped == at
+    assert np.isfinite(table.values).all()
+    asked = table["current_command_A"]
+    after = tripped + (reason == Reason.TEMPERATURE)  # which is known at the end of a period
+    assert not asked[after:].any()
+    assert not table["torque_command_Nm"][after:].any()
+    return tripped
+
+
+@pytest.mark.parametrize("action", ["release", "short"])
+@pytest.mark.parametrize("how", list(PROVOKED))
+def test_each_reason_by_what_provokes_it(how, action):
+    reason, changes, at = PROVOKED[how]
+    run = simulate(scenario(**changes, **{"watchdog.action": action}))
+    tripped = failed_safely(run, reason, at)
+    assert len(run.telemetry) == tripped + 1 + RUNDOWN
+    assert Reason.NONE not in run.telemetry["failsafe_reason"][tripped:]
+    currents = run.telemetry["current_A"][tripped + 8 :]
+    if action == "release":
+        # Ten time constants later, at least, the amplifiers' offsets are what is left.
+        assert np.abs(currents).max() <= 0.8e-3 * (1 + 1e-9)
+    else:
+        assert np.abs(currents).max() > 2e-3
+
+
+@pytest.mark.parametrize("rundown_s", [0.0, 0.001, 0.0314])
+def test_the_rundown_is_its_time(rundown_s):
+    run = simulate(scenario(fault=[fault("pot.alpha", "offset", 0.2)], **{"watchdog.rundown_s": rundown_s}))
+    assert failed_safely(run, Reason.JUMP, 100) == 100
+    assert len(run.telemetry) == 101 + round(rundown_s / 1e-3)
+
+
+BAD = (np.nan, np.inf, -np.inf, 1e300)
+
+
+def no_number(t, reference, measurement, parameters, state, torque):
+    for axis in range(3):
+        torque[axis] = (
+            BAD[int(parameters[0])] if t >= 0.05 else -0.5 * (measurement[0, axis] - reference[0, axis])
+        )
+
+
+@pytest.mark.parametrize("bad", range(len(BAD)))
+def test_a_law_that_gives_no_number(bad):
+    law = Law("lost", no_number, np.array([float(bad)]), np.zeros(0))
+    run = simulate(scenario("hold"), law)
+    assert failed_safely(run, Reason.COMMAND, 50) == 50
+    assert len(run.telemetry) == 51 + RUNDOWN
+    plain = simulate(scenario("hold", **{"watchdog.on": False}), law)
+    assert plain.status == "diverged"
+    assert len(plain.telemetry) == 50
+
+
+def test_a_measurement_that_overflows():
+    """Of so many turns there are more counts than a number holds; no scenario can bring the rotor there."""
+    for watching, status in ((True, "failsafe"), (False, "diverged")):
+        changes = {"sensors.encoder.counts": 2**31, "watchdog.on": watching}
+        with Session(scenario("hold", **changes)) as session:
+            session.advance(50)
+            session._machine._moving.stepped.q[2] = 1e300
+            table = session.advance(200)
+            assert session.status == status
+            assert np.isfinite(table.values).all()
+            assert len(table) == (1 + RUNDOWN if watching else 0)
+            if watching:
+                assert session.reason == Reason.MEASUREMENT
+                assert set(table["failsafe_reason"].tolist()) == {float(Reason.MEASUREMENT)}
+
+
+def test_shorted_coils_brake_at_the_rate_of_their_heat_and_a_release_does_not():
+    """Without friction and load, what the rotor loses is what heats the coils, but for the field at first."""
+    spinning = {
+        "plant.coulomb_Nm": [0.0] * 3, "plant.viscous_Nm_s": [0.0] * 3, "disturbance.load": 0.0,
+        "disturbance.random_bound_Nm": 0.0, "plant.modelling_torque_Nm": [0.0] * 3,
+        "plant.modelling_error": 0.0, "plant.gravity_m_s2": 0.0, "drive.resistance_per_K": 0.0,
+        "drive.amplifier_offset_V": 0.0, "watchdog.rundown_s": 0.4, "drive.dac_offset_V": 0.0,
+        "plant.initial_rad_s": [0.0, 0.0, 40.0], "watchdog.largest_rate_rad_s": 39.0,
+        "estimator.kind": "ideal", "controller.law": "pd",
+    }  # fmt: skip
+    for action in ("short", "release"):
+        run = simulate(scenario(**spinning, **{"watchdog.action": action}))
+        table = run.telemetry
+        assert failed_safely(run, Reason.SPEED) <= 2
+        assert len(table) > 400
+        energy = [
+            0.5 * rate @ inertia_matrix(pose, run.actuator.inertia) @ rate
+            for pose, rate in zip(table["q_rad"], table["qdot_rad_s"], strict=True)
+        ]
+        heat = np.sum(table["copper_loss_W"], axis=1) * 1e-3
+        field = 0.5 * 0.9e-3 * np.sum(table["current_A"] ** 2, axis=1)
+        lost, heated = energy[20] - energy[400], heat[20:400].sum()
+        if action == "release":
+            assert abs(lost) < 1e-6 * energy[0]
+        else:
+            assert lost > 0.01 * energy[0]
+            # The current is a mean over the first step, torques are held over one: some thousandths.
+            assert lost + field[20] - field[400] == pytest.approx(heated, rel=5e-3)
+
+
+@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("action", ["release", "short"])
+def test_a_fault_that_never_comes_moves_no_bit_of_what_a_watchdog_does(hardware, action):
+    early = {"watchdog.edge_margin_rad": 1.25, "watchdog.action": action}
+    plain = simulate(scenario(hardware=hardware, **early)).telemetry
+    planned = simulate(
+        scenario(hardware=hardware, fault=[fault("coil.03", "open", start_s=900.0)], **early)
+    ).telemetry  # fmt: skip
+    assert plain["failsafe_reason"][-1] == Reason.EDGE
+    for signal in plain.signals:
+        assert planned[signal.name].tobytes() == plain[signal.name].tobytes()
+
+
+def test_a_hanging_controller_cannot_keep_the_currents_from_being_taken():
+    faults = [fault("controller", "stuck"), fault("encoder.gamma", "dropout", start_s=0.12)]
+    run = simulate(
+        scenario(fault=faults, **{"watchdog.largest_rate_rad_s": 1e3, "watchdog.edge_margin_rad": -5.0})
+    )
+    tripped = int(np.flatnonzero(run.telemetry["failsafe_reason"])[0])
+    assert np.abs(run.telemetry["current_A"][tripped + 8 :]).max() <= 0.8e-3 * (1 + 1e-9)
+
+
+def test_what_a_watchdog_has_done_is_no_find_of_the_detector():
+    changes = {"detector.detect": True, "watchdog.action": "short", "watchdog.edge_margin_rad": 1.2}
+    run = simulate(scenario(**changes))
+    assert run.status == "failsafe"
+    assert not run.telemetry["group_out"].any()
+
+
+@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("engine", ["lagrangian", "mujoco"])
+def test_it_never_trips_in_a_shipped_scenario_of_the_prototype(name, engine):
+    run = simulate(scenarios.load(name, {"hardware": "prototype", "plant.engine": engine}))
+    assert run.scenario.watchdog.on
+    assert run.status == "completed"
+    assert not run.telemetry["failsafe_reason"].any()
+    off = simulate(
+        scenarios.load(name, {"hardware": "prototype", "plant.engine": engine, "watchdog.on": False})
+    )
+    for signal in off.telemetry.signals:
+        assert run.telemetry[signal.name].tobytes() == off.telemetry[signal.name].tobytes()
+
+
+@pytest.mark.parametrize(
+    ("changes", "status"),
+    [
+        ({"drive.shutdown_degC": 20.3}, "failsafe"),
+        ({"controller.law": "pd"}, "left_workspace"),
+    ],
+)
+def test_without_one_the_statuses_are_what_they_were(changes, status):
+    run = simulate(scenario(**changes, **{"watchdog.on": False}))
+    assert run.status == status
+    assert "failsafe_reason" not in {signal.name for signal in run.telemetry.signals}
+
+
+def test_the_command_says_why_and_keeps_it_all(tmp_path, capsys):
+    path = tmp_path / "stopped.parquet"
+    arguments = ["simulate", "nutation", "--hardware", "prototype", "--plant.engine", "lagrangian"]
+    arguments += ["--watchdog.edge-margin-rad", "1.3", "--telemetry", str(path)]
+    assert cli.main([*arguments, "--json"]) == 1
+    told = capsys.readouterr()
+    summary = json.loads(told.out)
+    assert summary["status"] == "failsafe"
+    assert summary["reason"] == Reason.EDGE.told
+    assert f"failsafe, {Reason.EDGE.told}" in told.err
+    table = read_parquet(path)[0]
+    assert np.isfinite(table.values).all()
+    assert table["failsafe_reason"][-1] == Reason.EDGE
+    assert len(table) == np.flatnonzero(table["failsafe_reason"])[0] + 1 + 50
+
+
+def test_after_its_end_a_session_goes_no_further_and_a_restored_one_goes_on():
+    changes = {"fault": [fault("pot.alpha", "offset", 0.2)]}
+    with Session(scenario(**changes)) as session, Session(scenario(**changes)) as other:
+        session.advance(110)
+        kept = session.snapshot()
+        rest = session.advance(500)
+        assert session.status == "failsafe"
+        assert len(session.advance(10)) == 0
+        other.restore(kept)
+        assert other.advance(500).values.tobytes() == rest.values.tobytes()
+        assert other.reason == Reason.JUMP
+
+
+def test_one_that_is_switched_on_again_begins_anew():
+    with Session(scenario("sinusoid")) as session:
+        session.advance(100)
+        session.set("watchdog.on", False)
+        session.advance(900)
+        session.set("watchdog.on", True)
+        assert not session.advance(500)["failsafe_reason"].any()
+
+
+def test_power_at_shorted_ends_is_none(actuator):
+    """What turns in the coils while they brake comes from the rotor."""
+    run = simulate(scenario(fault=[fault("pot.alpha", "offset", 0.2)], **{"watchdog.action": "short"}))
+    table = run.telemetry
+    assert not table["coil_power_W"][101:].any()
+    assert np.all(table["supply_power_W"][105:] <= 24 * 18 * 0.8e-3 * (1 + 1e-9))
+    rates = np.array(
+        [rate_jacobian(q) @ v for q, v in zip(table["q_rad"], table["qdot_rad_s"], strict=True)]
+    )  # fmt: skip
+    braking = np.sum(table["torque_Nm"] * rates, axis=1)[110:]
+    assert np.mean(braking < 0) > 0.9

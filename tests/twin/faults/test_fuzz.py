@@ -1,0 +1,238 @@
+"""Whatever fails, and whatever comes in: a run ends with a status or is refused, and all rows are numbers."""
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from spheretwin.control.law import Law
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.status import Status
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.faults.targets.registry import TARGETS
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import simulate
+
+TICKS, PERIOD_S = 60, 1e-3
+ENDS = {Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAILSAFE}
+PARTS = [(name, part, mode) for name, target in TARGETS.items() for part in target.names(18)
+         for mode in target.modes]  # fmt: skip
+
+
+def scenario(hardware="prototype", **changes):
+    fields = {"hardware": hardware, "plant.engine": "lagrangian", "duration": TICKS * PERIOD_S}
+    return scenarios.load("nutation", {**fields, **changes})
+
+
+@st.composite
+def faults(draw):
+    """One of any part, in any mode, of any size that is allowed, for any while."""
+    name, part, mode = draw(st.sampled_from(PARTS))
+    made = {"target": part, "mode": mode, "start_s": PERIOD_S * draw(st.integers(0, 40))}
+    if length := draw(st.integers(0, 30)):
+        made["end_s"] = made["start_s"] + PERIOD_S * length
+    value = TARGETS[name].modes[mode].value
+    if mode == "delay":
+        made["value"] = PERIOD_S * draw(st.sampled_from([0, 1, 3, 50, 1000]))
+    elif value is not None and (value.default is None or draw(st.booleans())):
+        ends = [value.least, value.largest, max(value.least, min(0.01, value.largest))]
+        made["value"] = float(draw(st.sampled_from(ends) | st.floats(value.least, value.largest)))
+    if TARGETS[name].each_group:
+        made |= {"known": draw(st.booleans()), "detect": draw(st.booleans())}
+    return made
+
+
+LOOKED_AFTER = st.fixed_dictionaries(
+    {
+        "watchdog.on": st.booleans(),
+        "watchdog.action": st.sampled_from(["release", "short"]),
+        "watchdog.rundown_s": st.sampled_from([0.0, 0.01]),
+        "detector.detect": st.booleans(),
+        "allocation": st.sampled_from(["least_norm", "bounded"]),
+    }
+)
+
+
+@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@settings(max_examples=150)
+@given(st.lists(faults(), max_size=8), LOOKED_AFTER)
+def test_any_plan_ends_with_a_status_and_numbers(hardware, planned, changes):
+    if hardware == "ideal":
+        planned = [each for each in planned if each["target"] != "supply"]
+    run = simulate(scenario(hardware, fault=planned, **changes))
+    assert run.status in ENDS
+    assert np.isfinite(run.telemetry.values).all()
+    if run.status == "completed":
+        assert len(run.telemetry) == TICKS
+
+
+@pytest.mark.parametrize("mode", ["gain", "offset", "noise"])
+@pytest.mark.parametrize("name", [name for name in TARGETS if name != "controller"])
+def test_many_of_the_largest_at_once(name, mode):
+    """On every part of a kind, some one behind the other, with all that is allowed of each."""
+    if mode not in TARGETS[name].modes:
+        return
+    largest = TARGETS[name].modes[mode].value.largest
+    one = [{"target": part, "mode": mode, "value": largest} for part in TARGETS[name].names(18)]
+    gains = [
+        {"target": part, "mode": "gain", "value": TARGETS[name].modes["gain"].value.largest}
+        for part in TARGETS[name].names(18)
+    ]
+    for watching in (False, True):
+        many = (1 if mode == "gain" else 20) * one + 3 * gains if mode != "gain" else 3 * one
+        run = simulate(scenario(fault=many, **{"watchdog.on": watching}))
+        assert run.status in ENDS
+        assert np.isfinite(run.telemetry.values).all()
+
+
+def test_gains_without_an_end_are_refused_and_one_after_the_other_are_not():
+    def gain(start_s, end_s):
+        return {"target": "adc", "mode": "gain", "value": 100.0, "start_s": start_s, "end_s": end_s}
+
+    with pytest.raises(InputError, match=r"gains of at most 1e\+06 in all for faults of adc at 0\.3 s"):
+        scenario(fault=[gain(0.1 * place, 1.0) for place in range(4)])
+    scenario(fault=[gain(0.1 * place, 1.0) for place in range(3)])
+    scenario(fault=[gain(0.1 * place, 0.1 * place + 0.1) for place in range(50)])
+    with pytest.raises(InputError, match="fault"):
+        scenario(fault=[{"target": "coil.01", "mode": "open"}] * 1001)
+
+
+BAD = st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e200, 1e12, 5e-324, -0.0])
+
+# Whatever a tick goes on from, by what it belongs to.
+INPUTS = {
+    "angle": lambda machine: machine._moving.stepped.q,
+    "rate": lambda machine: machine._moving.stepped.qdot,
+    "current": lambda machine: machine._plant.current,
+    "temperature": lambda machine: machine._plant.driving.driving.coil.temperature_degC,
+    "resistance": lambda machine: machine._plant.driving.driving.coil.resistance_ohm,
+    "on their way": lambda machine: machine._plant.driving.driving.delay.ring.ravel(),
+    "held": lambda machine: machine._plant.driving.faults.last_A,
+    "group gain": lambda machine: machine._plant.group_gain,
+    "estimate": lambda machine: machine._controller.estimates.memory,
+    "law": lambda machine: machine._controller.memory,
+    "belief": lambda machine: machine._controller.belief.current,
+    "detector": lambda machine: machine._controller.supervision.detector.shorted_A,
+    "wiper": lambda machine: machine._sensors.faults.wiper_V,
+    "converted": lambda machine: machine._sensors.faults.on_the_way_V.ravel(),
+    "seen": lambda machine: machine._controller.supervision.watchdog.last_rad,
+}
+
+PLAN = [
+    {"target": "dac.03", "mode": "stuck", "start_s": 0.02},
+    {"target": "pot.alpha", "mode": "stuck", "start_s": 0.02, "end_s": 0.03},
+    {"target": "adc", "mode": "delay", "value": 2e-3, "start_s": 0.02},
+    {"target": "coil.04", "mode": "short"},
+    {"target": "supply", "mode": "noise", "value": 1.0},
+]
+
+
+@pytest.mark.parametrize("watching", [False, True])
+@pytest.mark.parametrize("what", list(INPUTS))
+@settings(max_examples=30)
+@given(st.integers(0, 100), BAD, st.integers(0, 25))
+def test_any_value_in_any_place_ends_with_a_status_and_numbers(what, watching, place, bad, tick):
+    with Session(scenario(fault=PLAN, **{"watchdog.on": watching, "detector.detect": True})) as session:
+        session.advance(tick)
+        array = INPUTS[what](session._machine)
+        array[place % len(array)] = bad
+        table = session.advance(TICKS)
+        assert session.status in {*ENDS, Status.RUNNING}
+        assert np.isfinite(table.values).all()
+
+
+@pytest.mark.parametrize("watching", [False, True])
+@settings(max_examples=40)
+@given(st.integers(0, 7), BAD, st.integers(0, 20))
+def test_any_draw_ends_with_a_status_and_numbers(watching, column, bad, tick):
+    """Of the sensors, and of faults: no generator gives it, but a generator is not all that may break."""
+    with Session(scenario(fault=PLAN, **{"watchdog.on": watching})) as session:
+        session.advance(tick)
+        inputs = session._exogenous.rows(tick, 1)
+        for rows in (inputs.noise, inputs.fault_noise):
+            rows[0, column % rows.shape[1]] = bad
+        inputs.fault_noise[0, -18 - 4] = bad  # of the supply
+        table = session.advance(TICKS)
+        assert session.status in {*ENDS, Status.RUNNING}
+        if np.isnan(bad):
+            assert session.status != Status.RUNNING
+        assert np.isfinite(table.values).all()
+
+
+LOGGED = tuple(Signal(name, "1", 1, name) for name in ("calls", "bad", "own"))
+
+
+@numba.njit
+def spoiling(t, reference, measurement, parameters, state, torque):
+    state[0] += 1.0
+    for axis in range(3):
+        error = measurement[0, axis] - reference[0, axis]
+        torque[axis] = -0.5 * error - 0.05 * (measurement[1, axis] - reference[1, axis])
+    if state[0] == parameters[0]:
+        bad = state[1]
+        if parameters[1] == 0:
+            torque[int(parameters[2])] = bad
+        elif parameters[1] == 1:
+            measurement[int(parameters[2]), 1] = bad
+        elif parameters[1] == 2:
+            reference[int(parameters[2]), 1] = bad
+        else:
+            state[2] = bad
+
+
+@pytest.mark.parametrize("hardware", ["prototype", "ideal"])
+@pytest.mark.parametrize("watching", [False, True])
+@settings(max_examples=40)
+@given(st.integers(1, 50), st.integers(0, 3), st.integers(0, 2), BAD)
+def test_any_law_ends_with_a_status_and_numbers(hardware, watching, tick, where, axis, bad):
+    from spheretwin.models.telemetry.signals import Signal
+
+    signals = (
+        Signal("calls", "1", 1, "calls"),
+        Signal("bad", "1", 1, "value"),
+        Signal("mine", "1", 1, "own"),
+    )
+    law = Law("spoiling", spoiling, np.array([tick, where, axis], float), np.zeros(3), signals)
+    with Session(scenario(hardware, **{"watchdog.on": watching}), law) as session:
+        session._machine._controller.memory[1] = bad
+        table = session.advance(TICKS)
+        assert session.status in {*ENDS, Status.RUNNING}
+        assert np.isfinite(table.values).all()
+
+
+class Broken:
+    """A path on which one sample is another value."""
+
+    def __init__(self, tick, row, bad):
+        self.tick, self.row, self.bad = tick, row, bad
+
+    def sample(self, t):
+        made = np.zeros((len(t), 3, 3))
+        made[:, 0, 0] = 0.1 * np.sin(t)
+        made[np.rint(t / PERIOD_S) == self.tick, self.row, 1] = self.bad
+        return made
+
+
+@pytest.mark.parametrize("watching", [False, True])
+@settings(max_examples=40)
+@given(st.integers(0, 50), st.integers(0, 2), BAD)
+def test_any_trajectory_is_refused_or_ends_with_a_status_and_numbers(watching, tick, row, bad):
+    path, changes = Broken(tick, row, bad), {"watchdog.on": watching}
+    if tick == 0 and row == 0 and not abs(bad) < 1:  # no pose to start from
+        with pytest.raises(InputError):
+            Session(scenario(**changes), trajectory=path)
+        return
+    if tick == 0 and not np.isfinite(bad):
+        with pytest.raises(InputError, match="finite"):
+            Session(scenario(**changes), trajectory=path).advance(TICKS)
+        return
+    with Session(scenario(**changes), trajectory=path) as session:
+        table = session.advance(TICKS)
+        assert session.status in {*ENDS, Status.RUNNING}
+        assert np.isfinite(table.values).all()
+        if not np.isfinite(bad):  # all that there is before it is handed over; then it is said
+            assert len(table) == tick
+            with pytest.raises(InputError, match="finite"):
+                session.advance(1)

@@ -1,0 +1,226 @@
+"""What faults do to currents, torques and energies: differential equations, identities, moments."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from spheretwin.models.kinematics import rate_jacobian
+from spheretwin.models.magnetics import torque_matrix
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.faults.plan import FaultPlan
+from spheretwin.twin.session import Session
+
+GROUPS, R_OHM, L_H, STEP_S = 18, 1.3, 0.9e-3, 1e-3
+COLD = {"drive.resistance_per_K": 0.0, "watchdog.on": False, "plant.engine": "lagrangian"}
+
+
+def prototype(*faults, **changes):
+    fields = {"hardware": "prototype", "fault": list(faults), "plant.step_s": STEP_S, "seed": 2}
+    return scenarios.load("nutation", {**fields, **COLD, **changes})
+
+
+def each(mode, kind="coil", **more):
+    return [{"target": f"{kind}.{group:02d}", "mode": mode, **more} for group in range(GROUPS)]
+
+
+def emfs(table, actuator):
+    """Back-EMF of a group of full turns, (ticks, n) in V, held over each period."""
+    return np.array(
+        [
+            torque_matrix(q, actuator).T @ rate_jacobian(q) @ qdot
+            for q, qdot in zip(table["q_rad"], table["qdot_rad_s"], strict=True)
+        ]
+    )
+
+
+def stepped(scenario, ticks):
+    """Rows of a run, one at a time, and the currents (ticks + 1, n), A, between them."""
+    with Session(scenario) as session:
+        currents, parts = [session._machine._plant.current.copy()], []
+        for _ in range(ticks):
+            parts.append(session.advance(1))
+            currents.append(session._machine._plant.current.copy())
+        return parts, np.array(currents), session.actuator
+
+
+def column(parts, name):
+    return np.concatenate([part[name] for part in parts])
+
+
+def test_an_open_coil_has_no_current_and_no_torque():
+    with Session(prototype(*each("open", start_s=0.05)[:9])) as session:
+        table, actuator = session.advance(150), session.actuator
+    currents = table["current_A"]
+    assert np.all(np.abs(currents[45:50, :9]).max(axis=0) > 1e-3)
+    assert not currents[50:, :9].any()
+    assert not table["copper_loss_W"][50:, :9].any()
+    assert not table["coil_power_W"][50:, :9].any()
+    for tick in (60, 100, 149):
+        G = torque_matrix(table["q_rad"][tick], actuator)
+        # Sums of eighteen products, rounded in another order.
+        np.testing.assert_allclose(
+            table["torque_Nm"][tick], G[:, 9:] @ currents[tick, 9:], rtol=0, atol=1e-14
+        )
+
+
+def test_a_shorted_coil_carries_what_its_emf_drives():
+    """`L di/dt = -R i - e` with the EMF of the motion that was logged, by an ODE solver."""
+    with Session(prototype({"target": "coil.04", "mode": "short", "start_s": 0.3})) as session:
+        session.advance(299)
+        before = session.advance(1)
+        start = session._machine._plant.current[4]
+        table, actuator = session.advance(200), session.actuator
+    assert len(before) == 1
+    emf = emfs(table, actuator)[:, 4]
+    found = solve_ivp(
+        lambda t, i: (-R_OHM * i - emf[min(int(t / STEP_S), 199)]) / L_H,
+        (0, 0.2), [start], method="RK45", max_step=STEP_S / 5, rtol=1e-10, atol=1e-12,
+        dense_output=True,
+    )  # fmt: skip
+    within = np.linspace(0, STEP_S, 101)
+    means = [np.trapezoid(found.sol(tick * STEP_S + within)[0], within) / STEP_S for tick in range(200)]
+    # The solver steps over the corners of the EMF, the trapezoids are 1e-4 of a decay within the first step.
+    np.testing.assert_allclose(table["current_A"][:, 4], means, rtol=0, atol=2e-4 * np.abs(means).max())
+    assert np.abs(means[100:]).max() > 0.01
+
+
+def test_shorted_coils_brake_the_rotor_by_what_heats_them():
+    """EMF work is copper loss and change of ½ L i², to rounding, and takes its energy from the motion."""
+    scenario = prototype(*each("short"), **{"plant.initial_rad_s": [2.0, -1.0, 5.0]})
+    parts, currents, actuator = stepped(scenario, 150)
+    q, qdot = column(parts, "q_rad"), column(parts, "qdot_rad_s")
+    emf = emfs({"q_rad": q, "qdot_rad_s": qdot}, actuator)
+    work = -np.sum(emf * column(parts, "current_A"), axis=1) * STEP_S
+    heat = np.sum(column(parts, "copper_loss_W"), axis=1) * STEP_S
+    field = np.sum(0.5 * L_H * np.diff(currents**2, axis=0), axis=1)
+    # Sums of eighteen products each, of 1e-16 of their size.
+    np.testing.assert_allclose(work, heat + field, rtol=0, atol=1e-13 * heat.max())
+    rate_S = np.array([rate_jacobian(pose) @ rate for pose, rate in zip(q, qdot, strict=True)])
+    braking = np.sum(column(parts, "torque_Nm") * rate_S, axis=1) * STEP_S
+    np.testing.assert_allclose(braking, -work, rtol=0, atol=1e-13 * heat.max())
+    assert np.all(braking[5:] < 0)
+    assert not column(parts, "coil_power_W").any()  # no voltage at shorted ends
+
+
+def test_fewer_turns_scale_torque_and_emf_alike():
+    """Power at the coils, less heat and field, is the power of the torque on the rotor: an identity."""
+    gains = np.linspace(0.1, 0.9, GROUPS)
+    faults = [{"target": f"coil.{j:02d}", "mode": "gain", "value": gain} for j, gain in enumerate(gains)]
+    parts, currents, actuator = stepped(prototype(*faults), 200)
+    power = np.sum(column(parts, "coil_power_W") - column(parts, "copper_loss_W"), axis=1)
+    field = np.sum(0.5 * L_H * np.diff(currents**2, axis=0), axis=1) / STEP_S
+    q, qdot = column(parts, "q_rad"), column(parts, "qdot_rad_s")
+    rate_S = np.array([rate_jacobian(pose) @ rate for pose, rate in zip(q, qdot, strict=True)])
+    moving = np.sum(column(parts, "torque_Nm") * rate_S, axis=1)
+    # Powers of some 10 W, of 18 groups, whose difference is some mW: 1e-13 of the former.
+    np.testing.assert_allclose(power - field, moving, rtol=0, atol=1e-11)
+    for tick in (50, 150):
+        G = torque_matrix(q[tick], actuator)
+        expected = G @ (gains * column(parts, "current_A")[tick])
+        np.testing.assert_allclose(column(parts, "torque_Nm")[tick], expected, rtol=0, atol=1e-14)
+
+
+def test_without_a_supply_all_groups_are_as_good_as_shorted():
+    """No voltage at the coils: the currents of shorted ones, but with nothing drawn."""
+    times = {"start_s": 0.1}
+    silent = {"drive.amplifier_offset_V": 0.0}
+    with (
+        Session(prototype({"target": "supply", "mode": "dropout", **times}, **silent)) as dark,
+        Session(prototype(*each("short", **times), **silent)) as shorted,
+    ):
+        one, other = dark.advance(200), shorted.advance(200)
+    for name in ("current_A", "copper_loss_W", "torque_Nm", "q_rad", "coil_temperature_degC"):
+        # One current by way of a limit of 0 V, the other without: the same exponentials, rounded elsewhere.
+        np.testing.assert_allclose(one[name], other[name], rtol=0, atol=1e-12 * np.abs(other[name]).max())
+    assert not one["supply_power_W"][100:].any()
+    # Through a limit of 0 V no work is done at all, to the bit.
+    assert not one["coil_power_W"][100:].any()
+
+
+def test_a_shorted_coil_draws_from_the_supply_what_its_amplifier_drives_past_it():
+    steady = {"drive.amplifier_offset_V": 0.0, "drive.dac_bits": 0, "drive.delay_s": 0.0}
+    with Session(prototype(*each("short"), **steady)) as session:
+        table = session.advance(50)
+    expected = 24 * np.abs(np.clip(table["current_command_A"], -8, 8)).sum(axis=1)
+    np.testing.assert_allclose(table["supply_power_W"], expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.3])
+def test_a_low_supply_limits_the_ramp(share):
+    """From rest to the current limit, with what is left of the swing, by an ODE solver."""
+    fields = {
+        "drive.delay_s": 0.0, "drive.dac_bits": 0, "drive.amplifier_offset_V": 0.0,
+        "controller.law": "pd", "controller.stiffness": 1e4, "plant.initial_rad": [0.5, 0.5, 1.0],
+    }  # fmt: skip
+    with Session(prototype({"target": "supply", "mode": "gain", "value": share}, **fields)) as session:
+        row, actuator = session.advance(1), session.actuator
+        ends = session._machine._plant.current.copy()
+    up, down, stiffness = 24 * share - 4.8, 4.6 - 24 * share, L_H * 2 * np.pi * 2000
+    emf = emfs(row, actuator)[0]
+    limited = 0
+    for group in range(GROUPS):
+        target, e = np.clip(row["current_command_A"][0, group], -8, 8), emf[group]
+
+        def slope(t, i, target=target, e=e):
+            return (np.clip(R_OHM * i + stiffness * (target - i) + e, down, up) - R_OHM * i - e) / L_H
+
+        found = solve_ivp(slope, (0, STEP_S), [0.0], method="RK45", max_step=1e-6, rtol=1e-9, atol=1e-9)
+        # Steps of 1 µs over the corner where the limit is left: 1e-4 of the currents.
+        assert ends[group] == pytest.approx(found.y[0, -1], abs=1e-4 * 8)
+        limited += row["voltage_limited"][0, group] > 0
+    assert limited > 5
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("amplifier", 1.0), ("dac", 0.8)])
+def test_noise_of_a_line_has_the_stated_moments(kind, unit):
+    ideal = {
+        "hardware": "ideal", "drive.time_constant_s": 0.0, "drive.current_limit_A": 1e3,
+        "plant.engine": "lagrangian", "fault": each("noise", kind, value=0.2), "duration": 2.0,
+        "drive.transconductance_A_V": 0.8,
+    }  # fmt: skip
+    with Session(scenarios.load("nutation", ideal)) as session:
+        table = session.advance(2000)
+    noise = table["current_A"] - table["current_command_A"]
+    count = len(noise)
+    # Five standard errors each; correlations of groups and of ticks are those of independent numbers.
+    assert np.all(np.abs(noise.mean(axis=0)) < 5 * 0.2 * unit / np.sqrt(count))
+    np.testing.assert_allclose(noise.std(axis=0), 0.2 * unit, rtol=5 / np.sqrt(2 * count))
+    scaled = noise / (0.2 * unit)
+    together = scaled.T @ scaled / count - np.diag(np.mean(scaled**2, axis=0))
+    assert np.abs(together).max() < 5 / np.sqrt(count)
+    assert np.all(np.abs(np.mean(scaled[1:] * scaled[:-1], axis=0)) < 5 / np.sqrt(count))
+
+
+def test_noise_of_readings_has_the_stated_moments():
+    """Of potentiometers and converter at once, and of the encoder without its counts."""
+    exact = {
+        "sensors.potentiometer.noise_rad": 0.0, "sensors.potentiometer.nonlinearity_rad": 0.0,
+        "sensors.adc.bits": 0, "sensors.adc.offset_V": 0.0, "sensors.adc.gain_error": 0.0,
+        "sensors.adc.noise_V": 0.0, "sensors.encoder.counts": 0, "estimator.bandwidth_rad_s": 50.0,
+        "duration": 4.0,
+    }  # fmt: skip
+    faults = [
+        {"target": "pot.alpha", "mode": "noise", "value": 3e-4},
+        {"target": "pot.beta", "mode": "noise", "value": 4e-4},
+        {"target": "adc", "mode": "noise", "value": 3e-4 * 5 / np.radians(300)},
+        {"target": "encoder.gamma", "mode": "noise", "value": 2e-4},
+    ]
+    with Session(prototype(*faults, **exact)) as session:
+        table = session.advance(4000)
+    assert len(table) > 2000
+    noise = table["q_measured_rad"] - table["q_rad"]
+    expected = [np.hypot(3e-4, 3e-4), np.hypot(4e-4, 3e-4), 2e-4]
+    np.testing.assert_allclose(noise.std(axis=0), expected, rtol=5 / np.sqrt(2 * len(noise)))
+    assert np.all(np.abs(noise.mean(axis=0)) < 5 * np.array(expected) / np.sqrt(len(noise)))
+    together = np.corrcoef(noise.T) - np.eye(3)
+    assert np.abs(together).max() < 5 / np.sqrt(len(noise))
+
+
+def test_several_noises_of_one_source_are_one_of_their_root_sum_of_squares():
+    faults = each("noise", "amplifier", value=0.3) + each("noise", "amplifier", value=0.4)
+    with Session(prototype(*faults)) as session:
+        session.advance(1)
+        drive = session._machine._plant.driving.faults
+    np.testing.assert_allclose(drive.noise_A[:, 1], 0.5, rtol=1e-15)
+    assert not drive.noise_A[:, 0].any()
+    assert len(FaultPlan(session.scenario.fault, GROUPS, STEP_S, 0)) == 36

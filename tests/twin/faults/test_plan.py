@@ -1,0 +1,153 @@
+"""The plan of faults: which act at a tick, as a function of plan, seed, part and tick alone."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.twin.faults.fault import MODES, Fault
+from spheretwin.twin.faults.plan import NEVER, FaultPlan, part_names, part_of
+from spheretwin.twin.faults.targets.registry import TARGETS
+
+GROUPS, PERIOD_S = 18, 1e-3
+
+
+def plan(*faults, seed=0, period_s=PERIOD_S):
+    return FaultPlan(tuple(Fault(**each) for each in faults), GROUPS, period_s, seed)
+
+
+def coil(group=0, **more):
+    return {"target": f"coil.{group:02d}", "mode": "open", **more}
+
+
+@pytest.mark.parametrize("period_s", [1e-3, 1e-4, 3e-4, 1 / 3e3])
+@pytest.mark.parametrize("tick", [0, 1, 7, 300, 12_345, 10_000_000])
+def test_start_and_end_are_exact_ticks(tick, period_s):
+    """Times that are ticks are those ticks, though they are products of decimal fractions; others wait."""
+    for first, start_s in [
+        (tick, tick * period_s),
+        (tick, float(f"{tick * period_s:.10g}")),
+        (tick + 1, (tick + 0.01) * period_s),
+        (tick + 1, (tick + 0.99) * period_s),
+    ]:
+        acts = plan(coil(start_s=start_s), period_s=period_s)
+        assert acts.at_work(first) == (0,)
+        assert acts.at_work(first - 1) == ()
+        ends = plan(coil(end_s=start_s + 1e-12 if start_s == 0 else start_s), period_s=period_s)
+        if start_s:
+            assert ends.at_work(first - 1) == (0,)
+        assert ends.at_work(first) == ()
+
+
+def test_a_fault_within_a_period_never_acts():
+    assert not any(plan(coil(start_s=5.2e-3, end_s=5.8e-3)).at_work(tick) for tick in range(20))
+
+
+STRETCHES = st.floats(1e-6, 0.02)
+FAULTS = st.lists(
+    st.one_of(
+        st.builds(
+            lambda group, first, length, value: {
+                "target": f"coil.{group:02d}", "mode": "intermittent", "value": value,
+                "start_s": first * PERIOD_S,
+                **({"end_s": (first + length) * PERIOD_S} if length else {}),
+            },
+            st.integers(0, 2), st.integers(0, 40), st.integers(0, 40), STRETCHES,
+        ),
+        st.builds(
+            lambda group, first, length: {
+                "target": f"dac.{group:02d}", "mode": "dropout", "start_s": first * PERIOD_S,
+                **({"end_s": (first + length) * PERIOD_S} if length else {}),
+            },
+            st.integers(0, 2), st.integers(0, 60), st.integers(0, 60),
+        ),
+    ),
+    max_size=5,
+)  # fmt: skip
+
+
+@given(FAULTS, st.integers(0, 2**70))
+def test_the_next_change_skips_none(faults, seed):
+    """Against asking at every tick: between a tick and the next at which others may act, none do."""
+    made = plan(*faults, seed=seed)
+    began = [made.began_s(tick).tobytes() for tick in range(120)]
+    at_work = [made.at_work(tick) for tick in range(120)]
+    tick = 0
+    while tick < 120:
+        until = made.next_change(tick)
+        assert until > tick
+        for between in range(tick, min(until, 120)):
+            assert (at_work[between], began[between]) == (at_work[tick], began[tick])
+        tick = until
+    assert plan().next_change(0) == NEVER
+
+
+@given(FAULTS, st.integers(0, 1000))
+def test_what_acts_is_a_function_of_tick_and_part_alone(faults, seed):
+    """In any order of asking, and whatever else is planned."""
+    made = plan(*faults, seed=seed)
+    forwards = [made.at_work(tick) for tick in range(80)]
+    again = plan(*faults, seed=seed)
+    assert [again.at_work(tick) for tick in range(79, -1, -1)][::-1] == forwards
+    for place, each in enumerate(faults):
+        alone = plan(each, seed=seed)
+        assert [place in acting for acting in forwards] == [bool(alone.at_work(tick)) for tick in range(80)]
+
+
+def test_coins_are_fair_and_each_part_s_own():
+    stretches = 4000
+    parts = [coil(group, mode="intermittent", value=3e-3) for group in range(3)]
+    heads = np.array(
+        [
+            [bool(plan(each, seed=4).at_work(3 * stretch)) for stretch in range(stretches)]
+            for each in parts
+        ]
+    )  # fmt: skip
+    # Five standard errors of a fair coin, of agreement between parts, and of runs of two.
+    bound = 5 * 0.5 / math.sqrt(stretches)
+    assert np.all(np.abs(heads.mean(axis=1) - 0.5) < bound)
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        assert abs(np.mean(heads[one] == heads[other]) - 0.5) < bound
+    assert np.all(np.abs(np.mean(heads[:, 1:] == heads[:, :-1], axis=1) - 0.5) < bound)
+    other_seed = [bool(plan(parts[0], seed=5).at_work(3 * stretch)) for stretch in range(stretches)]
+    assert abs(np.mean(heads[0] == other_seed) - 0.5) < bound
+
+
+def test_a_stretch_is_whole_ticks_counted_from_the_start_of_the_run():
+    acts = plan(coil(mode="intermittent", value=4e-3, start_s=0.002), seed=1)
+    heads = [bool(acts.at_work(tick)) for tick in range(400)]
+    coins = [np.random.default_rng([1, 201, 0, k]).random() < 0.5 for k in range(100)]
+    assert heads[2:] == [coin for coin in coins for _ in range(4)][2:]
+    assert not any(heads[:2])
+    shortest = plan(coil(mode="intermittent", value=1e-6))  # no stretch is shorter than a period
+    assert {shortest.next_change(tick) - tick for tick in range(50)} == {1}
+
+
+def test_marks_are_numbers_of_modes_at_the_parts_places():
+    parts = part_names(GROUPS)
+    assert len(set(parts)) == len(parts)
+    for place, name in enumerate(parts):
+        target = TARGETS[name.partition(".")[0]]
+        mode = next(mode for mode, what in target.modes.items() if not what.intermittent)
+        value = target.modes[mode].value
+        given = {"value": 0.5} if value and value.default is None else {}
+        fault = Fault(target=name, mode=mode, **given)
+        assert part_of(fault, GROUPS) == place
+        marks = FaultPlan((fault,), GROUPS, PERIOD_S, 0).marks((0,))
+        assert marks.nonzero()[0].tolist() == [place]
+        assert MODES[int(marks[place]) - 1] == mode
+
+
+def test_the_last_of_several_on_one_part_is_marked_and_all_act():
+    made = plan(coil(), coil(mode="short", start_s=0.01))
+    assert made.at_work(10) == (0, 1)
+    assert made.marks((0, 1))[0] == 1 + MODES.index("short")
+    assert plan(coil(known=True), coil(3)).told((0, 1)).nonzero()[0].tolist() == [0]
+
+
+def test_a_group_s_fault_began_when_the_last_one_did():
+    made = plan(coil(2, start_s=0.01), {"target": "amplifier.02", "mode": "open", "start_s": 0.03})
+    assert [made.began_s(tick)[2] for tick in (9, 10, 29, 30, 31)] == [-1.0, 0.01, 0.01, 0.03, 0.03]
+    assert np.all(np.delete(made.began_s(31), 2) == -1.0)
