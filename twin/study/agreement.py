@@ -13,7 +13,6 @@ from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.metrics.metric import Planned
 from spheretwin.twin.metrics.tracking.rms_error import RmsError
-from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow
 from spheretwin.twin.study.grid import Row
 from spheretwin.twin.study.row import Rows, follower
@@ -51,7 +50,7 @@ def check(rows: Rows, row: Row) -> None:
 
 def _rms(rows: Rows, row: Row, engine: str) -> tuple[Status, list[float]]:
     scenario = rows.scenario(row, engine)
-    with Session(scenario) as session:
+    with rows.session(scenario) as session:
         metric = RmsError(Planned(session.begun_as, session.actuator, scenario.ticks))
         status = follow(session, scenario.ticks, [follower({"rms_error_rad": metric})])
         return status, metric.value() or []

@@ -18,6 +18,8 @@ from spheretwin.models.base.wording import did_you_mean, shown, without_breaks
 from spheretwin.models.telemetry.file import TelemetryFile
 from spheretwin.models.telemetry.kept import KeptTelemetry
 from spheretwin.models.telemetry.status import Status
+from spheretwin.twin import assembly
+from spheretwin.twin.assembly import Files
 from spheretwin.twin.metrics.metric import Metric, Planned
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.records.facts import record_of
@@ -30,6 +32,7 @@ from spheretwin.twin.scenario.own_law import scenario_with
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Run, Sink, follow
+from spheretwin.twin.study.axes.axis import Axis
 from spheretwin.twin.study.grid import Row
 from spheretwin.twin.study.study import Study
 
@@ -69,10 +72,13 @@ class Rows:
     def __init__(self, study: Study, telemetry: Path | None = None) -> None:
         self.study = study
         self._telemetry = telemetry
+        self._files: dict[tuple[str | None, ...], Files] = {}
         self._fields = reading.read(study.scenario)
         for dotted, value in study.fields.items():
             reading.override(self._fields, dotted, value)
+        self._names_files = True
         self.base = self._validated(copy.deepcopy(self._fields))
+        self._names_files = bool(study.law) or not all(map(_is_of_numbers, study.axis))
         self._defaults = self.base.model_dump(mode="json")
         chosen = [name for name in study.metrics if name in METRICS]
         self._check_axes()
@@ -115,7 +121,7 @@ class Rows:
         """Run a row; whatever goes wrong with it is its result."""
         try:
             scenario = self.scenario(row, engine)
-            with Session(scenario) as session:
+            with self.session(scenario) as session:
                 return self._followed(row, scenario, session)
         except InputError as error:
             return Result(REFUSED, None, str(error), {})
@@ -123,6 +129,13 @@ class Rows:
             raise
         except Exception as error:  # code of the user's, which may raise whatever it will
             return Result(FAILED, None, f"{type(error).__name__}: {without_breaks(error)}", {})
+
+    def session(self, scenario: Scenario) -> Session:
+        """Session of a row's scenario; its files are read once for a study."""
+        named = assembly.named_files(scenario)
+        if named not in self._files:
+            self._files[named] = assembly.files_of(scenario)
+        return Session(scenario, files=self._files[named])
 
     def command(self, row: Row) -> str:
         """Command line that runs a row alone."""
@@ -174,7 +187,8 @@ class Rows:
         for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
             reading.override(fields, dotted, value)
         source = self.study.scenario
-        return check_events(reading.validated(reading.beside("", fields), source), source)
+        taken = reading.beside("", fields) if self._names_files else fields
+        return check_events(reading.validated(taken, source), source)
 
     def _check_axes(self) -> None:
         """Find out before the first row whether each axis names a field."""
@@ -237,7 +251,7 @@ class _Follower:
 def _is_free_rotor(path: Path) -> bool:
     """Whether a model holds no more than the Lagrangian knows; one that cannot be read will say so itself."""
     try:
-        return not mjcf.beyond_a_free_rotor(mjcf.read(path).loaded)
+        return not mjcf.read(path).unknown_to_the_lagrangian
     except InputError:
         return False
 
@@ -248,6 +262,11 @@ def _period(fields: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(controller, Mapping) and "period_s" in controller:
         return {"period_s": controller["period_s"]}
     return {}
+
+
+def _is_of_numbers(axis: Axis) -> bool:
+    """Whether no value of an axis can name a file."""
+    return axis.is_drawn or all(isinstance(each, int | float) for each in getattr(axis, "values", ()))
 
 
 def _list_of(dotted: str) -> str:
