@@ -4,40 +4,48 @@ UV_VERSION := 0.13.8
 TOOLS := .tools
 UV := PYTHONPATH=$(TOOLS) UV_PYTHON_DOWNLOADS=never $(PYTHON) -m uv
 BIN := .venv/bin
+WHEEL := .venv-wheel/bin
+SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
 .PHONY: demo test check format benchmark setup clean
 
-demo: setup ## run the nutation under AFSM and leave a recording and its telemetry
+demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
 	@echo "here:      $(BIN)/rerun nutation.rrd"
 
 test: setup ## pass the tests
 	$(BIN)/pytest
 
-check: setup .venv-wheel/installed ## format, lint, types, import layers
-	$(BIN)/ruff format --check .
-	$(BIN)/ruff check .
-	.venv-wheel/bin/mypy
-	.venv-wheel/bin/lint-imports
+check: .venv-wheel/installed ## format, lint, types, import layers
+	$(WHEEL)/ruff format --check .
+	$(WHEEL)/ruff check .
+	$(WHEEL)/mypy
+	$(WHEEL)/lint-imports
 
 benchmark: setup ## print the speed ratios, and hold the bounded allocation against linear programmes
 	$(BIN)/python tests/benchmarks/ratios.py
 	$(BIN)/python tests/benchmarks/allocation.py
 
-format: setup
-	$(BIN)/ruff format .
-	$(BIN)/ruff check --fix .
+format: .venv-wheel/installed
+	$(WHEEL)/ruff format .
+	$(WHEEL)/ruff check --fix .
 
 setup: .venv/installed
 
-.venv/installed: uv.lock pyproject.toml $(TOOLS)/uv
-	$(UV) sync --quiet --frozen --compile-bytecode --python $(PYTHON) --all-extras --group dev
+# What the demo needs and no more; what is there already stays.
+.venv/demo: uv.lock pyproject.toml $(TOOLS)/uv
+	$(SYNC) --inexact --compile-bytecode
 	@touch $@
+
+# What the tests need: every extra that they use is among their group.
+.venv/installed: uv.lock pyproject.toml $(TOOLS)/uv
+	$(SYNC) --compile-bytecode --group test
+	@touch $@ .venv/demo
 
 # Type checkers and import-linter do not see folders that are mapped by an editable install.
 .venv-wheel/installed: uv.lock pyproject.toml $(TOOLS)/uv $(shell find models control viz twin -name '*.py')
 	rm -rf build
-	UV_PROJECT_ENVIRONMENT=.venv-wheel $(UV) sync --quiet --frozen --python $(PYTHON) --no-editable --reinstall-package spheretwin --all-extras --group dev
+	UV_PROJECT_ENVIRONMENT=.venv-wheel $(SYNC) --no-editable --reinstall-package spheretwin --all-extras --group dev
 	@touch $@
 
 # pip installs uv into a folder of the project: nothing outside it is touched.
