@@ -16,6 +16,7 @@ import re
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -56,6 +57,11 @@ class Mjcf:
     described: mujoco.MjModel
     bare: mujoco.MjModel
     loaded: mujoco.MjModel
+
+    @cached_property
+    def unknown_to_the_lagrangian(self) -> tuple[str, ...]:
+        """What `beyond_a_free_rotor` finds in the model to be stepped with a payload."""
+        return tuple(beyond_a_free_rotor(self.loaded))
 
 
 def read(path: Path) -> Mjcf:

@@ -16,7 +16,7 @@ from typing import NoReturn
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import is_plain, one_line, shown
-from spheretwin.twin.commands import crosscheck, magnetics, reproduce, simulate
+from spheretwin.twin.commands import crosscheck, magnetics, reproduce, simulate, sweep
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -85,6 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     simulate.add_to(verbs)
     crosscheck.add_to(verbs)
     reproduce.add_to(verbs)
+    sweep.add_to(verbs)
     magnetics.add_to(verbs)
     return parser
 

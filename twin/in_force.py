@@ -71,8 +71,10 @@ class InForce(NamedTuple):
             yield now
 
 
-def at_start(scenario: Scenario, law: Law | None, trajectory: Sampled | None) -> InForce:
-    """What a session begins with.
+def at_start(
+    scenario: Scenario, law: Law | None, trajectory: Sampled | None, files: Files | None = None
+) -> InForce:
+    """What a session begins with; its files are read unless given.
 
     Raises
     ------
@@ -80,7 +82,7 @@ def at_start(scenario: Scenario, law: Law | None, trajectory: Sampled | None) ->
         The model file, the torque curve, the trajectory or a value of the scenario cannot be used.
     """
     own = None if trajectory is None else checked(trajectory)
-    return _resolved(scenario, assembly.files_of(scenario), law, own)
+    return _resolved(scenario, files or assembly.files_of(scenario), law, own)
 
 
 def _resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None) -> InForce:

@@ -25,6 +25,7 @@ from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
+from spheretwin.twin.assembly import Files
 from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.in_force import at_start
 from spheretwin.twin.machine import Machine
@@ -47,6 +48,8 @@ class Session:
         Runs instead of the law that the scenario names.
     trajectory : object with ``sample(t)``, optional
         Followed instead of the trajectory that the scenario names, to the end.
+    files : Files, optional
+        What the files of this scenario say, from `assembly.files_of`; read anew unless given.
 
     Attributes
     ----------
@@ -73,7 +76,14 @@ class Session:
     A session belongs to one thread at a time: calls from a second one while the first is at work are refused.
     """
 
-    def __init__(self, scenario: Scenario, law: Law | None = None, trajectory: Sampled | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        law: Law | None = None,
+        trajectory: Sampled | None = None,
+        *,
+        files: Files | None = None,
+    ) -> None:
         self._busy = threading.Lock()
         self._closed = False
         self._own_laws = {law.name: law} if law else {}
@@ -81,7 +91,7 @@ class Session:
         self.journal: tuple[Change, ...] = ()
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
-        self._in_force = at_start(scenario, law, trajectory)
+        self._in_force = at_start(scenario, law, trajectory, files)
         self.begun_as = self.scenario
         self._planned = planned(self.begun_as)
         self._exogenous = self._outside()

@@ -35,7 +35,7 @@ def cache_folder() -> Path | None:
     `SPHERETWIN_CACHE_DIR` moves it elsewhere.
     """
     root = _root()
-    return root and root / _digest()
+    return root and root / sources_digest()
 
 
 def kept(name: str) -> bytes | None:
@@ -105,7 +105,8 @@ def _candidates() -> Iterator[Path]:
 
 
 @cache
-def _digest() -> str:
+def sources_digest() -> str:
+    """Digest of all sources that can hold compiled code, and of the versions of what it is made with."""
     digest = hashlib.sha256((sys.implementation.cache_tag or sys.version).encode())
     for package in ("numba", "llvmlite", "mujoco", "numpy", "scipy"):
         digest.update(importlib.metadata.version(package).encode())

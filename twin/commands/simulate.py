@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
+from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.commands.outputs import Outputs
 from spheretwin.twin.commands.own_metrics import OwnMetrics
 from spheretwin.twin.commands.reporting import print_json
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     plan = _planned(options, rest)
     own = OwnMetrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
-    with _interruptible() as stop_requested, Session(plan.scenario) as session:
+    with interruptible() as stop_requested, Session(plan.scenario) as session:
         figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
@@ -161,25 +161,6 @@ def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
             f"law {session.law.name}: expected a torque at {session.t_s:g} s,"
             f" received {type(error).__name__}: {told}"
         ) from error
-
-
-@contextlib.contextmanager
-def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C, or the end of the session, end the run at the next chunk: nothing computed is lost."""
-    asked = []
-    # What the parent has it ignore, as nohup a lost terminal, stays ignored.
-    heeded = [number for number in _ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda *_: asked.append(True)) for number in heeded}
-    try:
-        yield lambda: bool(asked)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-_ENDINGS = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
-]
 
 
 def _ending(session: Session, status: str, planned_s: float) -> str:

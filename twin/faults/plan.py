@@ -7,6 +7,7 @@ number of the stretch.
 
 from __future__ import annotations
 
+from functools import cache
 from math import ceil
 from typing import NamedTuple
 
@@ -141,6 +142,7 @@ def draws_width(groups: int) -> int:
     return COLUMNS_A_PART * len(part_names(groups)) + groups
 
 
+@cache
 def part_names(groups: int) -> tuple[str, ...]:
     """Every part that can fail, kind by kind."""
     return tuple(name for target in TARGETS.values() for name in target.names(groups))

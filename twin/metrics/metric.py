@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,9 @@ class Metric(ABC):
     planned : Planned
         The run to come.
     """
+
+    labels: ClassVar[tuple[str, ...]] = ()
+    """Names of its entries, where its value is a list."""
 
     def __init__(self, planned: Planned) -> None:
         self.planned = planned

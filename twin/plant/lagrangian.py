@@ -155,9 +155,9 @@ def _moved(start: Triple, time: float, rate: Triple) -> Triple:
 
 
 def _set_up(setting: Setting) -> LagrangianRotor:
-    unknown = mjcf.beyond_a_free_rotor(setting.model.loaded)
-    if setting.gravity_m_s2 is not None:
-        unknown = [name for name in unknown if name != mjcf.OTHER_GRAVITY]
+    told = setting.gravity_m_s2 is not None
+    known = (mjcf.OTHER_GRAVITY,) if told else ()
+    unknown = [name for name in setting.model.unknown_to_the_lagrangian if name not in known]
     if unknown:
         raise InputError(
             "Lagrangian plant: expected a rigid rotor on three ideal hinges, received a model with"

@@ -78,8 +78,8 @@ def override(fields: dict[str, Any], dotted: str, value: Any) -> None:
     for section, below in zip(sections, [*sections[1:], name], strict=False):
         inside = _entered(inside, section, [] if below.isdecimal() else {}, dotted)
     if isinstance(inside, list):
-        _entered(inside, name, value, dotted)
-        inside[int(name)] = value
+        place = _place(inside, name, dotted)
+        inside[place : place + 1] = [value]
     else:
         inside[name] = value
 
@@ -89,17 +89,21 @@ def _entered(inside: Any, part: str, empty: Any, dotted: str) -> Any:
     if isinstance(inside, dict):
         found = inside.setdefault(part, empty)
     else:
-        place = int(part) if part.isdecimal() and len(part) < 6 else len(inside) + 1
-        if place > len(inside):
-            raise InputError(
-                f"scenario: expected a place from 0 to {len(inside)} in a list, received {dotted}"
-            )
+        place = _place(inside, part, dotted)
         if place == len(inside):
             inside.append(empty)
         found = inside[place]
     if not isinstance(found, dict | list) and found is not empty:
         raise InputError(f"scenario: expected a section before the dot, received {dotted}")
     return found
+
+
+def _place(inside: list[Any], part: str, dotted: str) -> int:
+    """Place in a list, or the one behind its end."""
+    place = int(part) if part.isdecimal() and len(part) < 6 else len(inside) + 1
+    if place > len(inside):
+        raise InputError(f"scenario: expected a place from 0 to {len(inside)} in a list, received {dotted}")
+    return place
 
 
 def beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:

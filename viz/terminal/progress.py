@@ -7,8 +7,9 @@ from contextlib import contextmanager
 from types import TracebackType
 
 from rich.console import Console
-from rich.progress import BarColumn, ProgressColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, ProgressColumn, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
+from rich.text import Text
 
 from spheretwin.models.telemetry.table import Table
 
@@ -37,6 +38,21 @@ def runs(label: str, count: int) -> Iterator[Callable[[str], None]]:
     with _bars(transient=True) as bars:
         task = bars.add_task(f"{label}: getting ready", total=count)
         yield lambda name: bars.update(task, description=f"{label}, {name}", advance=1)
+
+
+@contextmanager
+def counted(label: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar for work that is told how much of it is done, and of how much; gone at the end."""
+    with _bars(_Rate(), transient=True) as bars:
+        task = bars.add_task(f"{label}: getting ready", total=None)
+        yield lambda done, of: bars.update(task, description=label, completed=done, total=of)
+
+
+class _Rate(ProgressColumn):
+    """Rows a second."""
+
+    def render(self, task: Task) -> Text:
+        return Text("" if task.speed is None else f"{task.speed:.0f} rows/s")
 
 
 class Progress:

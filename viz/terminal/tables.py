@@ -60,6 +60,26 @@ def print_files(record: Path | None, telemetry: Path | None) -> None:
         console.print(f"open it:   rerun {escape(str(record))}", soft_wrap=True)
 
 
+def print_study(name: str, found: dict[str, Any], summary: dict[str, Any]) -> None:
+    """Print what a study found: rows by status, then each figure's median and 95 % range, a column a law."""
+    figures = [figure for figure in next(iter(summary.values()), {}) if figure != "statuses"]
+    table = style.table(f"{name}: {found['rows']} of {found['of']} rows", "median (95 % range)", *summary)
+    for figure in figures:
+        table.add_row(figure, *(_spread(of_law[figure]) for of_law in summary.values()))
+    counts = [of_law["statuses"] for of_law in summary.values()]
+    for status in sorted({status for each in counts for status in each}):
+        table.add_row(status, *(str(each.get(status, 0)) for each in counts))
+    style.console().print(table)
+    style.console().print(f"table  {escape(found['table'])}", soft_wrap=True)
+
+
+def _spread(figure: dict[str, Any]) -> str:
+    if figure["median"] is None:
+        return "–"
+    low, high = figure["range_95"]
+    return f"{figure['median']:.4g} ({low:.4g} to {high:.4g})"
+
+
 def print_written(paths: Sequence[Path]) -> None:
     """Print where other files were written."""
     for path in paths:

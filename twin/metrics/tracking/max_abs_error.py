@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
 
 
 class MaxAbsError(Metric):
     """Largest ``|error_rad|`` of each hinge over the whole run, its start included, [3] in rad."""
+
+    labels = ANGLES
 
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
 
@@ -13,6 +14,8 @@ PIECE_TICKS = 256
 
 class RmsError(Metric):
     """Root mean square of ``error_rad`` of each hinge over the whole run, [3] in rad."""
+
+    labels = ANGLES
 
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
 
@@ -21,6 +22,8 @@ class SettlingTime(Metric):
     0 for a hinge that never leaves the band, None for one that is outside at the last tick. A change on the
     way starts the clock anew only by what it does to the error.
     """
+
+    labels = ANGLES
 
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
 from spheretwin.twin.metrics.tracking.rms_error import SquaresByPiece
@@ -15,6 +16,8 @@ class TailRmsError(Metric):
     The second half begins at exactly half of the planned ticks, and in a run that ended early within 256
     ticks before its half.
     """
+
+    labels = ANGLES
 
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned)

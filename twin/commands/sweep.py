@@ -1,0 +1,124 @@
+"""``spheretwin sweep STUDY``: many runs over all cores, interrupted and resumed, as one table."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.telemetry.versions import versions
+from spheretwin.twin.commands.interruption import interruptible
+from spheretwin.twin.commands.reporting import print_json
+from spheretwin.twin.study import Found, load
+from spheretwin.twin.study import run as run_study
+from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import Study, shipped
+from spheretwin.twin.study.summary import summary
+from spheretwin.viz.terminal import tables
+from spheretwin.viz.terminal.progress import counted
+
+MOST_THREADS = 1024
+
+
+def add_to(verbs: Any) -> None:
+    """Add the verb to the command's parser."""
+    parser = verbs.add_parser(
+        "sweep",
+        help="run a study: many runs, one table",
+        description="Run a study over all cores. What its journal has already is not run again: an"
+        " interrupted study goes on where it ended. Exit code 1 when it is not complete.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("study", metavar="STUDY", help=f"{', '.join(shipped())}, or a .toml file")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder of journal and table; NAME_study unless given"
+    )
+    parser.add_argument("--threads", type=_count, metavar="N", help="as many as there are cores unless given")
+    parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
+    parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
+    parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the verb; True when all rows that were wanted are finished."""
+    if rest:
+        raise InputError(
+            f"command line: expected --out, --threads, --limit, --row or --json, received {' '.join(rest)}"
+        )
+    study = load(options.study)
+    if options.row:
+        return _one(study, options.row, options.json)
+    with interruptible() as stop_requested, counted(study.name) as done, timers_stopped():
+        found = run_study(
+            study,
+            options.out,
+            threads=options.threads,
+            limit=options.limit,
+            done=done,
+            stop_requested=stop_requested,
+        )
+    told = summary(found.table)
+    if options.json:
+        print_json({**_told(found), "summary": told, "versions": versions()})
+    else:
+        tables.print_study(study.name, _told(found), told)
+    if found.torn:
+        print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
+    if found.rows < found.of:
+        print(
+            f"spheretwin: sweep: interrupted after {found.rows} of {found.of} rows;"
+            " the same command goes on from there",
+            file=sys.stderr,
+        )
+    return found.rows >= found.of
+
+
+def _told(found: Found) -> dict[str, Any]:
+    return {
+        "rows": found.rows,
+        "of": found.of,
+        "failed": found.failed,
+        "resumed": found.resumed,
+        "checked": found.checked,
+        "wall_s": found.wall_s,
+        "table": str(found.table),
+    }
+
+
+def _one(study: Study, key: str, as_json: bool) -> bool:
+    """Run one row, and print what it was and what it gave."""
+    rows, row = Rows(study), Grid(study).of(key)
+    result = rows.carried_out(row)
+    told = {
+        "row": row.number,
+        "key": row.key,
+        "seed": row.seed,
+        "values": dict(row.values),
+        "law": dict(row.law) if row.law else None,
+        "command": rows.command(row),
+        "status": result.status,
+        "reason": result.reason,
+        "error": result.error,
+        **result.figures,
+    }
+    if as_json:
+        print_json(told)
+    else:
+        tables.print_rows(f"row {row.number} of {study.name}", ("", "value"), _pairs(told), 2)
+    return result.error is None
+
+
+def _pairs(told: dict[str, Any]) -> list[tuple[str, ...]]:
+    return [(name, str(value)) for name, value in told.items()]
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or len(text) > 12 or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, received {text}")
+    return int(text)

@@ -1,0 +1,50 @@
+"""Sweeps: a study of many runs, row by row, over all cores, interrupted and resumed, as one table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from spheretwin.twin.study.running import Found, carried_out
+from spheretwin.twin.study.study import Study, load
+
+__all__ = ["Found", "Study", "load", "run"]
+
+
+def run(
+    study: Study | str,
+    out: Path | str | None = None,
+    *,
+    threads: int | None = None,
+    limit: int | None = None,
+    done: Callable[[int, int], None] = lambda rows, of: None,
+    stop_requested: Callable[[], bool] = lambda: False,
+) -> Found:
+    """Run a study.
+
+    Parameters
+    ----------
+    study : Study or str
+        Or its shipped name, or the path of its TOML file.
+    out : path, optional
+        Folder for journal and table; that of the study's name in the working folder unless given. Where a
+        journal of the same study is there already, its rows are not run again.
+    threads : int, optional
+        As many as there are cores unless given; the table does not depend on it.
+    limit : int, optional
+        Rows at most, from the first on.
+    done : callable
+        Told of the rows that are finished, and of how many there are, as they are finished.
+    stop_requested : callable
+        True ends the study when the rows in flight are finished.
+
+    Raises
+    ------
+    InputError
+        The study, the scenario or the folder cannot be used.
+    SpheretwinError
+        A row differs between the plants, or a file could not be written; what is finished is kept.
+    """
+    chosen = load(study) if isinstance(study, str) else study
+    folder = Path(out) if out is not None else Path(f"{chosen.name}_study")
+    return carried_out(chosen, folder, threads=threads, limit=limit, done=done, stop_requested=stop_requested)

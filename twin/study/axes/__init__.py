@@ -1,0 +1,1 @@
+"""Axes of a study: how the values of a field are chosen, one way a file, and their list."""

@@ -1,0 +1,173 @@
+"""From a study to its rows: which value of each axis, which law, which seed; each row by its number alone.
+
+Axes that are zipped go together, all other axes are crossed, and so are the points of the drawn ones, the
+laws and the seeds. The last of them changes fastest. Nothing is listed that can be counted: a row is found
+from its number, so that a study of millions takes no memory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin.study.axes.axis import DrawnAxis, ListedAxis
+from spheretwin.twin.study.study import Study
+
+KEY_LENGTH = 16
+
+# At a millisecond a row, beyond this a study takes a year.
+MOST_ROWS = 10**10
+
+# Of the points of drawn axes: what separates them from whatever else is drawn under the same seed.
+STAGE = 301
+
+
+class Row(NamedTuple):
+    """One run of a study."""
+
+    number: int
+    key: str
+    """By which it is known: of its values, its law and its repeat."""
+    seed: int
+    values: Mapping[str, Any]
+    """Of each axis, by its field."""
+    law: Mapping[str, Any] | None
+    repeat: int
+
+
+class Grid:
+    """All rows of a study.
+
+    Parameters
+    ----------
+    study : Study
+
+    Raises
+    ------
+    InputError
+        Zipped axes are not equally long, or there are more rows than can ever be run.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._groups = list(_groups(study).values())
+        self._points = _points(study)
+        self._laws: Sequence[Mapping[str, Any] | None] = study.law or (None,)
+        self._sizes = [
+            *(len(group[next(iter(group))]) for group in self._groups),
+            len(self._points),
+            len(self._laws),
+            study.seeds,
+        ]
+        self._rows = 1
+        for size in self._sizes:
+            self._rows *= size
+        if self._rows > MOST_ROWS:
+            raise InputError(f"study {study.name}: expected at most {MOST_ROWS} rows, received {self._rows}")
+
+    def __len__(self) -> int:
+        return self._rows
+
+    def __iter__(self) -> Iterator[Row]:
+        return (self[number] for number in range(len(self)))
+
+    def __getitem__(self, number: int) -> Row:
+        if not 0 <= number < self._rows:
+            raise IndexError(number)
+        *places, point, law, repeat = _mixed(number, self._sizes)
+        values: dict[str, Any] = {}
+        for group, place in zip(self._groups, places, strict=True):
+            values |= {field: listed[place] for field, listed in group.items()}
+        drawn = zip(self._study.drawn, self._points[point].tolist(), strict=True)
+        values |= {axis.field: value for axis, value in drawn}
+        ordered = {axis.field: values[axis.field] for axis in self._study.axis}
+        key = _key(ordered, self._laws[law], repeat)
+        return Row(number, key, _seed(self._study.seed, key), ordered, self._laws[law], repeat)
+
+    def is_number(self, field: str) -> bool:
+        """Whether all values of an axis are numbers."""
+        for group in self._groups:
+            if field in group:
+                return all(
+                    isinstance(each, int | float) and not isinstance(each, bool) for each in group[field]
+                )
+        return True
+
+    def of(self, key: str) -> Row:
+        """Row of a key.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        for row in self:
+            if row.key == key:
+                return row
+        raise InputError(f"study {self._study.name}: expected the key of one of its rows, received {key}")
+
+
+def _groups(study: Study) -> dict[str, dict[str, list[Any]]]:
+    """Listed axes that go together: values by field, by what tells the group."""
+    groups: dict[str, dict[str, list[Any]]] = {}
+    for place, axis in enumerate(study.axis):
+        if isinstance(axis, ListedAxis):
+            name = f"zip {axis.zip}" if axis.zip is not None else f"axis {place}"
+            groups.setdefault(name, {})[axis.field] = axis.listed()
+    for group in groups.values():
+        lengths = {field: len(values) for field, values in group.items()}
+        if len(set(lengths.values())) > 1:
+            told = ", ".join(f"{length} of {field}" for field, length in lengths.items())
+            raise InputError(f"study {study.name}: expected zipped axes of equal length, received {told}")
+    return groups
+
+
+def _points(study: Study) -> NDArray[np.float64]:
+    """Values of the drawn axes, (samples, axes); one empty point where there are none."""
+    axes = cast(tuple[DrawnAxis, ...], study.drawn)
+    if not axes:
+        return np.empty((1, 0))
+    uniform = _uniform(study, len(axes), study.samples or 1)
+    return np.stack([axis.drawn(column) for axis, column in zip(axes, uniform.T, strict=True)], axis=1)
+
+
+def _uniform(study: Study, axes: int, samples: int) -> NDArray[np.float64]:
+    """Points in the unit cube, (samples, axes), none on its faces."""
+    generator = np.random.default_rng([study.seed, STAGE])
+    if study.design == "random":
+        points = generator.random((samples, axes))
+    else:
+        from scipy.stats import qmc  # slow to import
+
+        if study.design == "sobol":
+            # Whole powers of two are drawn, and as many used as are wanted: a longer study begins alike.
+            points = qmc.Sobol(axes, rng=generator).random_base2((samples - 1).bit_length())[:samples]
+        else:
+            points = qmc.LatinHypercube(axes, rng=generator).random(samples)
+    return np.clip(points, np.finfo(float).eps, 1 - np.finfo(float).eps)
+
+
+def _mixed(number: int, sizes: Sequence[int]) -> list[int]:
+    """Digits of a number to mixed bases, the last one fastest."""
+    places: list[int] = []
+    for size in reversed(sizes):
+        number, place = divmod(number, size)
+        places.append(place)
+    return places[::-1]
+
+
+def _key(values: Mapping[str, Any], law: Mapping[str, Any] | None, repeat: int) -> str:
+    text = json.dumps([values, law, repeat], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:KEY_LENGTH]
+
+
+def _seed(study_seed: int, key: str) -> int:
+    """Seed of a row, from the study's and the row's key; below 2**53, so that JSON keeps it whole."""
+    digest = hashlib.sha256(f"{study_seed} {key}".encode()).digest()
+    return int.from_bytes(digest[:8], "big") >> 11

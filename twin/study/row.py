@@ -1,0 +1,297 @@
+"""One row of a study, from its number to its figures."""
+
+from __future__ import annotations
+
+import copy
+import re
+import shlex
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from spheretwin.models import mjcf
+from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.user_code import is_reference, load_function
+from spheretwin.models.base.wording import did_you_mean, shown, without_breaks
+from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry.kept import KeptTelemetry
+from spheretwin.models.telemetry.status import Status
+from spheretwin.twin import assembly
+from spheretwin.twin.assembly import Files
+from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.records.facts import record_of
+from spheretwin.twin.records.summary import OwnMetric, check_names, own_value
+from spheretwin.twin.scenario import reading
+from spheretwin.twin.scenario.changing import check_events
+from spheretwin.twin.scenario.fields import INDEX, every_field
+from spheretwin.twin.scenario.hardware import left_open
+from spheretwin.twin.scenario.own_law import scenario_with
+from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import Run, Sink, follow
+from spheretwin.twin.study.axes.axis import Axis
+from spheretwin.twin.study.grid import Row
+from spheretwin.twin.study.study import Study
+
+ENGINE = "plant.engine"
+
+REFUSED = "refused"
+"""Status of a row whose values make no scenario."""
+
+FAILED = "failed"
+"""Status of a row in which code of the user's raised."""
+
+
+class Result(NamedTuple):
+    """What is kept of a row; all of it as JSON holds it, and the same whenever and wherever it runs."""
+
+    status: str
+    reason: str | None
+    error: str | None
+    figures: dict[str, Any]
+
+
+class Rows:
+    """Runs rows of a study.
+
+    Parameters
+    ----------
+    study : Study
+    telemetry : Path, optional
+        Folder for the telemetry of chosen rows.
+
+    Raises
+    ------
+    InputError
+        The scenario cannot be read, an axis names no field, or a figure of the user's cannot be had.
+    """
+
+    def __init__(self, study: Study, telemetry: Path | None = None) -> None:
+        self.study = study
+        self._telemetry = telemetry
+        self._files: dict[tuple[str | None, ...], Files] = {}
+        self._fields = reading.read(study.scenario)
+        for dotted, value in study.fields.items():
+            reading.override(self._fields, dotted, value)
+        self._names_files = True
+        self.base = self._validated(copy.deepcopy(self._fields))
+        self._names_files = bool(study.law) or not all(map(_is_of_numbers, study.axis))
+        self._defaults = self.base.model_dump(mode="json")
+        chosen = [name for name in study.metrics if name in METRICS]
+        self._check_axes()
+        self.metrics = tuple(METRICS) if not study.metrics else tuple(chosen)
+        self._own = _own_metrics([name for name in study.metrics if is_reference(name)])
+        named = {*study.fields, *(axis.field for axis in study.axis)}
+        self.chooses_plant = study.fast and not any(field.startswith(ENGINE) for field in named)
+
+    @property
+    def own_metrics(self) -> tuple[str, ...]:
+        """Names of the user's figures."""
+        return tuple(self._own)
+
+    def scenario(self, row: Row, engine: str | None = None) -> Scenario:
+        """Scenario of a row.
+
+        Parameters
+        ----------
+        row : Row
+        engine : str, optional
+            Plant; the fast one where the model allows it, unless given.
+
+        Raises
+        ------
+        InputError
+            Its values are out of range, or do not fit each other.
+        """
+        fields = copy.deepcopy(self._fields)
+        if row.law is not None:
+            fields["controller"] = {**_period(fields), **row.law}
+        for dotted, value in row.values.items():
+            self._fill_list(fields, dotted)
+            reading.override(fields, dotted, value)
+        fields["seed"] = row.seed
+        if engine or self.chooses_plant:
+            reading.override(fields, ENGINE, engine or self._fast_engine(fields))
+        return self._validated(fields)
+
+    def carried_out(self, row: Row, engine: str | None = None) -> Result:
+        """Run a row; whatever goes wrong with it is its result."""
+        try:
+            scenario = self.scenario(row, engine)
+            with self.session(scenario) as session:
+                return self._followed(row, scenario, session)
+        except InputError as error:
+            return Result(REFUSED, None, str(error), {})
+        except SpheretwinError:  # no fault of the row's: a full disk
+            raise
+        except Exception as error:  # code of the user's, which may raise whatever it will
+            return Result(FAILED, None, f"{type(error).__name__}: {without_breaks(error)}", {})
+
+    def session(self, scenario: Scenario) -> Session:
+        """Session of a row's scenario; its files are read once for a study."""
+        named = assembly.named_files(scenario)
+        if named not in self._files:
+            self._files[named] = assembly.files_of(scenario)
+        return Session(scenario, files=self._files[named])
+
+    def command(self, row: Row) -> str:
+        """Command line that runs a row alone."""
+        words = ["spheretwin", "simulate", self.study.scenario]
+        law = {f"controller.{name}": value for name, value in (row.law or {}).items()}
+        named = {**self.study.fields, **law, **row.values, "seed": row.seed}
+        scenario = self.scenario(row)
+        if self.chooses_plant:
+            named[ENGINE] = scenario.plant.engine
+        whole = scenario.model_dump(mode="json")
+        named = {
+            _list_of(dotted): _value_at(whole, _list_of(dotted), value) for dotted, value in named.items()
+        }
+        for dotted, value in named.items():
+            words += [f"--{dotted.replace('_', '-')}", *_texts(value)]
+        return shlex.join(words)
+
+    def _followed(self, row: Row, scenario: Scenario, session: Session) -> Result:
+        metrics = {
+            name: METRICS[name](Planned(session.begun_as, session.actuator, scenario.ticks))
+            for name in self.metrics
+        }
+        sinks: list[Sink] = [follower(metrics)]
+        kept = KeptTelemetry(session.signals, scenario.ticks) if self._own else None
+        file = self._file(row, session)
+        sinks += [sink for sink in (kept, file) if sink]
+        try:
+            status = follow(session, scenario.ticks, sinks)
+        finally:
+            if file:
+                file.close(record_of(session).metadata())
+        figures = {name: metric.value() for name, metric in metrics.items()}
+        if kept:
+            figures |= self._own_values(session, status, kept)
+        return Result(str(status), session.reason.told if session.reason else None, None, figures)
+
+    def _own_values(self, session: Session, status: Status, kept: KeptTelemetry) -> dict[str, Any]:
+        run = Run(session.begun_as, status, kept.table, session.loop_s, session.actuator)
+        return {name: own_value(name, metric, run) for name, metric in self._own.items()}
+
+    def _file(self, row: Row, session: Session) -> TelemetryFile | None:
+        if self._telemetry is None or row.number not in self.study.telemetry:
+            return None
+        path = self._telemetry / f"{row.key}.parquet"
+        return TelemetryFile(path, session.signals, record_of(session).metadata())
+
+    def _validated(self, fields: dict[str, Any]) -> Scenario:
+        hardware = fields.get("hardware")
+        for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
+            reading.override(fields, dotted, value)
+        source = self.study.scenario
+        taken = reading.beside("", fields) if self._names_files else fields
+        return check_events(reading.validated(taken, source), source)
+
+    def _check_axes(self) -> None:
+        """Find out before the first row whether each axis names a field."""
+        known = {name for name, _ in every_field(type(self.base))}
+        for law in self.study.law:
+            known |= {name for name, _ in every_field(scenario_with(law["law"]))}
+        for axis in self.study.axis:
+            name = re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", axis.field)
+            if name.removesuffix(f".{INDEX}") not in known:
+                raise InputError(
+                    f"study {self.study.name}: expected an axis over a field of a scenario,"
+                    f" received {shown(axis.field)}{did_you_mean(axis.field, known)}"
+                )
+
+    def _fill_list(self, fields: dict[str, Any], dotted: str) -> None:
+        """Where a name leads into a list that the scenario leaves open, put its defaults there first."""
+        above, _, last = dotted.rpartition(".")
+        if not last.isdecimal():
+            return
+        default: Any = self._defaults
+        inside: Any = fields
+        for part in above.split("."):
+            if not isinstance(default, dict) or part not in default:
+                return
+            default = default[part]
+            inside = inside.get(part) if isinstance(inside, dict) else None
+        if isinstance(default, list) and not isinstance(inside, list):
+            reading.override(fields, above, list(default))
+
+    def _fast_engine(self, fields: Mapping[str, Any]) -> str:
+        plant = fields.get("plant")
+        section = plant if isinstance(plant, Mapping) else {}
+        named, integrator = section.get("mjcf"), section.get("integrator", "RK4")
+        path = Path(named) if isinstance(named, str) else MJCF_PATH
+        return "lagrangian" if integrator == "RK4" and _is_free_rotor(path) else "mujoco"
+
+
+def follower(metrics: Mapping[str, Metric]) -> Sink:
+    """Follows a run into some metrics."""
+    return _Follower(metrics)
+
+
+class _Follower:
+    def __init__(self, metrics: Mapping[str, Metric]) -> None:
+        self._metrics = metrics
+
+    def write(self, rows: Any) -> None:
+        if len(rows):
+            for metric in self._metrics.values():
+                metric.write(rows)
+
+    def note(self, t_s: float, text: str) -> None:
+        pass
+
+    def finish(self, status: Status) -> None:
+        pass
+
+
+@lru_cache(maxsize=8)
+def _is_free_rotor(path: Path) -> bool:
+    """Whether a model holds no more than the Lagrangian knows; one that cannot be read will say so itself."""
+    try:
+        return not mjcf.read(path).unknown_to_the_lagrangian
+    except InputError:
+        return False
+
+
+def _period(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Control period of the base scenario, which another law keeps."""
+    controller = fields.get("controller")
+    if isinstance(controller, Mapping) and "period_s" in controller:
+        return {"period_s": controller["period_s"]}
+    return {}
+
+
+def _is_of_numbers(axis: Axis) -> bool:
+    """Whether no value of an axis can name a file."""
+    return axis.is_drawn or all(isinstance(each, int | float) for each in getattr(axis, "values", ()))
+
+
+def _list_of(dotted: str) -> str:
+    """Name of the list where a name is that of an entry of one: a command line has lists as a whole."""
+    above, _, last = dotted.rpartition(".")
+    return above if last.isdecimal() else dotted
+
+
+def _value_at(whole: Mapping[str, Any], dotted: str, value: Any) -> Any:
+    """Value of a field of a whole scenario, where it is a list; else as it was given."""
+    inside: Any = whole
+    for part in dotted.split("."):
+        inside = inside.get(part) if isinstance(inside, Mapping) else None
+    return inside if isinstance(inside, list) else value
+
+
+def _own_metrics(references: list[str]) -> dict[str, OwnMetric]:
+    own = {each.rpartition(":")[2]: load_function(each, "metric") for each in references}
+    check_names(own)
+    return own
+
+
+def _texts(value: Any) -> list[str]:
+    import json
+
+    if isinstance(value, list | tuple) and value and not any(isinstance(each, list | dict) for each in value):
+        return [json.dumps(each) for each in value]
+    return [value if isinstance(value, str) else json.dumps(value)]
