@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,7 +39,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of journal and table; NAME_study unless given"
     )
-    parser.add_argument("--threads", type=_count, metavar="N", help="as many as there are cores unless given")
+    parser.add_argument("--threads", type=_threads, metavar="N", help="as many as there are cores unless given")
     parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
     parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
@@ -53,8 +54,15 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         )
     study = load(options.study)
     if options.row:
+        if options.out or options.threads or options.limit:
+            raise InputError("command line: expected --row without --out, --threads or --limit")
         return _one(study, options.row, options.json)
-    with interruptible() as stop_requested, counted(study.name) as done, timers_stopped():
+    with (
+        interruptible() as stop_requested,
+        counted(study.name) as done,
+        timers_stopped(),
+        contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
+    ):
         found = run_study(
             study,
             options.out,
@@ -70,6 +78,12 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         tables.print_study(study.name, _told(found), told)
     if found.torn:
         print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
+    if found.damaged:
+        print(
+            f"spheretwin: sweep: {found.damaged} damaged lines of the journal were passed over,"
+            " and their rows run again",
+            file=sys.stderr,
+        )
     if found.rows < found.of:
         print(
             f"spheretwin: sweep: interrupted after {found.rows} of {found.of} rows;"
@@ -93,8 +107,9 @@ def _told(found: Found) -> dict[str, Any]:
 
 def _one(study: Study, key: str, as_json: bool) -> bool:
     """Run one row, and print what it was and what it gave."""
-    rows, row = Rows(study), Grid(study).of(key)
-    result = rows.carried_out(row)
+    with contextlib.redirect_stdout(sys.stderr), timers_stopped():
+        rows, row = Rows(study), Grid(study).of(key)
+        result = rows.carried_out(row)
     told = {
         "row": row.number,
         "key": row.key,
@@ -116,6 +131,12 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
 
 def _pairs(told: dict[str, Any]) -> list[tuple[str, ...]]:
     return [(name, str(value)) for name, value in told.items()]
+
+
+def _threads(text: str) -> int:
+    if (count := _count(text)) > MOST_THREADS:
+        raise argparse.ArgumentTypeError(f"expected {MOST_THREADS} threads at most, received {count}")
+    return count
 
 
 def _count(text: str) -> int:
