@@ -14,12 +14,13 @@ from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.commands.reporting import print_json
-from spheretwin.twin.study import Found, load
 from spheretwin.twin.study import run as run_study
 from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.report import page, reading
+from spheretwin.twin.study.report.summary import summary
 from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import Study, shipped
-from spheretwin.twin.study.summary import summary
+from spheretwin.twin.study.running import Found
+from spheretwin.twin.study.study import Study, load, shipped
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.progress import counted
 
@@ -39,7 +40,9 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of journal and table; NAME_study unless given"
     )
-    parser.add_argument("--threads", type=_threads, metavar="N", help="as many as there are cores unless given")
+    parser.add_argument(
+        "--threads", type=_threads, metavar="N", help="as many as there are cores unless given"
+    )
     parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
     parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
@@ -71,11 +74,14 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             done=done,
             stop_requested=stop_requested,
         )
-    told = summary(found.table)
+    rows = reading.read(found.table)
+    told = summary(rows)
+    written = _report(found, rows, told, options.study)
     if options.json:
         print_json({**_told(found), "summary": told, "versions": versions()})
     else:
         tables.print_study(study.name, _told(found), told)
+        tables.print_written(written)
     if found.torn:
         print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
     if found.damaged:
@@ -103,6 +109,14 @@ def _told(found: Found) -> dict[str, Any]:
         "wall_s": found.wall_s,
         "table": str(found.table),
     }
+
+
+def _report(found: Found, rows: reading.Rows, told: dict[str, Any], source: str) -> list[Path]:
+    """Write the page beside the table, where it can be drawn."""
+    if page.can_be_drawn():
+        return page.write(found.table.parent, rows, told, found.of, source, versions())
+    print("spheretwin: sweep: no report was written: it takes the extra `spheretwin[plots]`", file=sys.stderr)
+    return []
 
 
 def _one(study: Study, key: str, as_json: bool) -> bool:
