@@ -114,7 +114,7 @@ def _told(found: Found) -> dict[str, Any]:
 def _report(found: Found, rows: reading.Rows, told: dict[str, Any], source: str) -> list[Path]:
     """Write the page beside the table, where it can be drawn."""
     if page.can_be_drawn():
-        return page.write(found.table.parent, rows, told, found.of, source, versions())
+        return page.write(found.table.parent, rows, told, (found.of, found.study_rows), source, versions())
     print("spheretwin: sweep: no report was written: it takes the extra `spheretwin[plots]`", file=sys.stderr)
     return []
 

@@ -37,6 +37,8 @@ class Found(NamedTuple):
         Finished, those of earlier runs included.
     of : int
         Wanted.
+    study_rows : int
+        Of the whole study.
     failed : int
         Finished rows whose status is other than ``completed``.
     resumed : int
@@ -53,6 +55,7 @@ class Found(NamedTuple):
 
     rows: int
     of: int
+    study_rows: int
     failed: int
     resumed: int
     torn: bool
@@ -91,6 +94,7 @@ def carried_out(
         return Found(
             rows=kept.done(wanted),
             of=wanted,
+            study_rows=len(grid),
             failed=sum(result.status != Status.COMPLETED for _, result in kept.results(wanted)),
             resumed=resumed,
             torn=kept.torn,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.plots import FAINT, INK, WIDTH_in
@@ -18,6 +20,7 @@ Array = NDArray[np.float64]
 
 CELL_in = 0.42
 LIGHT = 0.55  # share of the scale beyond which numbers are written in black
+MANY = 200.0  # from which on whole powers of ten are ticks enough
 SEVERAL = 5.0  # ratio of largest to smallest from which on a scale is logarithmic
 MOST_WRITTEN = 12  # rows or columns: in more, the numbers of the squares cannot be read
 
@@ -84,10 +87,11 @@ def maps(
         axes.set_xlabel(axes_names[1])
     bar = figure.colorbar(image, ax=list(grid.flat), shrink=0.9, aspect=30, label=quantity)
     bar.outline.set_visible(False)
-    bar.ax.yaxis.set_major_formatter("{x:g}")
-    bar.ax.yaxis.set_minor_formatter("{x:g}")
-    bar.ax.tick_params(labelsize="small", which="both")
-    figure.suptitle(title, fontsize="medium")
+    if isinstance(scale, LogNorm):
+        _in_plain_numbers(bar.ax.yaxis, scale.vmax / scale.vmin)
+    bar.ax.tick_params(labelsize="small")
+    lost = any(np.any(panel.lost) for panel in panels.values())
+    figure.suptitle(f"{title}\n× not all rows came to their end" if lost else title, fontsize="medium")
     return figure
 
 
@@ -116,9 +120,7 @@ def lines(
     if named:
         axes.set_xticks(places, list(x), rotation=20, ha="right")
     values = np.concatenate([line.median for line in by_law.values()])
-    if isinstance(_scale(values), LogNorm):
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter("{x:g}")
+    fit_scale(axes, "y", values)
     axes.set_xlabel(axis_name)
     axes.set_ylabel(quantity)
     axes.set_title(title, fontsize="medium")
@@ -133,6 +135,21 @@ def is_wide(values: Array) -> bool:
     """Whether a scale for some values is better logarithmic."""
     numbers = values[np.isfinite(values)]
     return bool(len(numbers)) and numbers.min() > 0 and numbers.max() > SEVERAL * numbers.min()
+
+
+def fit_scale(axes: Axes, which: Literal["x", "y"], values: Array) -> None:
+    """Make an axis logarithmic, in plain numbers, where its values are better seen so."""
+    if is_wide(values):
+        (axes.set_yscale if which == "y" else axes.set_xscale)("log")
+        numbers = values[np.isfinite(values)]
+        _in_plain_numbers(axes.yaxis if which == "y" else axes.xaxis, numbers.max() / numbers.min())
+
+
+def _in_plain_numbers(axis: Axis, ratio: float) -> None:
+    """Ticks of a logarithmic axis: 1, 2 and 5, or where it is long, whole powers of ten."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ratio < MANY else (1,)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def _scale(values: Array) -> Normalize:

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.plots import FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.study_maps import is_wide
+from spheretwin.viz.figures.study_maps import fit_scale
 from spheretwin.viz.palette import law_colours
 
 Array = NDArray[np.float64]
@@ -29,6 +29,7 @@ class Rank(NamedTuple):
     by_value: Array  # (axes,) rank correlation with the value
     by_distance: Array  # (axes,) and with its distance from the middle one
     chance: float  # below this, 95 % of what does not matter
+    is_partial: bool  # whether what goes with the other axes was taken away before
 
 
 def distributions(
@@ -56,10 +57,7 @@ def distributions(
             numbers = np.sort(values)
             share = np.arange(1, len(numbers) + 1) / totals[law]
             axes.step(numbers, share, where="post", color=colours[law], linewidth=1.3)
-        if is_wide(np.concatenate(list(by_law.values()))):
-            axes.set_xscale("log")
-            axes.xaxis.set_major_formatter("{x:g}")
-            axes.xaxis.set_minor_formatter(NullFormatter())
+        fit_scale(axes, "x", np.concatenate(list(by_law.values())))
         axes.set_ylim(0, 1.02)
         _plain(axes, name, "")
     for axes in grid[:, 0]:
@@ -96,7 +94,8 @@ def ranks(names: Sequence[str], by_law: Mapping[str, Rank], title: str) -> Figur
     axes.axvline(0, color=INK, linewidth=0.8)
     axes.set_yticks(range(len(names)), list(names))
     axes.set_ylim(len(names) - 0.5, -0.5)
-    _plain(axes, "rank correlation", title)
+    partial = all(rank.is_partial for rank in by_law.values())
+    _plain(axes, "partial rank correlation" if partial else "rank correlation", title)
     figure.legend(loc="outside lower center", ncols=min(len(by_law) + 2, 4), frameon=False, fontsize="small")
     return figure
 
@@ -124,11 +123,8 @@ def scatters(
     for axes, (name, by_law) in zip(grid.flat, axes_values.items(), strict=False):
         for law, x in by_law.items():
             _scatter(axes, x, figure_values[law], colours[law], law)
-        if is_wide(np.concatenate(list(figure_values.values()))):
-            axes.set_yscale("log")
-            axes.yaxis.set_major_formatter("{x:g}")
-            axes.yaxis.set_minor_formatter("{x:g}")
-            axes.tick_params(axis="y", which="minor", labelsize="xx-small")
+        fit_scale(axes, "y", np.concatenate(list(figure_values.values())))
+        axes.xaxis.set_major_locator(MaxNLocator(4))
         _plain(axes, name, "")
     for axes in grid[:, 0]:
         axes.set_ylabel(quantity, fontsize="small")
@@ -140,7 +136,7 @@ def scatters(
 
 def _scatter(axes: Axes, x: Array, y: Array, colour: str, law: str) -> None:
     step = -(-len(x) // MOST_DOTS) if len(x) else 1
-    axes.plot(x[::step], y[::step], ".", color=colour, markersize=2.5, alpha=0.35, markeredgewidth=0)
+    axes.plot(x[::step], y[::step], ".", color=colour, markersize=4, alpha=0.35, markeredgewidth=0)
     edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
     if len(edges) > 2:
         inside = [(x >= low) & (x <= high) for low, high in pairwise(edges)]

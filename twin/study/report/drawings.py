@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -95,10 +95,12 @@ def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
          for law, rank in found.items()},
         f"{rows.study['name']}: what {_quantity(rows)} goes with",
     )  # fmt: skip
+    partial = all(rank.is_partial for rank in found.values())
+    left = ", when what goes with the other axes is taken away" if partial else ""
     caption = (
         f"Spearman's rank correlation of {_quantity(rows)} with the value of each axis, and, as a ring, with"
-        f" its distance from the middle one, over the completed rows: the {len(bars)} strongest of"
-        f" {len(names)} axes. What does not matter is in the grey band 95 times of a hundred."
+        f" its distance from the middle one{left}: the {len(bars)} strongest of {len(names)} axes, over the"
+        " completed rows. What does not matter is in the grey band 95 times of a hundred."
     )
     yield Drawing("report_ranks.png", caption, figure)
     shown = [names[place] for place in order[:MOST_SCATTERS]]
@@ -126,7 +128,7 @@ def _distributions(rows: Rows) -> Drawing:
         name: {law: values[np.isfinite(values)] for law, values in by_law.items()}
         for name, by_law in figures.items()
     }
-    numbers = {name: by_law for name, by_law in numbers.items() if any(map(len, by_law.values()))}
+    numbers = {name: by_law for name, by_law in numbers.items() if _differ(by_law.values())}
     totals = {law: int(np.count_nonzero(rows.laws == law)) for law in rows.law_names}
     figure = study_spreads.distributions(numbers, totals, f"{rows.study['name']}: distributions")
     caption = (
@@ -143,6 +145,11 @@ def _quantity(rows: Rows) -> str:
 def _whole(rows: Rows, law: str) -> NDArray[np.bool_]:
     """Completed rows of a law that have the main figure."""
     return (rows.laws == law) & rows.completed & np.isfinite(rows.figures[str(rows.main)])
+
+
+def _differ(several: Iterable[Array]) -> bool:
+    """Whether there are two different numbers at all."""
+    return len(np.unique(np.concatenate(list(several)))) > 1
 
 
 def _distinct(values: NDArray[Any]) -> list[Any]:

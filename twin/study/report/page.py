@@ -31,7 +31,12 @@ def can_be_drawn() -> bool:
 
 
 def write(
-    folder: Path, rows: Rows, told: Mapping[str, Any], of: int, source: str, versions: Mapping[str, str]
+    folder: Path,
+    rows: Rows,
+    told: Mapping[str, Any],
+    wanted: tuple[int, int],
+    source: str,
+    versions: Mapping[str, str],
 ) -> list[Path]:
     """Write the page and its figures into a folder; returns both forms of the page.
 
@@ -42,8 +47,8 @@ def write(
     rows : Rows
     told : mapping
         Their summary.
-    of : int
-        Rows that were wanted.
+    wanted : two int
+        Rows that were wanted, and all that the study has.
     source : str
         The study as the command line names it.
     versions : mapping
@@ -56,7 +61,7 @@ def write(
     """
     drawn = list(drawings(rows))
     save_drawings(folder, drawn)
-    text = markdown(rows, told, of, drawn, source, versions)
+    text = markdown(rows, told, wanted, drawn, source, versions)
     title = str(rows.study["name"])
     return [save_text(folder / MARKDOWN, text), save_text(folder / HTML, html.page(title, text))]
 
@@ -64,29 +69,32 @@ def write(
 def markdown(
     rows: Rows,
     told: Mapping[str, Any],
-    of: int,
+    wanted: tuple[int, int],
     drawn: Sequence[Drawing],
     source: str,
     versions: Mapping[str, str],
 ) -> str:
     """Text of the page."""
-    study, count = rows.study, len(rows.laws)
+    study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
-    lines = [f"# {study['name']}", "", study["description"], "", _ends(rows, count, of), ""]
+    lines = [f"# {study['name']}", "", study["description"], "", _ends(rows, *wanted), ""]
     lines += ["## Figures of the rows", "", *_summary(told), ""]
     lines += [pieces.figure(drawing) for drawing in drawn]
-    lines += _worst(rows, source)
+    lines += _worst(rows, command)
     lines += _failures(rows)
     lines += ["## What differs from row to row", "", *_axes(study, rows), ""]
-    lines += [f"Made by `spheretwin sweep {shlex.quote(source)}` with {used}.", ""]
+    limit = f" --limit {wanted[0]}" if wanted[0] < wanted[1] else ""
+    lines += [f"Made by `{command}{limit}` with {used}.", ""]
     return "\n".join(lines)
 
 
-def _ends(rows: Rows, count: int, of: int) -> str:
+def _ends(rows: Rows, of: int, whole: int) -> str:
     """How many rows there are, and how they ended."""
+    count = len(rows.laws)
     ends = ", ".join(f"{number} {status}" for status, number in Counter(rows.statuses.tolist()).items())
     missing = f" The other {of - count} are still to be run: the same command goes on." if count < of else ""
-    return f"{count} of {of} rows: {ends or 'none'}.{missing}"
+    first = f" Only the first {of} of the study's {whole} were wanted." if of < whole else ""
+    return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
 
 
 def _summary(told: Mapping[str, Any]) -> list[str]:
@@ -106,7 +114,7 @@ def _spread(figure: Mapping[str, Any]) -> str:
     return f"{figure['median']:.4g} ({low:.4g} to {high:.4g})"
 
 
-def _worst(rows: Rows, source: str) -> list[str]:
+def _worst(rows: Rows, command: str) -> list[str]:
     """Completed rows with the largest main figure, and how each is run alone."""
     if rows.main is None:
         return []
@@ -120,7 +128,7 @@ def _worst(rows: Rows, source: str) -> list[str]:
     ]
     head = ["row", "key", "law", rows.main]
     table = pieces.table(head, body, [True, False, False, True])
-    alone = f"`spheretwin sweep {shlex.quote(source)} --row KEY` runs one alone."
+    alone = f"`{command} --row KEY` runs one alone, and prints the command line that does."
     return ["## The worst that were completed", "", *table, "", alone, ""]
 
 
