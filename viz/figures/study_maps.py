@@ -69,7 +69,8 @@ def maps(
         layout="constrained",
     )
     grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
-    scale = _scale(np.concatenate([panel.values.ravel() for panel in panels.values()]))
+    values = np.concatenate([panel.values.ravel() for panel in panels.values()])
+    scale = _scale(values)
     for spare in grid.flat[count:]:
         spare.set_visible(False)
     for axes, (law, panel) in zip(grid.flat, panels.items(), strict=False):
@@ -87,8 +88,8 @@ def maps(
         axes.set_xlabel(axes_names[1])
     bar = figure.colorbar(image, ax=list(grid.flat), shrink=0.9, aspect=30, label=quantity)
     bar.outline.set_visible(False)
-    if isinstance(scale, LogNorm):
-        _in_plain_numbers(bar.ax.yaxis, scale.vmax / scale.vmin)
+    if is_wide(values):
+        _in_plain_numbers(bar.ax.yaxis, float(np.nanmax(values) / np.nanmin(values)))
     bar.ax.tick_params(labelsize="small")
     lost = any(np.any(panel.lost) for panel in panels.values())
     figure.suptitle(f"{title}\n× not all rows came to their end" if lost else title, fontsize="medium")
