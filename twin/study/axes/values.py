@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, JsonValue
+from pydantic import Field, JsonValue, field_validator
 
 from spheretwin.twin.study.axes.axis import MOST_VALUES, ListedAxis
 
@@ -11,9 +11,16 @@ class Values(ListedAxis):
     """Listed."""
 
     kind: Literal["values"] = Field("values", description="how the values are chosen")
-    values: Annotated[tuple[JsonValue, ...], Field(min_length=1, max_length=MOST_VALUES)] = Field(
+    values: Annotated[tuple[JsonValue, ...], Field(max_length=MOST_VALUES)] = Field(
         description="the values, one after the other"
     )
+
+    @field_validator("values")
+    @classmethod
+    def _not_none(cls, values: tuple[JsonValue, ...]) -> tuple[JsonValue, ...]:
+        if not values:
+            raise ValueError("expected one value at least, received none")
+        return values
 
     def listed(self) -> list[Any]:
         """As they are."""
