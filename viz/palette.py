@@ -1,6 +1,7 @@
 """Colours: one for each axis, each law and each coil group, and a scale for signed currents."""
 
 import colorsys
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +28,24 @@ LAW_COLOURS: dict[str, str] = {
 
 OTHER_LAW = "#8a5a9e"
 
+_SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
+
 _NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)
 
 
 def law_colour(law: str) -> str:
     """Colour of a law, as a page writes it; one for all that have none of their own."""
     return LAW_COLOURS.get(law, OTHER_LAW)
+
+
+def law_colours(laws: Sequence[str]) -> dict[str, str]:
+    """A colour for each of some laws: its own by its name, or one that is left where that is taken."""
+    found: dict[str, str] = {}
+    for law in laws:
+        own = law_colour(law.split(",")[0])
+        others = [each for each in (own, *_SPARE) if each not in found.values()]
+        found[law] = others[0] if others else own
+    return found
 
 
 def group_colours(count: int) -> list[Colour]:

@@ -74,21 +74,21 @@ def add_to(verbs: Any) -> None:
 
 
 def _run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    from spheretwin.twin.commands import magnetics_curve
+    from spheretwin.twin.commands.magnetic import curve
 
-    return magnetics_curve.run(options, rest)
+    return curve.run(options, rest)
 
 
 def _run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    from spheretwin.twin.commands import magnetics_check
+    from spheretwin.twin.commands.magnetic import check
 
-    return magnetics_check.run(options, rest)
+    return check.run(options, rest)
 
 
 def _run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    from spheretwin.twin.commands import magnetics_map
+    from spheretwin.twin.commands.magnetic import map
 
-    return magnetics_map.run(options, rest)
+    return map.run(options, rest)
 
 
 def _part(parts: Any, name: str, summary: str, description: str) -> argparse.ArgumentParser:

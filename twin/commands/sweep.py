@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,12 +14,13 @@ from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.commands.reporting import print_json
-from spheretwin.twin.study import Found, load
 from spheretwin.twin.study import run as run_study
 from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.report import page, reading
+from spheretwin.twin.study.report.summary import summary
 from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import Study, shipped
-from spheretwin.twin.study.summary import summary
+from spheretwin.twin.study.running import Found
+from spheretwin.twin.study.study import Study, load, shipped
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.progress import counted
 
@@ -38,7 +40,9 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of journal and table; NAME_study unless given"
     )
-    parser.add_argument("--threads", type=_count, metavar="N", help="as many as there are cores unless given")
+    parser.add_argument(
+        "--threads", type=_threads, metavar="N", help="as many as there are cores unless given"
+    )
     parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
     parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
@@ -53,8 +57,15 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         )
     study = load(options.study)
     if options.row:
+        if options.out or options.threads or options.limit:
+            raise InputError("command line: expected --row without --out, --threads or --limit")
         return _one(study, options.row, options.json)
-    with interruptible() as stop_requested, counted(study.name) as done, timers_stopped():
+    with (
+        interruptible() as stop_requested,
+        counted(study.name) as done,
+        timers_stopped(),
+        contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
+    ):
         found = run_study(
             study,
             options.out,
@@ -63,13 +74,22 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             done=done,
             stop_requested=stop_requested,
         )
-    told = summary(found.table)
+    rows = reading.read(found.table)
+    told = summary(rows)
+    written = _report(found, rows, told, options.study)
     if options.json:
         print_json({**_told(found), "summary": told, "versions": versions()})
     else:
         tables.print_study(study.name, _told(found), told)
+        tables.print_written(written)
     if found.torn:
         print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
+    if found.damaged:
+        print(
+            f"spheretwin: sweep: {found.damaged} damaged lines of the journal were passed over,"
+            " and their rows run again",
+            file=sys.stderr,
+        )
     if found.rows < found.of:
         print(
             f"spheretwin: sweep: interrupted after {found.rows} of {found.of} rows;"
@@ -91,10 +111,19 @@ def _told(found: Found) -> dict[str, Any]:
     }
 
 
+def _report(found: Found, rows: reading.Rows, told: dict[str, Any], source: str) -> list[Path]:
+    """Write the page beside the table, where it can be drawn."""
+    if page.can_be_drawn():
+        return page.write(found.table.parent, rows, told, found.of, source, versions())
+    print("spheretwin: sweep: no report was written: it takes the extra `spheretwin[plots]`", file=sys.stderr)
+    return []
+
+
 def _one(study: Study, key: str, as_json: bool) -> bool:
     """Run one row, and print what it was and what it gave."""
-    rows, row = Rows(study), Grid(study).of(key)
-    result = rows.carried_out(row)
+    with contextlib.redirect_stdout(sys.stderr), timers_stopped():
+        rows, row = Rows(study), Grid(study).of(key)
+        result = rows.carried_out(row)
     told = {
         "row": row.number,
         "key": row.key,
@@ -116,6 +145,12 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
 
 def _pairs(told: dict[str, Any]) -> list[tuple[str, ...]]:
     return [(name, str(value)) for name, value in told.items()]
+
+
+def _threads(text: str) -> int:
+    if (count := _count(text)) > MOST_THREADS:
+        raise argparse.ArgumentTypeError(f"expected {MOST_THREADS} threads at most, received {count}")
+    return count
 
 
 def _count(text: str) -> int:

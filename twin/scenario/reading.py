@@ -6,7 +6,7 @@ import copy
 import json
 import os
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -108,16 +108,32 @@ def _place(inside: list[Any], part: str, dotted: str) -> int:
 
 def beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
     """Take the paths that fields by section name from a folder, in place; a second time changes nothing."""
+    return with_files(fields, lambda path, _: os.path.join(folder, _from_home(path)))
+
+
+def with_files(fields: dict[str, Any], told: Callable[[str, str], str]) -> dict[str, Any]:
+    """Say otherwise which files fields by section name, in place.
+
+    Parameters
+    ----------
+    fields : dict
+    told : callable
+        Of a path, or a reference into a file, and the field's name; returns what stands there instead.
+    """
     for named in files_in(fields, section_kind(Scenario)):
-        named.fields[named.name] = os.path.join(folder, _from_home(named.fields[named.name]))
+        named.fields[named.name] = told(named.fields[named.name], named.dotted)
     for event in _events(fields):
-        event["value"] = value_beside(folder, event["set"], event["value"])
+        event["value"] = _value_with(event["set"], event["value"], told)
     return fields
 
 
 def value_beside(folder: str, dotted: str, value: Any) -> Any:
     """Value of one field, the paths in it taken from a folder."""
-    inside: Any = beside(folder, alone(dotted, copy.deepcopy(value)))
+    return _value_with(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
+
+
+def _value_with(dotted: str, value: Any, told: Callable[[str, str], str]) -> Any:
+    inside: Any = with_files(alone(dotted, copy.deepcopy(value)), told)
     for part in dotted.split("."):
         inside = inside[0] if isinstance(inside, list) else inside[part]
     return inside

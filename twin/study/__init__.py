@@ -8,8 +8,6 @@ from pathlib import Path
 from spheretwin.twin.study.running import Found, carried_out
 from spheretwin.twin.study.study import Study, load
 
-__all__ = ["Found", "Study", "load", "run"]
-
 
 def run(
     study: Study | str,

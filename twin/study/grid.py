@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
 from spheretwin.twin.study.axes.axis import DrawnAxis, ListedAxis
-from spheretwin.twin.study.study import Study
+from spheretwin.twin.study.study import Study, repeated
 
 KEY_LENGTH = 16
 
-# At a millisecond a row, beyond this a study takes a year.
-MOST_ROWS = 10**10
+# At a millisecond a row, beyond this a study takes more than a day.
+MOST_ROWS = 10**8
 
 # Of the points of drawn axes: what separates them from whatever else is drawn under the same seed.
 STAGE = 301
@@ -90,14 +91,20 @@ class Grid:
         key = _key(ordered, self._laws[law], repeat)
         return Row(number, key, _seed(self._study.seed, key), ordered, self._laws[law], repeat)
 
-    def is_number(self, field: str) -> bool:
-        """Whether all values of an axis are numbers."""
-        for group in self._groups:
-            if field in group:
-                return all(
-                    isinstance(each, int | float) and not isinstance(each, bool) for each in group[field]
-                )
-        return True
+    def values(self, field: str) -> list[Any] | None:
+        """All values of an axis; None of one that is drawn, which has numbers."""
+        return next((group[field] for group in self._groups if field in group), None)
+
+    def of_law(self, law: int, most: int) -> Iterator[Row]:
+        """Some rows of a law, evenly spaced from its first to its last."""
+        outer = self._rows // (len(self._laws) * self._study.seeds)
+        for place in dict.fromkeys(np.linspace(0, outer - 1, min(most, outer)).round().astype(int).tolist()):
+            yield self[(place * len(self._laws) + law) * self._study.seeds]
+
+    @property
+    def laws(self) -> int:
+        """How many laws there are; the scenario's alone is one."""
+        return len(self._laws)
 
     def of(self, key: str) -> Row:
         """Row of a key.
@@ -121,11 +128,21 @@ def _groups(study: Study) -> dict[str, dict[str, list[Any]]]:
             name = f"zip {axis.zip}" if axis.zip is not None else f"axis {place}"
             groups.setdefault(name, {})[axis.field] = axis.listed()
     for group in groups.values():
-        lengths = {field: len(values) for field, values in group.items()}
-        if len(set(lengths.values())) > 1:
-            told = ", ".join(f"{length} of {field}" for field, length in lengths.items())
-            raise InputError(f"study {study.name}: expected zipped axes of equal length, received {told}")
+        _check_group(study, group)
     return groups
+
+
+def _check_group(study: Study, group: Mapping[str, list[Any]]) -> None:
+    """Values that go together are as many of each, and no two are the same: their rows would be."""
+    lengths = {field: len(values) for field, values in group.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{length} of {field}" for field, length in lengths.items())
+        raise InputError(f"study {study.name}: expected zipped axes of equal length, received {told}")
+    if twice := repeated(zip(*group.values(), strict=True)):
+        told = ", ".join(map(shown, twice[0]))
+        raise InputError(
+            f"study {study.name}: expected different values of {', '.join(group)}, received {told} twice"
+        )
 
 
 def _points(study: Study) -> NDArray[np.float64]:

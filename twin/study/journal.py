@@ -1,17 +1,19 @@
 """The journal of a study: every finished row, a line each, added as it happens and never changed.
 
 Its first line tells what the rows depend on: a digest of the study, of every file that it names, of the
-package's sources and of the versions that a figure may depend on. A journal of anything else is refused. A
-line that was torn when its process was killed is dropped. One process writes a journal at a time, held by a
-lock that goes with the process.
+package's sources and of the versions that a figure may depend on. A journal of anything else is refused.
+Each line ends in a check of itself. A last line that was torn when its process was killed is dropped; one in
+the middle that is damaged is passed over, its row is run again, and what follows it is kept. One process
+writes a journal at a time, held by a lock that goes with the process.
 """
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
+import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -20,11 +22,13 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.twin.study.grid import Row
+from spheretwin.twin.study.lock import lock
 from spheretwin.twin.study.row import Result
 
 NAME = "journal.jsonl"
 
-NOT_YET = -1
+NOT_YET = 0
+"""Place of no row: the first line is there. Zeros take no memory until they are written over."""
 
 
 class Journal:
@@ -43,19 +47,25 @@ class Journal:
     ----------
     torn : bool
         Whether a torn last line was dropped.
+    damaged : int
+        Lines that were passed over.
 
     Raises
     ------
     InputError
         It is that of another study, another process writes it, or it is no journal.
+    SpheretwinError
+        It could not be begun, as on a full disk.
     """
 
     def __init__(self, path: Path, digest: str, rows: int) -> None:
-        self.path, self.torn = path, False
-        self._places: NDArray[np.int64] = np.full(rows, NOT_YET, dtype=np.int64)
+        self.path, self.torn, self.damaged = path, False, 0
+        self._head = json.dumps({"journal": 1, "digest": digest}).encode() + b"\n"
+        self._places: NDArray[np.int64] = np.zeros(rows, dtype=np.int64)
+        self._end = 0
         self._file = _opened(path)
         try:
-            self._read(digest)
+            self._begin(digest)
         except BaseException:
             self._file.close()
             raise
@@ -66,10 +76,9 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    @property
-    def done(self) -> int:
-        """Rows that are finished."""
-        return int(np.count_nonzero(self._places != NOT_YET))
+    def done(self, below: int) -> int:
+        """How many of the rows below a number are finished."""
+        return int(np.count_nonzero(self._places[:below]))
 
     def has(self, number: int) -> bool:
         """Whether a row is finished."""
@@ -84,72 +93,90 @@ class Journal:
             It could not be written, as on a full disk; what was written before is kept.
         """
         place = self._end
-        line = json.dumps([row.number, row.key, *result]).encode() + b"\n"
-        try:
-            self._file.write(line)
-            self._file.flush()
-        except OSError as error:
-            raise SpheretwinError(
-                f"study: {self.path} could not be written, {error.strerror or error};"
-                f" the {self.done} rows before are kept"
-            ) from None
-        self._end += len(line)
+        self._write(_line([row.number, row.key, *result]))
         self._places[row.number] = place
 
-    def results(self) -> Iterator[tuple[int, Result]]:
-        """Every finished row in the order of the study: its number and its result."""
+    def results(self, below: int) -> Iterator[tuple[int, Result]]:
+        """Finished rows below a number, in the order of the study: the number of each, and its result."""
         with self.path.open("rb") as file:
-            for number in np.flatnonzero(self._places != NOT_YET):
+            for number in np.flatnonzero(self._places[:below]):
                 file.seek(int(self._places[number]))
                 yield int(number), _result(json.loads(file.readline()))
 
-    def _read(self, digest: str) -> None:
-        head = self._file.readline()
-        if not head.endswith(b"\n"):  # new, or torn before it was one
-            self._file.seek(0)
-            self._file.truncate()
-            self._file.write(json.dumps({"journal": 1, "digest": digest}).encode() + b"\n")
-            self._file.flush()
-            self._end = self._file.tell()
-            return
-        found = _parsed(head)
-        if not isinstance(found, dict) or "journal" not in found:
-            raise InputError(f"study: expected a journal of a study, received {self.path}")
-        if found.get("digest") != digest:
-            raise InputError(
-                f"study: expected {self.path} to be a journal of this study with these sources and versions,"
-                " received one of others; remove it, or write into another folder"
-            )
-        self._end = len(head)
-        for line in self._file:
-            if not self._take(line):
-                self.torn = True
-                break
-        self._file.seek(self._end)
-        self._file.truncate()
+    def _begin(self, digest: str) -> None:
+        with self.path.open("rb") as file:
+            head = file.readline()
+            if self._head.startswith(head) and head != self._head:  # new, or torn before it was one
+                self._write(self._head)
+                return
+            found = _parsed(head)
+            if not isinstance(found, dict) or "journal" not in found:
+                raise InputError(f"study: expected a journal of a study, received {self.path}")
+            if found.get("digest") != digest:
+                raise InputError(
+                    f"study: expected {self.path} to be a journal of this study with these sources and"
+                    " versions, received one of others; remove it, or write into another folder"
+                )
+            self._end = len(head)
+            for line in file:
+                self._take(line)
+        self._file.truncate(self._end)
 
-    def _take(self, line: bytes) -> bool:
-        parsed = _parsed(line) if line.endswith(b"\n") else None
-        if not isinstance(parsed, list) or not 0 <= parsed[0] < len(self._places):
-            return False
-        self._places[parsed[0]] = self._end
+    def _take(self, line: bytes) -> None:
+        if not line.endswith(b"\n"):
+            self.torn = True
+            return
+        number = _number(line)
+        if number is None or not 0 <= number < len(self._places):
+            self.damaged += 1
+        else:
+            self._places[number] = self._end
         self._end += len(line)
-        return True
+
+    def _write(self, line: bytes) -> None:
+        """Put a line at the end, whole or not at all."""
+        try:
+            self._file.seek(self._end)
+            left = memoryview(line)
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            with suppress(OSError):  # what is left of the line is dropped when it is read
+                self._file.truncate(self._end)
+            raise SpheretwinError(
+                f"study: {self.path} could not be written, {error.strerror or error};"
+                " the rows before are kept"
+            ) from None
+        self._end += len(line)
 
 
 def _opened(path: Path) -> BinaryIO:
+    """The file, without a buffer: what is written is written, and what failed is not tried again."""
     try:
-        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b", 0)
     except OSError as error:
         raise InputError(f"study: expected a folder for its journal, {error}") from None
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock(file)
     except OSError:
         file.close()
         raise InputError(
             f"study: expected one process at a time, received {path}, which another one writes"
         ) from None
     return file
+
+
+def _line(record: list[Any]) -> bytes:
+    """A line of JSON, the last entry of which is a check of all before it."""
+    body = json.dumps(record).encode()[:-1]
+    return body + b', "%08x"]\n' % zlib.crc32(body)
+
+
+def _number(line: bytes) -> int | None:
+    """Row of a line; None where it is damaged."""
+    body = line[: -len(', "00000000"]\n')]
+    parsed = _parsed(line) if line[len(body) :] == b', "%08x"]\n' % zlib.crc32(body) else None
+    return parsed[0] if isinstance(parsed, list) else None
 
 
 def _parsed(line: bytes) -> Any:
@@ -160,4 +187,4 @@ def _parsed(line: bytes) -> Any:
 
 
 def _result(parsed: list[Any]) -> Result:
-    return Result(*parsed[2:])
+    return Result(*parsed[2:-1])

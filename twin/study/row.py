@@ -73,8 +73,8 @@ class Rows:
         self.study = study
         self._telemetry = telemetry
         self._files: dict[tuple[str | None, ...], Files] = {}
-        self._fields = reading.read(study.scenario)
-        for dotted, value in study.fields.items():
+        self._fields = reading.read(study.source)
+        for dotted, value in self._found(study.fields).items():
             reading.override(self._fields, dotted, value)
         self._names_files = True
         self.base = self._validated(copy.deepcopy(self._fields))
@@ -83,9 +83,9 @@ class Rows:
         chosen = [name for name in study.metrics if name in METRICS]
         self._check_axes()
         self.metrics = tuple(METRICS) if not study.metrics else tuple(chosen)
-        self._own = _own_metrics([name for name in study.metrics if is_reference(name)])
-        named = {*study.fields, *(axis.field for axis in study.axis)}
-        self.chooses_plant = study.fast and not any(field.startswith(ENGINE) for field in named)
+        self._references = [study.beside(name) for name in study.metrics if is_reference(name)]
+        self._own = _own_metrics(self._references)
+        self.chooses_plant = study.fast and not self._names_engine()
 
     @property
     def own_metrics(self) -> tuple[str, ...]:
@@ -108,8 +108,9 @@ class Rows:
         """
         fields = copy.deepcopy(self._fields)
         if row.law is not None:
-            fields["controller"] = {**_period(fields), **row.law}
-        for dotted, value in row.values.items():
+            law = self._found({"controller": dict(row.law)})["controller"]
+            fields["controller"] = {**_period(fields), **law}
+        for dotted, value in self._found(row.values).items():
             self._fill_list(fields, dotted)
             reading.override(fields, dotted, value)
         fields["seed"] = row.seed
@@ -138,20 +139,42 @@ class Rows:
         return Session(scenario, files=self._files[named])
 
     def command(self, row: Row) -> str:
-        """Command line that runs a row alone."""
-        words = ["spheretwin", "simulate", self.study.scenario]
-        law = {f"controller.{name}": value for name, value in (row.law or {}).items()}
-        named = {**self.study.fields, **law, **row.values, "seed": row.seed}
-        scenario = self.scenario(row)
-        if self.chooses_plant:
-            named[ENGINE] = scenario.plant.engine
-        whole = scenario.model_dump(mode="json")
+        """Command line that runs a row alone; its values as they are, where they make no scenario."""
+        words = ["spheretwin", "simulate", self.study.source]
+        law = {"controller": {**_period(self._fields), **row.law}} if row.law is not None else {}
+        named = self._found({**self.study.fields, **law, **row.values})
+        named["seed"] = row.seed
+        try:
+            scenario = self.scenario(row)
+        except InputError:
+            whole: dict[str, Any] = {}
+        else:
+            whole = scenario.model_dump(mode="json")
+            if self.chooses_plant:
+                named[ENGINE] = scenario.plant.engine
         named = {
             _list_of(dotted): _value_at(whole, _list_of(dotted), value) for dotted, value in named.items()
         }
         for dotted, value in named.items():
             words += [f"--{dotted.replace('_', '-')}", *_texts(value)]
+        for reference in self._references:
+            words += ["--metric", reference]
         return shlex.join(words)
+
+    def _found(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values by dotted name, the paths in them taken from where the study is."""
+        return {dotted: self._found_one(dotted, value) for dotted, value in values.items()}
+
+    def _found_one(self, dotted: str, value: Any) -> Any:
+        if not isinstance(value, str | list | tuple | dict):  # a number names no file
+            return value
+        return reading.value_beside(self.study.folder, dotted, value)
+
+    def _names_engine(self) -> bool:
+        """Whether the plant is chosen by who wrote the study, or the scenario."""
+        plant = self._fields.get("plant")
+        chosen = isinstance(plant, Mapping) and "engine" in plant
+        return chosen or any(axis.field in ("plant", ENGINE) for axis in self.study.axis)
 
     def _followed(self, row: Row, scenario: Scenario, session: Session) -> Result:
         metrics = {
@@ -168,13 +191,12 @@ class Rows:
             if file:
                 file.close(record_of(session).metadata())
         figures = {name: metric.value() for name, metric in metrics.items()}
+        complaints: list[str] = []
         if kept:
-            figures |= self._own_values(session, status, kept)
-        return Result(str(status), session.reason.told if session.reason else None, None, figures)
-
-    def _own_values(self, session: Session, status: Status, kept: KeptTelemetry) -> dict[str, Any]:
-        run = Run(session.begun_as, status, kept.table, session.loop_s, session.actuator)
-        return {name: own_value(name, metric, run) for name, metric in self._own.items()}
+            run = Run(session.begun_as, status, kept.table, session.loop_s, session.actuator)
+            figures |= {name: _own_value(name, metric, run, complaints) for name, metric in self._own.items()}
+        reason = session.reason.told if session.reason else None
+        return Result(str(status), reason, "; ".join(complaints) or None, figures)
 
     def _file(self, row: Row, session: Session) -> TelemetryFile | None:
         if self._telemetry is None or row.number not in self.study.telemetry:
@@ -194,7 +216,8 @@ class Rows:
         """Find out before the first row whether each axis names a field."""
         known = {name for name, _ in every_field(type(self.base))}
         for law in self.study.law:
-            known |= {name for name, _ in every_field(scenario_with(law["law"]))}
+            name = self._found({"controller.law": law["law"]})["controller.law"]
+            known |= {name for name, _ in every_field(scenario_with(name))}
         for axis in self.study.axis:
             name = re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", axis.field)
             if name.removesuffix(f".{INDEX}") not in known:
@@ -287,6 +310,15 @@ def _own_metrics(references: list[str]) -> dict[str, OwnMetric]:
     own = {each.rpartition(":")[2]: load_function(each, "metric") for each in references}
     check_names(own)
     return own
+
+
+def _own_value(name: str, metric: OwnMetric, run: Run, complaints: list[str]) -> Any:
+    """A figure of the user's; None where it cannot be had: the row's other figures must not be lost by it."""
+    try:
+        return own_value(name, metric, run)
+    except InputError as error:
+        complaints.append(str(error))
+        return None
 
 
 def _texts(value: Any) -> list[str]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tomllib
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -20,7 +23,7 @@ from pydantic import (
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.models.base.wording import did_you_mean, shown
+from spheretwin.models.base.wording import did_you_mean, is_plain, shown
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.scenario.explaining import explain
 from spheretwin.twin.study.axes.axis import MOST_VALUES, Axis
@@ -34,12 +37,17 @@ class Study(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    name: Annotated[str, Field(min_length=1)] = Field(description="name of the study")
+    name: Annotated[str, Field(min_length=1, max_length=100)] = Field(
+        description="name of the study, and of its folder"
+    )
     description: str = Field("", description="what it shows")
     scenario: Annotated[str, Field(min_length=1)] = Field(description="base: a shipped name or a TOML file")
+    folder: str = Field(
+        "", exclude=True, description="where the paths in it are taken from; no part of what it is"
+    )
     fields: dict[str, JsonValue] = Field({}, description="fields of all rows, by dotted name")
     law: tuple[dict[str, JsonValue], ...] = Field(
-        (), description="controllers, [[law]] each, with their gains; the scenario's alone unless given"
+        (), description="controllers, [[law]] each, with their gains, instead of the scenario's"
     )
     axis: tuple[AnyAxis, ...] = Field((), description="what differs from row to row, [[axis]] each")
     design: Literal["random", "latin_hypercube", "sobol"] = Field(
@@ -49,7 +57,8 @@ class Study(BaseModel):
         None, description="points of the drawn axes, each crossed with all else"
     )
     seed: Annotated[int, Field(ge=0)] = Field(
-        0, description="of the study: of what is drawn, and of its rows"
+        0,
+        description="of what is drawn, and of the rows, each of which has its own instead of the scenario's",
     )
     seeds: Annotated[int, Field(ge=1, le=MOST_VALUES)] = Field(
         1, description="runs of each point, each with a seed of its own"
@@ -64,6 +73,13 @@ class Study(BaseModel):
         True, description="whether to run on the Lagrangian plant where the model is a free rotor"
     )
 
+    @field_validator("name")
+    @classmethod
+    def _names_a_folder(cls, name: str) -> str:
+        if not is_plain(name) or name.startswith(".") or set(name) & set('/\\:*?"<>|'):
+            raise ValueError(f"expected a name that a folder can have, received {shown(name)}")
+        return name
+
     @field_validator("metrics")
     @classmethod
     def _known(cls, metrics: tuple[str, ...]) -> tuple[str, ...]:
@@ -73,6 +89,9 @@ class Study(BaseModel):
                     f"expected {', '.join(METRICS)} or FILE.py:NAME,"
                     f" received {shown(name)}{did_you_mean(name, METRICS)}"
                 )
+        names = [name.rpartition(":")[2] for name in metrics]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"expected figures of different names, received {', '.join(twice)} twice")
         return metrics
 
     @model_validator(mode="after")
@@ -88,15 +107,62 @@ class Study(BaseModel):
         if taken := sorted({"seed", "controller.law"} & set(fields)):
             other = {"seed": "seeds", "controller.law": "[[law]]"}
             raise ValueError(f"expected {other[taken[0]]} instead of an axis over {taken[0]}")
+        self._check_nothing_is_dropped(fields)
         for law in self.law:
             if not isinstance(law.get("law"), str):
                 raise ValueError(f"expected law in each [[law]], received {shown(law)}")
+        if twice := repeated(self.law):
+            raise ValueError(f"expected each [[law]] once, received {shown(twice[0])} twice")
+        zips = [axis.zip for axis in self.axis if axis.zip is not None]
+        if alone := sorted({name for name in zips if zips.count(name) == 1}):
+            raise ValueError(f"expected two axes or more of a zip, received {alone[0]} once")
+        if zipped := [axis.field for axis in self.axis if axis.is_drawn and axis.zip is not None]:
+            raise ValueError(
+                f"expected no zip of what is drawn, which goes together as it is, received {zipped[0]}"
+            )
         return self
+
+    def _check_nothing_is_dropped(self, axes: list[str]) -> None:
+        """Refuse fields that something else of the study would overwrite without a word."""
+        for field in self.fields:
+            if field == "seed":
+                raise ValueError("expected seed and seeds of the study, received seed among its fields")
+            if field in axes:
+                raise ValueError(f"expected {field} among the fields or as an axis, received both")
+            of_controller = field == "controller" or field.startswith("controller.")
+            if self.law and of_controller and field != "controller.period_s":
+                raise ValueError(f"expected {field} in each [[law]], received it among the fields")
+
+    def beside(self, path: str) -> str:
+        """A path, or a reference into a file, as it is found from the working folder."""
+        return os.path.join(self.folder, os.path.expanduser(path))
+
+    @property
+    def source(self) -> str:
+        """The scenario as it is found from the working folder."""
+        return self.beside(self.scenario) if self.scenario.endswith(".toml") else self.scenario
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
         """Axes whose values are drawn."""
         return tuple(axis for axis in self.axis if axis.is_drawn)
+
+
+def repeated(values: Iterable[Any]) -> list[Any]:
+    """Those among some values that are there more than once; a whole number is the same as a broken one."""
+    by_text = [(json.dumps(_alike(value), sort_keys=True), value) for value in values]
+    counts = Counter(text for text, _ in by_text)
+    return [value for text, value in dict(by_text).items() if counts[text] > 1]
+
+
+def _alike(value: Any) -> Any:
+    """A number as a broken one, lists and tables through."""
+    if isinstance(value, list | tuple):
+        return [_alike(each) for each in value]
+    if isinstance(value, Mapping):
+        return {name: _alike(each) for name, each in value.items()}
+    is_whole = isinstance(value, int) and not isinstance(value, bool)
+    return float(value) if is_whole and abs(value) < 2**53 else value
 
 
 def shipped() -> list[str]:
@@ -116,9 +182,9 @@ def load(source: str) -> Study:
     if source in shipped():
         text = (FOLDER / f"{source}.toml").read_text(encoding="utf-8")
     elif source.endswith(".toml"):
-        folder = os.path.dirname(source)
         try:
-            text = Path(source).expanduser().read_text(encoding="utf-8-sig")
+            path = Path(source).expanduser()
+            text, folder = path.read_text(encoding="utf-8-sig"), os.path.dirname(path)
         except (OSError, ValueError, RuntimeError) as error:
             raise InputError(f"study {source}: expected a readable TOML file, {error}") from None
     else:
@@ -130,7 +196,8 @@ def load(source: str) -> Study:
         fields = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"study {source}: expected valid TOML, {error}") from None
-    return made(_beside(folder, fields), source)
+    fields["folder"] = os.path.join(folder, str(fields.get("folder", "")))
+    return made(fields, source)
 
 
 def made(fields: dict[str, Any], source: str) -> Study:
@@ -141,22 +208,7 @@ def made(fields: dict[str, Any], source: str) -> Study:
     InputError
         A field that is unknown, of the wrong type or out of range.
     """
-    import json
-
     try:
         return Study.model_validate_json(json.dumps(fields, default=str))
     except ValidationError as error:
         raise InputError(f"study {source}: {explain(error, Study)}") from None
-
-
-def _beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
-    """Take the scenario's path, and those of figures of the user's, from where the study is."""
-    scenario = fields.get("scenario")
-    if isinstance(scenario, str) and scenario.endswith(".toml"):
-        fields["scenario"] = os.path.join(folder, os.path.expanduser(scenario))
-    if isinstance(fields.get("metrics"), list):
-        fields["metrics"] = [
-            os.path.join(folder, os.path.expanduser(each)) if is_reference(each) else each
-            for each in fields["metrics"]
-        ]
-    return fields

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import whole_file
 from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.scenario import reading
 from spheretwin.twin.study.grid import Grid, Row
 from spheretwin.twin.study.journal import Journal
 from spheretwin.twin.study.row import Result, Rows
@@ -25,9 +27,26 @@ BATCH_ROWS = 10_000
 FIXED = ("row", "key", "seed", "law", "repeat", "status", "reason", "error")
 """Columns of every table, beside its axes and its figures."""
 
+LARGEST_WHOLE = 2**63 - 1
 
-def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> None:
-    """Write all finished rows, in the order of the study, whole or not at all.
+
+def check_names(rows: Rows) -> None:
+    """Find out before the first row whether all columns have names of their own.
+
+    Raises
+    ------
+    InputError
+        Two have the same.
+    """
+    names = [*FIXED, *(axis.field for axis in rows.study.axis), *rows.metrics, *rows.own_metrics]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(
+            f"study {rows.study.name}: expected columns of different names, received {twice[0]} twice"
+        )
+
+
+def write(path: Path, grid: Grid, journal: Journal, rows: Rows, wanted: int) -> None:
+    """Write those of the first rows that are finished, in the order of the study, whole or not at all.
 
     Raises
     ------
@@ -37,45 +56,78 @@ def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> None:
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as parquet
 
-    schema = _schema(grid, rows)
-    metadata = {"study": rows.study.model_dump_json(), "scenario": rows.base.model_dump_json()}
+    schema = _schema(grid, journal, rows, wanted)
+    base = _base(rows)
+    metadata = {"study": rows.study.model_dump_json(), "scenario": json.dumps(base)}
     with (
         whole_file(path) as temporary,
         parquet.ParquetWriter(temporary, schema.with_metadata(metadata), compression="zstd") as writer,
     ):
-        finished = journal.results()
+        finished = journal.results(wanted)
         while batch := list(islice(finished, BATCH_ROWS)):
-            columns = _columns(schema, [_record(grid[number], result, rows) for number, result in batch])
+            columns = _columns(
+                schema, [_record(grid[number], result, rows, base) for number, result in batch]
+            )
             writer.write_table(pa.table(columns, schema=schema))
 
 
-def _schema(grid: Grid, rows: Rows) -> pa.Schema:
+def _schema(grid: Grid, journal: Journal, rows: Rows, wanted: int) -> pa.Schema:
     import pyarrow as pa
 
-    fields = [
-        pa.field("row", pa.int64()),
-        pa.field("key", pa.string()),
-        pa.field("seed", pa.int64()),
-        *(pa.field(axis.field, _kind(grid, axis.field)) for axis in rows.study.axis),
-        pa.field("law", pa.string()),
-        pa.field("repeat", pa.int64()),
-        *(pa.field(name, pa.string()) for name in ("status", "reason", "error")),
-        *(pa.field(name, _figure_kind(name)) for name in rows.metrics),
-        *(pa.field(name, pa.string()) for name in rows.own_metrics),
+    own = _own_kinds(journal, rows, wanted)
+    return pa.schema(
+        [
+            pa.field("row", pa.int64()),
+            pa.field("key", pa.string()),
+            pa.field("seed", pa.int64()),
+            *(pa.field(axis.field, _kind_of(grid.values(axis.field))) for axis in rows.study.axis),
+            pa.field("law", pa.string()),
+            pa.field("repeat", pa.int64()),
+            *(pa.field(name, pa.string()) for name in ("status", "reason", "error")),
+            *(pa.field(name, _figure_kind(name)) for name in rows.metrics),
+            *(pa.field(name, own[name]) for name in rows.own_metrics),
+        ]
+    )
+
+
+def _kind_of(values: Iterable[Any] | None) -> pa.DataType:
+    """Type of a column that holds some values: their own where all have one, text of JSON else."""
+    import pyarrow as pa
+
+    if values is None:
+        return pa.float64()
+    tests: list[tuple[Callable[[Any], bool], pa.DataType]] = [
+        (_is_truth, pa.bool_()),
+        (_is_whole, pa.int64()),
+        (_is_number, pa.float64()),
     ]
-    names = [field.name for field in fields]
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise InputError(
-            f"study {rows.study.name}: expected columns of different names, received {twice[0]} twice"
-        )
-    return pa.schema(fields)
+    listed = [each for each in values if each is not None]
+    return next((kind for test, kind in tests if listed and all(map(test, listed))), pa.string())
 
 
-def _kind(grid: Grid, field: str) -> pa.DataType:
-    """Numbers where all values of an axis are; text of JSON else."""
+def _own_kinds(journal: Journal, rows: Rows, wanted: int) -> dict[str, pa.DataType]:
+    """Types of the user's figures: numbers where all rows have numbers, text of JSON else."""
     import pyarrow as pa
 
-    return pa.float64() if grid.is_number(field) else pa.string()
+    may_be = dict.fromkeys(rows.own_metrics, True)
+    if may_be:
+        for _, result in journal.results(wanted):
+            for name in may_be:
+                value = result.figures.get(name)
+                may_be[name] &= value is None or _is_number(value)
+    return {name: pa.float64() if is_number else pa.string() for name, is_number in may_be.items()}
+
+
+def _is_truth(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= LARGEST_WHOLE
+
+
+def _is_number(value: Any) -> bool:
+    return _is_whole(value) or isinstance(value, float)
 
 
 def _figure_kind(name: str) -> pa.DataType:
@@ -84,9 +136,15 @@ def _figure_kind(name: str) -> pa.DataType:
     return pa.list_(pa.float64()) if METRICS[name].labels else pa.float64()
 
 
-def _record(row: Row, result: Result, rows: Rows) -> dict[str, Any]:
-    law = rows.base.controller.law if row.law is None else _law_text(row.law)
-    own = {name: json.dumps(result.figures.get(name)) for name in rows.own_metrics}
+def _base(rows: Rows) -> dict[str, Any]:
+    """The base scenario, its paths as they are from where the study is, so that it is one from anywhere."""
+    folder = rows.study.folder or os.curdir
+    fields = rows.base.model_dump(mode="json")
+    return reading.with_files(fields, lambda path, _: os.path.relpath(path, folder))
+
+
+def _record(row: Row, result: Result, rows: Rows, base: dict[str, Any]) -> dict[str, Any]:
+    law = base["controller"]["law"] if row.law is None else law_text(row.law)
     return {
         "row": row.number,
         "key": row.key,
@@ -97,12 +155,11 @@ def _record(row: Row, result: Result, rows: Rows) -> dict[str, Any]:
         "status": result.status,
         "reason": result.reason,
         "error": result.error,
-        **{name: result.figures.get(name) for name in rows.metrics},
-        **own,
+        **{name: result.figures.get(name) for name in (*rows.metrics, *rows.own_metrics)},
     }
 
 
-def _law_text(law: Any) -> str:
+def law_text(law: Any) -> str:
     """Its name alone, where nothing else is said of it."""
     return str(law["law"]) if set(law) == {"law"} else json.dumps(law, sort_keys=True)
 
@@ -110,10 +167,18 @@ def _law_text(law: Any) -> str:
 def _columns(schema: pa.Schema, records: list[dict[str, Any]]) -> dict[str, Any]:
     import pyarrow as pa
 
-    columns: dict[str, Any] = {}
-    for field in schema:
-        values: Iterator[Any] = (record[field.name] for record in records)
-        if pa.types.is_string(field.type):
-            values = (each if each is None or isinstance(each, str) else json.dumps(each) for each in values)
-        columns[field.name] = pa.array(list(values), type=field.type)
-    return columns
+    return {
+        field.name: pa.array([_held(record[field.name], field) for record in records], type=field.type)
+        for field in schema
+    }
+
+
+def _held(value: Any, field: pa.Field) -> Any:
+    """A value as a column holds it."""
+    import pyarrow as pa
+
+    if value is None or (pa.types.is_string(field.type) and isinstance(value, str)):
+        return value
+    if pa.types.is_string(field.type):
+        return json.dumps(value)
+    return float(value) if pa.types.is_float64(field.type) else value

@@ -6,20 +6,22 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
+from typing import TypeVar
 
 from spheretwin.twin.study.grid import Row
-from spheretwin.twin.study.row import Result
 
 # Rows handed to each thread ahead of time: enough that none waits, few enough that no memory gathers.
 AHEAD = 4
 
+T = TypeVar("T")
+
 
 def carried_out(
     rows: Iterable[Row],
-    work: Callable[[Row], Result],
+    work: Callable[[Row], T],
     threads: int | None = None,
     stop_requested: Callable[[], bool] = lambda: False,
-) -> Iterator[tuple[Row, Result]]:
+) -> Iterator[tuple[Row, T]]:
     """Results of rows, each as it is finished.
 
     Parameters
@@ -35,7 +37,7 @@ def carried_out(
     count = threads or os.cpu_count() or 1
     waiting = iter(rows)
     with ThreadPoolExecutor(count, thread_name_prefix="row") as pool:
-        flying: dict[Future[Result], Row] = {}
+        flying: dict[Future[T], Row] = {}
 
         def take_off(most: int) -> None:
             for row in islice(waiting, most):

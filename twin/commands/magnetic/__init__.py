@@ -1,0 +1,1 @@
+"""The verbs below ``spheretwin magnetics``, one a file."""

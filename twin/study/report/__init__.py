@@ -1,0 +1,1 @@
+"""What the table of a study says as a whole: a summary, figures and a page."""
