@@ -15,6 +15,7 @@ from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.commands.reporting import print_json
 from spheretwin.twin.study import run as run_study
+from spheretwin.twin.study.engines.registry import ENGINES
 from spheretwin.twin.study.grid import Grid
 from spheretwin.twin.study.report import page, reading
 from spheretwin.twin.study.report.summary import summary
@@ -43,6 +44,18 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--threads", type=_threads, metavar="N", help="as many as there are cores unless given"
     )
+    parser.add_argument(
+        "--engine",
+        choices=tuple(ENGINES),
+        default="threads",
+        help="threads unless given; the table is the same",
+    )
+    parser.add_argument(
+        "--address",
+        metavar="HOST",
+        help="for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a cluster on this"
+        " machine alone unless given",
+    )
     parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
     parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
@@ -53,7 +66,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the verb; True when all rows that were wanted are finished."""
     if rest:
         raise InputError(
-            f"command line: expected --out, --threads, --limit, --row or --json, received {' '.join(rest)}"
+            "command line: expected --out, --engine, --address, --threads, --limit, --row or --json,"
+            f" received {' '.join(rest)}"
         )
     study = load(options.study)
     if options.row:
@@ -69,6 +83,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         found = run_study(
             study,
             options.out,
+            engine=options.engine,
+            address=options.address,
             threads=options.threads,
             limit=options.limit,
             done=done,
@@ -107,6 +123,7 @@ def _told(found: Found) -> dict[str, Any]:
         "resumed": found.resumed,
         "checked": found.checked,
         "wall_s": found.wall_s,
+        "startup_s": found.startup_s,
         "table": str(found.table),
     }
 

@@ -13,6 +13,8 @@ def run(
     study: Study | str,
     out: Path | str | None = None,
     *,
+    engine: str = "threads",
+    address: str | None = None,
     threads: int | None = None,
     limit: int | None = None,
     done: Callable[[int, int], None] = lambda rows, of: None,
@@ -27,8 +29,14 @@ def run(
     out : path, optional
         Folder for journal and table; that of the study's name in the working folder unless given. Where a
         journal of the same study is there already, its rows are not run again.
+    engine : str
+        ``threads`` of this process, or ``ray``; the table does not depend on it.
+    address : str, optional
+        For ``ray``: ``auto``, ``HOST`` or ``HOST:PORT`` of a cluster that this machine is a node of, on every
+        node of which are the same sources, versions and files. One that lasts as long as the study is started
+        on this machine unless given.
     threads : int, optional
-        As many as there are cores unless given; the table does not depend on it.
+        Rows at a time; as many as there are cores unless given, and the table does not depend on it.
     limit : int, optional
         Rows at most, from the first on.
     done : callable
@@ -41,8 +49,18 @@ def run(
     InputError
         The study, the scenario or the folder cannot be used.
     SpheretwinError
-        A row differs between the plants, or a file could not be written; what is finished is kept.
+        A row differs between the plants, a file could not be written, or a cluster was lost; what is finished
+        is kept.
     """
     chosen = load(study) if isinstance(study, str) else study
     folder = Path(out) if out is not None else Path(f"{chosen.name}_study")
-    return carried_out(chosen, folder, threads=threads, limit=limit, done=done, stop_requested=stop_requested)
+    return carried_out(
+        chosen,
+        folder,
+        engine=engine,
+        address=address,
+        threads=threads,
+        limit=limit,
+        done=done,
+        stop_requested=stop_requested,
+    )

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable
+from contextlib import closing, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from spheretwin.models.base.cache import sources_digest
-from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import make_folder
-from spheretwin.models.base.user_code import file_of, is_reference
+from spheretwin.models.base.wording import did_you_mean, shown
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.versions import versions
-from spheretwin.twin.records import facts
-from spheretwin.twin.scenario import reading
-from spheretwin.twin.study import agreement, checking, journal, table
-from spheretwin.twin.study import threads as pool
-from spheretwin.twin.study.grid import Grid, Row
+from spheretwin.twin.study import checking, journal, table
+from spheretwin.twin.study.basis import digest_of
+from spheretwin.twin.study.engines.engine import Engine, Order
+from spheretwin.twin.study.engines.registry import ENGINES
+from spheretwin.twin.study.engines.work import Work
+from spheretwin.twin.study.grid import Grid
 from spheretwin.twin.study.journal import Journal
-from spheretwin.twin.study.row import Result, Rows
+from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
 
 TELEMETRY = "telemetry"
@@ -50,6 +47,9 @@ class Found(NamedTuple):
     checked : int
         Rows that were run on both plants.
     wall_s : float
+    startup_s : float, optional
+        Of it, what went by before the first row was finished: the engine's start, and what is read and
+        compiled once. None where none was run.
     table : Path
     """
 
@@ -62,6 +62,7 @@ class Found(NamedTuple):
     damaged: int
     checked: int
     wall_s: float
+    startup_s: float | None
     table: Path
 
 
@@ -69,6 +70,8 @@ def carried_out(
     study: Study,
     folder: Path,
     *,
+    engine: str,
+    address: str | None,
     threads: int | None,
     limit: int | None,
     done: Callable[[int, int], None],
@@ -76,6 +79,7 @@ def carried_out(
 ) -> Found:
     """Run a study, as `spheretwin.twin.study.run` says."""
     started = time.perf_counter()
+    chosen = _engine(engine, address)
     grid = Grid(study)
     make_folder(folder)
     rows = Rows(study, _telemetry_folder(study, folder))
@@ -83,9 +87,11 @@ def carried_out(
     wanted = min(len(grid), limit or len(grid))
     with Journal(folder / journal.NAME, digest_of(rows), len(grid)) as kept:
         resumed = kept.done(wanted)
-        work = _Work(rows)
+        work = Work(rows)
+        todo = (number for number in range(wanted) if not kept.has(number))
+        order = Order(todo, wanted - resumed, grid, work, threads, address, stop_requested)
         try:
-            _fill(kept, grid, wanted, work, threads, done, stop_requested)
+            first = _fill(kept, wanted, chosen, order, done)
         except BaseException:
             with suppress(SpheretwinError):  # what came first is told, as that the disk is full
                 table.write(folder / table.NAME, grid, kept, rows, wanted)
@@ -101,95 +107,48 @@ def carried_out(
             damaged=kept.damaged,
             checked=len(work.checked),
             wall_s=time.perf_counter() - started,
+            startup_s=None if first is None else first - started,
             table=folder / table.NAME,
         )
 
 
 def _fill(
-    kept: Journal,
-    grid: Grid,
-    wanted: int,
-    work: _Work,
-    threads: int | None,
-    done: Callable[[int, int], None],
-    stop_requested: Callable[[], bool],
-) -> None:
-    """Run what the journal has not yet.
+    kept: Journal, wanted: int, engine: Engine, order: Order, done: Callable[[int, int], None]
+) -> float | None:
+    """Run what the journal has not yet; returns when the first row was finished.
 
     Raises
     ------
     SpheretwinError
         One of the rows has shown that the others cannot be believed; those in flight are finished and kept.
     """
-    todo = (grid[number] for number in range(wanted) if not kept.has(number))
+    work, asked = order.work, order.stop_requested
     finished = kept.done(wanted)
     done(finished, wanted)
-    for row, result in pool.carried_out(todo, work, threads, lambda: bool(work.faults) or stop_requested()):
-        if result is not None:
-            kept.add(row, result)
-            finished += 1
-            done(finished, wanted)
+    first = None
+    stopping = order._replace(stop_requested=lambda: bool(work.faults) or asked())
+    with closing(engine.carried_out(stopping)) as results:
+        for row, result in results:
+            first = first or time.perf_counter()
+            if result is not None:
+                kept.add(row, result)
+                finished += 1
+                done(finished, wanted)
     if work.faults:
         raise work.faults[0]
+    return first
 
 
-def digest_of(rows: Rows) -> str:
-    """Digest of all that results depend on: study, scenario, files, sources and versions.
-
-    Of a file, what is in it, not where it is: a study may be run from anywhere, and its folder may be moved.
-    """
-    study = rows.study.model_dump(mode="json", exclude={"description"})
-    told = json.dumps([study, *_contents(rows), sources_digest(), versions()], sort_keys=True)
-    return hashlib.sha256(told.encode()).hexdigest()
-
-
-def _contents(rows: Rows) -> Iterator[Any]:
-    """Values of the base and of what differs from row to row, with the content of each file for its path."""
-    study = rows.study
-    yield reading.with_files(rows.base.model_dump(mode="json"), _content)
-    named = [(axis.field, value) for axis in study.axis for value in getattr(axis, "values", ())]
-    named += [("controller", dict(law)) for law in study.law]
-    for dotted, value in named:
-        if isinstance(value, str | list | dict):  # a number names no file
-            found = reading.alone(dotted, reading.value_beside(study.folder, dotted, value))
-            yield reading.with_files(found, _content)
-    for name in study.metrics:
-        if is_reference(name):
-            yield _content(study.beside(name), "metrics")
-
-
-def _content(path: str, dotted: str) -> str:
-    if is_reference(path):
-        return f"{facts.digest(dotted, file_of(path))}:{path.rpartition(':')[2]}"
-    return str(facts.digest(dotted, path))
-
-
-class _Work:
-    """Runs a row; some of them on both plants.
-
-    Attributes
-    ----------
-    faults : list of SpheretwinError
-        Why rows have no result: no fault of theirs.
-    checked : list of int
-        Rows that were run on both plants.
-    """
-
-    def __init__(self, rows: Rows) -> None:
-        self._rows = rows
-        self.faults: list[SpheretwinError] = []
-        self.checked: list[int] = []
-
-    def __call__(self, row: Row) -> Result | None:
-        try:
-            result = self._rows.carried_out(row)
-            if result.error is None and self._rows.chooses_plant and agreement.is_checked(row):
-                agreement.check(self._rows, row)
-                self.checked.append(row.number)
-        except SpheretwinError as error:
-            self.faults.append(error)
-            return None
-        return result
+def _engine(name: str, address: str | None) -> Engine:
+    if name not in ENGINES:
+        raise InputError(
+            f"sweep: expected {', '.join(ENGINES)} as engine,"
+            f" received {shown(name)}{did_you_mean(name, ENGINES)}"
+        )
+    if address is not None and not ENGINES[name].takes_address:
+        able = [each for each, engine in ENGINES.items() if engine.takes_address]
+        raise InputError(f"sweep: expected engine {', '.join(able)} for an address, received {name}")
+    return ENGINES[name]
 
 
 def _telemetry_folder(study: Study, folder: Path) -> Path | None:

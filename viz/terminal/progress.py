@@ -45,7 +45,15 @@ def counted(label: str) -> Iterator[Callable[[int, int], None]]:
     """A bar for work that is told how much of it is done, and of how much; gone at the end."""
     with _bars(_Rate(), transient=True) as bars:
         task = bars.add_task(f"{label}: getting ready", total=None)
-        yield lambda done, of: bars.update(task, description=label, completed=done, total=of)
+        before: list[int] = []  # done earlier, which is told first: what does the rest has yet to start
+
+        def told(done: int, of: int) -> None:
+            if not before:
+                before.append(done)
+            named = label if done > before[0] else f"{label}: getting ready"
+            bars.update(task, description=named, completed=done, total=of)
+
+        yield told
 
 
 class _Rate(ProgressColumn):

@@ -70,6 +70,8 @@ def print_study(name: str, found: dict[str, Any], summary: dict[str, Any]) -> No
     for status in sorted({status for each in counts for status in each}):
         table.add_row(status, *(str(each.get(status, 0)) for each in counts))
     style.console().print(table)
+    if found["startup_s"] is not None:
+        style.console().print(f"took   {found['wall_s']:.1f} s, {found['startup_s']:.1f} s of it to start")
     style.console().print(f"table  {escape(found['table'])}", soft_wrap=True)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
 from typing import TypeVar
 
+from spheretwin.twin.study.engines.engine import Engine, Order
 from spheretwin.twin.study.grid import Row
+from spheretwin.twin.study.row import Result
 
 # Rows handed to each thread ahead of time: enough that none waits, few enough that no memory gathers.
 AHEAD = 4
@@ -21,7 +23,7 @@ def carried_out(
     work: Callable[[Row], T],
     threads: int | None = None,
     stop_requested: Callable[[], bool] = lambda: False,
-) -> Iterator[tuple[Row, T]]:
+) -> Generator[tuple[Row, T]]:
     """Results of rows, each as it is finished.
 
     Parameters
@@ -57,3 +59,11 @@ def carried_out(
                     take_off(AHEAD * count - len(flying))
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _of_order(order: Order) -> Generator[tuple[Row, Result | None]]:
+    rows = (order.grid[number] for number in order.numbers)
+    return carried_out(rows, order.work, order.threads, order.stop_requested)
+
+
+ENGINE = Engine(_of_order)
