@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from spheretwin.control.supervision.groups import Groups, tell
 from spheretwin.twin.electronics.driving import faulty as driving
 from spheretwin.twin.electronics.sensing import faulty as sensing
-from spheretwin.twin.faults.plan import FaultPlan
+from spheretwin.twin.faults.plan import NEVER, FaultPlan
 from spheretwin.twin.faults.target import Effects
 
 
@@ -43,6 +43,8 @@ class FaultsAtWork:
 
     def strike(self, tick: int) -> int:
         """Let act what is due at a control tick, and nothing else; returns the next at which others may."""
+        if self._as_of and not len(self._plan):
+            return NEVER  # as most runs are: a tick by itself shall not pay for what nobody planned
         at_work, began_s = self._plan.at_work(tick), self._plan.began_s(tick)
         if (at_work, began_s.tobytes()) != self._as_of:
             self._as_of = at_work, began_s.tobytes()
