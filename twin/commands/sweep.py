@@ -19,7 +19,12 @@ from spheretwin.twin.study.grid import Grid
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study, shipped
 from spheretwin.twin.study.summary import summary
-from spheretwin.viz.terminal import tables
+from spheretwin.twin.study.tuning import drawing
+from spheretwin.twin.study.tuning.gains import section_of
+from spheretwin.twin.study.tuning.running import tuned
+from spheretwin.twin.study.tuning.telling import told as told_of_tuning
+from spheretwin.viz.page.folder import prepare, save_drawings
+from spheretwin.viz.terminal import tables, tunings
 from spheretwin.viz.terminal.progress import counted
 
 MOST_THREADS = 1024
@@ -41,6 +46,10 @@ def add_to(verbs: Any) -> None:
     parser.add_argument("--threads", type=_count, metavar="N", help="as many as there are cores unless given")
     parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
     parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
+    parser.add_argument(
+        "--optimise", action="store_true", help="look for the gains that the study's [optimise] names"
+    )
+    parser.add_argument("--trials", type=_count, metavar="N", help="of each law, with --optimise")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
     parser.set_defaults(run=run)
 
@@ -52,6 +61,10 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             f"command line: expected --out, --threads, --limit, --row or --json, received {' '.join(rest)}"
         )
     study = load(options.study)
+    if options.optimise:
+        return _optimised(study, options)
+    if options.trials:
+        raise InputError("command line: expected --trials with --optimise, received it alone")
     if options.row:
         return _one(study, options.row, options.json)
     with interruptible() as stop_requested, counted(study.name) as done, timers_stopped():
@@ -77,6 +90,37 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             file=sys.stderr,
         )
     return found.rows >= found.of
+
+
+def _optimised(study: Study, options: argparse.Namespace) -> bool:
+    """Look for gains; True when all trials that were wanted are finished."""
+    if options.row or options.limit:
+        raise InputError("command line: expected --optimise without --row and --limit")
+    objectives = section_of(study).objective
+    folder = options.out or Path(f"{study.name}_study")
+    prepare(folder)
+    with interruptible() as stop_requested, counted(study.name, "trials") as done, timers_stopped():
+        found = tuned(
+            study,
+            folder,
+            trials=options.trials,
+            threads=options.threads,
+            done=done,
+            stop_requested=stop_requested,
+        )
+    save_drawings(folder, drawing.drawings(study.name, found, objectives))
+    told = told_of_tuning(found, objectives)
+    if options.json:
+        print_json({**told, "versions": versions()})
+    else:
+        tunings.print_tuning(study.name, told)
+    if found.trials < found.of:
+        print(
+            f"spheretwin: sweep: interrupted after {found.trials} of {found.of} trials;"
+            " the same command goes on from there",
+            file=sys.stderr,
+        )
+    return found.trials >= found.of
 
 
 def _told(found: Found) -> dict[str, Any]:

@@ -1,1 +1,1 @@
-"""Tuning: gains that a sampler proposes, judged by a study's rows, as trials that are kept and gone on with."""
+"""Tuning: gains that a sampler proposes, judged by the rows of a study, as trials that are kept."""

@@ -136,9 +136,9 @@ class Proposer:
             trial.set_user_attr(REASON, tried.reason)
             if not before.constraints:  # known as worse than any that completes
                 trial.set_constraint("completed", 1.0)
-        if tried.ended == Ended.PRUNED and len(self._optimise.objective) == 1:
-            if not before.intermediate_values:
-                trial.report(self._signed(tried.values)[0], len(tried.each))
+        can_report = len(self._optimise.objective) == 1 and not before.intermediate_values
+        if tried.ended == Ended.PRUNED and can_report:  # Optuna takes no reports of two objectives
+            trial.report(self._signed(tried.values)[0], len(tried.each))
         if tried.ended == Ended.COMPLETED:
             self._study.tell(trial, self._signed(tried.values))
         else:
