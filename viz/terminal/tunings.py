@@ -9,6 +9,8 @@ from rich.markup import escape
 from spheretwin.viz.terminal import style
 
 NONE = "–"
+MOST = 15
+"""Of a front that are printed, evenly along it; its table has all."""
 
 
 def print_tuning(name: str, told: dict[str, Any]) -> None:
@@ -16,6 +18,8 @@ def print_tuning(name: str, told: dict[str, Any]) -> None:
     console = style.console()
     for law, of_law in told["laws"].items():
         _print_law(f"{name}, {law}: {_counted(of_law)}", of_law)
+        if len(of_law["best"]) > MOST:
+            console.print(f"{MOST} of {len(of_law['best'])} on the front")
         if of_law["lost"]:
             console.print(f"lost first: {escape(of_law['lost'])}", soft_wrap=True)
         if len(of_law["best"]) == 1:
@@ -34,7 +38,7 @@ def _print_law(title: str, of_law: dict[str, Any]) -> None:
     fresh = [f"{each}, fresh seeds" for each in values] if is_fresh else []
     table = style.table(title, "trial", *gains, *values, *fresh)
     rows = [("start", of_law["start"])] if of_law["start"] else []
-    for label, each in rows + [(str(each["trial"]), each) for each in of_law["best"]]:
+    for label, each in rows + [(str(each["trial"]), each) for each in _some(of_law["best"])]:
         cells = [f"{each['gains'][gain]:.4g}" for gain in gains]
         cells += _cells(each["values"], values, each["ended"])
         cells += _cells(each["fresh"], values, "lost") if is_fresh else []
@@ -44,6 +48,12 @@ def _print_law(title: str, of_law: dict[str, Any]) -> None:
 
 def _cells(found: dict[str, float] | None, names: list[str], otherwise: str) -> list[str]:
     return [f"{found[name]:.4g}" for name in names] if found else [otherwise if names else NONE] * len(names)
+
+
+def _some(best: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    if len(best) <= MOST:
+        return best
+    return [best[round(place * (len(best) - 1) / (MOST - 1))] for place in range(MOST)]
 
 
 def _counted(of_law: dict[str, Any]) -> str:

@@ -1,16 +1,21 @@
-"""The gains of each law of a study, and the fields that follow from their values."""
+"""The gains of each law of a study: the fields that follow from them, and what can be told before a trial."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import did_you_mean
+from spheretwin.models.base.user_code import is_reference
+from spheretwin.models.base.wording import did_you_mean, shown
+from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.study.grid import Row
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.tuning.section import Gain, Optimise
+from spheretwin.twin.study.tuning.trial import with_fields
 
 
 def section_of(study: Study) -> Optimise:
@@ -105,3 +110,48 @@ def start_of(gains: Sequence[Gain]) -> dict[str, float] | None:
     """Values of the first trial; None where none are said."""
     starts = {each.called: each.start for each in gains if each.start is not None}
     return starts if len(starts) == len(gains) else None
+
+
+def judged(study: Study) -> Study:
+    """A study of the figures alone that its trials are judged by.
+
+    Raises
+    ------
+    InputError
+        An objective is no figure of the study.
+    """
+    own = {each.rpartition(":")[2]: each for each in study.metrics if is_reference(each)}
+    names: dict[str, None] = {}
+    for objective in section_of(study).objective:
+        if objective.metric not in METRICS and objective.metric not in own:
+            valid = [*METRICS, *own]
+            raise InputError(
+                f"study {study.name}: expected {', '.join(valid)} as an objective,"
+                f" received {shown(objective.metric)}{did_you_mean(objective.metric, valid)}"
+            )
+        names[own.get(objective.metric, objective.metric)] = None
+    return study.model_copy(
+        update={"metrics": tuple(names), "telemetry": (), "optimise": None, "description": ""}
+    )
+
+
+def check(study: Study, rows: Rows, laws: Sequence[tuple[Sequence[Gain], Row]]) -> None:
+    """Find out whether each law runs with its gains, from those that it starts with on.
+
+    Raises
+    ------
+    InputError
+        A gain sets no field or has no law, or the values that it starts with make no scenario.
+    """
+    check_laws(study, rows)
+    for of_law, row in laws:
+        rows.scenario(with_fields(row, values(of_law, middle(of_law))))
+
+
+def middle(of_law: Sequence[Gain]) -> dict[str, float]:
+    """Values that gains start with, or those in the middle of their ranges where none are said."""
+    return start_of(of_law) or {each.called: _middle(each) for each in of_law}
+
+
+def _middle(gain: Gain) -> float:
+    return math.sqrt(gain.low * gain.high) if gain.log else (gain.low + gain.high) / 2

@@ -149,12 +149,12 @@ class Proposer:
 
     def _of(self, trial: FrozenTrial) -> Kept:
         attributes: dict[str, Any] = trial.user_attrs
-        each = attributes[EACH]
+        each = attributes.get(EACH, [])
         values = [
             objectives.of_rows(objective, [row[place] for row in each], self._rows)
             for place, objective in enumerate(self._optimise.objective)
         ]
-        reason = attributes.get(REASON, "")
+        reason = attributes.get(REASON, "" if EACH in attributes else "told of by another program")
         completed = trial.state == self._optuna.trial.TrialState.COMPLETE
         ended = Ended.LOST if reason else Ended.COMPLETED if completed else Ended.PRUNED
         return Kept(trial.number, trial.params, Tried(ended, reason, values, each))

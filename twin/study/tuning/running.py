@@ -16,7 +16,7 @@ from spheretwin.twin.study.grid import Grid, Row
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.running import digest_of
 from spheretwin.twin.study.study import Study
-from spheretwin.twin.study.tuning import checking, gains, objectives, storage, table, trial
+from spheretwin.twin.study.tuning import gains, objectives, storage, table, trial
 from spheretwin.twin.study.tuning.fresh import Fresh, fresh
 from spheretwin.twin.study.tuning.proposing import Kept, Proposer
 from spheretwin.twin.study.tuning.section import Gain, Optimise
@@ -108,9 +108,9 @@ def tuned(
     """
     started = time.perf_counter()
     optimise = gains.section_of(study)
-    rows = Rows(checking.judged(study))
+    rows = Rows(gains.judged(study))
     laws = [_Law(study, rows, law) for law in study.law or (None,)]
-    checking.check(study, rows, [(each.gains, each.conditions[0]) for each in laws])
+    gains.check(study, rows, [(each.gains, each.conditions[0]) for each in laws])
     make_folder(folder)
     wanted = trials or optimise.trials
     with storage.opened(folder / storage.NAME) as kept:
@@ -215,7 +215,7 @@ class _Law:
 
     def check_plant(self) -> None:
         """Hold the fast plant against MuJoCo: the first row, as it starts."""
-        middle = checking.middle(self.gains)
+        middle = gains.middle(self.gains)
         row = trial.with_fields(self.conditions[0], gains.values(self.gains, middle))
         agreement.check(self._rows, row)
 
