@@ -19,7 +19,6 @@ from spheretwin.twin.study.grid import Grid
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study, shipped
 from spheretwin.twin.study.summary import summary
-from spheretwin.twin.study.tuning import drawing
 from spheretwin.twin.study.tuning.gains import section_of
 from spheretwin.twin.study.tuning.running import tuned
 from spheretwin.twin.study.tuning.telling import told as told_of_tuning
@@ -108,6 +107,8 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
             done=done,
             stop_requested=stop_requested,
         )
+    from spheretwin.twin.study.tuning import drawing  # with matplotlib, slow to import
+
     save_drawings(folder, drawing.drawings(study.name, found, objectives))
     told = told_of_tuning(found, objectives)
     if options.json:

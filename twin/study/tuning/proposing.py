@@ -1,6 +1,6 @@
 """What is tried next: Optuna's samplers, each trial with a stream of its own, so that any run proposes alike.
 
-The sampler of a trial is made anew from the study's seed and the trial's number, and sees the trials of
+The samplers of a trial are made anew from the study's seed and the trial's number, and see the trials of
 earlier batches and what its own batch asked for before it. Nothing else of the process goes into a proposal:
 neither threads nor an interruption change it, a SIGKILL in the middle of a proposal included.
 """
@@ -77,9 +77,10 @@ class Proposer:
         directions = [
             "minimize" if each.direction == "minimise" else "maximize" for each in optimise.objective
         ]
-        self._study = self._optuna.create_study(
-            study_name=law, storage=storage, directions=directions, load_if_exists=True
-        )
+        if law in {each.study_name for each in storage.get_all_studies()}:
+            self._study = self._optuna.load_study(study_name=law, storage=storage)
+        else:
+            self._study = self._optuna.create_study(study_name=law, storage=storage, directions=directions)
         trials = self._study.get_trials(deepcopy=False)
         found = self._study.user_attrs.get(DIGEST)
         if found is None and not trials:
@@ -123,6 +124,8 @@ class Proposer:
         else:
             trial = self._study.ask()
         for gain in self._gains:
+            # Of its own for each gain: those that a killed process had drawn already are not drawn again.
+            self._study.sampler = self._sampler(number, gain.called)
             trial.suggest_float(gain.called, gain.low, gain.high, log=gain.log)
         return trial
 
@@ -159,8 +162,8 @@ class Proposer:
         ended = Ended.LOST if reason else Ended.COMPLETED if completed else Ended.PRUNED
         return Kept(trial.number, trial.params, Tried(ended, reason, values, each))
 
-    def _sampler(self, number: int) -> BaseSampler:
-        digest = hashlib.sha256(f"{self._seed} {self._law} {number}".encode()).digest()
+    def _sampler(self, number: int, gain: str = "") -> BaseSampler:
+        digest = hashlib.sha256(f"{self._seed} {self._law} {number} {gain}".encode()).digest()
         seed = int.from_bytes(digest[:4], "big")
         samplers = self._optuna.samplers
         if self._optimise.sampler == "nsga2":

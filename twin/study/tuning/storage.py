@@ -6,6 +6,7 @@ process was killed is dropped before anything is added behind it.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,7 +56,7 @@ def opened(path: Path) -> Iterator[BaseStorage]:
     module.logging.set_verbosity(module.logging.WARNING)
     try:
         with _held(path) as file:
-            _drop_torn_line(file)
+            _drop_torn_line(file, path)
             yield _read(module, path)
     except OSError as error:
         raise SpheretwinError(
@@ -91,10 +92,15 @@ def _held(path: Path) -> Iterator[BinaryIO]:
         yield file
 
 
-def _drop_torn_line(file: BinaryIO) -> None:
+def _drop_torn_line(file: BinaryIO, path: Path) -> None:
     content = file.read()
-    if not content.endswith(b"\n"):
-        file.truncate(content.rfind(b"\n") + 1)
+    whole = content[: content.rfind(b"\n") + 1]
+    try:
+        if whole:  # Optuna finds any line but the last one itself
+            json.loads(whole[whole[:-1].rfind(b"\n") + 1 :])
+    except ValueError as error:
+        raise _no_trials(path, error) from None
+    file.truncate(len(whole))
 
 
 def _read(module: ModuleType, path: Path) -> BaseStorage:
@@ -104,7 +110,11 @@ def _read(module: ModuleType, path: Path) -> BaseStorage:
     except OSError:
         raise
     except Exception as error:  # whatever its parser meets in a file that is none of its own
-        raise InputError(
-            f"study: expected trials of Optuna, received {path} ({type(error).__name__});"
-            " remove it, or write into another folder"
-        ) from None
+        raise _no_trials(path, error) from None
+
+
+def _no_trials(path: Path, error: Exception) -> InputError:
+    return InputError(
+        f"study: expected trials of Optuna, received {path} ({type(error).__name__});"
+        " remove it, or write into another folder"
+    )

@@ -5,6 +5,7 @@ import math
 import pyarrow.parquet as parquet
 import pytest
 
+from spheretwin.twin.study.grid import Grid
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.tuning import gains, trial
 from spheretwin.twin.study.tuning.running import tuned
@@ -65,7 +66,7 @@ def test_pruning_loses_nothing(tmp_path, objectives, over):
     pruned = [each for each in law.kept if each.tried.ended == Ended.PRUNED]
     assert len(pruned) > 5
     rows = Rows(gains.judged(noisy))
-    conditions = list(gains.Grid(rows.study))
+    conditions = list(Grid(rows.study))
     completed = [each.tried.values for each in law.kept if each.tried.ended == Ended.COMPLETED]
     for each in pruned:
         fields = gains.values(noisy.optimise.gain, each.chosen)
