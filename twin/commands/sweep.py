@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,7 @@ from spheretwin.twin.study.summary import summary
 from spheretwin.twin.study.tuning.gains import section_of
 from spheretwin.twin.study.tuning.running import tuned
 from spheretwin.twin.study.tuning.telling import told as told_of_tuning
-from spheretwin.viz.page.folder import prepare, save_drawings
+from spheretwin.viz.page.folder import save_drawings
 from spheretwin.viz.terminal import tables, tunings
 from spheretwin.viz.terminal.progress import counted
 
@@ -97,8 +99,12 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         raise InputError("command line: expected --optimise without --row and --limit")
     objectives = section_of(study).objective
     folder = options.out or Path(f"{study.name}_study")
-    prepare(folder)
-    with interruptible() as stop_requested, counted(study.name, "trials") as done, timers_stopped():
+    with (
+        interruptible() as stop_requested,
+        counted(study.name, "trials") as done,
+        timers_stopped(),
+        contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
+    ):
         found = tuned(
             study,
             folder,
@@ -107,9 +113,12 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
             done=done,
             stop_requested=stop_requested,
         )
-    from spheretwin.twin.study.tuning import drawing  # with matplotlib, slow to import
+    if find_spec("matplotlib") is None:
+        print("spheretwin: sweep: no figures without the extra `spheretwin[plots]`", file=sys.stderr)
+    else:
+        from spheretwin.twin.study.tuning import drawing  # slow to import
 
-    save_drawings(folder, drawing.drawings(study.name, found, objectives))
+        save_drawings(folder, drawing.drawings(study.name, found, objectives))
     told = told_of_tuning(found, objectives)
     if options.json:
         print_json({**told, "versions": versions()})

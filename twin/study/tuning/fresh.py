@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
@@ -67,6 +68,6 @@ def fresh(
             return None
         return Fresh(tried.reason, tried.values if tried.ended == Ended.COMPLETED else [])
 
-    with ThreadPoolExecutor(threads, thread_name_prefix="fresh") as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count(), thread_name_prefix="fresh") as pool:
         found = zip(fields, pool.map(judged, fields), strict=True)
         return {number: each for number, each in found if each is not None}

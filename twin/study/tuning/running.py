@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -233,7 +234,7 @@ def _fill(
         finished += 1
         done(finished, of)
 
-    with ThreadPoolExecutor(threads, thread_name_prefix="trial") as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count(), thread_name_prefix="trial") as pool:
         for law in laws:
             for place, batch in enumerate(law.batches(wanted)):
                 if stop():

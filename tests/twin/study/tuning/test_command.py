@@ -117,6 +117,15 @@ def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys
         assert word in out
 
 
+def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sweep, "find_spec", lambda name: None)
+    assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
+    out, err = capsys.readouterr()
+    assert json.loads(out)["trials"] == 16
+    assert err == "spheretwin: sweep: no figures without the extra `spheretwin[plots]`\n"
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"trials.jsonl", "trials.parquet"}
+
+
 def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkeypatch):
     tuned = sweep.tuned
 

@@ -5,8 +5,11 @@ import math
 import pyarrow.parquet as parquet
 import pytest
 
+from spheretwin.control.laws.pid import PID
+from spheretwin.twin.study import run
 from spheretwin.twin.study.grid import Grid
 from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import made
 from spheretwin.twin.study.tuning import gains, trial
 from spheretwin.twin.study.tuning.running import tuned
 from spheretwin.twin.study.tuning.trial import Ended
@@ -107,6 +110,31 @@ def test_the_first_trial_is_the_start_and_fresh_seeds_are_others(tmp_path):
     more = best.fresh.values[0] - law.start.fresh.values[0]
     # The same fresh seeds for both: what is between them is the gain alone, but for rounding.
     assert more == pytest.approx(abs(math.log(best.fields["controller.stiffness"] / 300)), abs=1e-12)
+
+
+def test_the_start_is_what_a_sweep_of_the_study_gives(tmp_path):
+    """Same rows, same seeds: at gains that are the law's own, the worst row of the sweep's table."""
+    metric = "max_abs_error_rad"
+    ours = made(
+        {
+            "name": "own",
+            "scenario": "tilt",
+            "fields": {"duration": 0.05, "hardware": "prototype"},
+            "law": [{"law": "pid"}],
+            "axis": [{"field": "plant.payload_kg", "kind": "values", "values": [0.0, 0.05]}],
+            "seeds": 2,
+            "optimise": {
+                "gain": [gain("damping", 50.0, 500.0, start=PID().damping[0])],
+                "objective": [{"metric": metric, "of": ["alpha", "beta"]}],
+            },
+        },
+        "own",
+    )
+    (law,) = tuned(ours, tmp_path, trials=1).laws
+    swept = parquet.read_table(run(ours, tmp_path).table)[metric].to_pylist()
+    assert [each[0] for each in law.start.kept.tried.each] == [max(of_row[:2]) for of_row in swept]
+    assert law.start.kept.tried.values == [max(max(of_row[:2]) for of_row in swept)]
+    assert len({tuple(of_row) for of_row in swept}) == 4
 
 
 def test_a_trial_that_loses_is_told_as_such(tmp_path):
