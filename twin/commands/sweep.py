@@ -59,7 +59,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the verb; True when all rows that were wanted are finished."""
     if rest:
         raise InputError(
-            f"command line: expected --out, --threads, --limit, --row or --json, received {' '.join(rest)}"
+            "command line: expected --out, --threads, --limit, --row, --optimise, --trials or --json,"
+            f" received {' '.join(rest)}"
         )
     study = load(options.study)
     if options.optimise:

@@ -50,7 +50,7 @@ def study(folder: Path, objectives=("exact",), gains=(), seeds=1, **optimise) ->
             "scenario": "hold",
             "fields": {"duration": 0.005, "controller.law": "pd"},
             "seeds": seeds,
-            "metrics": [f"{folder}/figures.py:{each['metric']}" for each in listed],
+            "metrics": [f"{folder}/figures.py:{name}" for name in {each["metric"]: None for each in listed}],
             "optimise": {"gain": list(gains) or [gain()], "objective": listed, **optimise},
         },
         "known",

@@ -4,9 +4,8 @@ import pytest
 
 from spheretwin.control.laws.pid import PID, triple_pole
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.study import load
 from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import made
+from spheretwin.twin.study.study import load, made
 from spheretwin.twin.study.tuning.gains import gains_of, middle, values
 from spheretwin.twin.study.tuning.running import tuned
 from tests.twin.study.tuning.cases import TWO, gain, study
