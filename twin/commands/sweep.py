@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import shlex
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -22,9 +23,9 @@ from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study, shipped
 from spheretwin.twin.study.summary import summary
 from spheretwin.twin.study.tuning.gains import section_of
+from spheretwin.twin.study.tuning.report import page as tuning_page
+from spheretwin.twin.study.tuning.report.telling import told as told_of_tuning
 from spheretwin.twin.study.tuning.running import tuned
-from spheretwin.twin.study.tuning.telling import told as told_of_tuning
-from spheretwin.viz.page.folder import save_drawings
 from spheretwin.viz.terminal import tables, tunings
 from spheretwin.viz.terminal.progress import counted
 
@@ -114,17 +115,17 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
             done=done,
             stop_requested=stop_requested,
         )
+    trials = f" --trials {options.trials}" if options.trials else ""
+    command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
+    written = tuning_page.write(folder, study, found, command, versions())
     if find_spec("matplotlib") is None:
         print("spheretwin: sweep: no figures without the extra `spheretwin[plots]`", file=sys.stderr)
-    else:
-        from spheretwin.twin.study.tuning import drawing  # slow to import
-
-        save_drawings(folder, drawing.drawings(study.name, found, objectives))
     told = told_of_tuning(found, objectives)
     if options.json:
         print_json({**told, "versions": versions()})
     else:
         tunings.print_tuning(study.name, told)
+        tables.print_written(written)
     if found.trials < found.of:
         print(
             f"spheretwin: sweep: interrupted after {found.trials} of {found.of} trials;"

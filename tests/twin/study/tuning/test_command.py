@@ -10,6 +10,7 @@ import pytest
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import cli
 from spheretwin.twin.commands import sweep
+from spheretwin.twin.study.tuning.report import page
 from tests.twin.study.tuning.cases import FIGURES
 
 STUDY = """
@@ -81,7 +82,8 @@ def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
     assert (told["trials"], told["of"], told["resumed"]) == (16, 16, 0)
     assert list(told["laws"]) == ["pd", "pid"]
     files = {path.name for path in (tmp_path / "out").iterdir()}
-    assert files == {"trials.jsonl", "trials.parquet", "trials.png", "front.png"}
+    pages = {"tuning.md", "tuning.html"}
+    assert files == {"trials.jsonl", "trials.parquet", "trials.png", "front.png"} | pages
     table = parquet.read_table(told["table"]).to_pylist()
     for law, of_law in told["laws"].items():
         assert sum(of_law["ended"].values()) == 8
@@ -97,6 +99,22 @@ def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
             assert set(each["fresh"]) == set(each["values"])
     other = {"pd": "pid", "pid": "pd"}
     assert all(row[f"damping of {other[row['law']]}"] is None for row in table)
+
+
+def test_the_page_has_every_law_its_front_and_its_figures(small, tmp_path, capsys):
+    assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
+    laws = json.loads(capsys.readouterr().out)["laws"]
+    text = (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
+    for law, of_law in laws.items():
+        _, _, section = text.partition(f"\n## {law}\n")
+        rows = [
+            line.split("|")[1].strip() for line in section.partition("\n## ")[0].splitlines() if "|" in line
+        ]
+        assert rows[2:] == ["start", *(str(each["trial"]) for each in of_law["best"])]
+    for file in ("trials.png", "front.png"):
+        assert f"]({file})" in text
+        assert file in (tmp_path / "out" / "tuning.html").read_text(encoding="utf-8")
+    assert f"Made by `spheretwin sweep {small} --optimise` with python" in text
 
 
 def test_the_command_that_is_told_runs_the_gains(small, tmp_path, capsys):
@@ -121,12 +139,14 @@ def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys
 
 
 def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(sweep, "find_spec", lambda name: None)
+    for module in (sweep, page):
+        monkeypatch.setattr(module, "find_spec", lambda name: None)
     assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
     out, err = capsys.readouterr()
     assert json.loads(out)["trials"] == 16
     assert err == "spheretwin: sweep: no figures without the extra `spheretwin[plots]`\n"
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"trials.jsonl", "trials.parquet"}
+    assert list((tmp_path / "out").glob("*.png")) == []
+    assert "![" not in (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
 
 
 def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkeypatch):
