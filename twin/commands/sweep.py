@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import shlex
 import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,11 @@ from spheretwin.twin.study.report.summary import summary
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.running import Found
 from spheretwin.twin.study.study import Study, load, shipped
-from spheretwin.viz.terminal import tables
+from spheretwin.twin.study.tuning.gains import section_of
+from spheretwin.twin.study.tuning.report import page as tuning_page
+from spheretwin.twin.study.tuning.report.telling import told as told_of_tuning
+from spheretwin.twin.study.tuning.running import tuned
+from spheretwin.viz.terminal import tables, tunings
 from spheretwin.viz.terminal.progress import counted
 
 MOST_THREADS = 1024
@@ -58,6 +64,10 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
     parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
+    parser.add_argument(
+        "--optimise", action="store_true", help="look for the gains that the study's [optimise] names"
+    )
+    parser.add_argument("--trials", type=_count, metavar="N", help="of each law, with --optimise")
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
     parser.set_defaults(run=run)
 
@@ -66,10 +76,15 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the verb; True when all rows that were wanted are finished."""
     if rest:
         raise InputError(
-            "command line: expected --out, --engine, --address, --threads, --limit, --row or --json,"
+            "command line: expected --out, --engine, --address, --threads, --limit, --row, --optimise,"
+            " --trials or --json,"
             f" received {' '.join(rest)}"
         )
     study = load(options.study)
+    if options.optimise:
+        return _optimised(study, options)
+    if options.trials:
+        raise InputError("command line: expected --trials with --optimise, received it alone")
     if options.row:
         if options.out or options.threads or options.limit:
             raise InputError("command line: expected --row without --out, --threads or --limit")
@@ -113,6 +128,46 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             file=sys.stderr,
         )
     return found.rows >= found.of
+
+
+def _optimised(study: Study, options: argparse.Namespace) -> bool:
+    """Look for gains; True when all trials that were wanted are finished."""
+    if options.row or options.limit:
+        raise InputError("command line: expected --optimise without --row and --limit")
+    objectives = section_of(study).objective
+    folder = options.out or Path(f"{study.name}_study")
+    with (
+        interruptible() as stop_requested,
+        counted(study.name, "trials") as done,
+        timers_stopped(),
+        contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
+    ):
+        found = tuned(
+            study,
+            folder,
+            trials=options.trials,
+            threads=options.threads,
+            done=done,
+            stop_requested=stop_requested,
+        )
+    trials = f" --trials {options.trials}" if options.trials else ""
+    command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
+    written = tuning_page.write(folder, study, found, command, versions())
+    if find_spec("matplotlib") is None:
+        print("spheretwin: sweep: no figures without the extra `spheretwin[plots]`", file=sys.stderr)
+    told = told_of_tuning(found, objectives)
+    if options.json:
+        print_json({**told, "versions": versions()})
+    else:
+        tunings.print_tuning(study.name, told)
+        tables.print_written(written)
+    if found.trials < found.of:
+        print(
+            f"spheretwin: sweep: interrupted after {found.trials} of {found.of} trials;"
+            " the same command goes on from there",
+            file=sys.stderr,
+        )
+    return found.trials >= found.of
 
 
 def _told(found: Found) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.scenario.explaining import explain
 from spheretwin.twin.study.axes.axis import MOST_VALUES, Axis
 from spheretwin.twin.study.axes.registry import AnyAxis
+from spheretwin.twin.study.tuning.section import Optimise
 
 FOLDER = resources.files("spheretwin.twin.study") / "shipped"
 
@@ -68,6 +69,9 @@ class Study(BaseModel):
     )
     telemetry: tuple[Annotated[int, Field(ge=0)], ...] = Field(
         (), description="rows whose telemetry is kept, by number"
+    )
+    optimise: Optimise | None = Field(
+        None, exclude=True, description="gains that --optimise looks for; no part of what a sweep runs"
     )
     fast: bool = Field(
         True, description="whether to run on the Lagrangian plant where the model is a free rotor"

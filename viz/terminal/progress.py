@@ -41,9 +41,9 @@ def runs(label: str, count: int) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def counted(label: str) -> Iterator[Callable[[int, int], None]]:
+def counted(label: str, what: str = "rows") -> Iterator[Callable[[int, int], None]]:
     """A bar for work that is told how much of it is done, and of how much; gone at the end."""
-    with _bars(_Rate(), transient=True) as bars:
+    with _bars(_Rate(what), transient=True) as bars:
         task = bars.add_task(f"{label}: getting ready", total=None)
         before: list[int] = []  # done earlier, which is told first: what does the rest has yet to start
 
@@ -57,10 +57,14 @@ def counted(label: str) -> Iterator[Callable[[int, int], None]]:
 
 
 class _Rate(ProgressColumn):
-    """Rows a second."""
+    """How many a second."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__()
+        self._what = what
 
     def render(self, task: Task) -> Text:
-        return Text("" if task.speed is None else f"{task.speed:.0f} rows/s")
+        return Text("" if task.speed is None else f"{task.speed:.0f} {self._what}/s")
 
 
 class Progress:

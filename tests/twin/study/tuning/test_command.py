@@ -1,0 +1,211 @@
+"""``spheretwin sweep STUDY --optimise``: its two streams, its exit codes, its files."""
+
+import json
+import shlex
+import signal
+
+import pyarrow.parquet as parquet
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import cli
+from spheretwin.twin.commands import sweep
+from spheretwin.twin.study.tuning.report import page
+from tests.twin.study.tuning.cases import FIGURES
+
+STUDY = """
+name = "small"
+scenario = "hold"
+seeds = 2
+metrics = ["figures.py:miss", "figures.py:slowness"]
+
+[fields]
+duration = 0.005
+
+[[law]]
+law = "pd"
+
+[[law]]
+law = "pid"
+
+[optimise]
+trials = 8
+fresh = 2
+
+[[optimise.objective]]
+metric = "miss"
+
+[[optimise.objective]]
+metric = "slowness"
+
+[[optimise.gain]]
+field = "controller.stiffness"
+low = 30.0
+high = 3000.0
+log = true
+start = 100.0
+
+[[optimise.gain]]
+name = "damping of pd"
+field = "controller.damping"
+law = "pd"
+low = 5.0
+high = 500.0
+log = true
+start = 20.0
+
+[[optimise.gain]]
+name = "damping of pid"
+field = "controller.damping"
+law = "pid"
+low = 50.0
+high = 500.0
+log = true
+start = 60.0
+"""
+
+
+@pytest.fixture
+def small(tmp_path):
+    (tmp_path / "figures.py").write_text(FIGURES)
+    path = tmp_path / "small.toml"
+    path.write_text(STUDY)
+    return str(path)
+
+
+def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
+    arguments = ["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out"), "--threads", "2"]
+    assert cli.main(arguments) == cli.DONE
+    out, err = capsys.readouterr()
+    assert err == ""
+    told = json.loads(out)
+    assert (told["trials"], told["of"], told["resumed"]) == (16, 16, 0)
+    assert list(told["laws"]) == ["pd", "pid"]
+    files = {path.name for path in (tmp_path / "out").iterdir()}
+    pages = {"tuning.md", "tuning.html"}
+    assert files == {"trials.jsonl", "trials.parquet", "trials.png", "front.png"} | pages
+    table = parquet.read_table(told["table"]).to_pylist()
+    for law, of_law in told["laws"].items():
+        assert sum(of_law["ended"].values()) == 8
+        assert of_law["start"]["gains"]["controller.stiffness"] == 100.0
+        rows = {row["trial"]: row for row in table if row["law"] == law}
+        assert {each["trial"] for each in of_law["best"]} == {each for each in rows if rows[each]["best"]}
+        for each in of_law["best"]:
+            row = rows[each["trial"]]
+            assert each["values"] == {name: row[name] for name in ("worst miss", "worst slowness")}
+            assert each["values"]["worst miss"] == max(row["worst miss, each row"])
+            assert each["gains"][f"damping of {law}"] == each["fields"]["controller.damping"]
+            assert row["controller.damping"] == row[f"damping of {law}"]
+            assert set(each["fresh"]) == set(each["values"])
+    other = {"pd": "pid", "pid": "pd"}
+    assert all(row[f"damping of {other[row['law']]}"] is None for row in table)
+
+
+def test_the_page_has_every_law_its_front_and_its_figures(small, tmp_path, capsys):
+    assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
+    laws = json.loads(capsys.readouterr().out)["laws"]
+    text = (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
+    for law, of_law in laws.items():
+        _, _, section = text.partition(f"\n## {law}\n")
+        rows = [
+            line.split("|")[1].strip() for line in section.partition("\n## ")[0].splitlines() if "|" in line
+        ]
+        assert rows[2:] == ["start", *(str(each["trial"]) for each in of_law["best"])]
+    for file in ("trials.png", "front.png"):
+        assert f"]({file})" in text
+        assert file in (tmp_path / "out" / "tuning.html").read_text(encoding="utf-8")
+    assert f"Made by `spheretwin sweep {small} --optimise` with python" in text
+
+
+def test_the_command_that_is_told_runs_the_gains(small, tmp_path, capsys):
+    assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
+    best = json.loads(capsys.readouterr().out)["laws"]["pd"]["best"][0]
+    words = shlex.split(best["command"])
+    assert words[:3] == ["spheretwin", "simulate", "hold"]
+    reference = str(tmp_path / "figures.py:miss")
+    more = [] if reference in words else ["--metric", reference]
+    assert cli.main([*words[1:], *more, "--json"]) == cli.DONE
+    told = json.loads(capsys.readouterr().out)
+    row = parquet.read_table(tmp_path / "out" / "trials.parquet").to_pylist()[best["trial"]]
+    assert told["miss"] == row["worst miss, each row"][0]
+
+
+def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys):
+    assert cli.main(["sweep", small, "--optimise", "--out", str(tmp_path / "out")]) == cli.DONE
+    out, err = capsys.readouterr()
+    assert err == ""
+    for word in ("small, pd: ", "small, pid: ", "start", "damping of pid", "fresh", "trials.parquet"):
+        assert word in out
+
+
+def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys, monkeypatch):
+    for module in (sweep, page):
+        monkeypatch.setattr(module, "find_spec", lambda name: None)
+    assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
+    out, err = capsys.readouterr()
+    assert json.loads(out)["trials"] == 16
+    assert err == "spheretwin: sweep: no figures without the extra `spheretwin[plots]`\n"
+    assert list((tmp_path / "out").glob("*.png")) == []
+    assert "![" not in (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
+
+
+def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkeypatch):
+    tuned = sweep.tuned
+
+    def interrupted(*arguments, done, **more):
+        def told(trials, of):
+            if trials == 4:
+                signal.raise_signal(signal.SIGINT)
+            done(trials, of)
+
+        return tuned(*arguments, done=told, **more)
+
+    arguments = ["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out"), "--threads", "1"]
+    with monkeypatch.context() as patch:
+        patch.setattr(sweep, "tuned", interrupted)
+        assert cli.main(arguments) == cli.FAILED
+    out, err = capsys.readouterr()
+    found = json.loads(out)["trials"]
+    assert 4 <= found < 16
+    told = f"spheretwin: sweep: interrupted after {found} of 16 trials; the same command goes on from there\n"
+    assert err == told
+    assert cli.main(arguments) == cli.DONE
+    assert json.loads(capsys.readouterr().out)["resumed"] == found
+
+
+BAD = {
+    "--trials alone": (["tuning", "--trials", "5"], "expected --trials with --optimise, received it alone"),
+    "with a row": (["tuning", "--optimise", "--row", "abc"], "expected --optimise without --row and --limit"),
+    "with a limit": (["tuning", "--optimise", "--limit", "3"], "expected --optimise without --row"),
+    "no gains": (["paper", "--optimise"], "study paper: expected [optimise] in a study that is tuned"),
+    "no number": (["tuning", "--optimise", "--trials", "0"], "expected a whole number from 1 on"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_is_refused_in_a_line(case, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments, told = BAD[case]
+    assert cli.main(["sweep", *arguments]) == cli.BAD_INPUT
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert told in err
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sweep_of_the_same_study_leaves_its_gains_alone(small, tmp_path, capsys):
+    """What [optimise] says is no part of a sweep: its journal is gone on with when it changes."""
+    arguments = ["sweep", small, "--json", "--out", str(tmp_path / "out"), "--threads", "1"]
+    assert cli.main(arguments) == cli.DONE
+    assert json.loads(capsys.readouterr().out)["resumed"] == 0
+    (tmp_path / "small.toml").write_text(STUDY.replace("trials = 8", "trials = 9"))
+    assert cli.main(arguments) == cli.DONE
+    assert json.loads(capsys.readouterr().out)["resumed"] == 4
+
+
+def test_a_bad_section_is_refused_by_name(small, tmp_path):
+    (tmp_path / "small.toml").write_text(STUDY.replace('metric = "miss"', 'metrik = "miss"'))
+    with pytest.raises(InputError) as refusal:
+        sweep.load(small)
+    assert "optimise.objective.0.metric: expected a value, received none" in str(refusal.value)

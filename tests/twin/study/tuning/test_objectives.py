@@ -1,0 +1,50 @@
+"""What is certain of a trial's objectives before all of its rows are known."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.twin.study.tuning import objectives
+from spheretwin.twin.study.tuning.section import Objective
+
+VALUES = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=9)
+OVER = st.sampled_from(["worst", "median"])
+
+
+@given(VALUES, OVER)
+def test_an_objective_over_all_rows_is_what_its_name_says(values, over):
+    objective = Objective(metric="copper_loss_J", over=over)
+    slow = np.max(values) if over == "worst" else np.median(values)
+    # A median of an even number is a mean of two, which NumPy rounds otherwise: by some units of 1e6 · 2⁻⁵³.
+    assert objectives.of_rows(objective, values, len(values)) == pytest.approx(slow, rel=1e-12, abs=1e-9)
+
+
+@given(VALUES, OVER, st.data())
+def test_what_is_certain_is_never_above_what_comes(values, over, data):
+    objective = Objective(metric="copper_loss_J", over=over)
+    known = data.draw(st.integers(0, len(values) - 1))
+    whole = objectives.of_rows(objective, values, len(values))
+    bounds = [objectives.of_rows(objective, values[:k], len(values)) for k in range(known, len(values))]
+    assert [*bounds, whole] == sorted([*bounds, whole])
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3)), min_size=2, max_size=2))
+def test_one_dominates_where_it_is_never_worse_and_not_the_same(pair):
+    one, other = pair
+    slow = one != other and max(a - b for a, b in zip(one, other, strict=True)) <= 0
+    assert objectives.dominates(one, other) == slow
+
+
+def test_of_a_figure_of_each_hinge_the_worst_of_its_entries_is_taken():
+    figure = [0.1, 0.3, 0.9]
+    of_two = {"metric": "max_abs_error_rad", "of": ("alpha", "beta")}
+    assert objectives.of_row(Objective(**of_two), figure) == 0.3
+    assert objectives.of_row(Objective(metric="max_abs_error_rad"), figure) == 0.9
+    # To be large: the smallest is the worst, and all signs are changed.
+    assert objectives.of_row(Objective(**of_two, direction="maximise"), figure) == -0.1
+
+
+@pytest.mark.parametrize("figure", [None, [], [0.1, None, 0.2], float("nan"), float("inf"), True, "0.1", {}])
+def test_what_is_no_number_is_none(figure):
+    assert objectives.of_row(Objective(metric="max_abs_error_rad"), figure) is None

@@ -1,0 +1,251 @@
+"""A tuning from its first trial to its table: laws one after the other, trials of a batch side by side."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from spheretwin.models.base.files import make_folder
+from spheretwin.twin.study import agreement
+from spheretwin.twin.study.basis import digest_of
+from spheretwin.twin.study.grid import Grid, Row
+from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import Study
+from spheretwin.twin.study.tuning import gains, objectives, storage, table, trial
+from spheretwin.twin.study.tuning.fresh import Fresh, fresh
+from spheretwin.twin.study.tuning.proposing import Kept, Proposer
+from spheretwin.twin.study.tuning.section import Gain, Optimise
+from spheretwin.twin.study.tuning.trial import Ended
+
+Stop = Callable[[], bool]
+
+
+class Chosen(NamedTuple):
+    """A trial that is told of."""
+
+    kept: Kept
+    fields: Mapping[str, float]
+    """Value of each field that its gains set."""
+    fresh: Fresh | None
+    """What it gives under seeds that no trial was chosen by."""
+    command: str
+    """Command line that runs its first row."""
+
+
+class OfLaw(NamedTuple):
+    """What was found of one law."""
+
+    law: str
+    kept: Sequence[Kept]
+    start: Chosen | None
+    """The first trial, where the study says what it is."""
+    best: Sequence[Chosen]
+    """One trial, or the front from the best of the first objective to that of the second."""
+
+
+class Found(NamedTuple):
+    """What a tuning left.
+
+    Attributes
+    ----------
+    laws : sequence of OfLaw
+    trials : int
+        Finished, those of earlier runs included.
+    of : int
+        Wanted.
+    resumed : int
+        Trials that were there already.
+    wall_s : float
+    table : Path
+    """
+
+    laws: Sequence[OfLaw]
+    trials: int
+    of: int
+    resumed: int
+    wall_s: float
+    table: Path
+
+
+def tuned(
+    study: Study,
+    folder: Path,
+    *,
+    trials: int | None = None,
+    threads: int | None = None,
+    done: Callable[[int, int], None] = lambda trials, of: None,
+    stop_requested: Stop = lambda: False,
+) -> Found:
+    """Look for the gains of each law of a study.
+
+    Parameters
+    ----------
+    study : Study
+        With ``[optimise]``.
+    folder : Path
+        For storage and table. Where trials of the same study are there already, it goes on behind them.
+    trials : int, optional
+        Of each law; the study's unless given. More are the same and some more, where the number before was a
+        multiple of those proposed together.
+    threads : int, optional
+        As many as there are cores unless given; what is found does not depend on it.
+    done : callable
+        Told of the trials that are finished, and of how many there are.
+    stop_requested : callable
+        True ends it when the rows in flight are finished.
+
+    Raises
+    ------
+    InputError
+        The study, the scenario or the folder cannot be used.
+    SpheretwinError
+        The first row differs between the plants, or a file could not be written; what is finished is kept.
+    """
+    started = time.perf_counter()
+    optimise = gains.section_of(study)
+    rows = Rows(gains.judged(study))
+    laws = [_Law(study, rows, law) for law in study.law or (None,)]
+    gains.check(study, rows, [(each.gains, each.conditions[0]) for each in laws])
+    make_folder(folder)
+    wanted = trials or optimise.trials
+    with storage.opened(folder / storage.NAME) as kept:
+        digest = _digest(rows, optimise)
+        for law in laws:
+            law.proposer = Proposer(
+                kept, law.called, digest, law.gains, optimise, study.seed, len(law.conditions)
+            )
+        resumed = sum(len(law.proposer.kept) for law in laws)
+        try:
+            _fill(laws, wanted, threads, done, stop_requested)
+        finally:
+            found = [(law.called, law.gains, law.proposer.kept, law.proposer.best) for law in laws]
+            table.write(folder / table.NAME, study, rows, found)
+        told = [law.found(threads, stop_requested) for law in laws]
+    return Found(
+        laws=told,
+        trials=sum(len(law.kept) for law in told),
+        of=max(wanted * len(laws), sum(len(law.kept) for law in told)),
+        resumed=resumed,
+        wall_s=time.perf_counter() - started,
+        table=folder / table.NAME,
+    )
+
+
+class _Law:
+    """Runs trials of one law."""
+
+    proposer: Proposer
+
+    def __init__(self, study: Study, rows: Rows, law: Mapping[str, Any] | None) -> None:
+        self._rows, self._study, self._law = rows, study, law
+        self._optimise: Optimise = gains.section_of(study)
+        self.called = gains.called(law, rows)
+        self.gains: tuple[Gain, ...] = gains.gains_of(study, law, rows)
+        self.conditions: list[Row] = [row for row in Grid(rows.study) if row.law == law]
+
+    def batches(self, wanted: int) -> Iterator[range]:
+        """Numbers of the trials that are proposed together and not all finished."""
+        finished = {each.number for each in self.proposer.kept}
+        for first in range(0, wanted, self._optimise.together):
+            batch = range(first, min(first + self._optimise.together, wanted))
+            if not finished.issuperset(batch):
+                yield batch
+
+    def run(
+        self, batch: range, pool: ThreadPoolExecutor, stop_requested: Stop, told: Callable[[], None]
+    ) -> None:
+        """Run what is not finished of a batch."""
+        kept = self.proposer.kept
+        finished = {each.number for each in kept}
+        before = [
+            each.tried.values
+            for each in kept
+            if each.number < batch.start and each.tried.ended == Ended.COMPLETED
+        ]
+
+        def has_lost(values: Sequence[float]) -> bool:
+            return self._optimise.prune and any(objectives.dominates(each, values) for each in before)
+
+        proposed = [self.proposer.propose(number) for number in batch if number not in finished]
+        flying = {
+            pool.submit(
+                trial.carried_out,
+                self._rows,
+                self.conditions,
+                gains.values(self.gains, each.params),
+                self._optimise.objective,
+                has_lost,
+                stop_requested,
+            ): each
+            for each in proposed
+        }
+        try:
+            for future in as_completed(flying):
+                tried = future.result()
+                if tried is not None:
+                    self.proposer.tell(flying[future], tried)
+                    told()
+        finally:
+            for future in flying:
+                future.cancel()
+
+    def found(self, threads: int | None, stop_requested: Stop) -> OfLaw:
+        """What is told of the law: its start and its best, under fresh seeds too."""
+        kept = {each.number: each for each in self.proposer.kept}
+        has_start = gains.start_of(self.gains) is not None and 0 in kept
+        numbers = dict.fromkeys([*([0] if has_start else []), *self.proposer.best])
+        fields = {number: gains.values(self.gains, kept[number].chosen) for number in numbers}
+        judged = fresh(self._rows, self._law, self._optimise, fields, threads, stop_requested)
+        chosen = {
+            number: Chosen(
+                kept[number],
+                fields[number],
+                judged.get(number),
+                self._rows.command(trial.with_fields(self.conditions[0], fields[number])),
+            )
+            for number in numbers
+        }
+        best = [chosen[number] for number in self.proposer.best]
+        return OfLaw(self.called, list(kept.values()), chosen[0] if has_start else None, best)
+
+    def check_plant(self) -> None:
+        """Hold the fast plant against MuJoCo: the first row, as it starts."""
+        middle = gains.middle(self.gains)
+        row = trial.with_fields(self.conditions[0], gains.values(self.gains, middle))
+        agreement.check(self._rows, row)
+
+
+def _fill(
+    laws: Sequence[_Law], wanted: int, threads: int | None, done: Callable[[int, int], None], stop: Stop
+) -> None:
+    """Run the trials that are not there yet."""
+    of = wanted * len(laws)
+    finished = sum(min(len(law.proposer.kept), wanted) for law in laws)
+    done(finished, of)
+
+    def told() -> None:
+        nonlocal finished
+        finished += 1
+        done(finished, of)
+
+    with ThreadPoolExecutor(threads or os.cpu_count(), thread_name_prefix="trial") as pool:
+        for law in laws:
+            for place, batch in enumerate(law.batches(wanted)):
+                if stop():
+                    return
+                if place == 0:
+                    law.check_plant()
+                law.run(batch, pool, stop, told)
+
+
+def _digest(rows: Rows, optimise: Optimise) -> str:
+    """Digest of all that a trial depends on; how many there are, and how they are told of, is none of it."""
+    section = optimise.model_dump(mode="json", exclude={"trials", "fresh"})
+    told = json.dumps([digest_of(rows), section, storage.optuna().__version__], sort_keys=True)
+    return hashlib.sha256(told.encode()).hexdigest()
