@@ -8,7 +8,7 @@ import pytest
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.commands import simulate
+from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.commands.outputs import Outputs
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow
@@ -42,7 +42,7 @@ def test_signals_that_the_parent_has_ignored_stay_ignored():
     before = {number: signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)}
     try:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
-        with simulate._interruptible() as asked:
+        with interruptible() as asked:
             os.kill(os.getpid(), signal.SIGHUP)
             assert not asked()
             os.kill(os.getpid(), signal.SIGTERM)
