@@ -15,6 +15,8 @@ import os
 import secrets
 import signal
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Generator, Iterator
 from typing import Any
@@ -52,6 +54,11 @@ MOST_SILENCES = 5
 """Looks in a row that find no cluster, or no core in it, before it is given up."""
 
 REACH_S = 5.0
+
+CONNECT_S = 60.0
+
+# Where what answers is no cluster, or one that has another address for itself, Ray asks it again for ever.
+PROBE = "import ray, sys; ray.init(address=sys.argv[1], log_to_driver=False, configure_logging=False)"
 
 
 def carried_out(order: Order) -> Generator[tuple[Row, Result | None]]:
@@ -190,6 +197,7 @@ def _connected(ray: Any, order: Order) -> Iterator[None]:
     """A cluster: the one at the address, or one on this machine that ends with the sweep."""
     quiet = {"log_to_driver": False, "configure_logging": False}
     logging.getLogger("ray").setLevel(logging.CRITICAL)
+    ray._private.worker._worker_logs_enabled = False  # what a lost node had to say, on the driver's stdout
     if order.address is not None:
         _check_reachable(order.address)
     before = signal.getsignal(signal.SIGTERM)
@@ -222,7 +230,7 @@ def _where(address: str | None) -> str:
 
 
 def _check_reachable(address: str) -> None:
-    """Find out within seconds what takes Ray minutes.
+    """Find out within a minute what Ray finds out in many, or never.
 
     Raises
     ------
@@ -236,6 +244,17 @@ def _check_reachable(address: str) -> None:
         )
     if address != "auto" and not _answers(address):
         raise InputError(f"sweep: expected a Ray cluster at {address}, received no answer")
+    command = [sys.executable, "-c", PROBE, address]
+    try:
+        probe = subprocess.run(command, capture_output=True, text=True, timeout=CONNECT_S, check=False)
+    except subprocess.TimeoutExpired:
+        raise InputError(
+            f"sweep: expected a Ray cluster at {address}, received an answer, but none of Ray's within"
+            f" {CONNECT_S:g} s"
+        ) from None
+    if probe.returncode:
+        last = (probe.stderr.strip().splitlines() or ["nothing"])[-1]
+        raise InputError(f"sweep: expected a Ray cluster at {address}, received {last}")
 
 
 def _answers(address: str) -> bool:
