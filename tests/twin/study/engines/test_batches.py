@@ -1,5 +1,7 @@
 """Batches: every row once, a second each, and back again when they are lost."""
 
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,7 +30,7 @@ def test_every_row_lands_once_whatever_is_lost(count, at_a_time, row_s, losses):
 def test_a_batch_grows_until_it_lasts_a_second(row_s):
     cut = Batches(iter(range(10**9)), 10**9)
     sizes = [len(cut.next(1)) for _ in range(12) if cut.landed(cut.rows, cut.rows * row_s) is None]
-    assert all(after <= 2 * before for before, after in zip(sizes, sizes[1:], strict=False))
+    assert all(after <= 2 * before for before, after in pairwise(sizes))
     # Rounded down to whole rows, and twelve doublings reach a thousand.
     assert batches.TASK_S - row_s <= sizes[-1] * row_s <= batches.TASK_S * (1 + 1e-9)
 

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[4]
 STUDY = """
 name = "small"
 scenario = "sinusoid"
-samples = 300
+samples = 600
 telemetry = [7]
 [fields]
 duration = 0.5
@@ -38,7 +38,7 @@ kind = "values"
 values = [0.0, 1.0]
 """
 
-ROWS = 600
+ROWS = 1200
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,10 @@ def machines():
     cluster._ray(local=True)
     from ray.cluster_utils import Cluster
 
-    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    # A killed node is missed within seconds, not a quarter of a minute.
+    missed = {"health_check_period_ms": 500, "health_check_failure_threshold": 4}
+    head = {"num_cpus": 1, "include_dashboard": False, "_system_config": missed}
+    nodes = Cluster(initialize_head=True, head_node_args=head)
     nodes.add_node(num_cpus=1)
     yield nodes
     nodes.shutdown()
@@ -210,25 +213,48 @@ def test_an_installation_without_ray_names_the_extra(study, tmp_path, monkeypatc
         studies.run(study, tmp_path, engine="ray")
 
 
-def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, wanted, tmp_path):
-    source = tmp_path / "small.toml"
-    source.write_text(STUDY)
-    folder = tmp_path / "out"
+def started(source, folder, *options):
+    """The command line in a process of its own, when ten rows are in its journal."""
     program = "import sys; from spheretwin.twin.cli import main; sys.exit(main(sys.argv[1:]))"
-    command = [sys.executable, "-c", program, "sweep", str(source), "--engine", "ray", "--threads", "1"]
-    going = subprocess.Popen(
-        [*command, "--out", str(folder)], stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+    command = [sys.executable, "-c", program, "sweep", str(source), "--out", str(folder), "--engine", "ray"]
+    going = subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True)
     path = folder / journal.NAME
-    while going.poll() is None and (not path.exists() or path.read_bytes().count(b"\n") < 10):
-        time.sleep(0.05)
+    while going.poll() is None and (not path.exists() or path.read_bytes().count(b"\n") <= 10):
+        time.sleep(0.02)
+    return going
+
+
+def check_it_goes_on(study, folder, wanted):
+    before = (folder / journal.NAME).read_bytes()
+    found = studies.run(study, folder)
+    assert 10 <= found.resumed < ROWS
+    assert (folder / journal.NAME).read_bytes().startswith(before)
+    assert same_table(folder, wanted)
+
+
+@pytest.fixture
+def source(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, source, wanted, tmp_path):
+    going = started(source, tmp_path / "out", "--threads", "1")
     os.killpg(going.pid, signal.SIGINT)  # as a terminal does it, to all that it runs
     told = going.communicate()[1]
     assert going.returncode == 1
     assert "the same command goes on from there" in told
     assert "Traceback" not in told
-    before = path.read_bytes()
-    found = studies.run(study, folder)
-    assert 10 <= found.resumed < ROWS
-    assert path.read_bytes().startswith(before)
-    assert same_table(folder, wanted)
+    check_it_goes_on(study, tmp_path / "out", wanted)
+
+
+# The last one: it leaves no cluster.
+def test_a_cluster_that_is_lost_is_told_of_in_one_line(study, source, machines, wanted, tmp_path):
+    going = started(source, tmp_path / "out", "--threads", "1", "--address", machines.address)
+    machines.head_node.kill_gcs_server(check_alive=False)
+    told = going.communicate()[1]
+    assert going.returncode == 1
+    (line,) = told.splitlines()
+    assert "expected the cluster to stay, received no answer from it any more" in line
+    check_it_goes_on(study, tmp_path / "out", wanted)
