@@ -15,7 +15,10 @@ import os
 import secrets
 import signal
 import socket
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Generator, Iterator
 from typing import Any
 
@@ -30,7 +33,6 @@ from spheretwin.twin.study.row import Result
 # Whoever runs a sweep hears of it from the sweep; nobody else does.
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_BACKEND_LOG_LEVEL": "fatal",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # else it warns of accelerators, which nothing here uses
 }
 
@@ -45,13 +47,18 @@ OBJECTS_BYTES = 100_000_000
 AHEAD = 2
 """Batches a core: one runs, one waits."""
 
-WAIT_S = 1.0
-"""How long to wait for a batch before looking whether there is still somebody to wait for."""
+LOOK_S = 1.0
+"""How often to look whether there is still a cluster to wait for."""
 
-MOST_SILENCES = 5
+MOST_SILENCES = 3
 """Looks in a row that find no cluster, or no core in it, before it is given up."""
 
 REACH_S = 5.0
+
+CONNECT_S = 60.0
+
+# Where what answers is no cluster, or one that has another address for itself, Ray asks it again for ever.
+PROBE = "import ray, sys; ray.init(address=sys.argv[1], log_to_driver=False, configure_logging=False)"
 
 
 def carried_out(order: Order) -> Generator[tuple[Row, Result | None]]:
@@ -86,8 +93,14 @@ class _Cluster:
         # What is lost comes back to `Batches`, which knows how often; Ray itself repeats nothing.
         self._task = ray.remote(num_cpus=1, max_retries=0)(worker.carried_out)
         self._flying: dict[Any, list[int]] = {}
-        self._silences = 0
+        self._silences, self._looked_s = 0, time.monotonic()
         self._cores = self._most()
+        context = ray.get_runtime_context()
+        (ours,) = (node for node in ray.nodes() if node["NodeID"] == context.get_node_id())
+        self._lifelines = (
+            context.gcs_address,
+            f"{ours['NodeManagerAddress']}:{ours['NodeManagerPort']}",
+        )
 
     def results(self) -> Iterator[tuple[Row, Result | None]]:
         while True:
@@ -95,8 +108,8 @@ class _Cluster:
                 self._take_off()
             if not self._flying:
                 return
-            ready, _ = self._ray.wait(list(self._flying), timeout=WAIT_S)
-            if not ready:
+            ready, _ = self._ray.wait(list(self._flying), timeout=LOOK_S)
+            if time.monotonic() - self._looked_s >= LOOK_S:
                 self._look()
             for task in ready:
                 yield from self._land(task)
@@ -122,7 +135,6 @@ class _Cluster:
         except errors.RayError as error:  # node, process or memory is gone
             self._lose(batch, error)
             return
-        self._silences = 0
         self._batches.landed(len(batch), landed.wall_s)
         self._order.work.checked += landed.checked
         for number, result in landed.results:
@@ -139,14 +151,15 @@ class _Cluster:
             )
 
     def _look(self) -> None:
-        """See whether anybody is still at work, where nothing has come back for a while.
+        """See whether head and own node are still there.
 
         Raises
         ------
         SpheretwinError
-            The cluster is gone. Ray itself would end this process after a minute of it.
+            One is gone. Ray itself would end this process for it some time later, without a word.
         """
-        is_there = _answers(self._ray.get_runtime_context().gcs_address)
+        self._looked_s = time.monotonic()
+        is_there = all(map(_answers, self._lifelines))
         self._cores = self._most() if is_there else 0
         self._silences = 0 if self._cores else self._silences + 1
         if self._silences >= MOST_SILENCES:
@@ -190,6 +203,7 @@ def _connected(ray: Any, order: Order) -> Iterator[None]:
     """A cluster: the one at the address, or one on this machine that ends with the sweep."""
     quiet = {"log_to_driver": False, "configure_logging": False}
     logging.getLogger("ray").setLevel(logging.CRITICAL)
+    ray._private.worker._worker_logs_enabled = False  # what a lost node had to say, on the driver's stdout
     if order.address is not None:
         _check_reachable(order.address)
     before = signal.getsignal(signal.SIGTERM)
@@ -222,7 +236,7 @@ def _where(address: str | None) -> str:
 
 
 def _check_reachable(address: str) -> None:
-    """Find out within seconds what takes Ray minutes.
+    """Find out within a minute what Ray finds out in many, or never.
 
     Raises
     ------
@@ -236,6 +250,17 @@ def _check_reachable(address: str) -> None:
         )
     if address != "auto" and not _answers(address):
         raise InputError(f"sweep: expected a Ray cluster at {address}, received no answer")
+    command = [sys.executable, "-c", PROBE, address]
+    try:
+        probe = subprocess.run(command, capture_output=True, text=True, timeout=CONNECT_S, check=False)
+    except subprocess.TimeoutExpired:
+        raise InputError(
+            f"sweep: expected a Ray cluster at {address}, received an answer, but none of Ray's within"
+            f" {CONNECT_S:g} s"
+        ) from None
+    if probe.returncode:
+        last = (probe.stderr.strip().splitlines() or ["nothing"])[-1]
+        raise InputError(f"sweep: expected a Ray cluster at {address}, received {last}")
 
 
 def _answers(address: str) -> bool:

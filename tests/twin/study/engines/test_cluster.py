@@ -56,7 +56,10 @@ def machines():
     cluster._ray(local=True)
     from ray.cluster_utils import Cluster
 
-    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    # A killed node is missed within seconds, not a quarter of a minute.
+    missed = {"health_check_period_ms": 500, "health_check_failure_threshold": 4}
+    head = {"num_cpus": 1, "include_dashboard": False, "_system_config": missed}
+    nodes = Cluster(initialize_head=True, head_node_args=head)
     nodes.add_node(num_cpus=1)
     yield nodes
     nodes.shutdown()
@@ -105,3 +108,146 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
     lines = (tmp_path / journal.NAME).read_text().splitlines()
     assert len(lines) == 1 + ROWS  # its head, and each row once
     assert same_table(tmp_path, wanted)
+
+
+def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
+    carried_out = worker.carried_out
+
+    def of_plants_that_differ(job, numbers):
+        from spheretwin.twin.study import agreement
+        from spheretwin.twin.study.engines import worker
+
+        agreement.BOUND = -1.0  # in the process of a node
+        return worker.carried_out(job, numbers)
+
+    monkeypatch.setattr(worker, "carried_out", of_plants_that_differ)
+    with pytest.raises(SpheretwinError, match="to be the same on both plants"):
+        run(study, tmp_path, machines)
+    monkeypatch.setattr(worker, "carried_out", carried_out)
+    assert (tmp_path / "table.parquet").exists()
+    assert len((tmp_path / journal.NAME).read_text().splitlines()) < 1 + ROWS
+
+
+def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path, monkeypatch):
+    monkeypatch.setattr(batches, "MOST_LOSSES", 1)
+    (tmp_path / "own.py").write_text("import os\n\n\ndef dies(run):\n    os._exit(1)\n")
+    fatal = study.model_copy(update={"metrics": (f"{tmp_path}/own.py:dies",), "telemetry": ()})
+    with pytest.raises(SpheretwinError, match="expected row 0 to leave its process alive, received Worker"):
+        run(fatal, tmp_path / "out", machines, limit=1)
+
+
+# A copy of the package is found before the installed one, whichever way that is installed.
+FIRST = """
+import sys
+
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]
+"""
+
+
+def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wanted, tmp_path):
+    package = tmp_path / "other" / "spheretwin"
+    for name in ("models", "control", "viz", "twin"):
+        shutil.copytree(ROOT / name, package / name, ignore=shutil.ignore_patterns("__pycache__"))
+    with (package / "twin" / "loop.py").open("a") as file:
+        file.write("# another one\n")
+    (tmp_path / "other" / "sitecustomize.py").write_text(FIRST)
+    environment = {"PYTHONPATH": str(tmp_path / "other")}
+    other = machines.add_node(num_cpus=1, env_vars=environment)
+    try:
+        with pytest.raises(SpheretwinError, match="received other sources; none of its rows") as refusal:
+            run(study, tmp_path / "out", machines)
+    finally:
+        machines.remove_node(other)
+    assert "\n" not in str(refusal.value)
+    kept, of_threads = (
+        (folder / journal.NAME).read_text().splitlines() for folder in (tmp_path / "out", wanted)
+    )
+    assert set(kept) <= set(of_threads)
+
+
+def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
+    studies.run(study, tmp_path, limit=20)
+    kept = (tmp_path / journal.NAME).read_bytes()
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{unused.getsockname()[1]}"
+        with pytest.raises(InputError, match=f"at {address}, received no answer"):
+            studies.run(study, tmp_path, engine="ray", address=address)
+    assert (tmp_path / journal.NAME).read_bytes() == kept
+    found = run(study, tmp_path, machines)
+    assert (found.rows, found.resumed) == (ROWS, 20)
+    assert same_table(tmp_path, wanted)
+
+
+def test_who_answers_but_is_no_cluster_is_refused(study, tmp_path, monkeypatch):
+    # The probe of one that is silent for ever is cut off: how soon makes no difference.
+    monkeypatch.setattr(cluster, "CONNECT_S", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(InputError, match="received an answer, but none of Ray's within 1 s"):
+            studies.run(study, tmp_path, engine="ray", address=address)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"engine": "rya"}, "expected threads, ray as engine, received 'rya'; did you mean ray"),
+        ({"address": "auto"}, "expected engine ray for an address, received threads"),
+        ({"engine": "ray", "address": "ray://there:10001"}, "expected auto, HOST or HOST:PORT"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(study, tmp_path, options, told):
+    with pytest.raises(InputError) as refusal:
+        studies.run(study, tmp_path, **options)
+    assert told in str(refusal.value)
+
+
+def test_an_installation_without_ray_names_the_extra(study, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(InputError, match=r"expected the extra `spheretwin\[cluster\]`"):
+        studies.run(study, tmp_path, engine="ray")
+
+
+def started(source, folder, *options):
+    """The command line in a process of its own, when ten rows are in its journal."""
+    program = "import sys; from spheretwin.twin.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", program, "sweep", str(source), "--out", str(folder), "--engine", "ray"]
+    going = subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    path = folder / journal.NAME
+    while going.poll() is None and (not path.exists() or path.read_bytes().count(b"\n") <= 10):
+        time.sleep(0.02)
+    return going
+
+
+def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, wanted, tmp_path):
+    source = tmp_path / "small.toml"
+    source.write_text(STUDY)
+    going = started(source, tmp_path / "out", "--threads", "1")
+    os.killpg(going.pid, signal.SIGINT)  # as a terminal does it, to all that it runs
+    told = going.communicate()[1]
+    assert going.returncode == 1
+    assert "the same command goes on from there" in told
+    assert "Traceback" not in told
+    before = (tmp_path / "out" / journal.NAME).read_bytes()
+    found = studies.run(study, tmp_path / "out")
+    assert 10 <= found.resumed < ROWS
+    assert (tmp_path / "out" / journal.NAME).read_bytes().startswith(before)
+    assert same_table(tmp_path / "out", wanted)
+
+
+# The last one: it leaves no cluster.
+def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
+    source = tmp_path / "long.toml"
+    source.write_text(STUDY.replace("samples = 300", "samples = 100_000"))  # not done before it is missed
+    going = started(source, tmp_path / "out", "--threads", "1", "--address", machines.address)
+    machines.head_node.kill_gcs_server(check_alive=False)
+    told = going.communicate()[1]
+    assert going.returncode == 1
+    (line,) = told.splitlines()
+    assert "expected the cluster to stay, received no answer from it any more" in line
+    before = (tmp_path / "out" / journal.NAME).read_bytes()
+    found = studies.run(str(source), tmp_path / "out", limit=60)
+    assert found.resumed >= 10
+    assert (tmp_path / "out" / journal.NAME).read_bytes().startswith(before)
+    studies.run(str(source), tmp_path / "threads", limit=60)
+    assert same_table(tmp_path / "out", tmp_path / "threads")
