@@ -1,13 +1,20 @@
 """Sweeps on a Ray cluster of two nodes: the same table, whatever happens to it on the way."""
 
 import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.twin import study as studies
 from spheretwin.twin.study import journal
-from spheretwin.twin.study.engines import batches, cluster
+from spheretwin.twin.study.engines import batches, cluster, worker
 from spheretwin.twin.study.study import Study, load
 
 ROOT = Path(__file__).parents[4]
