@@ -52,7 +52,9 @@ class _Rate(ProgressColumn):
     """Rows a second."""
 
     def render(self, task: Task) -> Text:
-        return Text("" if task.speed is None else f"{task.speed:.0f} rows/s")
+        if task.speed is None:
+            return Text("")
+        return Text(f"{task.speed:.0f} rows/s" if task.speed >= 10 else f"{task.speed:.2g} rows/s")
 
 
 class Progress:
