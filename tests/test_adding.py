@@ -318,6 +318,31 @@ def step(angle, parameters, state, rate):
         ("    | Differentiator,\n", "    | Differentiator\n    | Rough,\n"),
         "from spheretwin.control.estimation.rough import Rough\n",
     ),
+    "axis": Addition(
+        "twin/study/axes/triangular.py",
+        '''
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.twin.study.axes.axis import DrawnAxis, Number
+
+
+class Triangular(DrawnAxis):
+    """Most often at its lower end."""
+
+    kind: Literal["triangular"] = Field("triangular", description="how the values are chosen")
+    low: Number = Field(description="lower bound, the most frequent")
+    width: Number = Field(description="from there to the upper bound")
+
+    def drawn(self, uniform):
+        return self.low + self.width * (1 - np.sqrt(1 - uniform))
+''',
+        "twin/study/axes/registry.py",
+        ("    | Normal,\n", "    | Normal\n    | Triangular,\n"),
+        "from spheretwin.twin.study.axes.triangular import Triangular\n",
+    ),
     "allocation": Addition(
         "control/allocation/halved.py",
         '''
@@ -543,6 +568,7 @@ EVERY = {
     "twin/metrics/test_every_metric.py": "mean_load_Nm",
     "twin/plant/test_every_engine.py": "uncoupled",
     "twin/reproduce/test_every_experiment.py": "holding",
+    "twin/study/test_every_axis.py": "triangular",
 }
 
 

@@ -1,4 +1,4 @@
-"""Studies in processes of their own: killed, interrupted, out of room, two at once; no finished row is lost."""
+"""Studies in processes of their own: killed, interrupted, out of room, two at once; no row is lost."""
 
 import json
 import resource
