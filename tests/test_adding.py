@@ -336,6 +336,31 @@ TARGET = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
         ("        supply.TARGET,\n", "        supply.TARGET,\n        fuse.TARGET,\n"),
         "from spheretwin.twin.faults.targets import fuse\n",
     ),
+    "axis": Addition(
+        "twin/study/axes/triangular.py",
+        '''
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.twin.study.axes.axis import DrawnAxis, Number
+
+
+class Triangular(DrawnAxis):
+    """Most often at its lower end."""
+
+    kind: Literal["triangular"] = Field("triangular", description="how the values are chosen")
+    low: Number = Field(description="lower bound, the most frequent")
+    width: Number = Field(description="from there to the upper bound")
+
+    def drawn(self, uniform):
+        return self.low + self.width * (1 - np.sqrt(1 - uniform))
+''',
+        "twin/study/axes/registry.py",
+        ("    | Normal,\n", "    | Normal\n    | Triangular,\n"),
+        "from spheretwin.twin.study.axes.triangular import Triangular\n",
+    ),
     "allocation": Addition(
         "control/allocation/halved.py",
         '''
@@ -573,6 +598,7 @@ EVERY = {
     "twin/plant/test_every_engine.py": "uncoupled",
     "twin/reproduce/test_every_experiment.py": "holding",
     "twin/faults/test_every_target.py": "fuse",
+    "twin/study/test_every_axis.py": "triangular",
 }
 
 

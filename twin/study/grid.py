@@ -58,6 +58,8 @@ class Grid:
     def __init__(self, study: Study) -> None:
         self._study = study
         self._groups = list(_groups(study).values())
+        for group in self._groups:
+            _check_lengths(study, group)
         self._points = _points(study)
         self._laws: Sequence[Mapping[str, Any] | None] = study.law or (None,)
         self._sizes = [
@@ -71,6 +73,8 @@ class Grid:
             self._rows *= size
         if self._rows > MOST_ROWS:
             raise InputError(f"study {study.name}: expected at most {MOST_ROWS} rows, received {self._rows}")
+        for group in self._groups:
+            _check_values(study, group)
 
     def __len__(self) -> int:
         return self._rows
@@ -127,17 +131,19 @@ def _groups(study: Study) -> dict[str, dict[str, list[Any]]]:
         if isinstance(axis, ListedAxis):
             name = f"zip {axis.zip}" if axis.zip is not None else f"axis {place}"
             groups.setdefault(name, {})[axis.field] = axis.listed()
-    for group in groups.values():
-        _check_group(study, group)
     return groups
 
 
-def _check_group(study: Study, group: Mapping[str, list[Any]]) -> None:
-    """Values that go together are as many of each, and no two are the same: their rows would be."""
+def _check_lengths(study: Study, group: Mapping[str, list[Any]]) -> None:
+    """Values that go together are as many of each."""
     lengths = {field: len(values) for field, values in group.items()}
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{length} of {field}" for field, length in lengths.items())
         raise InputError(f"study {study.name}: expected zipped axes of equal length, received {told}")
+
+
+def _check_values(study: Study, group: Mapping[str, list[Any]]) -> None:
+    """No two values are the same: their rows would be."""
     if twice := repeated(zip(*group.values(), strict=True)):
         told = ", ".join(map(shown, twice[0]))
         raise InputError(

@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -118,12 +119,12 @@ class Study(BaseModel):
         if twice := repeated(self.law):
             raise ValueError(f"expected each [[law]] once, received {shown(twice[0])} twice")
         zips = [axis.zip for axis in self.axis if axis.zip is not None]
-        if alone := sorted({name for name in zips if zips.count(name) == 1}):
-            raise ValueError(f"expected two axes or more of a zip, received {alone[0]} once")
         if zipped := [axis.field for axis in self.axis if axis.is_drawn and axis.zip is not None]:
             raise ValueError(
                 f"expected no zip of what is drawn, which goes together as it is, received {zipped[0]}"
             )
+        if alone := sorted({name for name in zips if zips.count(name) == 1}):
+            raise ValueError(f"expected two axes or more of a zip, received {alone[0]} once")
         return self
 
     def _check_nothing_is_dropped(self, axes: list[str]) -> None:
@@ -154,7 +155,11 @@ class Study(BaseModel):
 
 def repeated(values: Iterable[Any]) -> list[Any]:
     """Those among some values that are there more than once; a whole number is the same as a broken one."""
-    by_text = [(json.dumps(_alike(value), sort_keys=True), value) for value in values]
+    listed = list(values)
+    with suppress(TypeError):  # lists and tables, which need a closer look
+        if len(set(listed)) == len(listed):
+            return []
+    by_text = [(json.dumps(_alike(value), sort_keys=True), value) for value in listed]
     counts = Counter(text for text, _ in by_text)
     return [value for text, value in dict(by_text).items() if counts[text] > 1]
 

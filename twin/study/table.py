@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 NAME = "table.parquet"
 
-BATCH_ROWS = 10_000
+BATCH_ROWS = 2_000
 
 FIXED = ("row", "key", "seed", "law", "repeat", "status", "reason", "error")
 """Columns of every table, beside its axes and its figures."""

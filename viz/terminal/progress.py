@@ -64,7 +64,10 @@ class _Rate(ProgressColumn):
         self._what = what
 
     def render(self, task: Task) -> Text:
-        return Text("" if task.speed is None else f"{task.speed:.0f} {self._what}/s")
+        if task.speed is None:
+            return Text("")
+        figure = f"{task.speed:.0f}" if task.speed >= 10 else f"{task.speed:.2g}"
+        return Text(f"{figure} {self._what}/s")
 
 
 class Progress:

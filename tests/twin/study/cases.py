@@ -1,0 +1,50 @@
+"""What the tests of studies share: short studies, and what their journals and tables hold."""
+
+import pyarrow.parquet as parquet
+
+from spheretwin.twin.study import run
+from spheretwin.twin.study.running import TELEMETRY
+from spheretwin.twin.study.study import made
+
+SHORT = {"duration": 0.02}
+
+
+def values(field, *listed, **others):
+    return {"field": field, "kind": "values", "values": list(listed), **others}
+
+
+def study(*axes, **others):
+    """A study of runs of 20 ticks; `others` are its fields."""
+    fields = {"name": "short", "scenario": "sinusoid", "fields": SHORT, "axis": list(axes), **others}
+    return made(fields, "short")
+
+
+LOADS = (
+    values("disturbance.load", 0.0, 1.0, 2.0),
+    {"field": "plant.modelling_error", "kind": "uniform", "low": 0.0, "high": 0.4},
+)
+
+
+def loads(**others):
+    """24 rows: listed, drawn, two laws."""
+    laws = [{"law": "pd"}, {"law": "afsm", "surface_slope": [60.0, 60.0, 60.0]}]
+    return study(*LOADS, **{"samples": 4, "law": laws, **others})
+
+
+def rows_of(folder):
+    """Rows of a table, as dictionaries."""
+    return parquet.read_table(folder / "table.parquet").to_pylist()
+
+
+def found(a_study, folder, **options):
+    """Rows of a study that is run."""
+    run(a_study, folder, **{"threads": 1, **options})
+    return rows_of(folder)
+
+
+def table(folder):
+    return (folder / "table.parquet").read_bytes()
+
+
+def telemetry(folder):
+    return sorted(path.name for path in (folder / TELEMETRY).iterdir())

@@ -1,0 +1,169 @@
+"""What is said of a study as a whole: its summary, what the worst goes with, its figures and its page."""
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from spheretwin.twin.study.report import page
+from spheretwin.twin.study.report.drawings import drawings
+from spheretwin.twin.study.report.ranking import ranked, strongest
+from spheretwin.twin.study.report.reading import Rows, largest, read
+from spheretwin.twin.study.report.summary import summary
+from tests.twin.study.cases import LOADS, found, loads, study, values
+
+LISTS = st.none() | st.lists(st.none() | st.floats(-9, 9), min_size=1, max_size=3)
+
+
+def made(count, figures, axes, laws=("pd",), lost=()):
+    """Rows of a study that never ran."""
+    statuses = np.full(count, "completed", dtype=object)
+    statuses[list(lost)] = "left_workspace"
+    told = {
+        "name": "made",
+        "description": "It was made.",
+        "axis": [{"field": f, "kind": "values"} for f in axes],
+    }
+    texts = np.full(count, "", dtype=object)
+    named = np.array([laws[place % len(laws)] for place in range(count)], dtype=object)
+    keys = np.array([f"{place:016x}" for place in range(count)], dtype=object)
+    return Rows(told, np.arange(count), keys, named, statuses, texts, axes, figures)
+
+
+@given(st.lists(LISTS, max_size=8))
+def test_the_largest_of_a_list_is_none_where_a_part_is(lists):
+    column = pa.chunked_array(
+        [pa.array(lists[:3], pa.list_(pa.float64())), pa.array(lists[3:], pa.list_(pa.float64()))]
+    )
+    expected = [np.nan if each is None or None in each else max(each) for each in lists]
+    np.testing.assert_array_equal(largest(column), expected)
+
+
+def test_the_summary_is_numpy_s_over_the_completed_rows_of_each_law():
+    values_ = np.random.default_rng(0).normal(size=40)
+    values_[6] = np.nan
+    rows = made(40, {"max_abs_error_rad": values_}, {}, ("pd", "afsm"), lost=(0, 2, 3))
+    told = summary(rows)
+    assert told["pd"]["statuses"] == {"left_workspace": 2, "completed": 18}
+    of_pd = [values_[place] for place in range(4, 40, 2) if place != 6]
+    low, median, high = np.percentile(of_pd, [2.5, 50, 97.5])
+    assert told["pd"]["max_abs_error_rad"] == {"median": median, "range_95": [low, high]}
+    lost = made(2, {"max_abs_error_rad": np.ones(2)}, {}, lost=(0, 1))
+    assert summary(lost)["pd"]["max_abs_error_rad"] == {"median": None, "range_95": None}
+
+
+def test_rank_correlations_are_scipy_s_where_rows_are_few():
+    x = np.random.default_rng(1).normal(size=(3, 20))
+    y = x[0] + 0.5 * np.abs(x[1])
+    rank = ranked(list(x), y)
+    assert not rank.is_partial
+    for place in range(3):
+        expected = stats.spearmanr(x[place], y).statistic
+        # The same sums in another order.
+        assert rank.by_value[place] == pytest.approx(expected, abs=1e-14)
+
+
+def test_what_is_partial_is_the_correlation_of_what_fits_of_the_others_leave():
+    x = np.random.default_rng(2).normal(size=(3, 200))
+    y = 9 * x[0] + x[1] + np.abs(x[2])
+    rank = ranked(list(x), y)
+    assert rank.is_partial
+    columns = np.stack([stats.rankdata(each) for each in (*x, *(np.abs(a - np.median(a)) for a in x))])
+    for place in range(6):
+        others = np.vstack([np.delete(columns, place, axis=0), np.ones(200)]).T
+        left = [
+            each - others @ np.linalg.lstsq(others, each)[0] for each in (columns[place], stats.rankdata(y))
+        ]
+        found_ = [*rank.by_value, *rank.by_distance][place]
+        # Two ways to solve systems whose condition is some tens.
+        assert found_ == pytest.approx(np.corrcoef(left)[0, 1], abs=1e-9)
+    # Behind the first, which outweighs them, the others show: by value, and by distance alone.
+    assert rank.by_value[1] > 3 * rank.chance
+    assert rank.by_distance[2] > 3 * rank.chance
+    assert rank.by_distance[2] > abs(rank.by_value[2])
+    assert strongest([rank])[0] == 0
+
+
+def test_axes_that_go_together_or_do_not_differ_are_ranked_plainly():
+    x = np.random.default_rng(3).normal(size=100)
+    rank = ranked([x, 2 * x, np.ones(100)], x)
+    assert not rank.is_partial
+    # Sums of a hundred products.
+    np.testing.assert_allclose(rank.by_value, [1, 1, 0], atol=1e-13)
+
+
+def test_what_does_not_matter_is_by_chance_95_times_of_a_hundred():
+    generator = np.random.default_rng(4)
+    rank = ranked(list(generator.normal(size=(200, 2000))), generator.normal(size=2000))
+    inside = np.mean(np.abs([*rank.by_value, *rank.by_distance]) <= rank.chance)
+    # Of 400, each with 0.05: 3.5 deviations of a binomial.
+    assert inside == pytest.approx(0.95, abs=3.5 * np.sqrt(0.05 * 0.95 / 400))
+
+
+NUMBERS = np.linspace(0, 1, 24)
+
+
+@pytest.mark.parametrize(
+    ("axes", "files"),
+    [
+        ({}, ["report_spread.png"]),
+        ({"a": NUMBERS}, ["report_axis.png", "report_spread.png"]),
+        ({"a": np.array(["x", "y"] * 12, dtype=object)}, ["report_axis.png", "report_spread.png"]),
+        ({"a": NUMBERS // 0.25, "b": NUMBERS % 0.25 // 0.1}, ["report_map.png", "report_spread.png"]),
+        (
+            {"a": NUMBERS, "b": NUMBERS[::-1], "c": NUMBERS**2},
+            ["report_ranks.png", "report_strongest.png", "report_spread.png"],
+        ),
+    ],
+)
+@pytest.mark.parametrize("laws", [("pd",), ("pd", "afsm, gain = 2")])
+def test_figures_suit_the_axes(axes, files, laws):
+    rows = made(24, {"max_abs_error_rad": 0.1 + NUMBERS, "own": NUMBERS}, axes, laws, lost=(3,))
+    drawn = list(drawings(rows))
+    assert [drawing.file for drawing in drawn] == files
+    assert all(drawing.caption.endswith(".") for drawing in drawn)
+
+
+@pytest.mark.parametrize("lost", [range(24), range(23)])
+def test_where_hardly_a_row_was_completed_nothing_fails(tmp_path, lost):
+    rows = made(24, {"max_abs_error_rad": NUMBERS}, {"a": NUMBERS, "b": NUMBERS, "c": NUMBERS}, lost=lost)
+    assert len(page.write(tmp_path, rows, summary(rows), (24, 24), "made", {})) == 2
+    assert "| pd | left_workspace |" in (tmp_path / "report.md").read_text()
+
+
+def test_the_page_tells_of_a_study(tmp_path):
+    chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
+    told = found(chosen, tmp_path)
+    rows = read(tmp_path / "table.parquet")
+    markdown, html = page.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml", {"python": "3"})
+    text = markdown.read_text()
+    assert "48 of 48 rows: 24 completed, 24 refused." in text
+    assert "afsm, surface_slope = [60.0, 60.0, 60.0]" in text
+    worst = max(
+        (row for row in told if row["status"] == "completed"), key=lambda row: max(row["max_abs_error_rad"])
+    )
+    assert f"| {worst['row']} | `{worst['key']}` |" in text
+    assert "payload_kg: expected greater than or equal to 0, received -1.0 | 12 |" in text
+    assert "`spheretwin sweep 'my study.toml' --row KEY`" in text
+    for line in text.splitlines():
+        if line.startswith("!["):
+            assert (tmp_path / line.rpartition("(")[2].rstrip(")")).stat().st_size > 1000
+    assert "<table>" in html.read_text()
+
+
+def test_the_same_table_gives_the_same_page(tmp_path):
+    for name in ("a", "b"):
+        found(loads(), tmp_path / name)
+        rows = read(tmp_path / name / "table.parquet")
+        page.write(tmp_path / name, rows, summary(rows), (24, 24), "short", {})
+    for path in (tmp_path / "a").glob("report*"):
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+
+
+def test_a_study_of_one_row_has_a_page(tmp_path):
+    found(study(), tmp_path)
+    rows = read(tmp_path / "table.parquet")
+    page.write(tmp_path, rows, summary(rows), (1, 1), "short", {})
+    assert "Nothing but the seed." in (tmp_path / "report.md").read_text()

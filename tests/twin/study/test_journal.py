@@ -1,0 +1,211 @@
+"""The journal: what was finished is kept, whatever happens to its file."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.twin.study import journal
+from spheretwin.twin.study.grid import Grid, Row
+from spheretwin.twin.study.journal import Journal
+from spheretwin.twin.study.row import Result
+from tests.twin.study.cases import found, loads, study, table, values
+
+ROWS = [Row(number, f"{number:016x}", number, {}, None, 0) for number in range(6)]
+
+
+def result(number):
+    return Result("completed", None, None, {"rms_error_rad": [0.1 * number, None, float(number)]})
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A journal of six rows, written in another order than theirs."""
+    path = tmp_path / journal.NAME
+    with Journal(path, "d", 6) as kept:
+        for row in (ROWS[3], ROWS[0], ROWS[5], ROWS[1], ROWS[2], ROWS[4]):
+            kept.add(row, result(row.number))
+    return path
+
+
+def held(path, digest="d", below=6):
+    with Journal(path, digest, 6) as kept:
+        return dict(kept.results(below)), kept.torn, kept.damaged
+
+
+def test_results_come_in_the_order_of_the_study(path):
+    told, torn, damaged = held(path)
+    assert (list(told), torn, damaged) == (list(range(6)), False, 0)
+    assert told == {number: result(number) for number in range(6)}
+    assert list(held(path, below=2)[0]) == [0, 1]
+
+
+def test_a_journal_torn_anywhere_keeps_the_lines_before(path):
+    whole = path.read_bytes()
+    ends = [place + 1 for place, byte in enumerate(whole) if byte == ord("\n")]
+    for length in range(len(whole) + 1):
+        path.write_bytes(whole[:length])
+        told, torn, damaged = held(path)
+        lines = sum(end <= length for end in ends)
+        assert len(told) == max(lines - 1, 0)
+        assert torn == (length > ends[0] and length not in ends)
+        assert damaged == 0
+        kept = whole[: ends[lines - 1]] if lines else whole[: ends[0]]
+        assert path.read_bytes() == kept
+
+
+def test_a_line_damaged_in_the_middle_loses_itself_alone(path):
+    whole = path.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    begin = len(lines[0]) + len(lines[1])  # the line of row 0
+    for place in range(len(lines[2]) - 1):
+        changed = bytearray(whole)
+        changed[begin + place] ^= 1
+        path.write_bytes(changed)
+        told, torn, damaged = held(path)
+        assert list(told) == [1, 2, 3, 4, 5]
+        # A bit may turn a sign into the end of a line: two damaged ones.
+        assert (torn, damaged) == (False, 1 + (changed[begin + place] == ord("\n")))
+        assert path.read_bytes() == changed
+
+
+def test_a_row_whose_line_was_damaged_is_run_again_and_the_table_is_the_same(tmp_path):
+    whole = found(loads(), tmp_path / "a")
+    path = tmp_path / "a" / journal.NAME
+    before = table(tmp_path / "a")
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[5] = lines[5].replace(b"completed", b"cmopleted")
+    path.write_bytes(b"".join(lines))
+    assert found(loads(), tmp_path / "a") == whole
+    assert table(tmp_path / "a") == before
+    assert path.read_bytes().startswith(b"".join(lines))
+    assert len(path.read_bytes().splitlines()) == len(lines) + 1
+
+
+@pytest.mark.parametrize("text", [b"my notes", b"my notes\nand more\n", b"[1, 2]\n", b'{"journal": 1', b"\n"])
+def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(tmp_path, text):
+    path = tmp_path / journal.NAME
+    if b"journal" not in text:
+        path.write_bytes(text)
+        with pytest.raises(InputError, match="expected a journal of a study"):
+            held(path)
+        assert path.read_bytes() == text
+    else:  # as it begins: one that was torn in its first line
+        path.write_bytes(text)
+        assert held(path)[0] == {}
+
+
+def test_the_journal_of_another_study_is_refused_and_left_as_it_is(path):
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=r"expected .* to be a journal of this study .*; remove it"):
+        held(path, "other")
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"seed": 1},
+        {"seeds": 2},
+        {"fields": {"duration": 0.03}},
+        {"metrics": ["rms_error_rad"]},
+        {"law": [{"law": "pd"}]},
+        {"axis": [values("disturbance.load", 0.0)], "samples": None},
+    ],
+)
+def test_whatever_changes_a_figure_makes_another_study(tmp_path, other):
+    found(loads(), tmp_path, limit=1)
+    before = table(tmp_path)
+    with pytest.raises(InputError, match="received one of others"):
+        found(loads(**other), tmp_path)
+    assert table(tmp_path) == before
+
+
+def test_other_words_about_it_make_no_other_study(tmp_path):
+    found(loads(), tmp_path, limit=2)
+    assert len(found(loads(description="another"), tmp_path, limit=2)) == 2
+
+
+def test_an_edited_file_of_the_user_s_makes_another_study(tmp_path):
+    mine = tmp_path / "mine.py"
+    mine.write_text("def ticks(run): return len(run.telemetry)")
+    chosen = study(metrics=[f"{mine}:ticks"])
+    assert found(chosen, tmp_path / "out")[0]["ticks"] == 20
+    mine.write_text("def ticks(run): return 2 * len(run.telemetry)")
+    with pytest.raises(InputError, match="received one of others"):
+        found(chosen, tmp_path / "out")
+
+
+def test_a_second_writer_is_refused(path):
+    # The lock is a process's, so the second is one: within a process it would be the same on some systems.
+    script = (
+        "import sys; from pathlib import Path; from spheretwin.twin.study.journal import Journal\n"
+        "with Journal(Path(sys.argv[1]), 'd', 6): print('in', flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as other:
+        assert other.stdout.readline() == b"in\n"
+        with pytest.raises(InputError, match="one process at a time"):
+            held(path)
+        other.communicate(b"\n")
+    assert len(held(path)[0]) == 6
+
+
+class Full:
+    """A file on a disk that takes so many bytes more."""
+
+    def __init__(self, file, room):
+        self._file, self._room = file, room
+
+    def write(self, data):
+        if self._room <= 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        written = self._file.write(bytes(data)[: self._room])
+        self._room -= written
+        return written
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+
+def test_a_full_disk_is_told_and_what_was_finished_is_kept(path):
+    with Journal(path, "d", 6) as kept:
+        before = path.read_bytes()
+        kept._file = Full(kept._file, 20)
+        with pytest.raises(SpheretwinError) as failure:
+            kept.add(ROWS[0], result(0))
+        assert "No space left on device; the rows before are kept" in str(failure.value)
+    assert path.read_bytes() == before
+
+
+def test_a_full_disk_ends_a_study_which_goes_on_when_there_is_room(tmp_path, monkeypatch):
+    whole = found(loads(), tmp_path / "whole")
+    opened = journal._opened
+    monkeypatch.setattr(journal, "_opened", lambda path: Full(opened(path), 3000))
+    with pytest.raises(SpheretwinError, match="No space left"):
+        found(loads(), tmp_path / "full")
+    monkeypatch.setattr(journal, "_opened", opened)
+    lines = (tmp_path / "full" / journal.NAME).read_bytes().splitlines()
+    assert 2 < len(lines) < 1 + len(whole)
+    assert [json.loads(line)[0] for line in lines[1:]] == list(range(len(lines) - 1))
+    assert found(loads(), tmp_path / "full") == whole
+    assert table(tmp_path / "full") == table(tmp_path / "whole")
+
+
+def test_of_rows_that_there_may_be_none_takes_memory(tmp_path):
+    import tracemalloc
+
+    tracemalloc.start()
+    with Journal(tmp_path / journal.NAME, "d", 10**8) as kept:
+        peak = tracemalloc.get_traced_memory()[1]
+        kept.add(ROWS[5], result(5))
+        assert kept.done(10) == 1
+    tracemalloc.stop()
+    # Addresses are all that is taken before a row is finished: eight bytes a row, none of them written.
+    assert peak < 8 * 10**8 + 10**6
+    assert len(Grid(loads())) == 24

@@ -1,0 +1,121 @@
+"""Studies in processes of their own: killed, interrupted, out of room, two at once; no row is lost."""
+
+import json
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from spheretwin.twin import cli
+from tests.twin.study.cases import found, rows_of, study, table, values
+
+COMMAND = [sys.executable, "-m", "spheretwin.twin.cli", "sweep"]
+LOADS = [0.1 * place for place in range(60)]
+MANY = study(values("disturbance.load", *LOADS), law=[{"law": "pd"}], fields={"duration": 2.0})
+SOURCE = f"""
+name = "short"
+scenario = "sinusoid"
+fields = {{duration = 2.0}}
+law = [{{law = "pd"}}]
+axis = [{{field = "disturbance.load", kind = "values", values = {LOADS}}}]
+"""
+SOON_s = 60  # what no machine needs for a few rows
+
+
+@pytest.fixture
+def command(tmp_path):
+    """What sweeps the study into a folder of the test's."""
+    source = tmp_path / "short.toml"
+    source.write_text(SOURCE)
+    return [*COMMAND, str(source), "--out", str(tmp_path / "out"), "--json"]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    found(MANY, folder)
+    return folder
+
+
+def begun(command, folder, **options):
+    """A process that has finished some rows, and not all."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    for _ in range(100 * SOON_s):
+        if journal_lines(folder) > 4:
+            return process
+        time.sleep(0.01)
+    process.kill()
+    raise AssertionError(process.communicate())
+
+
+def journal_lines(folder):
+    path = folder / "journal.jsonl"
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def gone_on_with(command, folder, whole):
+    """Run the rest; the table is that of a study that nothing came between."""
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == cli.DONE, done.stderr
+    assert table(folder) == table(whole)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_kill_loses_no_finished_row(tmp_path, command, whole, threads):
+    folder = tmp_path / "out"
+    process = begun([*command, "--threads", threads], folder)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    kept = journal_lines(folder) - 1
+    assert 4 <= kept < len(LOADS)
+    assert not (folder / "table.parquet").exists()
+    assert gone_on_with(command, folder, whole)["resumed"] == kept
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(tmp_path, command, whole, number):
+    folder = tmp_path / "out"
+    process = begun([*command, "--threads", "2"], folder)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=SOON_s)
+    assert process.returncode == cli.FAILED
+    told = json.loads(out)
+    assert 4 <= told["rows"] == journal_lines(folder) - 1 == len(rows_of(folder)) < told["of"] == len(LOADS)
+    assert f"interrupted after {told['rows']} of 60 rows; the same command goes on from there" in err
+    assert "Traceback" not in err
+    assert gone_on_with(command, folder, whole)["resumed"] == told["rows"]
+
+
+def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, whole):
+    folder = tmp_path / "out"
+    process = begun([*command, "--threads", "1"], folder)
+    process.send_signal(signal.SIGSTOP)  # so that it does not end before the other begins
+    second = subprocess.run(command, capture_output=True, text=True)
+    process.send_signal(signal.SIGCONT)
+    assert second.returncode == cli.BAD_INPUT
+    assert second.stderr.startswith("spheretwin: study: expected one process at a time")
+    assert second.stderr.count("\n") == 1
+    process.communicate(timeout=SOON_s)
+    assert process.returncode == cli.DONE
+    assert table(folder) == table(whole)
+
+
+def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(tmp_path, command, whole):
+    # As a full disk, for one process: no file of it may be longer than this.
+    def limited():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))
+
+    folder = tmp_path / "out"
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limited)
+    assert done.returncode == cli.FAILED
+    assert done.stderr.startswith("spheretwin: study: ")
+    assert done.stderr.endswith("could not be written, File too large; the rows before are kept\n")
+    assert done.stderr.count("\n") == 1
+    kept = journal_lines(folder) - 1
+    assert 2 < kept < len(LOADS)
+    assert gone_on_with(command, folder, whole)["resumed"] == kept

@@ -1,0 +1,265 @@
+"""What differs from row to row is what its scenario has; a row run alone gives the same figures."""
+
+import json
+import shlex
+
+import numpy as np
+import pyarrow.parquet as parquet
+import pytest
+
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin import cli, scenario
+from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.records.summary import figures_of
+from spheretwin.twin.simulation import simulate
+from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import load
+from tests.twin.study.cases import LOADS, found, loads, study, telemetry, values
+
+FAULTS = (
+    [],
+    [{"target": "coil.07", "mode": "open"}],
+    [{"target": "pot.alpha", "mode": "offset", "value": 0.02}],
+)
+
+LAW = """
+def step(t, reference, measurement, parameters, state, torque):
+    for axis in range(3):
+        torque[axis] = 0.3 * (reference[0, axis] - measurement[0, axis])
+
+
+def pull(run):
+    return float(abs(run.telemetry["torque_command_Nm"]).max())
+
+
+def ends(run):
+    print("not among the figures")
+    return {"status": str(run.status)}
+
+
+def fails(run):
+    if run.scenario.disturbance.load > 0:
+        raise ValueError("too\\nmuch")
+    return 1
+
+
+def squares(run):
+    return float("nan")
+"""
+
+
+@pytest.fixture
+def mine(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(LAW)
+    return path
+
+
+def scenarios(chosen):
+    rows = Rows(chosen)
+    return [rows.scenario(row) for row in Grid(chosen)]
+
+
+def test_each_row_has_its_values_and_what_the_study_says_of_all():
+    chosen = loads(fields={"duration": 0.03, "plant.payload_kg": 0.01})
+    for row, of_row in zip(Grid(chosen), scenarios(chosen), strict=True):
+        assert of_row.disturbance.load == row.values["disturbance.load"]
+        assert of_row.plant.modelling_error == row.values["plant.modelling_error"]
+        assert (of_row.duration, of_row.plant.payload_kg, of_row.seed) == (0.03, 0.01, row.seed)
+        assert of_row.controller.law == row.law["law"]
+        assert of_row.plant.engine == "lagrangian"
+    assert scenarios(chosen)[1].controller.surface_slope == (60.0, 60.0, 60.0)
+
+
+def test_an_entry_of_a_list_leaves_the_others():
+    chosen = study(values("plant.coulomb_Nm.1", 0.0, 0.002), values("plant.group_gain.17", 0.9, 1.0),
+                   fields={"duration": 0.02, "plant.group_gain": [1.0] * 18})  # fmt: skip
+    friction = [each.plant.coulomb_Nm for each in scenarios(chosen)]
+    assert friction == [(0, 0, 0), (0, 0, 0), (0, 0.002, 0), (0, 0.002, 0)]
+    assert [each.plant.group_gain[16:] for each in scenarios(chosen)[:2]] == [(1.0, 0.9), (1.0, 1.0)]
+
+
+def test_faults_are_an_axis(tmp_path):
+    rows = found(study(values("fault", *FAULTS)), tmp_path)
+    assert [json.loads(row["fault"]) for row in rows] == list(FAULTS)
+    assert [row["status"] for row in rows] == ["completed"] * 3
+    assert len({tuple(row["rms_error_rad"]) for row in rows}) == 3
+
+
+def test_none_is_a_value(tmp_path):
+    rows = found(study(values("nominal.inertia_kg_m2", None, [3e-4, 3e-4, 3e-4])), tmp_path)
+    assert [row["nominal.inertia_kg_m2"] for row in rows] == [None, "[0.0003, 0.0003, 0.0003]"]
+    assert [row["error"] for row in rows] == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("listed", "held"),
+    [
+        ([0.5, 1.0], "double"),
+        ([1, 2], "int64"),
+        ([1, 2.5], "double"),
+        ([1.0, "auto"], "string"),
+        ([1, 2**70], "string"),
+    ],
+)
+def test_columns_are_of_the_values_kind(tmp_path, listed, held):
+    rows = found(study(values("disturbance.load", *listed)), tmp_path)
+    kept = parquet.read_schema(tmp_path / "table.parquet").field("disturbance.load").type
+    assert str(kept) == held
+    texts = [each if isinstance(each, str) else json.dumps(each) for each in listed]
+    assert [row["disturbance.load"] for row in rows] == (texts if held == "string" else listed)
+
+
+def test_a_law_of_one_s_own_and_figures_of_one_s_own_are_found_beside_the_study(tmp_path, mine, monkeypatch):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "base.toml").write_text(
+        'name = "base"\nduration = 0.02\n[trajectory]\nshape = "sinusoid"\n[controller]\nlaw = "afsm"\n'
+        "surface_slope = [40.0, 40.0, 40.0]\n"
+    )
+    (tmp_path / "sub" / "study.toml").write_text(
+        'name = "mine"\nscenario = "base.toml"\n'
+        'metrics = ["rms_error_rad", "../mine.py:pull", "../mine.py:ends"]\n'
+        '[[law]]\nlaw = "../mine.py:step"\n[[law]]\nlaw = "pd"\n'
+        '[[axis]]\nfield = "disturbance.load"\nkind = "values"\nvalues = [0.0, 1.0]\n'
+    )
+    out = tmp_path / "out"
+    rows = found(load(str(tmp_path / "sub" / "study.toml")), out)
+    assert [row["law"] for row in rows] == ["../mine.py:step", "pd"] * 2
+    assert [json.loads(row["ends"]) for row in rows] == [{"status": "completed"}] * 4
+    assert all(row["pull"] > 0 for row in rows)
+    before = (out / "table.parquet").read_bytes()
+    # From another folder it is the same study, and its journal is gone on with.
+    for folder, name in ((tmp_path, "sub/study.toml"), (tmp_path / "sub", "study.toml")):
+        monkeypatch.chdir(folder)
+        found(load(name), out)
+        assert (out / "table.parquet").read_bytes() == before
+    monkeypatch.setenv("HOME", str(tmp_path))
+    found(load("~/sub/study.toml"), out)
+    assert (out / "table.parquet").read_bytes() == before
+
+
+def test_files_among_the_values_are_found_beside_the_study(tmp_path):
+    for name, end in (("a", 0.1), ("b", 0.2)):
+        (tmp_path / f"{name}.csv").write_text(
+            f"t_s,alpha_rad,beta_rad,gamma_rad\n0,0,0,0\n0.5,{end},0,0\n1,{end},0,0\n"
+        )
+    chosen = study(
+        values("trajectory.file", "a.csv", "b.csv"),
+        fields={"duration": 0.05, "trajectory": {"shape": "waypoints", "file": "a.csv"}},
+        folder=str(tmp_path),
+    )
+    rows = found(chosen, tmp_path / "out")
+    assert [(row["trajectory.file"], row["error"]) for row in rows] == [("a.csv", None), ("b.csv", None)]
+    assert rows[0]["max_abs_error_rad"] != rows[1]["max_abs_error_rad"]
+
+
+def test_a_figure_that_fails_leaves_the_others_of_its_row(tmp_path, mine):
+    metrics = ["rms_error_rad", f"{mine}:fails", f"{mine}:squares"]
+    rows = found(study(values("disturbance.load", 0.0, 1.0), metrics=metrics), tmp_path)
+    assert [(row["status"], row["fails"]) for row in rows] == [("completed", 1.0), ("completed", None)]
+    assert rows[1]["error"] == "metric fails: expected a figure, it raised ValueError: too much"
+    assert len(rows[1]["rms_error_rad"]) == 3
+    assert np.isnan(rows[0]["squares"])
+    assert set(METRICS) & set(rows[0]) == {"rms_error_rad"}
+
+
+def test_a_law_that_raises_is_a_row_with_its_error(tmp_path):
+    (tmp_path / "bad.py").write_text(
+        "def step(t, reference, measurement, parameters, state, torque):\n    raise ValueError('no more')\n"
+    )
+    rows = found(study(law=[{"law": f"{tmp_path}/bad.py:step"}, {"law": "pd"}]), tmp_path / "out")
+    assert rows[0]["error"] is not None
+    assert "no more" in rows[0]["error"]
+    assert (rows[1]["status"], rows[1]["error"]) == ("completed", None)
+
+
+def test_all_figures_are_those_of_the_run(tmp_path):
+    chosen = loads()
+    rows = found(chosen, tmp_path)
+    for row, of_row in list(zip(rows, scenarios(chosen), strict=True))[::7]:
+        alone = figures_of(simulate(of_row))
+        assert {name: row[name] for name in METRICS} == alone
+
+
+def test_telemetry_of_chosen_rows_is_kept(tmp_path):
+    chosen = loads(telemetry=[2, 3])
+    rows = found(chosen, tmp_path, threads=2)
+    assert telemetry(tmp_path) == sorted(f"{rows[number]['key']}.parquet" for number in (2, 3))
+    path = tmp_path / "telemetry" / f"{rows[3]['key']}.parquet"
+    kept = read_parquet(path)[0]
+    assert np.abs(kept["error_rad"]).max(axis=0).tolist() == rows[3]["max_abs_error_rad"]
+    assert cli.main(["simulate", "--replay", str(path), "--telemetry", str(tmp_path / "again.parquet")]) == 0
+    assert (tmp_path / "again.parquet").read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        {},
+        {"axis": [*LOADS, values("fault", *FAULTS[1:])], "samples": 1},
+        {"axis": [*LOADS, values("plant.coulomb_Nm.1", 0.0, 0.002)], "samples": 1},
+        {"axis": [*LOADS, values("trajectory", {"shape": "hold"}, {"shape": "tilt"})], "samples": 1},
+    ],
+)
+def test_a_row_alone_and_its_printed_command_give_the_same_figures(tmp_path, capsys, mine, chosen):
+    fields = {"metrics": ["max_abs_error_rad", "copper_loss_J", f"{mine}:pull"], **chosen}
+    source = tmp_path / "study.toml"
+    a_study = loads(**fields)
+    source.write_text(_toml(json.loads(a_study.model_dump_json(exclude_none=True))))
+    assert load(str(source)).model_dump() == a_study.model_dump()
+    for row in found(a_study, tmp_path)[-2:]:
+        assert cli.main(["sweep", str(source), "--row", row["key"], "--json"]) == cli.DONE
+        alone = json.loads(capsys.readouterr().out)
+        program, *words = shlex.split(alone["command"])
+        assert program == "spheretwin"
+        assert cli.main([*words, "--json"]) == cli.DONE
+        printed = json.loads(capsys.readouterr().out)
+        assert (alone["row"], alone["seed"]) == (row["row"], row["seed"])
+        for name in ("status", "max_abs_error_rad", "copper_loss_J", "pull"):
+            assert row[name] == alone[name] == printed[name]
+
+
+def test_the_command_of_a_law_has_no_gain_of_the_scenario_s(tmp_path, capsys):
+    base = tmp_path / "base.toml"
+    base.write_text(
+        'name = "base"\nduration = 0.02\n[trajectory]\nshape = "hold"\n'
+        '[controller]\nlaw = "afsm"\nsurface_slope = [40.0, 40.0, 40.0]\nperiod_s = 0.002\n'
+    )
+    chosen = study(law=[{"law": "pd"}], scenario=str(base), fields={})
+    (row,) = Grid(chosen)
+    _, *words = shlex.split(Rows(chosen).command(row))
+    assert cli.main([*words, "--json"]) == cli.DONE
+    told = json.loads(capsys.readouterr().out)["scenario"]["controller"]
+    assert (told["law"], told["period_s"]) == ("pd", 0.002)
+
+
+def test_a_refused_row_alone_tells_why_and_its_command_is_refused_alike(capsys, tmp_path):
+    source = tmp_path / "study.toml"
+    axis = values("plant.payload_kg", 0.0, -1.0)
+    source.write_text(_toml(json.loads(study(axis).model_dump_json(exclude_none=True))))
+    key = Grid(study(axis))[1].key
+    assert cli.main(["sweep", str(source), "--row", key, "--json"]) == cli.FAILED
+    alone = json.loads(capsys.readouterr().out)
+    assert alone["status"] == "refused"
+    _, *words = shlex.split(alone["command"])
+    assert cli.main(words) == cli.BAD_INPUT
+    assert capsys.readouterr().err.strip().removeprefix("spheretwin: ") == alone["error"]
+
+
+def test_the_seed_of_a_row_takes_the_place_of_the_scenario_s():
+    (row,) = Grid(study())
+    assert scenarios(study())[0].seed == row.seed != scenario.load("sinusoid").seed
+
+
+def _toml(fields):
+    """Fields as TOML, in which JSON's values are what they are but for tables."""
+    return "".join(f"{name} = {_inline(value)}\n" for name, value in fields.items())
+
+
+def _inline(value):
+    if isinstance(value, dict):
+        return "{" + ", ".join(f'"{name}" = {_inline(each)}' for name, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    return json.dumps(value)

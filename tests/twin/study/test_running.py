@@ -1,0 +1,162 @@
+"""A study as a whole: the same table however it is run, failures that are rows, plants that agree."""
+
+import pytest
+
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.twin.study import agreement, run
+from spheretwin.twin.study import table as tables
+from tests.twin.study.cases import found, loads, rows_of, study, table, values
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Folder of a study that was run at once on one thread."""
+    folder = tmp_path_factory.mktemp("whole")
+    found(loads(), folder)
+    return folder
+
+
+@pytest.mark.parametrize("threads", [2, 64])
+def test_threads_change_no_byte(whole, tmp_path, threads):
+    found(loads(), tmp_path, threads=threads)
+    assert table(tmp_path) == table(whole)
+
+
+def stopped(folder, threads):
+    """What was found, and told, of a study that is stopped after its second row."""
+    told = []
+    done = run(
+        loads(),
+        folder,
+        threads=threads,
+        done=lambda rows, of: told.append((rows, of)),
+        stop_requested=lambda: len(told) > 2,
+    )
+    return done, told
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_study_that_is_stopped_goes_on_to_the_same_table(whole, tmp_path, threads):
+    counts = [0]
+    while counts[-1] < 24:
+        done, told = stopped(tmp_path, threads)
+        assert told == [(rows, 24) for rows in range(counts[-1], done.rows + 1)]
+        assert len(rows_of(tmp_path)) == done.rows > counts[-1] == done.resumed
+        counts.append(done.rows)
+    assert len(counts) > 3
+    assert table(tmp_path) == table(whole)
+
+
+def test_a_limit_has_the_first_rows_whatever_is_there_already(whole, tmp_path):
+    assert found(loads(), tmp_path, limit=5) == rows_of(whole)[:5]
+    first = table(tmp_path)
+    found(loads(), tmp_path)
+    assert table(tmp_path) == table(whole)
+    done = run(loads(), tmp_path, limit=5)
+    assert (done.rows, done.of, done.study_rows, done.resumed) == (5, 5, 24, 5)
+    assert table(tmp_path) == first
+
+
+def test_a_table_in_many_batches_has_the_same_rows(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "BATCH_ROWS", 5)
+    assert found(loads(), tmp_path) == rows_of(whole)
+
+
+def test_a_row_that_is_refused_is_a_row_with_its_error(tmp_path):
+    rows = found(study(values("plant.payload_kg", 0.0, -1.0, 0.01)), tmp_path)
+    assert [row["status"] for row in rows] == ["completed", "refused", "completed"]
+    assert "plant.payload_kg: expected greater than or equal to 0, received -1.0" in rows[1]["error"]
+    assert rows[1]["rms_error_rad"] is rows[0]["error"] is None
+
+
+def test_a_run_that_ends_early_is_a_row_with_what_it_gave(tmp_path):
+    stuck = [{"target": "encoder.gamma", "mode": "dropout", "start_s": 0.01}]
+    chosen = study(values("watchdog.on", True), fields={"duration": 0.3, "fault": stuck}, fast=False)
+    (row,) = found(chosen, tmp_path)
+    assert (row["status"], row["reason"], row["error"]) == ("failsafe", "no fresh measurement", None)
+    assert row["watchdog.on"] is True
+    assert len(row["rms_error_rad"]) == 3
+
+
+def test_plants_that_differ_end_the_study_and_keep_its_rows(tmp_path, monkeypatch):
+    checked = []
+    real = agreement._rms
+
+    def elsewhere(rows, row, engine):
+        checked.append((row.number, engine))
+        status, rms = real(rows, row, engine)
+        return status, [(1 + 0.03 * (engine == "mujoco" and row.number > 0)) * each for each in rms]
+
+    monkeypatch.setattr(agreement, "_rms", elsewhere)
+    monkeypatch.setattr(agreement, "EVERY", 5)
+    with pytest.raises(SpheretwinError) as failure:
+        found(loads(), tmp_path)
+    first = checked[-1][0]
+    assert checked == [(n, engine) for n in (0, first) for engine in ("lagrangian", "mujoco")]
+    assert f"expected row {first} to be the same on both plants within 0.02, received" in str(failure.value)
+    assert "fast = false runs it on MuJoCo alone" in str(failure.value)
+    told = [row["row"] for row in rows_of(tmp_path)]
+    assert first > 0
+    assert first not in told
+    # What had been handed out behind it is finished, no more.
+    assert set(range(first)) <= set(told) <= set(range(first + 5))
+
+
+@pytest.mark.parametrize("share", [0.019, 0.021])
+def test_the_bound_of_the_plants_is_a_bound(tmp_path, monkeypatch, share):
+    real = agreement._rms
+    shift = {"mujoco": 1.0, "lagrangian": 1.0 - share}
+
+    def shifted(rows, row, engine):
+        # One and the same plant, so that the shift is all there is between them.
+        status, rms = real(rows, row, "lagrangian")
+        return status, [shift[engine] * each for each in rms]
+
+    monkeypatch.setattr(agreement, "_rms", shifted)
+    if share < agreement.BOUND:
+        assert run(study(), tmp_path).checked == 1
+    else:
+        with pytest.raises(SpheretwinError, match="both plants"):
+            run(study(), tmp_path)
+
+
+def test_the_rows_are_the_same_on_both_plants_within_the_bound(tmp_path):
+    fast, slow = (found(loads(fast=fast), tmp_path / str(fast)) for fast in (True, False))
+    for ours, theirs in zip(fast, slow, strict=True):
+        assert ours["key"] == theirs["key"]
+        assert ours["rms_error_rad"] == pytest.approx(theirs["rms_error_rad"], rel=agreement.BOUND)
+
+
+def test_a_plant_that_is_named_is_kept(tmp_path):
+    engine = {"fields": {"duration": 0.02, "plant.engine": "mujoco"}}
+    assert run(study(**engine), tmp_path / "a").checked == 0
+    assert run(study(values("plant.engine", "mujoco", "lagrangian")), tmp_path / "b").checked == 0
+    (tmp_path / "base.toml").write_text(
+        'name = "b"\nduration = 0.02\n[plant]\nengine = "mujoco"\n[trajectory]\nshape = "hold"\n'
+    )
+    chosen = study(scenario="base.toml", fields={}, folder=str(tmp_path))
+    assert run(chosen, tmp_path / "c").checked == 0
+
+
+def test_a_folder_that_cannot_be_had_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="expected a writable folder"):
+        found(study(), tmp_path / "file")
+    (tmp_path / "journal.jsonl").mkdir()
+    with pytest.raises(InputError, match="expected a folder for its journal"):
+        found(study(), tmp_path)
+
+
+def test_a_failure_of_the_table_hides_no_other(tmp_path, monkeypatch):
+    def fails(*_):
+        raise SpheretwinError("table")
+
+    def differs(*_):
+        raise SpheretwinError("plants")
+
+    monkeypatch.setattr(tables, "write", fails)
+    with pytest.raises(SpheretwinError, match="table"):
+        found(study(), tmp_path / "a")
+    monkeypatch.setattr(agreement, "check", differs)
+    with pytest.raises(SpheretwinError, match="plants"):
+        found(study(), tmp_path / "b")

@@ -1,0 +1,117 @@
+"""Studies from TOML: what cannot be run is told in one line before the first row."""
+
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin.study import checking, run
+from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import load, shipped
+from tests.twin.study.cases import LOADS, found, study, values
+
+PD = [{"law": "pd"}]
+
+
+def test_two_studies_ship_and_each_has_the_rows_that_it_says():
+    assert shipped() == ["paper", "robustness"]
+    paper, robustness = (load(name) for name in shipped())
+    assert (len(Grid(paper)), len(Grid(robustness))) == (108, 10_000)
+    assert [law["law"] for law in paper.law] == ["pd", "adaptive_fuzzy", "afsm"]
+    assert robustness.fields["duration"] == 1.0
+    for chosen in (paper, robustness):
+        checking.check(Grid(chosen), Rows(chosen))
+
+
+def refusal(action):
+    with pytest.raises(InputError) as refused:
+        action()
+    assert "\n" not in str(refused.value)
+    return str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("axes", "others", "told"),
+    [
+        (
+            [values("disturbance.laod", 1.0)],
+            {},
+            "received 'disturbance.laod'; did you mean disturbance.load?",
+        ),
+        ([values("plant.modelling_error.3", 1.0)], {}, "expected a section before the dot"),
+        ([values("plant.coulomb_Nm.9", 1.0)], {}, "expected a place from 0 to 3 in a list"),
+        ([values("plant", 1.0)], {}, "plant: expected an object"),
+        ([values("disturbance.load", "1.0", "2")], {}, "expected a valid number, received '1.0'"),
+        ([values("seed", 1)], {}, "expected seeds instead of an axis over seed"),
+        ([values("controller.law", "pd")], {}, "expected [[law]] instead of an axis over controller.law"),
+        ([LOADS[0], LOADS[0]], {}, "expected one axis for a field, received disturbance.load twice"),
+        ([LOADS[1]], {}, "expected samples, as plant.modelling_error is drawn"),
+        ([LOADS[0]], {"samples": 3}, "expected an axis that is drawn for samples, received 3"),
+        ([LOADS[0]], {"fields": {"disturbance.load": 1.0}}, "among the fields or as an axis, received both"),
+        ([values("disturbance.load", 1.0, zip="a")], {}, "expected two axes or more of a zip"),
+        ([], {"fields": {"seed": 1}}, "expected seed and seeds of the study"),
+        ([], {"fields": {"": 1}}, "expected a field such as controller.law"),
+        ([], {"fields": {"duration": "long"}}, "duration: expected a valid number"),
+        ([], {"law": PD, "fields": {"controller.stiffness": [1.0]}}, "in each [[law]], received it among"),
+        ([], {"law": PD * 2}, "expected each [[law]] once, received {'law': 'pd'} twice"),
+        ([], {"law": [{"gain": 1.0}]}, "expected law in each [[law]]"),
+        ([], {"law": [{"law": "pdd"}]}, "received 'pdd'; did you mean pd?"),
+        ([], {"law": [{"law": "pd", "wobble": 1.0}]}, "in controller, received wobble"),
+        (
+            [],
+            {"law": [*PD, {"law": "afsm", "wobble": 1.0}]},
+            "expected rows under 'afsm' that make a scenario",
+        ),
+        ([], {"law": [{"law": "nothing.py:step"}]}, "nothing.py"),
+        ([], {"metrics": ["rms"]}, "or FILE.py:NAME, received 'rms'"),
+        ([], {"metrics": ["rms_error_rad", "rms_error_rad"]}, "figures of different names"),
+        (
+            [],
+            {"metrics": ["a.py:one", "b.py:one"]},
+            "expected figures of different names, received one twice",
+        ),
+        ([], {"metrics": ["nothing.py:one"]}, "expected a readable file of Python"),
+        ([], {"telemetry": [1]}, "expected rows up to 0 for telemetry, received 1"),
+        ([], {"design": "grid"}, "design: expected"),
+        ([], {"seeds": 0}, "seeds: expected greater than or equal to 1"),
+        ([], {"scenario": "sinsoid"}, "did you mean sinusoid?"),
+        ([], {"name": "../up"}, "expected a name that a folder can have, received '../up'"),
+        ([], {"name": ""}, "name: expected"),
+        ([], {"colour": "red"}, "colour"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_before_the_first_row(tmp_path, axes, others, told):
+    assert told in refusal(lambda: run(study(*axes, **others), tmp_path))
+    assert not (tmp_path / "journal.jsonl").exists()
+
+
+def test_a_figure_may_not_have_the_name_of_a_column(tmp_path):
+    (tmp_path / "mine.py").write_text("def key(run): return 1\n")
+    chosen = study(metrics=[f"{tmp_path}/mine.py:key"])
+    assert "expected columns of different names, received key twice" in refusal(lambda: run(chosen, tmp_path))
+
+
+def test_some_values_out_of_range_are_rows_all_of_them_are_a_refusal(tmp_path):
+    assert len(found(study(values("plant.payload_kg", -1.0, 0.0)), tmp_path / "a")) == 2
+    chosen = study(values("plant.payload_kg", -1.0, -2.0))
+    assert "received none among 2; the first: scenario" in refusal(lambda: run(chosen, tmp_path / "b"))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("name = ", "expected valid TOML"),
+        ("", "name: expected"),
+        ('name = "a"\nscenario = "sinusoid"\naxis = 3\n', "axis: expected"),
+        ('name = "a"\nscenario = "nothing.toml"\n', "expected a readable TOML file"),
+        ("a" * 10 + "[" * 2000, "expected valid TOML"),
+    ],
+)
+def test_files_that_are_no_study_are_refused(tmp_path, text, told):
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    assert told in refusal(lambda: run(str(path), tmp_path / "out"))
+
+
+@pytest.mark.parametrize("source", ["papr", "nothing.toml", "nothing", "a\0.toml"])
+def test_names_that_are_no_study_are_refused(source):
+    assert "expected" in refusal(lambda: load(source))
