@@ -84,7 +84,10 @@ def test_plants_that_differ_are_told_in_one_line(source, tmp_path, capsys, monke
         (["paper", "--limit", "x"], "expected a whole number from 1 on, received x"),
         (["paper", "--row", "0", "--limit", "3"], "expected --row without --out, --threads or --limit"),
         (["paper", "--row", "0"], "expected the key of one of its rows, received 0"),
-        (["paper", "--disturbance.load", "1"], "expected --out, --threads, --limit, --row or --json"),
+        (
+            ["paper", "--disturbance.load", "1"],
+            "expected --out, --engine, --address, --threads, --limit, --row",
+        ),
     ],
 )
 def test_bad_input_is_one_line(arguments, told, capsys):
