@@ -192,7 +192,7 @@ def test_a_full_disk_ends_a_study_which_goes_on_when_there_is_room(tmp_path, mon
     monkeypatch.setattr(journal, "_opened", opened)
     lines = (tmp_path / "full" / journal.NAME).read_bytes().splitlines()
     assert 2 < len(lines) < 1 + len(whole)
-    assert [json.loads(line)[0] for line in lines[1:]] == list(range(len(lines) - 1))
+    assert {json.loads(line)[0] for line in lines[1:]} < {row["row"] for row in whole}
     assert found(loads(), tmp_path / "full") == whole
     assert table(tmp_path / "full") == table(tmp_path / "whole")
 
