@@ -6,8 +6,51 @@ the order of the plan.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from spheretwin.twin.electronics.driving.faulty import DriveFaults
-from spheretwin.twin.faults.target import Strike, is_held
+from spheretwin.twin.faults import target
+from spheretwin.twin.faults.target import Effects, Mode, Strike, is_held
+
+
+def modes(
+    source: int, unit: str, ampere: Callable[[Effects], float] = lambda effects: 1.0
+) -> dict[str, Mode]:
+    """Ways in which what is asked for can be wrong.
+
+    Parameters
+    ----------
+    source : int
+        Of noise: converter or amplifier.
+    unit : str
+        That a fault's value is told in.
+    ampere : callable
+        What one of it is, A.
+    """
+
+    def stuck(effects: Effects, strike: Strike) -> None:
+        hold(effects.drive, strike, ampere(effects))
+
+    def offset(effects: Effects, strike: Strike) -> None:
+        shift(effects.drive, strike, ampere(effects))
+
+    def gain(effects: Effects, strike: Strike) -> None:
+        scale(effects.drive, strike)
+
+    def noise(effects: Effects, strike: Strike) -> None:
+        add_noise(effects.drive, strike, source, ampere(effects) * strike.value)
+
+    def dropout(effects: Effects, strike: Strike) -> None:
+        silence(effects.drive, strike)
+
+    return {
+        "stuck": Mode(stuck, target.held(unit)),
+        "offset": Mode(offset, target.offset(unit)),
+        "gain": Mode(gain, target.GAIN),
+        "noise": Mode(noise, target.noise(unit)),
+        "dropout": Mode(dropout),
+        "intermittent": Mode(dropout, target.STRETCH, intermittent=True),
+    }
 
 
 def hold(drive: DriveFaults, strike: Strike, ampere_per_unit: float) -> None:

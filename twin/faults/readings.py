@@ -5,8 +5,46 @@ Several on one line act one behind the other, in the order of the plan.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from spheretwin.twin.electronics.sensing.faulty import ENCODER, GAIN, NOISE, OFFSET, SensorFaults
-from spheretwin.twin.faults.target import Strike, is_held
+from spheretwin.twin.faults import target
+from spheretwin.twin.faults.target import Effects, Mode, Strike, is_held
+
+
+def modes(
+    line: Callable[[Strike], int], unit: str, in_its_own: Callable[[Effects], float] = lambda effects: 1.0
+) -> dict[str, Mode]:
+    """Ways in which any reading can be wrong.
+
+    Parameters
+    ----------
+    line : callable
+        Line of the part that is struck.
+    unit : str
+        That a fault's value is told in.
+    in_its_own : callable
+        What one of it is in the unit of the line.
+    """
+
+    def stuck(effects: Effects, strike: Strike) -> None:
+        hold(effects.sensors, line(strike), strike, in_its_own(effects))
+
+    def offset(effects: Effects, strike: Strike) -> None:
+        shift(effects.sensors, line(strike), strike, in_its_own(effects))
+
+    def gain(effects: Effects, strike: Strike) -> None:
+        scale(effects.sensors, line(strike), strike)
+
+    def noise(effects: Effects, strike: Strike) -> None:
+        add_noise(effects.sensors, line(strike), strike, in_its_own(effects))
+
+    return {
+        "stuck": Mode(stuck, target.held(unit)),
+        "offset": Mode(offset, target.offset(unit)),
+        "gain": Mode(gain, target.GAIN),
+        "noise": Mode(noise, target.noise(unit)),
+    }
 
 
 def fix(sensors: SensorFaults, line: int, value: float) -> None:

@@ -6,8 +6,8 @@ from typing import BinaryIO
 
 try:
     import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
+except ImportError:  # Windows, which has `msvcrt` instead
+    fcntl = None  # type: ignore[assignment] # a module to the checker, and asked for before each use
 
 BEYOND = 1 << 62
 """Byte that is locked where a lock keeps others from reading: one that no file has."""

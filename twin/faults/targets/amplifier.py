@@ -2,17 +2,7 @@
 
 from spheretwin.twin.electronics.driving.undriven import OPEN
 from spheretwin.twin.faults import lines
-from spheretwin.twin.faults.target import (
-    GAIN,
-    STRETCH,
-    Effects,
-    Mode,
-    Strike,
-    Target,
-    held,
-    noise,
-    offset,
-)
+from spheretwin.twin.faults.target import Effects, Mode, Strike, Target
 
 SOURCE = 1
 """Of noise."""
@@ -23,22 +13,4 @@ def _open(effects: Effects, strike: Strike) -> None:
     effects.drive.contact[strike.place] = OPEN
 
 
-def _noise(effects: Effects, strike: Strike) -> None:
-    lines.add_noise(effects.drive, strike, SOURCE, strike.value)
-
-
-TARGET = Target(
-    "amplifier",
-    {
-        "open": Mode(_open),
-        "stuck": Mode(lambda effects, strike: lines.hold(effects.drive, strike, 1.0), held("A")),
-        "offset": Mode(lambda effects, strike: lines.shift(effects.drive, strike, 1.0), offset("A")),
-        "gain": Mode(lambda effects, strike: lines.scale(effects.drive, strike), GAIN),
-        "noise": Mode(_noise, noise("A")),
-        "dropout": Mode(lambda effects, strike: lines.silence(effects.drive, strike)),
-        "intermittent": Mode(
-            lambda effects, strike: lines.silence(effects.drive, strike), STRETCH, intermittent=True
-        ),
-    },
-    each_group=True,
-)
+TARGET = Target("amplifier", {"open": Mode(_open), **lines.modes(SOURCE, "A")}, each_group=True)

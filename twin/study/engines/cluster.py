@@ -218,7 +218,7 @@ def _connected(ray: Any, order: Order) -> Iterator[None]:
             )
         else:
             ray.init(address=order.address, **quiet)
-    except Exception as error:  # of whatever type its parts raise
+    except Exception as error:  # Ray raises what its parts do: of sockets, of gRPC, or bare ones of its own
         raise InputError(
             f"sweep: expected a Ray cluster {_where(order.address)}, received {without_breaks(error)}"
         ) from None

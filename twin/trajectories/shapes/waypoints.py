@@ -130,7 +130,8 @@ class Waypoints(Shape):
         """Largest rate (rad/s) and largest acceleration (rad/s²) of the path, and where they are."""
         return self._path.peaks()
 
-    def notes(self) -> list[str]:  # noqa: D102
+    def notes(self) -> list[str]:
+        """Largest rate and acceleration of the path, which its file alone does not tell."""
         rate, acceleration = (
             f"{peak.value:.4g} {unit} ({ANGLES[AXES.index(peak.axis)]} at {peak.t_s:.4g} s)"
             for peak, unit in zip(self.peaks(), ("rad/s", "rad/s²"), strict=True)
