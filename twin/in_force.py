@@ -9,9 +9,9 @@ from spheretwin.control.law import Law
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.twin import assembly
-from spheretwin.twin.assembly import Files
+from spheretwin.twin import assembly, resolving
 from spheretwin.twin.scenario.changing import changed
+from spheretwin.twin.scenario.files import Files, files_again, files_of
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, checked
 
@@ -54,7 +54,7 @@ class InForce(NamedTuple):
         if own_law and name.startswith("controller."):
             raise InputError(f"session: expected no field of a shipped law, as {own_law.name} is not one")
         scenario = changed(self.scenario, name, value)
-        files = assembly.files_again(self.files, self.scenario, scenario)
+        files = files_again(self.files, self.scenario, scenario)
         return _resolved(scenario, files, own_law, self.own_trajectory)
 
     def after_each(self, plan: tuple[Change, ...]) -> Iterator[InForce]:
@@ -82,8 +82,8 @@ def at_start(
         The model file, the torque curve, the trajectory or a value of the scenario cannot be used.
     """
     own = None if trajectory is None else checked(trajectory)
-    return _resolved(scenario, files or assembly.files_of(scenario), law, own)
+    return _resolved(scenario, files or files_of(scenario), law, own)
 
 
 def _resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None) -> InForce:
-    return InForce(assembly.resolved(scenario, files, law, trajectory), files, law, trajectory)
+    return InForce(resolving.resolved(scenario, files, law, trajectory), files, law, trajectory)

@@ -19,10 +19,10 @@ from spheretwin.models.magnetics import torque_model
 from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
-from spheretwin.twin.assembly import Files
 from spheretwin.twin.electronics.driving import stages as drivings
 from spheretwin.twin.electronics.sensing import stages as senses
 from spheretwin.twin.plant.rotor import Rotor
+from spheretwin.twin.scenario.files import Files
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Triple
 from spheretwin.twin.wiring import wires as wiring

@@ -23,13 +23,14 @@ from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated
-from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
-from spheretwin.twin.assembly import Files
+from spheretwin.twin import resolving
 from spheretwin.twin.exogenous import Exogenous
 from spheretwin.twin.in_force import at_start
 from spheretwin.twin.machine import Machine
+from spheretwin.twin.scenario import files as scenario_files
 from spheretwin.twin.scenario.changing import from_now_on, is_fixed
+from spheretwin.twin.scenario.files import Files
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain, is_dotted
 from spheretwin.twin.scenario.sections import OwnPath, Scenario
@@ -49,7 +50,7 @@ class Session:
     trajectory : object with ``sample(t)``, optional
         Followed instead of the trajectory that the scenario names, to the end.
     files : Files, optional
-        What the files of this scenario say, from `assembly.files_of`; read anew unless given.
+        What the files of this scenario say, from `twin.scenario.files.files_of`; read anew unless given.
 
     Attributes
     ----------
@@ -226,7 +227,7 @@ class Session:
                 self.scenario,
                 self.begun_as,
                 self._key_of(self._in_force.own_law),
-                assembly.digest(self._in_force.files),
+                scenario_files.digest(self._in_force.files),
                 self.scenario.controller.source,
                 self.tick,
                 self._status,
@@ -272,7 +273,7 @@ class Session:
 
     def warnings(self) -> list[str]:
         """What a user should know of model and scenario before believing the figures; one line each."""
-        return assembly.warnings_of(self.scenario, self._in_force.files)
+        return resolving.warnings_of(self.scenario, self._in_force.files)
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -390,7 +391,7 @@ class Session:
         return next((key for key, other in self._own_laws.items() if other is law), None)
 
     def _restore(self, snapshot: Snapshot) -> None:
-        files = assembly.files_again(self._in_force.files, self.scenario, snapshot.scenario)
+        files = scenario_files.files_again(self._in_force.files, self.scenario, snapshot.scenario)
         snapshot.check_fits(files)
         own_law = self._own_laws[snapshot.own_law] if snapshot.own_law is not None else None
         self._in_force = self._in_force._replace(scenario=snapshot.scenario, files=files, own_law=own_law)
@@ -407,7 +408,7 @@ class Session:
 def _recorded(value: Any) -> Any:
     """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
     if isinstance(value, Law):
-        return assembly.name_of_own(value.name)
+        return resolving.name_of_own(value.name)
     return json.loads(json.dumps(value, default=as_plain))
 
 

@@ -8,9 +8,8 @@ from typing import Any
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import assembly
-from spheretwin.twin.assembly import Files
 from spheretwin.twin.machine import State
+from spheretwin.twin.scenario.files import Files, digest
 from spheretwin.twin.scenario.sections import Scenario
 
 
@@ -46,7 +45,7 @@ class Snapshot:
                 f"session: expected {controller.law} as it was when the snapshot was taken,"
                 " received a file that was changed since"
             )
-        if assembly.digest(files) != self.files:
+        if digest(files) != self.files:
             raise InputError(
                 "session: expected a snapshot of the same model and torque curves, received one of others"
             )

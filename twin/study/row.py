@@ -18,8 +18,6 @@ from spheretwin.models.base.wording import did_you_mean, shown, without_breaks
 from spheretwin.models.telemetry.file import TelemetryFile
 from spheretwin.models.telemetry.kept import KeptTelemetry
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import assembly
-from spheretwin.twin.assembly import Files
 from spheretwin.twin.metrics.metric import Metric, Planned
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.records.facts import record_of
@@ -27,6 +25,7 @@ from spheretwin.twin.records.summary import OwnMetric, check_names, own_value
 from spheretwin.twin.scenario import reading
 from spheretwin.twin.scenario.changing import check_events
 from spheretwin.twin.scenario.fields import INDEX, every_field
+from spheretwin.twin.scenario.files import Files, files_of, named_files
 from spheretwin.twin.scenario.hardware import left_open
 from spheretwin.twin.scenario.own_law import scenario_with
 from spheretwin.twin.scenario.sections import Scenario
@@ -133,9 +132,9 @@ class Rows:
 
     def session(self, scenario: Scenario) -> Session:
         """Session of a row's scenario; its files are read once for a study."""
-        named = assembly.named_files(scenario)
+        named = named_files(scenario)
         if named not in self._files:
-            self._files[named] = assembly.files_of(scenario)
+            self._files[named] = files_of(scenario)
         return Session(scenario, files=self._files[named])
 
     def command(self, row: Row) -> str:
