@@ -13,8 +13,9 @@ demo: .venv/demo ## run the nutation under AFSM and leave a recording and its te
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
 	@echo "here:      $(BIN)/rerun nutation.rrd"
 
-test: setup ## pass the tests
-	$(BIN)/pytest
+# Tests of one file stay together: they share what they have computed.
+test: setup ## pass the tests, side by side
+	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 
 check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/ruff format --check .

@@ -1,6 +1,8 @@
 """Shared by all tests: the shipped actuator, reproducible property tests, what parameters owe."""
 
 import copy
+import os
+import signal
 from typing import get_args
 
 import hypothesis
@@ -11,6 +13,11 @@ from pydantic import BaseModel
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import scenario as scenarios
+
+# Whatever the width of the terminal, and whether or not the tests run in the background of a shell,
+# which ignores interruptions there: what they start has neither from them.
+os.environ.pop("COLUMNS", None)
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Derandomised: a failure on one machine is a failure on every machine. No deadline: machines are shared.
 hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=None, max_examples=200)
