@@ -11,7 +11,7 @@ from typing import Any
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.versions import versions
-from spheretwin.twin.commands.reporting import kept, print_json
+from spheretwin.twin.commands.reporting import add_verbose, kept, print_json
 from spheretwin.twin.crosscheck.part import STATES
 from spheretwin.viz.page.folder import prepare
 from spheretwin.viz.terminal import tables
@@ -39,6 +39,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--mjcf", type=Path, default=actuators.MJCF_PATH, metavar="FILE.xml", help="model file"
     )
+    add_verbose(parser)
     parser.set_defaults(run=run)
 
 
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the verb; True when every bound is kept."""
     if rest:
         raise InputError(
-            f"command line: expected --out, --json, --states or --mjcf, received {' '.join(rest)}"
+            f"command line: expected --out, --json, --states, --mjcf or --verbose, received {' '.join(rest)}"
         )
     if not 1 <= options.states <= MOST_STATES:
         raise InputError(
@@ -66,6 +67,6 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     if options.json:
         print_json({"checks": checks, "wall_s": wall_s, "versions": versions()})
     else:
-        print_checks(f"crosscheck, {wall_s:.1f} s", checks)
+        print_checks(f"crosscheck, {wall_s:.1f} s", checks, options.verbose)
         tables.print_written(written)
     return kept("crosscheck", checks)

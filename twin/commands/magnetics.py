@@ -10,6 +10,7 @@ from typing import Any
 
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
+from spheretwin.twin.commands.reporting import add_verbose
 
 CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
 
@@ -97,6 +98,7 @@ def _part(parts: Any, name: str, summary: str, description: str) -> argparse.Arg
     )
     part.add_argument("--mjcf", type=Path, default=MJCF_PATH, metavar="FILE.xml", help="model file")
     part.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
+    add_verbose(part)
     return part
 
 

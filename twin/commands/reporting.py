@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import sys
@@ -22,6 +23,13 @@ def warn(lines: Iterable[str]) -> None:
     """Print warnings on stderr, one line each."""
     for line in lines:
         print(f"spheretwin: warning: {line}", file=sys.stderr)
+
+
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """Add the flag of the verbs that have checks."""
+    parser.add_argument(
+        "--verbose", action="store_true", help="also say what each check compares, and why its bound"
+    )
 
 
 def write_text(path: Path, text: str) -> None:

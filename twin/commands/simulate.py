@@ -76,6 +76,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         scenario = scenarios.load(options.scenario or EXAMPLE, flags.overrides(rest))
         tables.print_fields(scenario.name, flags.described(scenario))
         return True
+    if _is_bare(options, rest):
+        tables.print_scenarios({name: scenarios.load(name).description for name in shipped()})
     plan = _planned(options, rest)
     own = OwnMetrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
@@ -108,6 +110,12 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     return status == Status.COMPLETED and not faults and not own.faults
 
 
+def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Whether nothing was given but the verb."""
+    chosen = (options.record, options.telemetry, options.replay, options.metric, options.live, options.json)
+    return options.scenario is None and not any(chosen) and not rest
+
+
 def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
     """What to run, from a scenario and flags or from a run's own file."""
     if options.replay:
@@ -128,12 +136,12 @@ def _report(
 ) -> None:
     """Print the figures, and how the run ended where it did not complete."""
     scenario = session.begun_as
+    planned_s = plan.ticks * scenario.controller.period_s
     if as_json:
         print_json(told)
     else:
-        tables.print_run(scenario.name, scenario.controller.law, told, own)
+        tables.print_run(scenario.controller.law, planned_s, told, own)
     if status != Status.COMPLETED:
-        planned_s = plan.ticks * scenario.controller.period_s
         print(f"spheretwin: {_ending(session, status, planned_s)}", file=sys.stderr, flush=True)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
@@ -29,20 +30,21 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
         Current limit, for the titles.
     """
     figure = Figure(figsize=(1.25 * WIDTH_in, 1.2 * WIDTH_in), layout="constrained")
+    least_norm, best, singular_value = (
+        _over_spin(workspace, values, np.min)
+        for values in (on_grid.least_norm_Nm, on_grid.best_Nm, on_grid.singular_value_Nm_per_A)
+    )
+    condition = _over_spin(workspace, on_grid.condition, np.max)
+    torque = Normalize(np.nanmin(least_norm), np.nanmax(best))  # one scale: the two are to be compared
     maps = (
-        (f"least-norm torque at {limit_A:g} A, N·m", on_grid.least_norm_Nm, np.min, "viridis"),
-        (f"torque by the best currents at {limit_A:g} A, N·m", on_grid.best_Nm, np.min, "viridis"),
-        (
-            "least singular value σ, N·m/A",
-            on_grid.singular_value_Nm_per_A,
-            np.min,
-            "viridis",
-        ),
-        ("condition number", on_grid.condition, np.max, "viridis_r"),
+        (f"least-norm torque at {limit_A:g} A, N·m", least_norm, torque, "viridis"),
+        (f"torque by the best currents at {limit_A:g} A, N·m", best, torque, "viridis"),
+        ("least singular value σ, N·m/A", singular_value, None, "viridis"),
+        ("condition number", condition, None, "viridis_r"),
     )
     grid = figure.subplots(2, 2, subplot_kw={"projection": "polar"})
-    for axes, (title, values, worst, colours) in zip(grid.flat, maps, strict=True):
-        _polar(figure, axes, workspace, _over_spin(workspace, values, worst), title, colours)
+    for axes, (title, values, scale, colours) in zip(grid.flat, maps, strict=True):
+        _polar(figure, axes, workspace, values, scale, title, colours)
     figure.suptitle(
         "Worst direction and worst spin on the grid; radius: tilt of the shaft, angle: its azimuth"
     )
@@ -69,7 +71,7 @@ def capability_by_tilt(
     for colour, (name, figure_of_merit) in zip(SERIES, series, strict=False):
         _, middle, high = _spread(workspace, getattr(on_grid, figure_of_merit))
         low = _at_all_tilts(workspace, worst[figure_of_merit])
-        torque.fill_between(tilt, low, high, color=colour, alpha=0.2, linewidth=0)
+        torque.fill_between(tilt, low, high, color=colour, alpha=0.2, linewidth=0, label=f"{name}: all poses")
         torque.plot(tilt, low, color=colour, label=f"{name}: worst pose")
         torque.plot(tilt, middle, color=colour, linestyle=":", label=f"{name}: median")
     torque.set_ylim(bottom=0.0)
@@ -90,12 +92,24 @@ def capability_by_tilt(
 
 
 def _polar(
-    figure: Figure, axes: PolarAxes, workspace: Workspace, values: Array, title: str, colours: str
+    figure: Figure,
+    axes: PolarAxes,
+    workspace: Workspace,
+    values: Array,
+    scale: Normalize | None,
+    title: str,
+    colours: str,
 ) -> None:
     azimuth = np.append(workspace.azimuth_rad, 2 * np.pi)
     closed = np.column_stack([values, values[:, :1]])  # (t, a + 1)
     drawn = axes.pcolormesh(
-        azimuth, np.degrees(workspace.tilt_rad), closed, shading="gouraud", cmap=colours, rasterized=True
+        azimuth,
+        np.degrees(workspace.tilt_rad),
+        closed,
+        shading="gouraud",
+        cmap=colours,
+        norm=scale,
+        rasterized=True,
     )
     figure.colorbar(drawn, ax=axes, shrink=0.8, pad=0.09)
     axes.set_title(title)

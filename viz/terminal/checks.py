@@ -9,25 +9,29 @@ from rich.markup import escape
 from spheretwin.models.base.check import Check, broken
 from spheretwin.viz.terminal import style
 
-WIDTH_OF_REASONS = 120  # a narrower table would have more lines of reasons than of figures
 
-
-def print_checks(title: str, checks: Sequence[Check]) -> None:
-    """Print each figure beside its bound; in a wide terminal also what is compared, and why the bound."""
+def print_checks(title: str, checks: Sequence[Check], verbose: bool = False) -> None:
+    """Print a line a check: whether it holds, figure and bound; at length also what each means."""
     console = style.console()
-    reasons = console.width >= WIDTH_OF_REASONS
-    table = style.table(title, "check", "states", "value", "bound", lines=reasons)
-    table.columns[0].ratio = 5
-    for column in table.columns[1:]:
+    table = style.table(title, "", "value", "bound")
+    table.add_column("check")
+    for column in table.columns[:3]:
         column.no_wrap = True
-    if reasons:
-        table.add_column("why the bound", ratio=4)
     for check in checks:
-        name, compares = escape(check.name), f"\n[dim]{escape(check.compares)}[/dim]" if reasons else ""
-        value = check.value_text() + ("" if check.ok else " BROKEN")
-        cells = (name + compares, f"{check.states}", value, check.bound_text())
-        table.add_row(*cells, *([escape(check.why)] if reasons else []), style="" if check.ok else "bold red")
+        look = "" if check.ok else "bold red"
+        table.add_row(_verdict(check), check.value_text(), check.bound_text(), escape(check.name), style=look)
     console.print(table)
+    if verbose:
+        for check in checks:
+            console.print(f"\n[bold]{escape(check.name)}[/bold], {check.states} states")
+            console.print(f"compares: {escape(check.compares)}")
+            console.print(f"bound {check.bound_text()}: {escape(check.why)}")
     console.print(f"{len(checks) - len(broken(checks))} of {len(checks)} checks hold")
-    if not reasons:
-        console.print("What each compares, and why its bound: --json, or a wider terminal.")
+    if not verbose:
+        console.print("What each compares, and why its bound: --verbose.")
+
+
+def _verdict(check: Check) -> str:
+    if not check.ok:
+        return "BROKEN"
+    return "" if check.value is None or check.bound is None else "holds"

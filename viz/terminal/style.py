@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 
 from rich import box
@@ -10,11 +11,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-WIDTH_WITHOUT_TERMINAL = 150
+WIDTH_WITHOUT_TERMINAL = 100
+LEAST = 1e-3
+"""Smaller figures are written as less than this: all that they say is that they do not matter."""
 
 
 def console() -> Console:
-    """What is written to stdout, as wide as the terminal, or as a file is read."""
+    """What is written to stdout: as wide as the terminal; in a pipe or a file as wide as one is read."""
     told = Console()
     if told.is_terminal or "COLUMNS" in os.environ:
         return told
@@ -24,6 +27,8 @@ def console() -> Console:
 def table(title: str, first: str, *others: str, lines: bool = False) -> Table:
     """A table under its title: what a row is about at the left, figures at the right.
 
+    Where no terminal is, it is Markdown.
+
     Parameters
     ----------
     title, first, others : str
@@ -31,15 +36,26 @@ def table(title: str, first: str, *others: str, lines: bool = False) -> Table:
     lines : bool
         Whether to part the rows, where they have several lines each.
     """
+    told = console()
     made = Table(
         title=escape(title),
         title_justify="left",
-        box=box.HORIZONTALS,
-        pad_edge=False,
-        show_lines=lines,
-        min_width=min(cell_len(title), console().width),  # a title is wrapped to its table
+        box=box.HORIZONTALS if told.is_terminal else box.MARKDOWN,
+        pad_edge=not told.is_terminal,
+        show_lines=lines and told.is_terminal,
+        min_width=min(cell_len(title), told.width),  # a title is wrapped to its table
     )
     made.add_column(escape(first), overflow="fold")
     for heading in others:
         made.add_column(escape(heading), justify="right")
     return made
+
+
+def three_digits(value: float) -> str:
+    """A figure with three significant digits, without a power of ten."""
+    if not math.isfinite(value):
+        return "–"
+    if abs(value) < LEAST:
+        return "0" if value == 0 else f"< {LEAST:g}"
+    places = 2 - math.floor(math.log10(abs(value)))
+    return f"{round(value, places):.{max(places, 0)}f}"

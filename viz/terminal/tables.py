@@ -2,29 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
 
 from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.status import Level, Status, named
 from spheretwin.viz.terminal import style
+from spheretwin.viz.terminal.style import three_digits
+
+ERRORS = {
+    "largest": "max_abs_error_rad",
+    "rms": "rms_error_rad",
+    "rms, second half": "tail_rms_error_rad",
+}
+
+COLOURS = {Level.INFO: "italic", Level.WARN: "bold yellow", Level.ERROR: "bold red"}
 
 
-def print_run(scenario: str, law: str, summary: dict[str, Any], own: Sequence[str] = ()) -> None:
+def print_run(law: str, planned_s: float, summary: dict[str, Any], own: Sequence[str] = ()) -> None:
     """Print the figures of one run: errors per axis, currents and speed, then those of the user's own."""
-    console = style.console()
-    errors = style.table(f"{scenario} under {law}: {summary['status']}", "tracking error, rad", *ANGLES)
-    rows = {
-        "largest": "max_abs_error_rad",
-        "rms": "rms_error_rad",
-        "rms, second half": "tail_rms_error_rad",
-    }
-    for label, key in rows.items():
-        errors.add_row(label, *(f"{value:.4f}" for value in summary[key] or ()))
+    console, status = style.console(), named(summary["status"])
+    title = f"{summary['scenario']['name']} under {law}: {_ending(status, planned_s, summary)}"
+    errors = style.table(title, "tracking error, mrad (degrees)", *ANGLES)
+    errors.title_style = COLOURS[status.level]
+    for label, key in ERRORS.items():
+        errors.add_row(label, *(_angle(value) for value in summary[key] or ()))
     settled = summary["settling_time_s"] or ()
-    errors.add_row("settled after", *("never" if t is None else f"{t:.3f} s" for t in settled))
+    errors.add_row("settled after", *("never" if t is None else f"{three_digits(t)} s" for t in settled))
     console.print(errors)
     if summary["max_abs_current_A"] is not None:
         console.print(
@@ -48,6 +56,25 @@ def print_run(scenario: str, law: str, summary: dict[str, Any], own: Sequence[st
         console.print(escape(note), soft_wrap=True)
     for warning in summary["warnings"]:
         console.print(f"[yellow]warning[/yellow]  {escape(warning)}", soft_wrap=True)
+
+
+def _ending(status: Status, planned_s: float, summary: dict[str, Any]) -> str:
+    """How a run ended; where it did not complete, also when, and why."""
+    if status == Status.COMPLETED:
+        return status
+    why = f", {summary['reason']}" if summary["reason"] else ""
+    return f"{status} at {summary['simulated_s']:.3f} s of {planned_s:g} s{why}"
+
+
+def _angle(value_rad: float) -> str:
+    return f"{three_digits(1e3 * value_rad)} ({three_digits(math.degrees(value_rad))}°)"
+
+
+def print_scenarios(descriptions: Mapping[str, str]) -> None:
+    """Print what scenarios there are, a line each."""
+    width = max(map(len, descriptions))
+    for name, description in descriptions.items():
+        style.console().print(f"{name:{width}}  {escape(description)}", soft_wrap=True)
 
 
 def print_files(record: Path | None, telemetry: Path | None) -> None:

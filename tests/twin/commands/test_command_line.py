@@ -48,7 +48,7 @@ def test_version_is_printed():
     [
         (["fly"], ["simulate", "magnetics", "fly"]),
         ([], ["VERB"]),
-        (["simulate"], ["hold, nutation, sinusoid, tilt"]),
+        (["simulate", "--json"], ["hold, nutation, sinusoid, tilt"]),
         (["simulate", "spiral"], ["hold, nutation, sinusoid, tilt", "spiral"]),
         (["simulate", "hold", "--controller.law", "pdd"], ["pd, pid, adaptive_fuzzy, afsm", "'pdd'"]),
         (["simulate", "hold", "--controler.law", "pd"], ["controller", "controler"]),
@@ -90,6 +90,15 @@ def test_bad_input_is_one_line_exit_2_and_no_file(tmp_path, monkeypatch, argumen
     for part in parts:
         assert part in line
     assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_the_verb_alone_lists_the_scenarios_a_line_each():
+    code, stdout, stderr = called("simulate")
+    assert code == cli.BAD_INPUT
+    lines = stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["hold", "nutation", "sinusoid", "tilt"]
+    assert all(line.endswith(".") and len(line) > 30 for line in lines)
+    assert stderr.count("\n") == 1
 
 
 LONG = "x" * 20_000

@@ -16,48 +16,65 @@ CHECKS = [
 
 @pytest.fixture
 def printed(monkeypatch, capsys):
-    def lines(columns):
-        monkeypatch.setenv("COLUMNS", str(columns))
-        print_checks("magnetics check", CHECKS)
-        return capsys.readouterr().out.splitlines()
+    def lines(verbose):
+        monkeypatch.setenv("COLUMNS", "80")
+        print_checks("magnetics check", CHECKS, verbose)
+        return [line.rstrip() for line in capsys.readouterr().out.splitlines()]
 
     return lines
 
 
 def row(lines, name):
-    (line,) = (line for line in lines if line.lstrip().startswith(name))
-    return line.split()
+    (line,) = (line for line in lines if line.endswith(f"{name:8} |"))
+    return [cell.strip() for cell in line.strip("|").split("|")]
 
 
-def test_a_narrow_terminal_has_one_line_a_check(printed):
-    lines = printed(80)
-    assert lines[0].rstrip() == "magnetics check"
-    assert row(lines, "mesh") == ["mesh", "[1]", "3", "1.00e-06", "≤", "5.00e-03"]
-    assert row(lines, "need") == ["need", "7", "2", "BROKEN", "≤", "1"]
-    assert row(lines, "trace") == ["trace", "5000", "nan", "rad", "reported"]
+def test_a_check_is_a_line_with_its_verdict(printed):
+    lines = printed(verbose=False)
+    assert lines[0] == "magnetics check"
+    assert row(lines, "mesh [1]") == ["holds", "1.00e-06", "≤ 5.00e-03", "mesh [1]"]
+    assert row(lines, "need") == ["BROKEN", "2", "≤ 1", "need"]
+    assert row(lines, "trace") == ["", "nan rad", "reported", "trace"]
     assert "2 of 3 checks hold" in lines
-    assert "wider terminal" in lines[-1]
+    assert "--verbose" in lines[-1]
     assert not any("as much as is known" in line for line in lines)
 
 
-def test_a_wide_terminal_says_what_is_compared_and_why(printed):
-    lines = printed(120)
-    for text in (
-        "this mesh with that",
-        "as much as is known",
-        "what is wanted over what there is",
-        "no bound",
-    ):
+def test_at_length_it_says_what_is_compared_and_why(printed):
+    lines = printed(verbose=True)
+    where = lines.index("mesh [1], 3 states")
+    assert lines[where + 1] == "compares: this mesh with that"
+    assert lines[where + 2] == "bound ≤ 5.00e-03: as much as is known"
+    for text in ("what is wanted over what there is", "no bound"):
         assert any(text in line for line in lines)
     assert lines[-1] == "2 of 3 checks hold"
-    assert max(len(line) for line in lines) <= 120
+    assert max(map(len, lines)) <= 80
 
 
-def test_a_file_is_as_wide_as_reasons_need(monkeypatch, capsys):
+def test_a_pipe_gets_plain_text_of_a_width_that_can_be_read(monkeypatch, capsys):
     monkeypatch.delenv("COLUMNS", raising=False)
-    assert style.console().width == style.WIDTH_WITHOUT_TERMINAL
     print_checks("magnetics check", CHECKS)
-    assert "as much as is known" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "\x1b" not in out
+    assert max(map(len, out.splitlines())) <= style.WIDTH_WITHOUT_TERMINAL
+    assert set("─━│┃").isdisjoint(out)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1261.3, "1260"),
+        (30.24, "30.2"),
+        (0.10451, "0.105"),
+        (0.99951, "1.000"),  # rounding may add a place
+        (-2.5, "-2.50"),
+        (0.0, "0"),
+        (1e-9, "< 0.001"),
+        (np.inf, "–"),
+    ],
+)
+def test_figures_have_three_significant_digits(value, text):
+    assert style.three_digits(value) == text
 
 
 def test_a_title_is_not_wrapped_to_a_narrow_table(monkeypatch, capsys):

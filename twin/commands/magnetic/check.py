@@ -18,7 +18,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the part; True when every bound is kept."""
     if rest:
         raise InputError(
-            f"command line: expected --csv, --mjcf, --poses, --seed or --json, received {' '.join(rest)}"
+            "command line: expected --csv, --mjcf, --poses, --seed, --json or --verbose,"
+            f" received {' '.join(rest)}"
         )
     actuator = actuators.load(options.mjcf, options.csv)
     verdict = field_verdict.judge(actuator, options.poses, options.seed, tracked("direct sums"))
@@ -27,7 +28,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         print_json(verdict._asdict())
     else:
         magnetic_tables.print_field(verdict)
-        print_checks("magnetics check", verdict.checks)
+        print_checks("magnetics check", verdict.checks, options.verbose)
     if verdict.curve_is_of_another_geometry:
         distance = 100 * verdict.sources.curve_between_samples_of_peak
         warn(

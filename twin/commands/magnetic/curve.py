@@ -21,23 +21,25 @@ from spheretwin.viz.terminal.progress import tracked
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the part; True when every bound is kept."""
     if rest:
-        raise InputError(f"command line: expected --out, --csv, --mjcf or --json, received {' '.join(rest)}")
+        raise InputError(
+            f"command line: expected --out, --csv, --mjcf, --json or --verbose, received {' '.join(rest)}"
+        )
     if options.csv and options.out:
         raise InputError("command line: expected --out or --csv, received both")
     if options.csv:
         return _judge(options.csv, options.mjcf, options.json)
     if options.out:
         check_writable(options.out)
-    return _compute(options.out, options.mjcf, options.json)
+    return _compute(options)
 
 
-def _compute(out: Path | None, mjcf: Path, as_json: bool) -> bool:
+def _compute(options: argparse.Namespace) -> bool:
     """Compute the curve, check it, write it."""
-    computed = curve_verdict.compute(mjcf, tracked("torque curve"))
+    computed = curve_verdict.compute(options.mjcf, tracked("torque curve"))
     warn(computed.warnings)
-    if out:
-        write_text(out, computed.csv)
-    if as_json:
+    if options.out:
+        write_text(options.out, computed.csv)
+    if options.json:
         print_json(
             {
                 **computed.peak._asdict(),
@@ -48,10 +50,10 @@ def _compute(out: Path | None, mjcf: Path, as_json: bool) -> bool:
                 "warnings": computed.warnings,
             }
         )
-    elif out:
+    elif options.out:
         magnetic_tables.print_computed_curve(computed)
-        print_checks("magnetics curve", computed.checks)
-        tables.print_written([out])
+        print_checks("magnetics curve", computed.checks, options.verbose)
+        tables.print_written([options.out])
     else:
         _print_text(computed)
     return kept("magnetics curve", computed.checks)

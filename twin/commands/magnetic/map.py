@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         print_json({**verdict._asdict(), "figures": [str(path) for path in files]})
     else:
         magnetic_tables.print_workspace(verdict)
-        print_checks("magnetics map", verdict.checks)
+        print_checks("magnetics map", verdict.checks, options.verbose)
         tables.print_written(files)
     return kept("magnetics map", verdict.checks)
 
