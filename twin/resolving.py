@@ -39,7 +39,8 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
     Raises
     ------
     InputError
-        The first pose is outside the hinges' range, or a list does not fit the actuator.
+        The first pose is outside the hinges' range, a list does not fit the actuator, or the law is made for
+        another control period.
     """
     actuator, given, nominal, section = files.actuator, scenario.drive, scenario.nominal, scenario.plant
     group = actuator.group
@@ -76,6 +77,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
         ),
     }
     if law:
+        law.check_period(scenario.controller.period_s)
         filled["controller"] = OwnController(
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
