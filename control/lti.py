@@ -2,7 +2,7 @@ r"""A discrete linear system as a law: ``x' = A x + B e, torque = C x + D e``, o
 
 The error is *reference minus measured*, as the sum in front of a controller in a textbook's loop has it, so
 that a gain that stabilises is positive; the telemetry's `error_rad` has the other sign. Of one output, the
-same system runs on each axis.
+same system runs on each axis. It is told of no limit of the currents: an integrator in it winds up.
 
 A system is known by what it has: matrices, polynomials, or a method that makes matrices of it. So neither
 python-control nor scipy need be there for a law that is none of theirs.
