@@ -10,8 +10,9 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from spheretwin.control import lti
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown
+from spheretwin.models.base.wording import shown, told_apart
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, width
 
 _vector = types.float64[::1]
@@ -19,6 +20,9 @@ _matrix = types.float64[:, ::1]
 
 SIGNATURE = types.void(types.float64, _matrix, _matrix, _vector, _vector, _vector)
 """Compiled signature: t, reference (3, 3), measurement (3, 3), parameters, state, torque (3,)."""
+
+# Periods are built from decimal fractions; two that are the same are so to rounding only.
+SAME_PERIOD = 1e-9
 
 
 class Known(NamedTuple):
@@ -63,12 +67,14 @@ class Law:
     asks_torque : bool
         Whether the third row of `measurement` is wanted. What is not asked for is not computed: the row
         holds no numbers then. It begins at 0 at the first tick under the law.
+    period_s : float, optional
+        Control period that it is made for, s: under another it is refused. Any unless given.
 
     Raises
     ------
     InputError
         The name is no text, the step no function, the numbers are not real, finite and in one dimension,
-        or the signals do not fit the state.
+        the signals do not fit the state, or the period is none.
     """
 
     name: str
@@ -77,6 +83,41 @@ class Law:
     state: NDArray[np.float64]
     signals: tuple[Signal, ...] = ()
     asks_torque: bool = False
+    period_s: float | None = None
+
+    @classmethod
+    def from_lti(
+        cls,
+        system: Any,
+        *,
+        name: str = "lti",
+        inertia_kg_m2: ArrayLike | None = None,
+        constant_torque_Nm: ArrayLike = 0.0,
+    ) -> Law:
+        """Law that runs a discrete linear system, from errors to torques.
+
+        Parameters
+        ----------
+        system : discrete linear system
+            A state space or transfer function of python-control or scipy, or zeros, poles and gain, with its
+            `dt` in s: the control period. Its three inputs are the errors of the angles (rad), *reference
+            minus measured*; of six, the last three are those of the rates (rad/s). Its three outputs are the
+            generalised torque (N·m). A system of one output, with one input or two, runs on each axis.
+        name : str
+            For tables and figures.
+        inertia_kg_m2 : float or (3,) array, kg·m², optional
+            Where given, as `Known.inertia`, the outputs are accelerations (rad/s²): it multiplies them.
+        constant_torque_Nm : float or (3,) array, N·m
+            Added to the outputs: what holds the rotor where the errors are 0.
+
+        Raises
+        ------
+        InputError
+            The system is continuous or improper, has another number of inputs or outputs, or holds a number
+            that is not finite.
+        """
+        made = lti.running(name, system, inertia_kg_m2, constant_torque_Nm)
+        return cls(name, lti.step, made.parameters, made.state, period_s=made.period_s)
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -98,6 +139,23 @@ class Law:
         names = [*COMMON_NAMES, *(signal.name for signal in self.signals)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
+        given = self.period_s
+        if given is not None and not (isinstance(given, int | float) and 0 < given < np.inf):
+            raise InputError(
+                f"law {self.name}: expected period_s as a number above 0, received {shown(given)}"
+            )
+
+    def check_period(self, period_s: float) -> None:
+        """Hold a control period (s) against the one that the law is made for.
+
+        Raises
+        ------
+        InputError
+            It is made for another.
+        """
+        if self.period_s is not None and abs(period_s - self.period_s) > SAME_PERIOD * self.period_s:
+            own, received = told_apart(self.period_s, period_s)
+            raise InputError(f"law {self.name}: expected a control period of {own} s, received {received} s")
 
 
 def _numbers(law: str, field: str, given: ArrayLike) -> NDArray[np.float64]:

@@ -137,6 +137,28 @@ def gravity_torque(q: NDArray[np.float64], weight_moment: float) -> NDArray[np.f
     return G
 
 
+def gravity_stiffness(q: NDArray[np.float64], weight_moment: float) -> NDArray[np.float64]:
+    """Derivative of `gravity_torque` with respect to the pose: what gravity is to small motions.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose.
+    weight_moment : float, N·m
+        m g l of the payload.
+
+    Returns
+    -------
+    (3, 3) array, N·m/rad
+        The Hessian of the potential energy; negative definite in (alpha, beta) where a payload is upright.
+    """
+    at = turns(triple(q))
+    stiffness = np.zeros((3, 3))
+    stiffness[0, 0] = stiffness[1, 1] = -weight_moment * at.ca * at.cb
+    stiffness[0, 1] = stiffness[1, 0] = weight_moment * at.sa * at.sb
+    return stiffness
+
+
 @compiled
 def acceleration(
     q: NDArray[np.float64],

@@ -44,7 +44,7 @@ def law_of(scenario: Scenario) -> Law:
     Raises
     ------
     InputError
-        It is one of the user's, and makes none.
+        It is one of the user's, and makes none, or one for another control period.
     """
     section = scenario.controller
     try:
@@ -58,6 +58,7 @@ def law_of(scenario: Scenario) -> Law:
         ) from error
     if not isinstance(law, Law):
         raise InputError(f"law {section.law}: expected build(known) to make a Law, received {shown(law)}")
+    law.check_period(section.period_s)
     return law
 
 

@@ -39,7 +39,8 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
     Raises
     ------
     InputError
-        The first pose is outside the hinges' range, or a list does not fit the actuator.
+        The first pose is outside the hinges' range, a list does not fit the actuator, or the law is made for
+        another control period.
     """
     actuator, given, nominal, section = files.actuator, scenario.drive, scenario.nominal, scenario.plant
     group = actuator.group
@@ -63,7 +64,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
                 "inertia_kg_m2": nominal.inertia_kg_m2 or tuple(actuator.inertia.tolist()),
                 "current_limit_A": nominal.current_limit_A or drive_section.current_limit_A,
                 "time_constant_s": (
-                    _lag_s(drive_section) if nominal.time_constant_s is None else nominal.time_constant_s
+                    lag_of(drive_section) if nominal.time_constant_s is None else nominal.time_constant_s
                 ),
                 "delay_s": given.delay_s if nominal.delay_s is None else nominal.delay_s,
             }
@@ -76,6 +77,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
         ),
     }
     if law:
+        law.check_period(scenario.controller.period_s)
         filled["controller"] = OwnController(
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
@@ -125,7 +127,7 @@ def name_of_own(name: str) -> str:
     return f"{name} of the user's" if name in LAWS or name in SHAPES or is_reference(name) else name
 
 
-def _lag_s(drive: DriveSection) -> float:
+def lag_of(drive: DriveSection) -> float:
     """Lag of the currents while no voltage is at its limit."""
     return 1 / drive.bandwidth_rad_s if drive.supply_V is not None else drive.time_constant_s or 0.0
 

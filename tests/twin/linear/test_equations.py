@@ -1,0 +1,257 @@
+"""The linear model against differences of the equations of motion that both engines step, and identities."""
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.kinematics import rate_jacobian
+from spheretwin.models.lagrangian import acceleration, loaded_inertia
+from spheretwin.models.magnetics import torque_matrix
+from spheretwin.twin import assembly
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.in_force import at_start
+from spheretwin.twin.linear.model import linearise
+from spheretwin.twin.plant.friction import friction, friction_torque
+from spheretwin.twin.plant.stepping import step
+
+LOADED = {"plant.modelling_error": 0.2, "plant.payload_kg": 0.05}
+TILTED = np.array([0.3, -0.2, 0.4])
+POSES = [np.zeros(3), TILTED, np.array([-0.7, 0.9, 2.0])]
+UNEVEN = [1 + 0.2 * np.sin(3 * j) for j in range(18)]
+
+
+def scenario(changes=None):
+    return scenarios.load("hold", LOADED | (changes or {}))
+
+
+def gradient(function, at, h=1e-3):
+    """Central differences of fourth order; the last index is that of the argument."""
+    steps = h * np.eye(len(at))
+    near = np.array([function(at + d) - function(at - d) for d in steps])
+    far = np.array([function(at + 2 * d) - function(at - 2 * d) for d in steps])
+    return np.moveaxis((8 * near - far) / (12 * h), 0, -1)
+
+
+def inverse(matrix):
+    return np.linalg.pinv(matrix)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
+@pytest.mark.parametrize("pose", POSES, ids=str)
+def test_one_physics_step_of_either_engine_has_the_model_s_derivatives(engine, pose):
+    """Over a step h a torque is held: x' = exp(A h) x + (∫exp(A s) ds B) u."""
+    model = linearise(scenario({"plant.engine": engine}), pose)
+    in_force = at_start(scenario({"plant.engine": engine}), None, None)
+    rotor, h = assembly.rotor_of(in_force.scenario, in_force.files), in_force.scenario.plant.step_s
+
+    def after(at):
+        stepped = rotor.start(pose + at[:3], at[3:6])
+        stepped.torque_q[:] = model.input_at_rest + at[6:]
+        step(stepped)
+        return np.concatenate([stepped.q - pose, stepped.qdot])
+
+    np.testing.assert_allclose(after(np.zeros(9)), 0, rtol=0, atol=1e-15)  # it rests: rounding alone
+    A, B = cont2discrete((model.system.A, model.system.B, model.system.C, model.system.D), h)[:2]
+    # What a step changes, over its length, is A and B to first order: 1e-6 of their largest entries. The
+    # engine's own steps are off by (18 1/s² h²)^2, 2e-11; differences of 1e-3 by 1e-16 / 1e-3 / h, 2e-10.
+    found = gradient(after, np.zeros(9))
+    unit = np.eye(6)
+    assert np.abs(model.system.A).max() > 10
+    np.testing.assert_allclose(
+        (found[:, :6] - unit) / h, (A - unit) / h, rtol=0, atol=1e-6 * np.abs(model.system.A).max()
+    )
+    np.testing.assert_allclose(found[:, 6:] / h, B / h, rtol=0, atol=1e-6 * np.abs(model.system.B).max())
+
+
+@pytest.mark.parametrize("pose", POSES, ids=str)
+def test_viscous_friction_damps_as_the_plant_s_does(actuator, pose):
+    viscous = np.array([1e-3, 2e-3, 5e-4])
+    model = linearise(scenario({"plant.viscous_Nm_s": viscous.tolist()}), pose)
+    height = actuator.payload_mount_m[2]
+    inertia = loaded_inertia(1.2 * actuator.inertia, 0.05, height)
+    # Over a step this short the rates that friction is taken at are those before it, to 1e-8.
+    acting = friction(np.zeros(3), viscous, 0.01, inertia, 1e-8)
+
+    def accelerated(qdot):
+        torque = np.empty(3)
+        friction_torque(acting, pose, qdot, torque)
+        return acceleration(pose, qdot, torque, inertia, 0.0)
+
+    np.testing.assert_allclose(
+        model.system.A[3:, 3:], gradient(accelerated, np.zeros(3)), rtol=1e-6, atol=1e-9
+    )
+
+
+def test_coulomb_friction_has_no_linear_part():
+    smooth, rough = (linearise(scenario({"plant.coulomb_Nm": [each] * 3}), TILTED) for each in (0.0, 5e-3))
+    np.testing.assert_array_equal(rough.system.A, smooth.system.A)
+
+
+@pytest.mark.parametrize("pose", POSES, ids=str)
+def test_currents_pull_as_the_compiled_torque_matrix_says(actuator, pose):
+    model = linearise(scenario({"plant.group_gain": UNEVEN}), pose, inputs="currents")
+    by_torque = linearise(scenario({"plant.group_gain": UNEVEN}), pose)
+    per_torque = linearise(scenario(), pose).system.B[3:]
+
+    def torque(q):
+        return rate_jacobian(q).T @ torque_matrix(q, actuator) @ (UNEVEN * model.input_at_rest)
+
+    # The table meets the curve within 2e-7 of its peak.
+    matrix = rate_jacobian(pose).T @ torque_matrix(pose, actuator) * UNEVEN
+    assert np.abs(model.system.B[3:] - per_torque @ matrix).max() < 1e-6 * np.abs(model.system.B).max()
+    # So its differences over 1e-3 rad are good to some 1e-4.
+    pulled = model.system.A[3:, :3] - linearise(scenario(), pose).system.A[3:, :3]
+    expected = per_torque @ gradient(torque, pose)
+    assert np.abs(pulled - expected).max() <= 1e-3 * np.abs(expected).max()
+    assert by_torque.input_at_rest.shape == (3,)
+
+
+def test_a_mistaken_controller_is_part_of_the_true_model(actuator):
+    """The torque of a command: through the nominal matrix to currents, through the true one back."""
+    told = {"plant.group_gain": UNEVEN, "nominal.torque_scale": 1.25}
+    model, plain = linearise(scenario(told), TILTED), linearise(scenario(), TILTED)
+    command = model.input_at_rest
+
+    def given(q):
+        matrix = rate_jacobian(q).T @ torque_matrix(q, actuator)
+        return (matrix * UNEVEN) @ inverse(1.25 * matrix)
+
+    np.testing.assert_allclose(given(TILTED) @ command, plain.input_at_rest, rtol=1e-6, atol=1e-9)
+    expected = plain.system.B[3:] @ given(TILTED)
+    np.testing.assert_allclose(model.system.B[3:], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    turning = plain.system.B[3:] @ gradient(lambda q: given(q) @ command, TILTED)
+    change = model.system.A[3:, :3] - plain.system.A[3:, :3]
+    assert np.abs(turning).max() > 0.1
+    # Differences of the table, as above.
+    assert np.abs(change - turning).max() < 1e-3 * np.abs(turning).max()
+
+
+def test_a_scale_that_is_wrong_alone_scales_the_input_alone():
+    model, plain = (linearise(scenario({"nominal.torque_scale": scale}), TILTED) for scale in (1.25, 1.0))
+    np.testing.assert_allclose(model.input_at_rest, 1.25 * plain.input_at_rest, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(1.25 * model.system.B, plain.system.B, rtol=1e-12, atol=1e-11)
+    # Its slopes cancel but for the rounding of their differences.
+    np.testing.assert_allclose(model.system.A, plain.system.A, rtol=0, atol=1e-8)
+
+
+def responses(system, at_rad_s=(1.0, 30.0, 300.0)):
+    A, B, C = system.A, system.B, system.C
+    return np.array([C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) for w in at_rad_s])
+
+
+@pytest.mark.parametrize(("inputs", "states"), [("torque", 9), ("currents", 24)])
+def test_a_lag_is_one_more_pole_of_every_response(inputs, states):
+    """Where no current flows at rest, x' = A x + B i and i' = (u - i) / lag: G / (1 + lag s)."""
+    unloaded = {"plant.payload_kg": 0.0, "drive.time_constant_s": 4e-3, "plant.viscous_Nm_s": [1e-3] * 3}
+    plain, late = (linearise(scenario(unloaded), TILTED, inputs=inputs, lag=lag) for lag in (False, True))
+    assert late.system.A.shape == (states, states)
+    pole = 1 + 4e-3j * np.array([1.0, 30.0, 300.0])
+    np.testing.assert_allclose(
+        responses(late.system) * pole[:, None, None], responses(plain.system), rtol=1e-9, atol=1e-12
+    )
+
+
+def test_a_lag_under_load_is_the_same_for_torques_and_for_the_currents_that_answer_them(actuator):
+    """Currents commanded as the allocation does, also as it follows the pose, are a torque commanded."""
+    told = {"drive.time_constant_s": 4e-3}
+    by_torque = linearise(scenario(told), TILTED, lag=True).system
+    model = linearise(scenario(told), TILTED, inputs="currents", lag=True)
+    by_currents, held = model.system, linearise(scenario(told), TILTED).input_at_rest
+
+    def allocated(q):
+        return inverse(rate_jacobian(q).T @ torque_matrix(q, actuator)) @ held
+
+    np.testing.assert_allclose(allocated(TILTED), model.input_at_rest, rtol=0, atol=1e-6 * 0.1)
+    follows = np.hstack([gradient(allocated, TILTED), np.zeros((18, 21))])
+    answered = by_currents.B @ inverse(rate_jacobian(TILTED).T @ torque_matrix(TILTED, actuator))
+    closed = by_currents.A + by_currents.B @ follows
+    first, second = (
+        responses(by_torque),
+        np.array(
+            [
+                by_currents.C @ np.linalg.solve(1j * w * np.eye(24) - closed, answered)
+                for w in (1.0, 30.0, 300.0)
+            ]
+        ),
+    )
+    for one, other in zip(first, second, strict=True):
+        # Differences of the table, as above.
+        assert np.abs(one - other).max() < 1e-3 * np.abs(one).max()
+
+
+def test_a_drive_without_lag_has_no_states_for_it():
+    assert linearise(scenario({"drive.time_constant_s": 0.0}), lag=True).system.A.shape == (6, 6)
+
+
+def test_the_prototype_s_lag_is_that_of_its_amplifiers():
+    model = linearise(scenarios.load("tilt", {"hardware": "prototype"}), lag=True)
+    bandwidth = scenarios.load("tilt", {"hardware": "prototype"}).drive.bandwidth_rad_s
+    np.testing.assert_array_equal(model.system.A[6:, 6:], -bandwidth * np.eye(3))
+
+
+def test_the_nominal_model_is_what_the_controller_knows():
+    told = {
+        "nominal.inertia_kg_m2": [2e-3, 3e-3, 4e-3], "nominal.time_constant_s": 3e-3,
+        "nominal.torque_scale": 1.3, "plant.viscous_Nm_s": [1e-3] * 3,
+        "plant.modelling_torque_Nm": [0.01] * 3,
+    }  # fmt: skip
+    model = linearise(scenario(told), np.zeros(3), nominal=True, lag=True)
+    np.testing.assert_allclose(
+        np.linalg.inv(model.system.A[3:6, 6:]), np.diag([2e-3, 3e-3, 4e-3]), rtol=1e-12
+    )
+    np.testing.assert_array_equal(model.system.A[3:6, :6], 0)
+    np.testing.assert_array_equal(model.system.B[6:], np.eye(3) / 3e-3)
+    np.testing.assert_array_equal(model.input_at_rest, 0)
+
+
+def test_a_constant_torque_is_held_beside_gravity():
+    plain, pulled = (
+        linearise(scenario({"plant.modelling_torque_Nm": pull}), TILTED).input_at_rest
+        for pull in ([0.0, 0.0, 0.0], [0.01, -0.02, 0.03])
+    )
+    np.testing.assert_allclose(pulled - plain, [0.01, -0.02, 0.03], rtol=1e-12)
+
+
+def test_states_inputs_and_outputs_are_named_and_the_first_pose_is_where_it_rests():
+    model = linearise(scenario({"plant.initial_rad": [0.1, 0.2, 0.3]}), inputs="currents", lag=True)
+    np.testing.assert_array_equal(model.pose_rad, [0.1, 0.2, 0.3])
+    assert model.states[:7] == (
+        "alpha_rad", "beta_rad", "gamma_rad", "alpha_rad_s", "beta_rad_s", "gamma_rad_s", "current_00_A",
+    )  # fmt: skip
+    assert len(model.states) == len(model.system.A) == 24
+    assert len(model.inputs) == model.system.B.shape[1] == len(model.input_at_rest) == 18
+    assert model.outputs == ("alpha_rad", "beta_rad", "gamma_rad")
+
+
+@pytest.mark.parametrize(
+    ("changes", "given", "part"),
+    [
+        ({}, {"pose_rad": [1.5, 0.0, 0.0]}, "a pose with alpha from -1.39626 to 1.39626 rad, received 1.5"),
+        ({}, {"pose_rad": [0.0, np.pi / 2, 0.0]}, "a pose with beta from -1.39626 to 1.39626 rad"),  # locked
+        ({}, {"pose_rad": [0.0, 0.0]}, "a pose of three finite angles, received [0.0, 0.0]"),
+        ({}, {"pose_rad": [0.0, np.nan, 0.0]}, "a pose of three finite angles"),
+        ({}, {"pose_rad": "upright"}, "a pose of three finite angles, received 'upright'"),
+        ({}, {"inputs": "voltages"}, "inputs as one of torque, currents, received 'voltages'"),
+        ({}, {"kind": "matlab"}, "kind as one of scipy, control, received 'matlab'"),
+        ({"plant.payload_kg": 60.0}, {"pose_rad": TILTED}, "a pose that the coils hold within 8 A"),
+        ({"plant.group_gain": [0.0] * 18}, {}, "coils that give torque"),
+    ],
+)
+def test_what_has_no_linear_model_is_refused_in_one_line(changes, given, part):
+    with pytest.raises(InputError) as caught:
+        linearise(scenario(changes), **given)
+    message = str(caught.value)
+    assert message.startswith("linear model: expected ")
+    assert part in message
+    assert message.isprintable()
+
+
+def test_a_model_that_the_lagrangian_does_not_know_is_refused(tmp_path):
+    text, hinge = actuators.MJCF_PATH.read_text(encoding="utf-8"), 'axis="0 0 1"/>'
+    assert hinge in text
+    text = text.replace('meshdir="assets"', f'meshdir="{actuators.FOLDER / "assets"}"')
+    (path := tmp_path / "mine.xml").write_text(text.replace(hinge, hinge[:-2] + ' damping="1e-3"/>'), "utf-8")
+    with pytest.raises(InputError, match=r"three ideal hinges, received a model with .*damp"):
+        linearise(scenario({"plant.mjcf": str(path)}))

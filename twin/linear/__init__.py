@@ -1,0 +1,1 @@
+"""The actuator about a pose at rest, as linear control has it."""
