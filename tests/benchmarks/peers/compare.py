@@ -9,6 +9,8 @@ is `simulate` with its telemetry, a row all that a study does for it, from its v
 import argparse
 import importlib
 import sys
+import time
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
@@ -20,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import ours
 from problem import problem
 from ratios import fastest, seconds_of
-from telling import Told
+from telling import Taken, Told
 
 from spheretwin.twin.simulation import simulate
 
@@ -72,16 +74,16 @@ def peer(told: Told, name: str):
 
 def single_runs(told: Told) -> None:
     """Peers that run one row at a time."""
-    told.head("One run at a time, PD: time of a simulated second, and over ours")
+    told.head("One run at a time, PD: time of a simulated second, of cores, and over ours")
     scenario, lagrangian = ours.scenario("pd"), ours.scenario("pd", "lagrangian")
     numbers, telemetry = problem(scenario), simulate(scenario).telemetry
     work = {"ours": partial(simulate, scenario), "ours, on the Lagrangian": partial(simulate, lagrangian)}
     for module in filter(None, (peer(told, "plain_mujoco"), peer(told, "drake_plant"))):
         hold_trace(told, module.NAME, module.run(numbers), telemetry, (LINEAR_rad, LINEAR_A))
         work[module.NAME] = partial(module.run, numbers)
-    taken = fastest({name: partial(seconds_of, each) for name, each in work.items()}, ROUNDS)
-    for name, seconds in taken.items():
-        told.time(name, seconds / scenario.duration, taken["ours"] / scenario.duration)
+    taken = timed(work)
+    for name, each in taken.items():
+        told.time(name, each.of(scenario.duration), taken["ours"].of(scenario.duration))
 
 
 def hold_traces(told: Told, rows, rotors) -> None:
@@ -114,13 +116,28 @@ def many_rows(told: Told, law: str, rows, rotors) -> None:
             work[name] = ready = rows.Rows(numbers[:most], rotor.Rotor, batch, on_each_core)
             hold_figures(told, f"{name}, {law}", ready(), figures, SAME_FIGURES[law])
             count[name], compile_s[name] = most, ready.compile_s
-    told.head(f"{ROWS} rows of a second on all cores, {law}: time of a row, and over ours")
-    taken = fastest({name: partial(seconds_of, each) for name, each in work.items()}, ROUNDS)
-    row_s = {name: seconds / count[name] for name, seconds in taken.items()}
-    for name, seconds in row_s.items():
-        told.time(name, seconds, row_s[mine], compile_s[name])
-    best = min(seconds for name, seconds in row_s.items() if name != mine)
-    told.ratio(f"a study's row over the best of JAX, {law}", row_s[mine] / best, AT_MOST)
+    told.head(f"{ROWS} rows of a second on all cores, {law}: time of a row, of cores, and over ours")
+    of_row = {name: each.of(count[name]) for name, each in timed(work).items()}
+    for name, each in of_row.items():
+        told.time(name, each, of_row[mine], compile_s[name])
+    peers = [each for name, each in of_row.items() if name != mine]
+    best, least = min(each.wall_s for each in peers), min(each.cores_s for each in peers)
+    told.ratio(f"a study's row over the best of JAX, {law}", of_row[mine].wall_s / best, AT_MOST)
+    told.ratio(f"the same, time of cores, {law}", of_row[mine].cores_s / least)
+
+
+def timed(work: dict[str, Callable[[], object]]) -> dict[str, Taken]:
+    """Least time of each, on the clock and of cores, over some rounds in turn."""
+    cores = {name: [] for name in work}
+
+    def measured(name: str) -> float:
+        before = time.process_time()
+        seconds = seconds_of(work[name])
+        cores[name].append(time.process_time() - before)
+        return seconds
+
+    wall = fastest({name: partial(measured, name) for name in work}, ROUNDS)
+    return {name: Taken(wall[name], min(cores[name])) for name in work}
 
 
 def hold_figures(told: Told, name: str, theirs, figures, bound: float) -> None:

@@ -1,8 +1,21 @@
 """What was found, row by row: printed as it is found, or all of it as one JSON."""
 
 import json
+from typing import NamedTuple
 
 import numpy as np
+
+
+class Taken(NamedTuple):
+    """How long something takes."""
+
+    wall_s: float
+    cores_s: float
+    """Of all cores together: on a machine that is shared, the steadier of the two."""
+
+    def of(self, parts: float) -> "Taken":
+        """How long each of its parts takes."""
+        return Taken(self.wall_s / parts, self.cores_s / parts)
 
 
 class Told:
@@ -35,16 +48,19 @@ class Told:
         self._found["agreement"].append(row)
         self._print(f"{difference:8.1e}  <= {bound:<6g}  {name}, {unit}{'' if ok else '  MISSED'}")
 
-    def time(self, name: str, seconds: float, ours_s: float, compile_s: float | None = None) -> None:
-        row = {"name": name, "s": seconds, "over_ours": seconds / ours_s, "compile_s": compile_s}
+    def time(self, name: str, taken: Taken, ours: Taken, compile_s: float | None = None) -> None:
+        over_ours = taken.wall_s / ours.wall_s
+        row = {"name": name, **taken._asdict(), "over_ours": over_ours, "compile_s": compile_s}
         self._found["times"].append(row)
         compiled = "" if compile_s is None else f" (and compiled in {compile_s:.1f} s)"
-        self._print(f"{1e3 * seconds:8.3f} ms  {seconds / ours_s:6.2f}  {name}{compiled}")
+        times = f"{1e3 * taken.wall_s:8.3f} ms {1e3 * taken.cores_s:8.3f} ms"
+        self._print(f"{times}  {over_ours:6.2f}  {name}{compiled}")
 
-    def ratio(self, name: str, value: float, at_most: float) -> None:
-        row = {"name": name, "value": value, "at_most": at_most, "ok": value <= at_most}
-        self._found["ratios"].append(row)
-        self._print(f"{value:8.2f}     <= {at_most:<4g}  {name}{'' if row['ok'] else '  MISSED'}")
+    def ratio(self, name: str, value: float, at_most: float | None = None) -> None:
+        ok = at_most is None or value <= at_most
+        self._found["ratios"].append({"name": name, "value": value, "at_most": at_most, "ok": ok})
+        bound = "reported" if at_most is None else f"<= {at_most}"
+        self._print(f"{value:8.2f}  {bound:>8}  {name}{'' if ok else '  MISSED'}")
 
     def _print(self, line: str) -> None:
         if not self._as_json:
