@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test check format benchmark setup clean
+.PHONY: demo test check format benchmark peers setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -27,6 +27,9 @@ benchmark: setup ## print the speed ratios, and hold the bounded allocation agai
 	$(BIN)/python tests/benchmarks/ratios.py
 	$(BIN)/python tests/benchmarks/allocation.py
 
+peers: .venv-peers/installed ## hold JAX, MJX, Drake and plain NumPy against ours, and print the times of all
+	.venv-peers/bin/python tests/benchmarks/peers/compare.py
+
 format: .venv-wheel/installed
 	$(WHEEL)/ruff format .
 	$(WHEEL)/ruff check --fix .
@@ -43,6 +46,11 @@ setup: .venv/installed
 	$(SYNC) --compile-bytecode --group test
 	@touch $@ .venv/demo
 
+# Some peers are as large as all the rest: they stay out of the way.
+.venv-peers/installed: uv.lock pyproject.toml $(TOOLS)/uv
+	UV_PROJECT_ENVIRONMENT=.venv-peers $(SYNC) --compile-bytecode --group peers
+	@touch $@
+
 # Type checkers and import-linter do not see folders that are mapped by an editable install.
 .venv-wheel/installed: uv.lock pyproject.toml $(TOOLS)/uv $(shell find models control viz twin -name '*.py')
 	rm -rf build
@@ -54,4 +62,4 @@ $(TOOLS)/uv:
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check --root-user-action ignore --target $(TOOLS) --upgrade uv==$(UV_VERSION)
 
 clean:
-	rm -rf .venv .venv-wheel $(TOOLS) build *.egg-info
+	rm -rf .venv .venv-wheel .venv-peers $(TOOLS) build *.egg-info

@@ -10,6 +10,17 @@ import numpy as np
 CENTRES = np.array([-3.0, -1.5, 0.0, 1.5, 3.0])
 
 
+class PlainPd:
+    """``-stiffness e - damping edot``, as an acceleration."""
+
+    def __init__(self, stiffness, damping, inertia):
+        self.stiffness, self.damping, self.inertia = np.array(stiffness), np.array(damping), inertia
+
+    def __call__(self, reference, q, qdot):
+        error, error_rate = q - reference[0], qdot - reference[1]
+        return -self.inertia * (self.stiffness * error + self.damping * error_rate)
+
+
 class PlainAfsm:
     """Equations (40)-(43) on all three axes at once, 75 consequents each."""
 
@@ -52,9 +63,14 @@ def torque_matrix(R_SR, actuator):
     return columns[actuator.groups].sum(axis=1).T
 
 
-def run(model, data, actuator, scenario, reference, disturbance, ticks):
+def allocated(G, E, torque_q, limit):
+    """Least-norm currents for a generalised torque, scaled as a whole to respect the limit."""
+    command = G.T @ np.linalg.solve(G @ G.T, np.linalg.solve(E.T, torque_q))
+    return command * min(1.0, limit / max(np.abs(command).max(), 1e-300))
+
+
+def run(model, data, actuator, scenario, law, reference, disturbance, ticks):
     """Run the first control ticks; returns the telemetry rows as a list."""
-    law = PlainAfsm(actuator.inertia, scenario.controller.period_s)
     rotor = model.body("rotor").id
     steps = scenario.plant.step_s * actuator.group.resistance_ohm / actuator.group.inductance_H
     decay, mean_share = np.exp(-steps), (1 - np.exp(-steps)) / steps
@@ -66,8 +82,7 @@ def run(model, data, actuator, scenario, reference, disturbance, ticks):
         torque_q = law(reference[tick], q, qdot)
         R_SR, E = rotation(q)
         G = torque_matrix(R_SR, actuator)
-        command = G.T @ np.linalg.solve(G @ G.T, np.linalg.solve(E.T, torque_q))
-        command *= min(1.0, limit / max(np.abs(command).max(), 1e-300))
+        command = allocated(G, E, torque_q, limit)
         for substep in range(scenario.substeps):
             if substep:
                 G = torque_matrix(rotation(data.qpos)[0], actuator)

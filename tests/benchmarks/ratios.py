@@ -143,8 +143,11 @@ def plain_seconds() -> float:
     reference = scenario.trajectory.sample(t)
     disturbance = scenario.disturbance.sample(t, Draws(np.random.default_rng(0).random(PLAIN_TICKS), None))
     rotor.start(reference[0, 0], np.zeros(3))
+    law = plain.PlainAfsm(actuator.inertia, scenario.controller.period_s)
     work = seconds_of(
-        lambda: plain.run(rotor.model, rotor.data, actuator, scenario, reference, disturbance, PLAIN_TICKS)
+        lambda: plain.run(
+            rotor.model, rotor.data, actuator, scenario, law, reference, disturbance, PLAIN_TICKS
+        )
     )
     return work / (PLAIN_TICKS * scenario.substeps)
 

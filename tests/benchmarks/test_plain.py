@@ -26,8 +26,10 @@ def test_plain_loop_runs_the_same_physics():
         mjcf.read(actuators.MJCF_PATH), section.step_s, section.integrator, section.modelling_error, 0.0
     )
     rotor.start(np.zeros(3), np.zeros(3))
+    actuator = actuators.load()
+    law = plain.PlainAfsm(actuator.inertia, scenario.controller.period_s)
     rows = plain.run(
-        rotor.model, rotor.data, actuators.load(), scenario, reference, table["disturbance_Nm"], TICKS
+        rotor.model, rotor.data, actuator, scenario, law, reference, table["disturbance_Nm"], TICKS
     )
     names = (
         "q_rad",

@@ -1,0 +1,153 @@
+"""The closed loop as the best peers would have it: ``python tests/benchmarks/peers/compare.py [--json]``.
+
+Each peer is held against ours first: one that computes something else is none. Then all are timed in turn,
+several times, and the fastest of each counts. A peer is handed all that can be made ready: it is compiled,
+its reference and disturbance are arrays in place, and of many rows it keeps two figures. Ours is whole: a run
+is `simulate` with its telemetry, a row all that a study does for it, from its values to the table.
+"""
+
+import argparse
+import importlib
+import sys
+import time
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import ours
+from problem import problem
+from ratios import fastest, seconds_of
+from telling import Taken, Told
+
+from spheretwin.twin.simulation import simulate
+
+# Ours over the best of JAX, a row.
+AT_MOST = 0.7
+
+# Where a law is smooth only rounding parts two runs, as it does our own two plants.
+SAME_rad, SAME_A = 1e-9, 1e-6
+# NumPy takes f_t as linear between samples 0.25 degrees apart: 1e-4 of the peak, as much of the largest
+# current (2.6 A), and of an angle what currents that are wrong by that do within a control period.
+LINEAR_rad, LINEAR_A = 1e-5, 1e-3
+# Of each row's figures, relative. Under AFSM signs of s may be decided by rounding, as between our plants.
+SAME_FIGURES = {"pd": 1e-9, "afsm": 5e-3}
+
+ROWS, MJX_ROWS = 1024, 256
+
+# Rows of a batch, and whether each core has one of its own or XLA all cores for one.
+BATCHES = ((256, False), (1024, False), (256, True), (512, True))
+MJX_BATCHES = ((128, True),)
+
+ROUNDS = 3
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    told = Told(parser.parse_args().json)
+    single_runs(told)
+    rows = peer(told, "jax_rows")
+    if rows:
+        lagrangian, mjx = peer(told, "jax_lagrangian"), peer(told, "mjx_rotor")
+        rotors = [(lagrangian, ROWS, BATCHES), *([(mjx, MJX_ROWS, MJX_BATCHES)] if mjx else [])]
+        hold_traces(told, rows, [rotor for rotor, *_ in rotors])
+        many_rows(told, "pd", rows, rotors)
+        many_rows(told, "afsm", rows, rotors[:1])
+    kept = told.finished()
+    return 0 if kept and rows else 1  # without JAX the bar is not held
+
+
+def peer(told: Told, name: str):
+    """Module of a peer; None where what it is written in is not installed."""
+    try:
+        with redirect_stdout(sys.stderr):  # libraries tell there what they do without
+            return importlib.import_module(name)
+    except ImportError as error:
+        told.not_installed(name, error)
+        return None
+
+
+def single_runs(told: Told) -> None:
+    """Peers that run one row at a time."""
+    told.head("One run at a time, PD: time of a simulated second, of cores, and over ours")
+    scenario, lagrangian = ours.scenario("pd"), ours.scenario("pd", "lagrangian")
+    numbers, telemetry = problem(scenario), simulate(scenario).telemetry
+    work = {"ours": partial(simulate, scenario), "ours, on the Lagrangian": partial(simulate, lagrangian)}
+    for module in filter(None, (peer(told, "plain_mujoco"), peer(told, "drake_plant"))):
+        hold_trace(told, module.NAME, module.run(numbers), telemetry, (LINEAR_rad, LINEAR_A))
+        work[module.NAME] = partial(module.run, numbers)
+    taken = timed(work)
+    for name, each in taken.items():
+        told.time(name, each.of(scenario.duration), taken["ours"].of(scenario.duration))
+
+
+def hold_traces(told: Told, rows, rotors) -> None:
+    """Hold one run of each kind of rotor against ours."""
+    told.head("Many rows at once: are they the same?")
+    scenario = ours.scenario("pd")
+    numbers, telemetry = problem(scenario), simulate(scenario).telemetry
+    for rotor in rotors:
+        hold_trace(told, rotor.NAME, rows.trace(numbers, rotor.Rotor), telemetry, (SAME_rad, SAME_A))
+
+
+def hold_trace(told: Told, name: str, trace, telemetry, bounds) -> None:
+    """Hold angles and currents of a whole run against ours; one of another length is not the same."""
+    units = {"q_rad": "rad", "current_A": "A"}
+    for (column, unit), theirs, bound in zip(units.items(), trace, bounds, strict=True):
+        same = theirs.shape == telemetry[column].shape
+        apart = float(np.max(np.abs(theirs - telemetry[column]))) if same else np.inf
+        told.agreement(f"{name}: {column} of PD over 5 s, largest difference", apart, bound, unit)
+
+
+def many_rows(told: Told, law: str, rows, rotors) -> None:
+    """Peers that run many rows at once, and the bar."""
+    study = ours.study(law, ROWS)
+    figures, numbers = ours.carried_out(study), ours.problems(study)
+    mine = "ours, a study's rows"
+    work, count, compile_s = {mine: partial(ours.carried_out, study)}, {mine: ROWS}, {mine: None}
+    for rotor, most, batches in rotors:
+        for batch, on_each_core in batches:
+            name = f"{rotor.NAME}, {batch} rows {'on each core' if on_each_core else 'at once'}"
+            work[name] = ready = rows.Rows(numbers[:most], rotor.Rotor, batch, on_each_core)
+            hold_figures(told, f"{name}, {law}", ready(), figures, SAME_FIGURES[law])
+            count[name], compile_s[name] = most, ready.compile_s
+    told.head(f"{ROWS} rows of a second on all cores, {law}: time of a row, of cores, and over ours")
+    of_row = {name: each.of(count[name]) for name, each in timed(work).items()}
+    for name, each in of_row.items():
+        told.time(name, each, of_row[mine], compile_s[name])
+    peers = [each for name, each in of_row.items() if name != mine]
+    best, least = min(each.wall_s for each in peers), min(each.cores_s for each in peers)
+    told.ratio(f"a study's row over the best of JAX, {law}", of_row[mine].wall_s / best, AT_MOST)
+    told.ratio(f"the same, time of cores, {law}", of_row[mine].cores_s / least)
+
+
+def timed(work: dict[str, Callable[[], object]]) -> dict[str, Taken]:
+    """Least time of each, on the clock and of cores, over some rounds in turn."""
+    cores = {name: [] for name in work}
+
+    def measured(name: str) -> float:
+        before = time.process_time()
+        seconds = seconds_of(work[name])
+        cores[name].append(time.process_time() - before)
+        return seconds
+
+    wall = fastest({name: partial(measured, name) for name in work}, ROUNDS)
+    return {name: Taken(wall[name], min(cores[name])) for name in work}
+
+
+def hold_figures(told: Told, name: str, theirs, figures, bound: float) -> None:
+    """Hold the figures of all rows against those of the study."""
+    apart = [
+        np.abs(getattr(theirs, figure) / known[: len(getattr(theirs, figure))] - 1)
+        for figure, known in figures.items()
+    ]
+    told.agreement(f"{name}: errors of all rows, largest difference", float(np.max(apart)), bound, "relative")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,53 @@
+"""What the peers are measured against: a run, and the rows of a study."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as parquet
+from problem import Problem, problem
+
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin import study as studies
+from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.study import grid, row
+from spheretwin.twin.study.study import Study, made
+
+SCENARIO = "nutation"
+ROW_s = 1.0
+
+# At the scenario's load of 2 PD is at the current limit and leaves the workspace; at a quarter it completes.
+CONDITIONS = {"pd": {"disturbance.load": 0.5}, "afsm": {}}
+
+FIGURES = ("max_abs_error_rad", "rms_error_rad")
+
+
+def scenario(law: str, engine: str = "mujoco") -> Scenario:
+    return scenarios.load(SCENARIO, {"controller.law": law, "plant.engine": engine, **CONDITIONS[law]})
+
+
+def study(law: str, rows: int) -> Study:
+    """Rows of a second that differ in the modelling error and, by their seeds, in the random torque."""
+    fields = {
+        "name": "peers",
+        "scenario": SCENARIO,
+        "samples": rows,
+        "fields": {"duration": ROW_s, "plant.engine": "lagrangian", **CONDITIONS[law]},
+        "law": [{"law": law}],
+        "axis": [{"field": "plant.modelling_error", "kind": "uniform", "low": -0.2, "high": 0.5}],
+    }
+    return made(fields, "peers")
+
+
+def problems(chosen: Study) -> list[Problem]:
+    """The same rows as a peer is handed them."""
+    rows = row.Rows(chosen)
+    return [problem(rows.scenario(each)) for each in grid.Grid(chosen)]
+
+
+def carried_out(chosen: Study) -> dict[str, np.ndarray]:
+    """Run a study, whole: journal, all figures, table. Returns what peers have of these, (rows, 3) each."""
+    with tempfile.TemporaryDirectory() as folder:
+        studies.run(chosen, Path(folder))
+        table = parquet.read_table(Path(folder) / "table.parquet", columns=list(FIGURES))
+    return {name: np.array(table[name].to_pylist()) for name in FIGURES}
