@@ -2,8 +2,8 @@
 
 Each peer is held against ours first: one that computes something else is none. Then all are timed in turn,
 several times, and the fastest of each counts. A peer is handed all that can be made ready: it is compiled,
-its reference and disturbance are arrays in place, and of many rows it keeps two figures. Ours is whole: a run
-is `simulate` with its telemetry, a row all that a study does for it, from its values to the table.
+its reference and disturbance are arrays in place. Ours is whole: a run is `simulate` with its telemetry, a
+row all that a study does for it, from its values to the table. Of many rows both keep the same two figures.
 """
 
 import argparse

@@ -34,6 +34,7 @@ def study(law: str, rows: int) -> Study:
         "samples": rows,
         "fields": {"duration": ROW_s, "plant.engine": "lagrangian", **CONDITIONS[law]},
         "law": [{"law": law}],
+        "metrics": list(FIGURES),
         "axis": [{"field": "plant.modelling_error", "kind": "uniform", "low": -0.2, "high": 0.5}],
     }
     return made(fields, "peers")
@@ -46,7 +47,7 @@ def problems(chosen: Study) -> list[Problem]:
 
 
 def carried_out(chosen: Study) -> dict[str, np.ndarray]:
-    """Run a study, whole: journal, all figures, table. Returns what peers have of these, (rows, 3) each."""
+    """Run a study, whole: journal, figures, table. Returns the figures, (rows, 3) each."""
     with tempfile.TemporaryDirectory() as folder:
         studies.run(chosen, Path(folder))
         table = parquet.read_table(Path(folder) / "table.parquet", columns=list(FIGURES))
