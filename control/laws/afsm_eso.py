@@ -35,12 +35,12 @@ Each is input-to-state stable and none acts back on the one before, so that the 
 
     |e| ≤ N [2/ω_o + 1/ω_d + ((K + λ)(2 ω_o + ω_d) + K λ)/(ω_o² ω_d)]/(λ K).
 
-A constant load leaves nothing. The factor of N is 2.2e-5 s² for `ideal`, 4.0e-6 s² for `fast`.
+A constant load leaves nothing. The factor of N is 2.2e-5 s³ for `ideal`, 4.0e-6 s³ for `fast`.
 
 *With another inertia*, 1 + m times the nominal one, ν holds the rate of q̈ itself, and the cascade becomes a
 loop. One axis within the layer is linear then; at 1 kHz its five poles are within the unit circle for m from
-−0.91 to 7.9 (`ideal`), −0.86 to 5.2 (`fast`), currents without lag. Where it is stable a constant load leaves no error, as
-d̂ rests only where angle and reference agree.
+−0.91 to 7.9 (`ideal`), −0.86 to 5.2 (`fast`), currents without lag. Where it is stable a constant load leaves
+no error, as d̂ rests only where angle and reference agree.
 
 *Not proven, but flown:* the current limit, the lag of the coils (with which m may be −0.6 to 2 and −0.5 to
 3), the sampled boost, a delay that is not known.
