@@ -35,15 +35,24 @@ Each is input-to-state stable and none acts back on the one before, so that the 
 
     |e| ≤ N [2/ω_o + 1/ω_d + ((K + λ)(2 ω_o + ω_d) + K λ)/(ω_o² ω_d)]/(λ K).
 
-A constant load leaves nothing. The factor of N is 2.2e-5 s³ for `ideal`, 4.0e-6 s³ for `fast`.
+A constant load leaves nothing. The factor of N is 2.2e-5 s³ for `ideal`, 4.0e-6 s³ for `fast`, 1.7e-5 s³ for
+`prototype`.
 
 *With another inertia*, 1 + m times the nominal one, ν holds the rate of q̈ itself, and the cascade becomes a
 loop. One axis within the layer is linear then; at 1 kHz its five poles are within the unit circle for m from
-−0.91 to 7.9 (`ideal`), −0.86 to 5.2 (`fast`), currents without lag. Where it is stable a constant load leaves
-no error, as d̂ rests only where angle and reference agree.
+−0.91 to 7.9 (`ideal`), −0.86 to 5.2 (`fast`), −0.75 to 2.9 (`prototype`, α and β), currents without lag.
+Where it is stable a constant load leaves no error, as d̂ rests only where angle and reference agree.
 
-*Not proven, but flown:* the current limit, the lag of the coils (with which m may be −0.6 to 2 and −0.5 to
-3), the sampled boost, a delay that is not known.
+*Not proven, but flown* on the sinusoid: the current limit; the lag of the coils, with which m may be −0.6 to
+2 (`ideal`) and −0.5 to 3 (`fast`); a delay that is not known, up to 3 ms and 1.5 ms; the sampled boost.
+
+*Presets.* `ideal` and `fast` are for angles without noise. On the sinusoid with its random torque, m from 0
+to 0.5 and L from 0 to 5, worst of 20 seeds, no axis errs by more than 7.3e-3 and 3.3e-3 rad, nor by 4.4e-4
+and 2.3e-4 rad rms in the second half; AFSM: 56e-3 and 29e-4. `ideal` takes less torque than AFSM at every one
+of these conditions; `fast` a third more where there is no load. `prototype` is for its noise, with poles of
+observer and surface alike and ω_d fixed: on the tilt it errs by 0.063° on α and β (median over 20 seeds) and
+varies the currents by 22 A/s, PID by 0.069° and 75 A/s. Most of that is offset and gain of the converter:
+without them and the nonlinearity, 0.041° and 0.047°.
 """
 
 from math import exp
@@ -119,14 +128,14 @@ PRESETS: dict[str, dict[str, Any]] = {
         "fast_disturbance_bandwidth_rad_s": 600.0,
     },
     "prototype": {
-        "surface_slope_1_s": 50.0,
-        "reaching_gain_1_s": 40.0,
-        "boost_slope_1_s": 0.0,
-        "boost_layer_rad_s": 0.1,
-        "boost_bound_rad_s2": 0.0,
-        "observer_bandwidth_rad_s": (180.0, 180.0, 30.0),
-        "disturbance_bandwidth_rad_s": 90.0,
-        "fast_disturbance_bandwidth_rad_s": 90.0,
+        "surface_slope_1_s": 130.0,
+        "reaching_gain_1_s": 100.0,
+        "boost_slope_1_s": 100.0,
+        "boost_layer_rad_s": 0.05,
+        "boost_bound_rad_s2": 30.0,
+        "observer_bandwidth_rad_s": (70.0, 70.0, 30.0),  # the encoder of γ has coarse steps
+        "disturbance_bandwidth_rad_s": 70.0,
+        "fast_disturbance_bandwidth_rad_s": 70.0,  # a schedule would learn noise
     },
 }
 """Gains by name; each of them can be given alone as well."""

@@ -11,6 +11,7 @@ from spheretwin.models.base.compiled import compiled_callback
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario.changing import changed
 from spheretwin.twin.simulation import simulate
 
 PERIOD = 1e-3
@@ -155,6 +156,11 @@ def test_ideal_is_the_default():
         assert getattr(AFSMWithObserver(), name) == field.default
 
 
+def test_another_law_in_its_place_starts_with_its_own_gains():
+    afsm = scenarios.load("hold", {"controller.law": "afsm"})
+    assert changed(afsm, "controller.law", "afsm_eso").controller == AFSMWithObserver()
+
+
 @pytest.mark.parametrize("bad", ["slow", 3, ["fast"], None])
 def test_a_preset_that_is_none_is_refused(bad):
     with pytest.raises(InputError, match=r"controller\.preset: expected 'ideal', 'fast' or 'prototype'"):
@@ -191,7 +197,11 @@ def torque_of(law, state):
 
 @pytest.mark.parametrize(
     ("preset", "stable", "unstable"),
-    [("ideal", (-0.91, 7.9), (-0.92, 7.92)), ("fast", (-0.86, 5.2), (-0.87, 5.3))],
+    [
+        ("ideal", (-0.91, 7.9), (-0.92, 7.92)),
+        ("fast", (-0.86, 5.2), (-0.87, 5.3)),
+        ("prototype", (-0.75, 2.9), (-0.76, 3.0)),
+    ],
 )
 def test_with_another_inertia_the_poles_are_stable_as_far_as_is_said(actuator, preset, stable, unstable):
     for m in np.linspace(*stable, 30):
