@@ -57,7 +57,7 @@ def step(t, reference, measurement, parameters, state, torque):
         torque[axis] -= 0.05 * (measurement[1, axis] - reference[1, axis])
 ''',
         "control/laws/registry.py",
-        ("    | AFSM,\n", "    | AFSM\n    | Lazy,\n"),
+        ("    | AFSMWithObserver,\n", "    | AFSMWithObserver\n    | Lazy,\n"),
         "from spheretwin.control.laws.lazy import Lazy\n",
     ),
     "trajectory": Addition(
@@ -521,7 +521,7 @@ def test_a_law(grown):
     assert (grown["code"], grown["summary"]["status"]) == (0, "completed")
     assert grown["summary"]["scenario"]["controller"]["slackness"] == [1.0, 2.0, 3.0]
     assert grown["helped"]["--controller.slackness"] == "torque a unit of error, N·m"
-    assert "pd, pid, adaptive_fuzzy, afsm, lazy" in grown["refused"]["controller.law"]
+    assert "pd, pid, adaptive_fuzzy, afsm, afsm_eso, lazy" in grown["refused"]["controller.law"]
 
 
 def test_a_trajectory(grown):

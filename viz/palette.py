@@ -23,6 +23,7 @@ LAW_COLOURS: dict[str, str] = {
     "pid": "#e69f00",
     "adaptive_fuzzy": "#009e73",
     "afsm": "#d55e00",
+    "afsm_eso": "#000000",
 }
 """Of the shipped laws, by name; Okabe and Ito's, told apart by the colour-blind too."""
 

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from spheretwin.control.laws.adaptive_fuzzy import AdaptiveFuzzy
 from spheretwin.control.laws.afsm import AFSM
+from spheretwin.control.laws.afsm_eso import AFSMWithObserver
 from spheretwin.control.laws.pd import PD
 from spheretwin.control.laws.pid import PID
 from spheretwin.control.parts.parameters import LawParameters
@@ -14,7 +15,8 @@ AnyLaw = Annotated[
     PD  # one row each
     | PID
     | AdaptiveFuzzy
-    | AFSM,
+    | AFSM
+    | AFSMWithObserver,
     Field(discriminator="law"),
 ]
 

@@ -27,6 +27,7 @@ FIXED = (
     "hardware",
     "event",
     "controller.period_s",
+    "controller.preset",
     "plant.step_s",
     "plant.engine",
     "plant.mjcf",

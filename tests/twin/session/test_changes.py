@@ -157,7 +157,9 @@ def test_an_event_far_off_is_in_force_at_its_tick():
         assert session._planned[0].tick == 300_000_000
 
 
-@pytest.mark.parametrize("name", ["event", "event.0", "event.0.t_s", "controller.period_s", "plant"])
+@pytest.mark.parametrize(
+    "name", ["event", "event.0", "event.0.t_s", "controller.period_s", "controller.preset", "plant"]
+)
 def test_what_is_fixed_is_fixed_with_all_its_parts(name):
     event = {"t_s": 0.1, "set": "disturbance.load", "value": 1.0}
     with Session(hold(event=[event])) as session, pytest.raises(InputError, match="may change during a run"):

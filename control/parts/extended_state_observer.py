@@ -1,0 +1,108 @@
+r"""Extended state observer: angle, rate and disturbing torque from the measured angle and the torque given.
+
+*Model.* The disturbance d is all that the nominal rotor does not explain: load, friction, and what another
+inertia than the nominal one needs. With the torque τ of the last period,
+
+    M̂ q̈ + Ĉ q̇ = τ + d,      d a constant torque until it is seen to change.
+
+*Observer.* Once a period T: predict (z₁, z₂) with τ + d̂, and correct by the innovation i = y − z₁,
+
+    z₁ += l₁ i,      z₂ += l₂ i,      d̂ += M̂ l₃ i.
+
+*Gains.* With ε = (z₁ − q, z₂ − q̇, M̂⁻¹ (d̂ − d)), on the exact model and to first order in ε, ε⁺ = F ε where
+F = (1 − l e₁ᵀ) A and A is the matrix of a triple integrator over T. Its characteristic polynomial is
+(z − a)² (z − b), a = e^(−ω_o T), b = e^(−ω_d T), for
+
+    l₁ = 1 − a² b,   l₃ = (1 − a)² (1 − b)/T²,   l₂ = (3 − 2a − b − l₁ − ½ l₃ T²)/T.
+
+*Error.* Only the rate of d drives it, ν = M̂⁻¹ ḋ: ε⁺ = F ε − (1 − l e₁ᵀ) e₃ T ν, so that a constant load
+leaves none. While d rises steadily, l₃ i = T ν gives the error that stays, for small T the second,
+
+    ε = −(ν/l₃) (T (1 − l₁), l₁ − ½ l₂ T, l₂),
+    ε = −ν (1/(ω_o² ω_d), (2 ω_o + ω_d)/(ω_o² ω_d), 2/ω_o + 1/ω_d).
+
+The response to one step of d has one sign in each component (d̂ follows it without overshoot, as ½ T² l₃
+times z + 1 and a power of z over the polynomial), so that its sum is its sum of magnitudes: |ν| times these
+factors is also the least bound of |ε| for any d of rate at most |ν|, beside what is left of the start.
+
+*Schedule.* ω_d may move from tick to tick, as it likes. The left eigenvectors of the double pole a,
+e₁ᵀA (A − a)⁻¹ and e₁ᵀA (A − a)⁻², do not depend on b: in their coordinates F is triangular for all b at once,
+with a, a and b on its diagonal, a cascade whose error decays as that of its slowest ω_d, or faster.
+"""
+
+from math import exp
+from typing import NamedTuple
+
+from spheretwin.control.parts.nominal_motion import Motion, Nominal, inertial_torque, moved_on
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.lagrangian import Triple
+
+
+class Gains(NamedTuple):
+    """What an innovation corrects on one axis."""
+
+    of_angle: float  # l1
+    of_rate: float  # l2, 1/s
+    of_acceleration: float  # l3, 1/s²
+
+
+class Observed(NamedTuple):
+    """What the observer knows."""
+
+    motion: Motion
+    disturbance: Triple  # d̂, N·m
+
+
+@allocation_free
+def observer_gains(bandwidth_rad_s: float, disturbance_bandwidth_rad_s: float, period_s: float) -> Gains:
+    """Gains that put two poles at the one bandwidth and one at the other.
+
+    Parameters
+    ----------
+    bandwidth_rad_s, disturbance_bandwidth_rad_s : float, rad/s
+        ω_o and ω_d; with ω_d = 0 no disturbance is learnt.
+    period_s : float, s
+    """
+    a, b = exp(-bandwidth_rad_s * period_s), exp(-disturbance_bandwidth_rad_s * period_s)
+    of_angle = 1.0 - a * a * b
+    of_acceleration = (1.0 - a) ** 2 * (1.0 - b) / period_s**2
+    of_rate = (3.0 - 2.0 * a - b - of_angle - 0.5 * of_acceleration * period_s**2) / period_s
+    return Gains(of_angle, of_rate, of_acceleration)
+
+
+@allocation_free
+def observe(
+    before: Observed,
+    angle: Triple,
+    torque: Triple,
+    gains: tuple[Gains, Gains, Gains],
+    nominal: Nominal,
+    period_s: float,
+) -> Observed:
+    """What is known one period later.
+
+    Parameters
+    ----------
+    before : Observed
+    angle : (3,) rad
+        Measured now.
+    torque : (3,) N·m
+        Of the coils over the period.
+    gains : Gains of each axis
+    nominal : Nominal
+    period_s : float, s
+    """
+    alpha, beta, gamma = gains
+    predicted = moved_on(before.motion, _sum(torque, before.disturbance), nominal, period_s)
+    (q1, q2, q3), (v1, v2, v3) = predicted.angle, predicted.rate
+    i1, i2, i3 = angle[0] - q1, angle[1] - q2, angle[2] - q3
+    corrected = (q1 + alpha.of_angle * i1, q2 + beta.of_angle * i2, q3 + gamma.of_angle * i3)
+    rate = (v1 + alpha.of_rate * i1, v2 + beta.of_rate * i2, v3 + gamma.of_rate * i3)
+    unexplained = (alpha.of_acceleration * i1, beta.of_acceleration * i2, gamma.of_acceleration * i3)
+    learnt = inertial_torque(corrected, unexplained, nominal)
+    return Observed(Motion(corrected, rate), _sum(before.disturbance, learnt))
+
+
+@allocation_free
+def _sum(x: Triple, y: Triple) -> Triple:
+    return x[0] + y[0], x[1] + y[1], x[2] + y[2]

@@ -1,0 +1,240 @@
+"""The law with an observer: a slow copy, its boost and its presets, its poles, no error under a load."""
+
+import numba
+import numpy as np
+import pytest
+
+from spheretwin.control.controller import law_at
+from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver, boosted
+from spheretwin.models.base.compiled import compiled_callback
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario.changing import changed
+from spheretwin.twin.simulation import simulate
+
+PERIOD = 1e-3
+CENTRES = np.array([-3, -1.5, 0, 1.5, 3])
+EVERYTHING = {
+    "surface_slope_1_s": [40.0, 50.0, 60.0],
+    "boost_layer_rad_s": [0.1, 0.2, 0.3],
+    "observer_bandwidth_rad_s": [300.0, 400.0, 500.0],
+    "fuzzy_adaptation": [5.0, 0.0, 20.0],
+    "fuzzy_bound": 0.5,
+}
+
+
+@numba.njit
+def by_address(address, t, reference, measurement, parameters, state, torque):
+    """Call a law as the loop does: its machine code."""
+    law_at(address)(t, reference, measurement, parameters, state, torque)
+
+
+class SlowLaw:
+    """The law as its docstring has it, with matrices; every torque that it ever asked for is kept."""
+
+    def __init__(self, gains, inertia, delay_s):
+        self.gains, self.inertia, self.delay_s = gains, inertia, delay_s
+        self.d, self.theta, self.asked = np.zeros(3), np.zeros((3, 75)), []
+        self.z, self.wd = None, np.array(gains.disturbance_bandwidth_rad_s)
+
+    def inertia_at(self, q):
+        return inertia_matrix(q if self.gains.coupled else np.zeros(3), self.inertia)
+
+    def coriolis_torque(self, q, v):
+        return coriolis_matrix(q, v, self.inertia) @ v if self.gains.coupled else np.zeros(3)
+
+    def moved(self, q, v, torque, time_s):
+        a = np.linalg.solve(self.inertia_at(q), torque + self.d - self.coriolis_torque(q, v))
+        return q + time_s * v + time_s**2 / 2 * a, v + time_s * a
+
+    def asked_before(self, periods):
+        return self.asked[-periods] if 0 < periods <= len(self.asked) else np.zeros(3)
+
+    def observe(self, y, torque):
+        a, b = np.exp(-np.array(self.gains.observer_bandwidth_rad_s) * PERIOD), np.exp(-self.wd * PERIOD)
+        l1, l3 = 1 - a**2 * b, (1 - a) ** 2 * (1 - b) / PERIOD**2
+        l2 = (3 - 2 * a - b - l1 - l3 * PERIOD**2 / 2) / PERIOD
+        q, v = self.moved(*self.z, torque, PERIOD)
+        i = y - q
+        self.z = q + l1 * i, v + l2 * i
+        self.d = self.d + self.inertia_at(self.z[0]) @ (l3 * i)
+
+    def fuzzy(self, q, v, s):
+        g, f = self.gains, np.zeros(3)
+        for i in np.flatnonzero(g.fuzzy_adaptation):
+            gaussians = np.exp(-0.5 * ((np.array([v[i], q[i]])[:, None] - CENTRES) / 2) ** 2)
+            psi = np.outer(gaussians[0], gaussians[1]).ravel()
+            psi /= psi.sum()
+            regressor = np.concatenate([psi, psi * v[i], psi * q[i]])
+            f[i] = self.theta[i] @ regressor
+            learnt = s[i] if abs(s[i]) > g.fuzzy_dead_zone_rad_s else 0.0
+            self.theta[i] -= g.fuzzy_adaptation[i] * learnt * PERIOD * regressor
+            self.theta[i] *= 1 - g.fuzzy_leakage_1_s * PERIOD
+            norm = np.linalg.norm(self.theta[i])
+            self.theta[i] *= min(1, g.fuzzy_bound / norm) if norm else 1
+        return f
+
+    def torque(self, reference, measurement):
+        g = self.gains
+        if self.z is None:
+            self.z = measurement[0].copy(), measurement[1].copy()
+        else:
+            self.observe(measurement[0], measurement[2])
+        whole, late = int(self.delay_s / PERIOD), self.delay_s / PERIOD % 1
+        q, v = self.moved(*self.z, self.asked_before(whole + 1), late * PERIOD)
+        for periods in range(whole, 0, -1):
+            q, v = self.moved(q, v, self.asked_before(periods), PERIOD)
+        desired_rate = reference[1] + self.delay_s * reference[2]
+        desired = reference[0] + self.delay_s * reference[1] + self.delay_s**2 / 2 * reference[2]
+        slope, layer = np.array(g.surface_slope_1_s), np.array(g.boost_layer_rad_s)
+        s = v - desired_rate + slope * (q - desired)
+        beyond = s - np.clip(s, -layer, layer)
+        boost = np.clip(g.boost_slope_1_s * beyond, -np.array(g.boost_bound_rad_s2), g.boost_bound_rad_s2)
+        slow = np.array(g.disturbance_bandwidth_rad_s)
+        fading = slow + np.exp(-PERIOD / g.fade_s) * (self.wd - slow)
+        self.wd = np.where(beyond != 0, g.fast_disturbance_bandwidth_rad_s, fading)
+        asked = late * self.asked_before(whole + 2) + (1 - late) * self.asked_before(whole + 1)
+        learns = np.abs(asked - measurement[2]).sum() <= 0.2 * np.abs(asked).sum()
+        f = self.fuzzy(q, v, s if learns else np.zeros(3))
+        a = reference[2] - slope * (v - desired_rate) - np.array(g.reaching_gain_1_s) * s - boost + f
+        self.asked.append(self.inertia_at(q) @ a + self.coriolis_torque(q, v) - self.d)
+        return self.asked[-1]
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 1e-3, 2.25e-3])
+@pytest.mark.parametrize(
+    "gains",
+    [{}, {"preset": "fast", "coupled": False}, {"preset": "prototype", **EVERYTHING}],
+    ids=["ideal", "uncoupled", "everything"],
+)
+def test_law_follows_its_equations(actuator, gains, delay_s):
+    gains = AFSMWithObserver(**gains)
+    law = gains.build(Known(PERIOD, delay_s, actuator.inertia))
+    slow = SlowLaw(gains, actuator.inertia, delay_s)
+    compiled = compiled_callback(SIGNATURE, law.step)
+    generator = np.random.default_rng(0)
+    state, torque = law.state.copy(), np.empty(3)
+    for tick in range(200):
+        q = 0.3 * np.sin(0.02 * tick + np.arange(3))
+        reference = np.array([q, 0.1 * generator.normal(size=3), generator.normal(size=3)])
+        measurement = np.array([q + 0.002 * generator.normal(size=3), reference[1], slow.asked_before(1)])
+        if tick % 3:  # now and then it gets what it asks for, so that f̂ learns
+            measurement[2] += generator.normal(size=3)
+        by_address(compiled.address, PERIOD * tick, reference, measurement, law.parameters, state, torque)
+        # 200 ticks of a stable recursion whose torques reach some N·m: accumulated rounding.
+        np.testing.assert_allclose(torque, slow.torque(reference, measurement), rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(state[3:6], slow.d, rtol=1e-9, atol=1e-10)
+        np.testing.assert_array_equal(state[9:12] == law.parameters[24:27], slow.wd == law.parameters[24:27])
+
+
+def test_the_boost_is_nothing_within_the_layer_and_pushes_back_beyond_it():
+    inside = np.linspace(-0.15, 0.15, 31)
+    assert not any(boosted(s, 70.0, 0.15, 100.0) for s in inside)
+    for s in (0.151, 0.3, 5.0):
+        assert 0 < boosted(s, 70.0, 0.15, 100.0) == -boosted(-s, 70.0, 0.15, 100.0) <= 100.0
+    assert boosted(5.0, 70.0, 0.15, 100.0) == 100.0
+    assert boosted(0.25, 70.0, 0.15, 100.0) == pytest.approx(7.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_preset_gives_what_is_not_given(preset):
+    law = {"controller.law": "afsm_eso", "controller.preset": preset}
+    gains = scenarios.load("hold", law).controller.model_dump()
+    for name, value in PRESETS[preset].items():
+        assert gains[name] == (value if isinstance(value, tuple) else (value,) * 3)
+    own = scenarios.load("hold", {**law, "controller.surface_slope_1_s": 33.0}).controller.model_dump()
+    assert own == {**gains, "surface_slope_1_s": (33.0,) * 3}
+    run = simulate(scenarios.load("hold", {**law, "duration": 0.01}))
+    assert run.scenario.controller.model_dump() == gains  # the resolved scenario shows what is in force
+
+
+def test_ideal_is_the_default():
+    assert AFSMWithObserver() == AFSMWithObserver(preset="ideal")
+    for name, field in AFSMWithObserver.model_fields.items():
+        assert getattr(AFSMWithObserver(), name) == field.default
+
+
+def test_another_law_in_its_place_starts_with_its_own_gains():
+    afsm = scenarios.load("hold", {"controller.law": "afsm"})
+    assert changed(afsm, "controller.law", "afsm_eso").controller == AFSMWithObserver()
+
+
+@pytest.mark.parametrize("bad", ["slow", 3, ["fast"], None])
+def test_a_preset_that_is_none_is_refused(bad):
+    with pytest.raises(InputError, match=r"controller\.preset: expected 'ideal', 'fast' or 'prototype'"):
+        scenarios.load("hold", {"controller.law": "afsm_eso", "controller.preset": bad})
+
+
+def closed_loop(preset, modelling_error, inertia):
+    """Matrix of one period of (angle, rate, ẑ₁, ẑ₂, d̂) of β: the law on (1 + m) of its double integrator."""
+    law = AFSMWithObserver(preset=preset, coupled=False).build(Known(PERIOD, 0.0, inertia))
+    columns, small = [], 1e-4  # well within the layer
+    state, torque = law.state.copy(), np.empty(3)
+    law.step(0.0, np.zeros((3, 3)), np.zeros((3, 3)), law.parameters, state, torque)
+    for unit in small * np.eye(5):
+        angle, rate = unit[:2]
+        now = state.copy()
+        now[16], now[19], now[4] = unit[2], unit[3], unit[4] * inertia[1]
+        # The torque that the law asks for in this state: its observer is let see what it expects.
+        asked = torque_of(law, now)
+        push = asked / inertia[1] / (1 + modelling_error)
+        angle, rate = angle + PERIOD * rate + 0.5 * PERIOD**2 * push, rate + PERIOD * push
+        measurement = np.zeros((3, 3))
+        measurement[0, 1], measurement[2, 1] = angle, asked
+        law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, now, torque)
+        columns.append([angle, rate, now[16], now[19], now[4] / inertia[1]])
+    return np.array(columns).T / small
+
+
+def torque_of(law, state):
+    """What the law asks for on β in a state that it has just come to."""
+    slope, reaching = law.parameters[4], law.parameters[7]
+    s = state[19] + slope * state[16]
+    return law.parameters[1] * (-slope * state[19] - reaching * s) - state[4]
+
+
+@pytest.mark.parametrize(
+    ("preset", "stable", "unstable"),
+    [
+        ("ideal", (-0.91, 7.9), (-0.92, 7.92)),
+        ("fast", (-0.86, 5.2), (-0.87, 5.3)),
+        ("prototype", (-0.75, 2.9), (-0.76, 3.0)),
+    ],
+)
+def test_with_another_inertia_the_poles_are_stable_as_far_as_is_said(actuator, preset, stable, unstable):
+    for m in np.linspace(*stable, 30):
+        assert np.abs(np.linalg.eigvals(closed_loop(preset, m, actuator.inertia))).max() < 1
+    for m in unstable:
+        assert np.abs(np.linalg.eigvals(closed_loop(preset, m, actuator.inertia))).max() > 1
+
+
+def test_at_the_nominal_inertia_the_poles_are_those_of_observer_and_surface(actuator):
+    found = np.linalg.eigvals(closed_loop("ideal", 0.0, actuator.inertia))
+    gains = AFSMWithObserver()
+    slope, reaching, wo, wd = (
+        getattr(gains, name)[1]
+        for name in (
+            "surface_slope_1_s",
+            "reaching_gain_1_s",
+            "observer_bandwidth_rad_s",
+            "disturbance_bandwidth_rad_s",
+        )
+    )
+    # Held over a period, v = -(λ + K) q̇ - λ K q gives d² + ((λ + K) T + λ K T²/2) d + λ K T², d = z - 1.
+    damping, stiffness = (slope + reaching) * PERIOD, slope * reaching * PERIOD**2
+    of_surface = np.roots([1, damping + stiffness / 2, stiffness]) + 1
+    expected = np.poly([*of_surface, *np.exp(-np.array([wo, wo, wd]) * PERIOD)])
+    # Double poles are known to the root of rounding; their polynomial, from entries of 1e6 T², to 1e-8.
+    np.testing.assert_allclose(np.poly(found), expected, rtol=1e-7)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_constant_load_leaves_no_error(preset):
+    loaded = {"disturbance.load": 1.0, "plant.payload_kg": 0.05, "plant.modelling_error": 0.3}
+    law = {"controller.law": "afsm_eso", "controller.preset": preset}
+    run = simulate(scenarios.load("hold", {**law, **loaded, "plant.engine": "lagrangian"}))
+    last = run.telemetry.rows(len(run.telemetry) - 100, len(run.telemetry))
+    # After 3 s the slowest pole, 20 1/s, has left e^-60 of 0.2 rad; the rest is rounding.
+    assert np.abs(last["error_rad"]).max() < 1e-14

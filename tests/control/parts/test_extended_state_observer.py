@@ -1,0 +1,117 @@
+"""The observer: poles where they are placed, the error that a moving disturbance leaves, any schedule."""
+
+import numpy as np
+import pytest
+
+from spheretwin.control.parts.extended_state_observer import Observed, observe, observer_gains
+from spheretwin.control.parts.nominal_motion import Motion, Nominal, moved_on
+
+PERIOD = 1e-3
+TUNINGS = [(800.0, 20.0), (800.0, 400.0), (700.0, 100.0), (180.0, 90.0)]
+ONE = Nominal((1.0, 1.0, 1.0), False)  # a disturbance is an acceleration
+REST = (0.0, 0.0, 0.0)
+
+
+def seen(before, angle, torque, bandwidths, nominal=ONE):
+    gains = observer_gains(*bandwidths, PERIOD)
+    return observe(before, tuple(angle), tuple(torque), (gains,) * 3, nominal, PERIOD)
+
+
+def error_map(bandwidths):
+    """F, column by column: errors of the first axis after one period at rest."""
+    columns = []
+    for angle, rate, disturbance in np.eye(3):
+        wrong = Observed(Motion((angle, 0.0, 0.0), (rate, 0.0, 0.0)), (disturbance, 0.0, 0.0))
+        motion, learnt = seen(wrong, REST, REST, bandwidths)
+        columns.append([motion.angle[0], motion.rate[0], learnt[0]])
+    return np.array(columns).T
+
+
+def poles(bandwidths):
+    return np.exp(-np.array([bandwidths[0], bandwidths[0], bandwidths[1]]) * PERIOD)
+
+
+@pytest.mark.parametrize("bandwidths", TUNINGS)
+def test_poles_are_where_they_are_placed(bandwidths):
+    # The double pole is known to the root of rounding, the polynomial is not.
+    found = np.poly(error_map(bandwidths))
+    np.testing.assert_allclose(found, np.poly(poles(bandwidths)), rtol=1e-10, atol=1e-10)
+
+
+def test_the_error_on_the_exact_model_decays_to_nothing(actuator):
+    """All axes coupled, large motion, random torques, under a constant load."""
+    nominal, load = Nominal(tuple(actuator.inertia), True), np.array([0.05, -0.03, 0.04])
+    generator = np.random.default_rng(0)
+    true = Motion((0.2, -0.3, 0.4), (1.0, -2.0, 3.0))
+    known, errors = Observed(Motion(true.angle, REST), REST), []
+    for _ in range(600):
+        torque = 0.05 * generator.normal(size=3) - 0.2 * np.array(true.rate) * actuator.inertia - load
+        true = moved_on(true, tuple(torque + load), nominal, PERIOD)
+        known = seen(known, true.angle, torque, (180.0, 90.0), nominal)
+        errors.append(np.abs(np.subtract(known.motion.rate, true.rate)).max())
+    # The slowest pole, 90 1/s, over 0.1 s. It is moved by some of the rotor's own rates, 4 rad/s in all: M
+    # turns while d̂ is learnt, and Coriolis terms are taken at rates that are not quite known.
+    assert errors[0] > 1.0
+    assert errors[200] < np.exp(-80.0 * 0.1) * errors[100]
+    assert errors[300] < np.exp(-80.0 * 0.1) * errors[200]
+    assert errors[-1] < 1e-11  # e^-48 of the start; the rounding of angles over a period of 1e-3 s
+
+
+@pytest.mark.parametrize("bandwidths", TUNINGS)
+def test_a_disturbance_that_rises_steadily_leaves_what_is_said(bandwidths):
+    rise, gains = 5.0, observer_gains(*bandwidths, PERIOD)
+    l1, l2, l3 = gains.of_angle, gains.of_rate, gains.of_acceleration
+    said = -rise / l3 * np.array([PERIOD * (1 - l1), l1 - 0.5 * l2 * PERIOD, l2])
+    errors = errors_under(rise * PERIOD * np.arange(2000), bandwidths)
+    # After 2 s the slowest pole has left e^-40 of the start; sums of some 1e4 m/s² round at 1e-12 of them.
+    np.testing.assert_allclose(errors[-1], said, rtol=1e-6)
+    wo, wd = bandwidths
+    limit = -rise * np.array([1 / (wo**2 * wd), (2 * wo + wd) / (wo**2 * wd), 2 / wo + 1 / wd])
+    fine = errors_under(rise * 1e-5 * np.arange(round(10 / wd / 1e-5)), bandwidths, 1e-5)
+    # Ten times 1/ω_d leave e^-10. Sampling moves a gain by some ω T = 8e-3 of itself, and a delay of
+    # two ticks that of d̂ by 2e-5 s of 5e-3.
+    np.testing.assert_allclose(fine[-1], limit, rtol=2e-2)
+
+
+def errors_under(push, bandwidths, period_s=PERIOD):
+    """Errors of angle, rate and disturbance while an exact double integrator is pushed; as matrices."""
+    gains = observer_gains(*bandwidths, period_s)
+    A = np.array([[1, period_s, 0.5 * period_s**2], [0, 1, period_s], [0, 0, 1]])
+    true, known, errors = np.zeros(2), np.zeros(3), []
+    for acceleration in push:
+        errors.append([*(known[:2] - true), known[2] - acceleration])
+        true = A[:2] @ [*true, acceleration]
+        known = A @ known
+        known = known + np.array(gains) * (true[0] - known[0])
+    return np.array(errors)
+
+
+@pytest.mark.parametrize("bandwidths", TUNINGS)
+def test_the_bound_of_the_error_is_attained_by_the_steady_rise(bandwidths):
+    """All of one sign, the response to one step of the disturbance sums to what a steady rise leaves."""
+    F, kernel = error_map(bandwidths), [np.array([0.0, 0.0, -1.0])]
+    for _ in range(2000):
+        kernel.append(F @ kernel[-1])
+    # Nothing is above rounding of the last disturbance, nor of its share of an angle within a period.
+    assert (np.array(kernel) <= 1e-15).all()
+    rise = errors_under(PERIOD * np.arange(2000), bandwidths)[-1]
+    np.testing.assert_allclose(PERIOD * np.sum(kernel, axis=0), rise, rtol=1e-6)
+
+
+def test_a_schedule_leaves_the_fast_poles_their_directions():
+    """The rows that the docstring names are left eigenvectors, and of second order, whatever ω_d is."""
+    A = np.array([[1, PERIOD, 0.5 * PERIOD**2], [0, 1, PERIOD], [0, 0, 1]])
+    a = np.exp(-800.0 * PERIOD)
+    inverse = np.linalg.inv(A - a * np.eye(3))
+    first = A[0] @ inverse
+    second = first @ inverse
+    for slow in (0.0, 20.0, 100.0, 400.0):
+        F = error_map((800.0, slow))
+        # Numbers of the order of 1; F has been through differences of numbers of 1e6 T² = 1.
+        np.testing.assert_allclose(first @ F, a * first, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(second @ F, a * second + first, rtol=1e-9, atol=1e-12)
+
+
+def test_without_a_bandwidth_no_disturbance_is_learnt():
+    found = seen(Observed(Motion(REST, REST), (0.3, 0.3, 0.3)), (0.1, 0.2, 0.3), REST, (500.0, 0.0))
+    assert found.disturbance == (0.3, 0.3, 0.3)
