@@ -1,4 +1,4 @@
-r"""Active disturbance rejection (ADRC): an observer finds what pushes beside the coils, feedback takes it off.
+"""Active disturbance rejection (ADRC): what pushes beside the coils is observed, and taken off.
 
 After Liu and others, *IET Control Theory and Applications* 11 (2017), doi 10.1049/iet-cta.2016.0551, linear
 and with its two bandwidths as the only gains. Each axis is a double integrator 1/J to it; coupling, load and
@@ -12,13 +12,19 @@ J l₃ m. With a = e^(−ω_o T) and
 
     l₁ = 1 − a³,   l₃ = (1 − a)³/T²,   l₂ = (3(1 − a) − l₁ − ½ l₃ T²)/T
 
-all three poles of its error are at a, sampled exactly. As the torque is that of the coils, neither the current
-limit nor the delay of the commands enters d: nothing winds up. Under a constant load its error goes to 0, and
-with it that of the angle.
+all three poles of its error are at a, sampled exactly. As the torque is that of the coils, neither the
+current limit nor the delay of the commands enters d: nothing winds up. Under a constant load its error goes
+to 0, and with it that of the angle.
 
 *Two numbers.* Model and observer separate: the poles are two at −ω and three at −ω_o, in either order.
 
-TUNED
+*Default.* ω = 140 1/s before an observer of 80, and of 40 for γ, which is counted: a slow observer is the
+filter that lets the feedback be fast. On the tilt (60) with the prototype the largest true error of α and β
+is 0.105° at 36 A/s of variation, worst of 20 seeds. Of 60 trials of the study `tuning` one beats it in both,
+0.104° at 30 A/s for 113 and 87 1/s, and errs twice as far on the nutation, whose last turns take all
+currents. On ideal hardware an observer is better fast: ω = 80 and ω_o = 400 leave at most 4.4 mrad of the
+sinusoid of m = 0.2 and L = 1, and 9.3 at m = 0.5 and L = 5, against 12 and 57 (γ; 5.3 and 24 of α and β), and
+would vary the prototype's currents by 515 A/s.
 """
 
 from typing import Literal

@@ -21,7 +21,10 @@ rest.
 (s + λ)(s² + h(1 + β/δ) s + γ): with λ = ω, h(1 + β/δ) = 2ω and γ = ω² three poles at −ω. β/δ = ½ leaves
 h = 4ω/3 outside.
 
-TUNED
+*Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s. On the tilt (60) with the prototype the largest true
+error of α and β is 0.095° at 66 A/s of variation, worst of 20 seeds. Of 60 trials of the study `tuning` none
+beats it in both; a layer six times as wide has 0.097° at 59 A/s, at 43 1/s. On ideal hardware a faster one is
+better: the sinusoid of m = 0.2 and L = 1 has at most 7.7 mrad at 40, 4.6 at 60.
 """
 
 from typing import Literal
@@ -57,7 +60,9 @@ class BacksteppingSlidingMode(LawParameters):
 
     law: Literal["backstepping_sliding_mode"] = named("backstepping_sliding_mode")
     surface_slope: PositiveEach = Field(each(BANDWIDTH_rad_s), description="λ = c + k of σ = λe + ė, 1/s")
-    reaching_gain: PositiveEach = Field(each(4 * BANDWIDTH_rad_s / 3), description="h of the reaching term, 1/s")
+    reaching_gain: PositiveEach = Field(
+        each(4 * BANDWIDTH_rad_s / 3), description="h of the reaching term, 1/s"
+    )
     switching: NonNegativeEach = Field(each(0.05), description="β, reaching beside σ, rad/s")
     layer: PositiveEach = Field(each(0.1), description="δ, boundary layer of the switching, rad/s")
     adaptation_rate: NonNegativeEach = Field(

@@ -4,15 +4,20 @@
 Bai and Lee, IEEE/ASME Transactions on Mechatronics 19 (2014), doi 10.1109/TMECH.2013.2264565, and Chen and
 others, Sensors and Actuators A 180 (2012), doi 10.1016/j.sna.2012.04.010; the integral is added.
 
-*Why.* Where the model is true and nothing disturbs, M cancels and ``eddot + damping edot + stiffness e = 0`` on
-each axis, whatever the motion: no coupling is left. What the model lacks divides by the stiffness: a load d
-leaves M⁻¹d/stiffness without the integral, and nothing with it. I is kept as a torque, I' = −M integral e, so
-that a constant load is a constant to it while the rotor moves; it is back-calculated as PID's is, see
-`control.parts.integral_feedback`. ``integral = 0`` is the law of the two papers.
+*Why.* Where the model is true and nothing disturbs, M cancels and ë + damping ė + stiffness e = 0 on each
+axis, whatever the motion: no coupling is left. A load d leaves M⁻¹d/stiffness without the integral, and
+nothing with it. I is kept as a torque, I' = −M integral e, so that a constant load is a constant to it while
+the rotor moves; it is back-calculated, see `control.parts.integral_feedback`. ``integral = 0`` is the law of
+the two papers.
 
 *Tuning by one number.* (3ω², 3ω, ω³) puts three poles at −ω; without an integral (ω², 2ω, 0) puts two.
 
-TUNED
+*Default.* ω = 40 1/s, as PID's. On the tilt (60) with the prototype the largest true error of α and β is
+0.099° at 76 A/s of variation, worst of 20 seeds. Of 60 trials of the study `tuning` none beats it in both;
+0.103° at 64 A/s are had at ω = 28 1/s with 1.4 times the damping. On ideal hardware a faster one is better:
+the sinusoid of m = 0.2 and L = 1 has at most 6.4 mrad at 40, 3.8 at 60; without an integral, at 90, 4.1. What
+the integral is for shows at m = 0.5 and L = 5: without it the RMS of the second half is 15 mrad, with it, at
+60, 0.2.
 """
 
 from typing import Literal

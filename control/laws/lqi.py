@@ -1,16 +1,19 @@
 """Linear quadratic with integral (LQI): PID's feedback with the gains that are least by a cost.
 
-An axis is a double integrator to it, and the error's integral a third state. Of all feedbacks of (e, ė, ∫e) it
-has the one with the least of Σ ((w_e e)² + (w_r ė)² + (w_i ∫e)² + v²) over the ticks, v the acceleration,
+An axis is a double integrator to it, and the error's integral a third state. Of all feedbacks of (e, ė, ∫e)
+it has the one with the least of Σ ((w_e e)² + (w_r ė)² + (w_i ∫e)² + v²) over the ticks, v the acceleration,
 held over each: a discrete Riccati equation, solved where the law is built. The weights are in the units of
 the gains. Integral and windup are those of `control.parts.integral_feedback`.
 
 *Tuning.* For fast ticks the identity of the return difference gives integral = w_i,
-stiffness² = w_e² + 2 integral damping and damping² = w_r² + 2 stiffness. The integral's weight alone, ω³, places
-Butterworth's poles of radius ω; a share of the error's, w_e in ω², damps them more; and (√3ω², √3ω, ω³) is PID's
-triple pole, so that this law can be no worse.
+stiffness² = w_e² + 2 integral damping and damping² = w_r² + 2 stiffness. The integral's weight alone, ω³,
+places Butterworth's poles of radius ω; w_e as a share of ω² damps them more; and w_e = √3ω², w_r = √3ω,
+w_i = ω³ are those of PID's triple pole.
 
-TUNED
+*Default.* ω = 60 1/s, no other weight. On the tilt (60) with the prototype the largest true error of α and β
+is 0.103° at 96 A/s of variation, worst of 20 seeds. Of 60 trials of the study `tuning` none beats it in both;
+half the variation costs little: 0.113° at 50 A/s for ω = 30 1/s with w_e = 2.9 ω². On ideal hardware a faster
+one is better: the sinusoid of m = 0.2 and L = 1 has at most 5.8 mrad at 60, 4.1 at 80.
 """
 
 from typing import Literal
@@ -71,10 +74,12 @@ class LQI(LawParameters):
     law: Literal["lqi"] = named("lqi")
     error_weight: NonNegativeEach = Field(each(0.0), description="weight of the error, 1/s²")
     rate_weight: NonNegativeEach = Field(each(0.0), description="weight of its rate, 1/s")
-    integral_weight: PositiveEach = Field(each(BANDWIDTH_rad_s**3), description="weight of its integral, 1/s³")
+    integral_weight: PositiveEach = Field(
+        each(BANDWIDTH_rad_s**3), description="weight of its integral, 1/s³"
+    )
 
     def build(self, known: Known) -> Law:
         """Law whose integral starts at 0."""
         weights = zip(self.error_weight, self.rate_weight, self.integral_weight, strict=True)
         gains = np.array([regulator(*each, known.period_s) for each in weights])
-        return feedback(self.law, *gains.T, known)
+        return feedback(self.law, gains.T, known)

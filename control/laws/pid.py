@@ -35,5 +35,4 @@ class PID(LawParameters):
 
     def build(self, known: Known) -> Law:
         """Law whose integral starts at 0."""
-        gains = (np.array(each) for each in (self.stiffness, self.damping, self.integral))
-        return feedback(self.law, *gains, known)
+        return feedback(self.law, np.array([self.stiffness, self.damping, self.integral]), known)

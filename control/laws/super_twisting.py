@@ -9,17 +9,20 @@
 10.1080/00207179.2016.1142616, but for its adaptation; the linear terms help where s is large.
 
 *Why it holds.* On an axis M and J cancel: ṡ = −k₁φ₁ + w, w' = −k₂φ₂, where a constant load is part of w. In
-ζ = (φ₁, w) that is ζ' = φ₁'(s) A ζ with A = [−k₁ 1; −k₂ 0], which is stable for all positive gains. With
-AᵀP + PA = −1 and V = ζᵀPζ, V' = −(½|s|^(−½) + μ)|ζ|² ≤ −a √V − b V, where a = ½ √p_min/p_max and b = μ/p_max for
-the eigenvalues p of P: s and ṡ are 0 after at most (2/b) ln(1 + (b/a) √V₀), or 2 √V₀/a where μ = 0. Sampled, |s|
-stays about (k₁T/2)², within which the root turns s round in one period. W is back-calculated, as in
-`control.parts.integral_feedback`, at λ/√3.
+ζ = (φ₁, w/√k₂) that is ζ' = φ₁'(s) A ζ with A = [−k₁ √k₂; −√k₂ 0], which is stable for all positive gains.
+With AᵀP + PA = −1 and V = ζᵀPζ, V' = −(½|s|^(−½) + μ)|ζ|² ≤ −a √V − b V, where a = ½ √p_min/p_max and
+b = μ/p_max for the eigenvalues p of P: s and ṡ are 0 after at most (2/b) ln(1 + (b/a) √V₀), or 2 √V₀/a where
+μ = 0. Sampled, |s| stays about (k₁T/2)², where the root turns s round in one period. W is back-calculated, as
+in `control.parts.integral_feedback`, at λ/√3.
 
-*Tuning by two numbers.* Far from the surface the polynomial of an axis is (s + λ)(s² + k₁μ s + k₂μ²): with λ = ω,
-k₁ = 2ω/μ and k₂ = ω²/μ² three poles at −ω. The smaller μ, the more of it is root, and the more the currents
-twist.
+*Tuning by two numbers.* Far from the surface the polynomial of an axis is (p + λ)(p² + k₁μ p + k₂μ²): with
+λ = ω, k₁ = 2ω/μ and k₂ = ω²/μ² three poles at −ω. The smaller μ, the more of it is root, and the more
+restless are the currents.
 
-TUNED
+*Default.* ω = 40 1/s, μ = 8. On the tilt (60) with the prototype the largest true error of α and β is 0.104°
+at 89 A/s of variation, worst of 20 seeds. Of 60 trials of the study `tuning` none beats it in both; 0.106° at
+50 A/s are had at ω = 28 1/s with μ = 19, which is hardly a root any more. On ideal hardware a faster one is
+better: the sinusoid of m = 0.2 and L = 1 has at most 5.6 mrad at 40, 3.4 at 60, and 3.1 at 60 with μ = 5.
 """
 
 from math import sqrt

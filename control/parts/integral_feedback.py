@@ -1,4 +1,4 @@
-"""Feedback of an axis's error, its rate and its integral: ``v = -stiffness e - damping edot - integral ∫e dt``.
+"""Feedback of an axis's error, rate and integral: ``v = -stiffness e - damping edot - integral ∫e dt``.
 
 The integral is kept as the torque that it asks for, and back-calculated from what the controller believes
 that its currents gave,
@@ -8,8 +8,8 @@ that its currents gave,
 with `asked` as old as the known delay makes it. While the allocation gives all that is asked, the bracket is
 what the lag of the currents still owes, and 0 at rest: a constant load leaves no error. At the current limit
 it holds the integral where the torque is just at the limit. The time constant √(damping/integral) is the
-root of integral time and derivative time, as is usual; it is √3/ω for a triple pole at −ω. What lowers the torque beyond the wires, as a drive
-whose limit is below the nominal one, a controller does not know.
+root of integral time and derivative time, as is usual; it is √3/ω for a triple pole at −ω. What lowers the
+torque beyond the wires, as a drive whose limit is below the nominal one, a controller does not know.
 """
 
 import numpy as np
@@ -36,19 +36,20 @@ def tracking(damping: Array, integral: Array, known: Known) -> Array:
     return tracking_rate(np.sqrt(integral / damping), known)
 
 
-def feedback(name: str, stiffness: Array, damping: Array, integral: Array, known: Known) -> Law:
+def feedback(name: str, gains: Array, known: Known) -> Law:
     """Law whose integral starts at 0.
 
     Parameters
     ----------
     name : str
-    stiffness, damping, integral : (3,) array, 1/s², 1/s and 1/s³
-        Acceleration a unit of error, of its rate and of its integral.
+    gains : (3, 3) array
+        Stiffness, damping and integral as rows, 1/s², 1/s and 1/s³: acceleration a unit of error, of its
+        rate and of its integral.
     known : Known
     """
-    gains = [each * known.inertia for each in (stiffness, damping, integral)]
     late, kept = lateness(known)
-    parameters = [*np.concatenate([*gains, tracking(damping, integral, known)]), late, known.period_s]
+    torques = (gains * known.inertia).ravel()
+    parameters = [*torques, *tracking(gains[1], gains[2], known), late, known.period_s]
     state = np.zeros(ASKED + kept)
     return Law(name, step, np.array(parameters), state, (INTEGRAL_SIGNAL,), asks_torque=True)
 

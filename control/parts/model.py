@@ -10,9 +10,7 @@ Array = NDArray[np.float64]
 
 
 @compiled
-def model_torque(
-    measurement: Array, acceleration: Array, rate: Array, inertia: Array, torque: Array
-) -> None:
+def model_torque(measurement: Array, acceleration: Array, rate: Array, inertia: Array, torque: Array) -> None:
     """Write the torque at the measured pose and rates.
 
     Parameters
