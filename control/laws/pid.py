@@ -3,7 +3,7 @@ r"""Proportional-integral-derivative law: ``v = -stiffness e - damping edot - in
 *Tuning by one number.* On a double integrator, which an axis is to this law, the characteristic polynomial is
 s³ + damping s² + stiffness s + integral. With (3ω, 3ω², ω³) all three poles are at −ω: `triple_pole`.
 
-*Windup.* The integral is back-calculated at √(integral/damping), √3⁻¹ω for a triple pole: see
+*Windup.* The integral is back-calculated at √(integral/damping), ω/√3 for a triple pole: see
 `control.parts.integral_feedback`.
 
 *Default.* ω = 40 1/s: of 30, 35, 38, 40, 42, 45, 50 the one with the least of the largest true errors of any

@@ -20,9 +20,10 @@ in `control.parts.integral_feedback`, at λ/√3.
 restless are the currents.
 
 *Default.* ω = 40 1/s, μ = 8. On the tilt (60) with the prototype the largest true error of α and β is 0.104°
-at 89 A/s of variation, worst of 20 seeds. Of 60 trials of the study `tuning` none beats it in both; 0.106° at
-50 A/s are had at ω = 28 1/s with μ = 19, which is hardly a root any more. On ideal hardware a faster one is
-better: the sinusoid of m = 0.2 and L = 1 has at most 5.6 mrad at 40, 3.4 at 60, and 3.1 at 60 with μ = 5.
+at 89 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study `tuning` none beats it in
+both; 0.106° at 50 A/s are had at ω = 28 1/s with μ = 19, which is hardly a root any more. On ideal hardware a
+faster one is better: the sinusoid of m = 0.2 and L = 1 has at most 5.6 mrad at 40, 3.4 at 60, and 3.1 at 60
+with μ = 5.
 """
 
 from math import sqrt
