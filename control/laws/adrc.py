@@ -22,7 +22,7 @@ to 0, and with it that of the angle.
 filter that lets the feedback be fast. On the tilt (60) with the prototype the largest true error of α and β
 is 0.105° at 36 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study `tuning` seven
 beat it in both, the quietest with 0.103° at 7.6 A/s for 69 and 57 1/s. They pay where loads come at once:
-that one lets α go 14 mrad on the sinusoid of m = 0.2 and L = 1, where the default has 5.3. On ideal hardware
+it lets α go 14.5 mrad on the sinusoid of m = 0.2 and L = 1, where the default has 5.3. On ideal hardware
 an observer is better fast: ω = 80 and ω_o = 400 leave at most 4.4 mrad of the sinusoid of m = 0.2 and L = 1,
 and 9.3 at m = 0.5 and L = 5, against 12 and 57 (γ; 5.3 and 24 of α and β), and would vary the prototype's
 currents by 515 A/s.
