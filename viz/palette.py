@@ -21,11 +21,19 @@ DESIRED_TRACE: Colour = (130, 136, 146)
 LAW_COLOURS: dict[str, str] = {
     "pd": "#0072b2",
     "pid": "#e69f00",
+    "lqi": "#8c3315",
+    "computed_torque": "#2d00b2",
+    "backstepping_sliding_mode": "#ffa6ff",
+    "adrc": "#400040",
+    "super_twisting": "#426654",
     "adaptive_fuzzy": "#009e73",
     "afsm": "#d55e00",
     "afsm_eso": "#000000",
 }
-"""Of the shipped laws, by name; Okabe and Ito's, told apart by the colour-blind too."""
+"""Of the shipped laws, by name, told apart by the colour-blind too, and by their lightness in grey.
+
+Okabe and Ito's for the paper's laws and PID; the others are where these leave most room.
+"""
 
 OTHER_LAW = "#8a5a9e"
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any, get_args
 
 from pydantic import Field, SerializeAsAny
 
-from spheretwin.control.laws.own import parameters_of
 from spheretwin.control.laws.registry import AnyLaw
+from spheretwin.control.own_law import parameters_of
 from spheretwin.control.parts.parameters import LawParameters
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.twin.scenario.sections import Scenario

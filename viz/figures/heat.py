@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 ROW_in = 0.3
 NEAR, FAR = 0.003, 0.1  # degrees: less change is hardly coloured, more has the full colour
 TICKS = (-0.1, -0.03, -0.01, 0, 0.01, 0.03, 0.1)
+MOST_BESIDE = 5  # columns of panels that have room side by side
 DARK = 0.36  # distance from the middle of the scale beyond which numbers are written in white
 
 
@@ -31,7 +32,9 @@ class Panel(NamedTuple):
 def heat(
     panels: Mapping[str, Panel], rows: Sequence[str], columns: Sequence[str], title: str, change: str
 ) -> Figure:
-    """Panels side by side, on one scale of colours: blue for less, red for more.
+    """Panels side by side, or one below the other where columns are many, on one scale of colours.
+
+    Blue is less, red is more.
 
     Parameters
     ----------
@@ -42,8 +45,11 @@ def heat(
         What the colours are, with its unit.
     """
     scale = SymLogNorm(linthresh=NEAR, vmin=-FAR, vmax=FAR)
-    figure = Figure(figsize=(1.35 * WIDTH_in, 1.8 + ROW_in * len(rows)), layout="constrained")
-    sides = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    beside = len(columns) <= MOST_BESIDE
+    down, across = (1, len(panels)) if beside else (len(panels), 1)
+    height_in = 1.8 + ROW_in * len(rows) * down
+    figure = Figure(figsize=(1.35 * WIDTH_in, height_in), layout="constrained")
+    sides = figure.subplots(down, across, sharex=not beside, sharey=beside, squeeze=False).ravel()
     for axes, (name, panel) in zip(sides, panels.items(), strict=True):
         image = axes.imshow(np.clip(panel.changes, -FAR, FAR), norm=scale, cmap="RdBu_r", aspect="auto")
         _write(axes, panel, scale)

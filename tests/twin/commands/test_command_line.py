@@ -50,7 +50,7 @@ def test_version_is_printed():
         ([], ["VERB"]),
         (["simulate", "--json"], ["hold, nutation, sinusoid, tilt"]),
         (["simulate", "spiral"], ["hold, nutation, sinusoid, tilt", "spiral"]),
-        (["simulate", "hold", "--controller.law", "pdd"], ["pd, pid, adaptive_fuzzy, afsm", "'pdd'"]),
+        (["simulate", "hold", "--controller.law", "pdd"], ["pd, pid, lqi", "'pdd'"]),
         (["simulate", "hold", "--controler.law", "pd"], ["controller", "controler"]),
         (["simulate", "hold", "--duration", "nan"], ["duration", "nan"]),
         (["simulate", "hold", "--duration", "Infinity"], ["duration", "inf"]),

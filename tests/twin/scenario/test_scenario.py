@@ -56,7 +56,7 @@ def test_flags_reach_every_field():
     [
         (
             {"controller.law": "pdd"},
-            ["controller.law", "pd, pid, adaptive_fuzzy, afsm", "'pdd'", "did you mean pd?"],
+            ["controller.law", "pd, pid, lqi", "'pdd'", "did you mean pd?"],
         ),
         ({"controler.law": "pd"}, ["controller", "plant", "controler"]),
         ({"plant.colour": 1}, ["modelling_error", "plant", "colour"]),

@@ -199,7 +199,7 @@ REFUSED = [
     ("disturbance.load", "much", "valid number"),
     ("disturbance.load", float("nan"), "finite number"),
     ("controller.law", "pdd", "did you mean pd"),
-    ("controller.law", 3, "expected one of pd, pid, adaptive_fuzzy, afsm"),
+    ("controller.law", 3, "expected one of pd, pid, lqi"),
     ("disturbance.load", plain_law(), "a law for controller.law"),
     ("controller.law", Law("broken", numba.njit(not_compilable), [], []), "that compiles"),
     ("nominal.torque_scale", 0.0, "0.001 in magnitude"),

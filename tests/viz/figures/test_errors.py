@@ -78,6 +78,18 @@ def test_heat_writes_what_is_a_number():
     assert written == ["0.100", "9.00", "0.300"]
 
 
+@pytest.mark.parametrize(("columns", "beside"), [(5, True), (6, False)])
+def test_panels_of_many_columns_are_one_below_the_other(columns, beside):
+    panel, names = (
+        heat.Panel(np.zeros((2, columns)), np.zeros((2, columns))),
+        [str(i) for i in range(columns)],
+    )
+    figure = heat.heat({"α": panel, "β": panel}, ROWS[:2], names, "heat", "change, degrees")
+    first, second = (axes.get_subplotspec() for axes in figure.axes[:2])
+    assert (first.rowspan == second.rowspan) == beside
+    assert (first.colspan == second.colspan) != beside
+
+
 def test_laws_have_colours_of_their_own_or_share_the_last():
     assert set(palette.LAW_COLOURS) <= set(LAWS)
     colours = [palette.law_colour(law) for law in palette.LAW_COLOURS]

@@ -2,7 +2,8 @@
 
 import pytest
 
-from spheretwin.control.laws.pid import PID, triple_pole
+from spheretwin.control.laws.pid import triple_pole
+from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import load, made
@@ -10,18 +11,29 @@ from spheretwin.twin.study.tuning.gains import gains_of, middle, values
 from spheretwin.twin.study.tuning.running import tuned
 from tests.twin.study.tuning.cases import TWO, gain, study
 
+SHIPPED = load("tuning")
+
 
 def pid_gains():
-    shipped = load("tuning")
-    (law,) = (law for law in shipped.law if law["law"] == "pid")
-    return gains_of(shipped, law, Rows(shipped))
+    (law,) = (law for law in SHIPPED.law if law["law"] == "pid")
+    return gains_of(SHIPPED, law, Rows(SHIPPED))
 
 
-def test_the_shipped_tuning_starts_with_the_laws_own_gains():
-    fields, default = values(pid_gains(), middle(pid_gains())), PID()
+@pytest.mark.parametrize("law", SHIPPED.law, ids=lambda law: law["law"])
+def test_the_shipped_tuning_starts_with_the_laws_own_gains(law):
+    gains, default = gains_of(SHIPPED, law, Rows(SHIPPED)), LAWS[law["law"]]()
+    own = {name: tuple(value) for name, value in law.items() if name != "law"}
+    for field, value in values(gains, middle(gains)).items():
+        name, _, entry = field.removeprefix("controller.").partition(".")
+        at = [int(entry)] if entry else [0, 1, 2]
+        # Gains that are the products of factors and powers: some units in the last place.
+        assert [getattr(default, name)[i] for i in at] == pytest.approx([value] * len(at), rel=1e-15)
+    assert own == {name: getattr(default, name) for name in own}
+
+
+def test_the_shipped_tuning_of_pid_is_of_its_three_gains():
+    fields = values(pid_gains(), middle(pid_gains()))
     assert set(fields) == {f"controller.{name}" for name in ("stiffness", "damping", "integral")}
-    for name, value in fields.items():
-        assert (value,) * 3 == getattr(default, name.removeprefix("controller."))
 
 
 def test_a_gain_may_set_several_fields_and_a_field_be_set_by_several():

@@ -1,0 +1,105 @@
+"""Adaptive backstepping sliding mode: a surface found in two steps, and an estimate of what disturbs.
+
+After Liu and others, *Aerospace Science and Technology* 67 (2017), doi 10.1016/j.ast.2017.03.032. Its first
+step makes −c e of ė, its second puts a surface σ = k e + (ė + c e) on what is left. c and k enter the law by
+their sum alone, so λ = c + k is the parameter: σ = ė + λe, and with the rate q̇_r = q̇_d − λe
+
+    τ = M q̈_r + C q̇_r − J h (σ + β sat(σ/δ)) + D,   D' = −J γ σ.
+
+*Why it holds.* With the true model and a constant load d, M σ̇ + C σ = −J h (σ + β sat) + D − d, and Ṁ − 2C is
+skew-symmetric. So for 0 < w < 4λh
+
+    V  = ½ σᵀMσ + ½ w Σ J e² + ½ Σ (D − d)²/(Jγ)
+    V' = −Σ J (h σ² − w e σ + wλ e²) − h β Σ J |σ sat(σ/δ)| ≤ 0,
+
+on the coupled rotor, not on three axes apart; e and σ go to 0 by Barbalat's lemma, under any constant load.
+The sign of the paper's switching is smoothed over the layer δ; |D| is held by back-calculation, as in
+`control.parts.integral_feedback`, at the rate √(λγ/(λ + h)) of the integral and damping that the law has near
+rest.
+
+*Tuning by one number.* Within the layer the characteristic polynomial of an axis at rest is
+(s + λ)(s² + h(1 + β/δ) s + γ): with λ = ω, h(1 + β/δ) = 2ω and γ = ω² three poles at −ω. β/δ = ½ leaves
+h = 4ω/3 outside.
+
+*Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s. On the tilt (60) with the prototype the largest true
+error of α and β is 0.095° at 66 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study
+`tuning` none beats it in both; a layer six times as wide has 0.097° at 59 A/s, at 43 1/s. On ideal hardware a
+faster one is better: the sinusoid of m = 0.2 and L = 1 has at most 7.7 mrad at 40, 4.6 at 60.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from spheretwin.control.law import Known, Law
+from spheretwin.control.parts.model import model_torque
+from spheretwin.control.parts.parameters import LawParameters, NonNegativeEach, PositiveEach, each, named
+from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
+from spheretwin.control.parts.windup import asked_before, lateness, remember, tracking_rate
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+
+Array = NDArray[np.float64]
+
+SIGNALS = (
+    SLIDING_SIGNAL,
+    Signal("adapted_torque_Nm", "N·m", 3, "estimate D of what disturbs", ANGLES),
+)
+# Layout of the parameters.
+SURFACE_SLOPE, REACHING_GAIN, SWITCHING, LAYER, ADAPTATION, TRACKING, INERTIA, LATE, PERIOD = (
+    0, 3, 6, 9, 12, 15, 18, 21, 22,
+)  # fmt: skip
+SLIDING, ADAPTED, ASKED = 0, 3, 6  # layout of the state
+
+BANDWIDTH_rad_s = 40.0
+
+
+class BacksteppingSlidingMode(LawParameters):
+    """Adaptive backstepping sliding mode."""
+
+    law: Literal["backstepping_sliding_mode"] = named("backstepping_sliding_mode")
+    surface_slope: PositiveEach = Field(each(BANDWIDTH_rad_s), description="λ = c + k of σ = λe + ė, 1/s")
+    reaching_gain: PositiveEach = Field(
+        each(4 * BANDWIDTH_rad_s / 3), description="h of the reaching term, 1/s"
+    )
+    switching: NonNegativeEach = Field(each(0.05), description="β, reaching beside σ, rad/s")
+    layer: PositiveEach = Field(each(0.1), description="δ, boundary layer of the switching, rad/s")
+    adaptation_rate: NonNegativeEach = Field(
+        each(BANDWIDTH_rad_s**2), description="γ, adaptation rate of the disturbance's estimate, 1/s²"
+    )
+
+    def build(self, known: Known) -> Law:
+        """Law whose estimate starts at 0."""
+        late, kept = lateness(known)
+        slope, reaching = np.array(self.surface_slope), np.array(self.reaching_gain)
+        tracking = tracking_rate(np.sqrt(slope * self.adaptation_rate / (slope + reaching)), known)
+        gains = [*self.surface_slope, *self.reaching_gain, *self.switching, *self.layer]
+        rates = [*self.adaptation_rate, *tracking]
+        parameters = np.array([*gains, *rates, *known.inertia, late, known.period_s])
+        return Law(self.law, step, parameters, np.zeros(ASKED + kept), SIGNALS, asks_torque=True)
+
+
+def step(
+    t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
+) -> None:
+    """Write the torque of one control tick, as `control.law.Law` says."""
+    period, asked, inertia = parameters[PERIOD], state[ASKED:], parameters[INERTIA : INERTIA + 3]
+    rate, acceleration = np.empty(3), np.empty(3)
+    for axis in range(3):
+        slope = parameters[SURFACE_SLOPE + axis]
+        error = measurement[0, axis] - reference[0, axis]
+        error_rate = measurement[1, axis] - reference[1, axis]
+        state[SLIDING + axis] = sliding_surface(error, error_rate, slope)
+        rate[axis] = reference[1, axis] - slope * error
+        acceleration[axis] = reference[2, axis] - slope * error_rate
+        owed = measurement[2, axis] - asked_before(asked, axis, parameters[LATE])
+        state[ADAPTED + axis] += period * parameters[TRACKING + axis] * owed
+    model_torque(measurement, acceleration, rate, inertia, torque)
+    for axis in range(3):
+        s = state[SLIDING + axis]
+        switched = parameters[SWITCHING + axis] * min(1.0, max(-1.0, s / parameters[LAYER + axis]))
+        reaching = parameters[REACHING_GAIN + axis] * (s + switched)
+        torque[axis] += state[ADAPTED + axis] - inertia[axis] * reaching
+        state[ADAPTED + axis] -= period * parameters[ADAPTATION + axis] * inertia[axis] * s
+    remember(asked, torque)

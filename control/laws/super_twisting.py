@@ -1,0 +1,102 @@
+"""Super-twisting: a second-order sliding mode, whose torque is continuous.
+
+``tau = M(q) (qddot_d - lambda edot - k1 phi1(s)) + C(q, qdot) qdot + W``, ``W' = -J k2 phi2(s)`` with
+``s = lambda e + edot``, the nominal M and C, and
+
+    φ₁ = |s|^½ sgn s + μ s,   φ₂ = φ₁ φ₁' = ½ sgn s + (3/2) μ |s|^½ sgn s + μ² s.
+
+μ = 0 is the law as Bartolini and others have it, International Journal of Control 89 (2016), doi
+10.1080/00207179.2016.1142616, but for its adaptation; the linear terms help where s is large.
+
+*Why it holds.* On an axis M and J cancel: ṡ = −k₁φ₁ + w, w' = −k₂φ₂, where a constant load is part of w. In
+ζ = (φ₁, w/√k₂) that is ζ' = φ₁'(s) A ζ with A = [−k₁ √k₂; −√k₂ 0], which is stable for all positive gains.
+With AᵀP + PA = −1 and V = ζᵀPζ, V' = −(½|s|^(−½) + μ)|ζ|² ≤ −a √V − b V, where a = ½ √p_min/p_max and
+b = μ/p_max for the eigenvalues p of P: s and ṡ are 0 after at most (2/b) ln(1 + (b/a) √V₀), or 2 √V₀/a where
+μ = 0. Sampled, |s| stays about (k₁T/2)², where the root turns s round in one period. W is back-calculated, as
+in `control.parts.integral_feedback`, at λ/√3.
+
+*Tuning by two numbers.* Far from the surface the polynomial of an axis is (p + λ)(p² + k₁μ p + k₂μ²): with
+λ = ω, k₁ = 2ω/μ and k₂ = ω²/μ² three poles at −ω. The smaller μ, the more of it is root, and the more
+restless are the currents.
+
+*Default.* ω = 40 1/s, μ = 8. On the tilt (60) with the prototype the largest true error of α and β is 0.104°
+at 89 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study `tuning` none beats it in
+both; 0.106° at 50 A/s are had at ω = 28 1/s with μ = 19, which is hardly a root any more. On ideal hardware a
+faster one is better: the sinusoid of m = 0.2 and L = 1 has at most 5.6 mrad at 40, 3.4 at 60, and 3.1 at 60
+with μ = 5.
+"""
+
+from math import sqrt
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from spheretwin.control.law import Known, Law
+from spheretwin.control.parts.model import model_torque
+from spheretwin.control.parts.parameters import LawParameters, NonNegativeEach, PositiveEach, each, named
+from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
+from spheretwin.control.parts.windup import asked_before, lateness, remember, tracking_rate
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+
+Array = NDArray[np.float64]
+
+SIGNALS = (
+    SLIDING_SIGNAL,
+    Signal("twisting_torque_Nm", "N·m", 3, "torque W of the integral", ANGLES),
+)
+SURFACE_SLOPE, ROOT, TWISTING, LINEAR, TRACKING, INERTIA, LATE, PERIOD = 0, 3, 6, 9, 12, 15, 18, 19
+SLIDING, TWISTED, ASKED = 0, 3, 6  # layout of the state
+
+BANDWIDTH_rad_s = 40.0
+LINEAR_SHARE = 8.0  # (rad/s)^-½
+
+
+class SuperTwisting(LawParameters):
+    """Super-twisting."""
+
+    law: Literal["super_twisting"] = named("super_twisting")
+    surface_slope: PositiveEach = Field(each(BANDWIDTH_rad_s), description="λ of s = λe + ė, 1/s")
+    root_gain: PositiveEach = Field(
+        each(2 * BANDWIDTH_rad_s / LINEAR_SHARE), description="k₁ of the proportional part, (rad/s³)^½"
+    )
+    twisting_gain: PositiveEach = Field(
+        each((BANDWIDTH_rad_s / LINEAR_SHARE) ** 2), description="k₂ of the integral, rad/s³"
+    )
+    linear_share: NonNegativeEach = Field(
+        each(LINEAR_SHARE), description="μ of s beside its root, (rad/s)^-½; 0 for the root alone"
+    )
+
+    def build(self, known: Known) -> Law:
+        """Law whose integral starts at 0."""
+        late, kept = lateness(known)
+        tracking = tracking_rate(np.array(self.surface_slope) / sqrt(3), known)
+        gains = [*self.surface_slope, *self.root_gain, *self.twisting_gain, *self.linear_share]
+        parameters = np.array([*gains, *tracking, *known.inertia, late, known.period_s])
+        return Law(self.law, step, parameters, np.zeros(ASKED + kept), SIGNALS, asks_torque=True)
+
+
+def step(
+    t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
+) -> None:
+    """Write the torque of one control tick, as `control.law.Law` says."""
+    period, asked, inertia = parameters[PERIOD], state[ASKED:], parameters[INERTIA : INERTIA + 3]
+    acceleration, growth = np.empty(3), np.empty(3)
+    for axis in range(3):
+        slope, linear = parameters[SURFACE_SLOPE + axis], parameters[LINEAR + axis]
+        error_rate = measurement[1, axis] - reference[1, axis]
+        s = sliding_surface(measurement[0, axis] - reference[0, axis], error_rate, slope)
+        root, sign = sqrt(abs(s)), np.sign(s)
+        first = (root + linear * root * root) * sign
+        second = (0.5 + 1.5 * linear * root + linear * linear * root * root) * sign
+        acceleration[axis] = reference[2, axis] - slope * error_rate - parameters[ROOT + axis] * first
+        growth[axis] = -parameters[TWISTING + axis] * inertia[axis] * second
+        owed = measurement[2, axis] - asked_before(asked, axis, parameters[LATE])
+        state[TWISTED + axis] += period * parameters[TRACKING + axis] * owed
+        state[SLIDING + axis] = s
+    model_torque(measurement, acceleration, measurement[1], inertia, torque)
+    for axis in range(3):
+        torque[axis] += state[TWISTED + axis]
+        state[TWISTED + axis] += period * growth[axis]
+    remember(asked, torque)

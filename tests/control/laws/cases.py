@@ -1,0 +1,68 @@
+"""What tests of laws share: a law called as the loop calls it, beside a slow copy, and on one axis alone."""
+
+import numba
+import numpy as np
+
+from spheretwin.control.controller import law_at
+from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.models.base.compiled import compiled_callback
+
+PERIOD = 1e-3
+TICKS = 200
+
+
+@numba.njit
+def by_address(address, t, reference, measurement, parameters, state, torque):
+    """Call a law as the loop does: its machine code."""
+    law_at(address)(t, reference, measurement, parameters, state, torque)
+
+
+def known(actuator, delay_s=0.0, period_s=PERIOD):
+    return Known(period_s, delay_s, actuator.inertia)
+
+
+def follows(law, slow):
+    """Hold the torque and what is logged of a law's machine code against a slow copy, on random inputs."""
+    compiled = compiled_callback(SIGNATURE, law.step)
+    generator = np.random.default_rng(0)
+    state, torque = law.state.copy(), np.empty(3)
+    for tick in range(TICKS):
+        reference, measurement = generator.normal(size=(3, 3)), generator.normal(size=(3, 3))
+        by_address(compiled.address, PERIOD * tick, reference, measurement, law.parameters, state, torque)
+        wanted, logged = slow(reference, measurement)
+        # Sums of some hundred numbers, rounded by 1e-16 of the largest each.
+        np.testing.assert_allclose(torque, wanted, rtol=1e-11, atol=1e-11 * np.abs(wanted).max())
+        np.testing.assert_allclose(state[: len(logged)], logged, rtol=1e-11, atol=1e-11)
+
+
+class Asked:
+    """Torques that were asked for, as old as the known delay, from all that there ever were."""
+
+    def __init__(self, delay_s):
+        self.whole, self.late = divmod(delay_s / PERIOD, 1)
+        self.all = [np.zeros(3)]
+
+    def __call__(self):
+        older, newer = (self._at(int(self.whole) + more) for more in (1, 0))
+        return self.late * older + (1 - self.late) * newer
+
+    def _at(self, periods):
+        return self.all[-1 - periods] if periods < len(self.all) else np.zeros(3)
+
+
+def on_an_axis(law, inertia, start, seconds, period_s, load_Nm=0.0):
+    """Course of (error, rate, first logged) of β at rest on the others: a double integrator, stepped exactly.
+
+    At α = γ = 0 the inertia matrix of β alone is J2 and nothing couples, so that the model is the plant.
+    """
+    state, torque = law.state.copy(), np.zeros(3)
+    angle, rate = start
+    course = []
+    for _ in range(round(seconds / period_s)):
+        measurement = np.zeros((3, 3))
+        measurement[:2, 1], measurement[2] = (angle, rate), torque
+        law.step(0.0, np.zeros((3, 3)), measurement, law.parameters, state, torque)
+        course.append((angle, rate, *state[1 : len(law.state) : 3]))
+        push = (torque[1] - load_Nm) / inertia[1]
+        angle, rate = angle + period_s * rate + 0.5 * period_s**2 * push, rate + period_s * push
+    return np.array([row[:4] for row in course])

@@ -1,0 +1,72 @@
+"""LQI: its gains solve the Riccati equation, which is checked without solving one."""
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_lyapunov
+
+from spheretwin.control.laws.lqi import LQI, regulator
+from spheretwin.control.laws.pid import PID, triple_pole
+from spheretwin.models.base.errors import InputError
+from tests.control.laws.cases import PERIOD, known
+
+WEIGHTS = [(0.0, 0.0, 60.0**3), (3000.0, 30.0, 3e4), (0.0, 50.0, 10.0), (1e5, 0.0, 1e6)]
+
+
+def sampled(period_s):
+    """A double integrator and its integral, (e, ė, ∫e), over a period in which v is held."""
+    T = period_s
+    return np.array([[1, T, 0], [0, 1, 0], [T, 0, 1]]), np.array([[T * T / 2], [T], [0.0]])
+
+
+@pytest.mark.parametrize("weights", WEIGHTS)
+def test_gains_are_the_best_that_there_are(weights):
+    """The cost of these gains is P; the gains that are best where P is to come are these gains."""
+    (A, B), K = sampled(PERIOD), np.array([regulator(*weights, PERIOD)])
+    closed = A - B @ K
+    assert np.abs(np.linalg.eigvals(closed)).max() < 1
+    P = solve_discrete_lyapunov(closed.T, np.diag(np.square(weights)) + K.T @ K)
+    best = np.linalg.solve(1 + B.T @ P @ B, B.T @ P @ A)
+    # P is worth eps times the condition of 1 - closed, some 1e6 here, and so are the gains.
+    np.testing.assert_allclose(K, best, rtol=1e-7)
+    riccati = A.T @ P @ A - A.T @ P @ B @ best + np.diag(np.square(weights)) - P
+    assert np.abs(riccati / np.sqrt(np.outer(np.diag(P), np.diag(P)))).max() < 1e-9
+
+
+@pytest.mark.parametrize("weights", WEIGHTS)
+def test_poles_obey_the_return_difference(weights):
+    """|p(jω)|² of fast ticks is ω⁶ + w_r² ω⁴ + w_e² ω² + w_i²: the cost's own spectrum."""
+    period_s = 1e-7
+    stiffness, damping, integral = regulator(*weights, period_s)
+    found = [damping**2 - 2 * stiffness, stiffness**2 - 2 * integral * damping, integral**2]
+    # Sampling moves the gains by half a period times the fastest pole, up to 400 1/s.
+    size = max(weights[0] ** 0.5, weights[1], weights[2] ** (1 / 3)) ** np.array([2, 4, 6])
+    np.testing.assert_allclose(found / size, np.square(weights)[[1, 0, 2]] / size, atol=1e-3)
+
+
+def test_a_triple_pole_is_among_its_gains():
+    w = 40.0
+    gains = regulator(3**0.5 * w**2, 3**0.5 * w, w**3, 1e-6)
+    np.testing.assert_allclose(
+        gains, triple_pole(w), rtol=1e-4
+    )  # half a period times the pole, 2e-5, a few times
+
+
+def test_law_is_the_feedback_with_these_gains(actuator):
+    gains = LQI(
+        error_weight=[100.0, 2000.0, 0.0], rate_weight=[0.0, 5.0, 9.0], integral_weight=[1e4, 2e4, 3e4]
+    )
+    each = [regulator(*weights, PERIOD) for weights in [(100, 0, 1e4), (2000, 5, 2e4), (0, 9, 3e4)]]
+    stiffness, damping, integral = (list(gain) for gain in zip(*each, strict=True))
+    pid = PID(stiffness=stiffness, damping=damping, integral=integral).build(known(actuator))
+    lqi = gains.build(known(actuator))
+    assert lqi.step is pid.step
+    np.testing.assert_array_equal(lqi.parameters, pid.parameters)
+
+
+@pytest.mark.parametrize(
+    ("weights", "period_s", "told"),
+    [((0.0, 0.0, 1e9), 1.0, "for ticks of 1 s"), ((3e7, 6e-4, 6e-9), 1e-3, "nearer to each other")],
+)
+def test_weights_without_a_solution_are_refused(weights, period_s, told):
+    with pytest.raises(InputError, match=told):
+        regulator(*weights, period_s)
