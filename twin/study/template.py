@@ -14,6 +14,8 @@ from spheretwin.twin.scenario.sections import Scenario
 # What no text of a scenario may hold.
 MARK = "\x01"
 
+MOST_USUAL = 2**63
+
 
 class Template:
     """JSON of a scenario with a gap for each number that differs from row to row.
@@ -49,13 +51,18 @@ class Template:
         InputError
             They are out of range, or do not fit each other.
         """
-        filled = (_text(values[place]) for place in self._order)
+        filled = (self._text(values[place]) for place in self._order)
         text = self._first + "".join(chain.from_iterable(zip(filled, self._parts, strict=True)))
         scenario = reading.from_json(text, self._source, self._kind)
         if not self._texts_are_checked:
             reading.check_texts(self._source, scenario)
             self._texts_are_checked = True
         return check_events(scenario, self._source)
+
+    def _text(self, value: float) -> str:
+        """A number as JSON has it, which is as Python has it but for a few."""
+        is_usual = isfinite(value) if isinstance(value, float) else abs(value) < MOST_USUAL
+        return repr(value) if is_usual else reading.as_json(self._source, value).decode()
 
 
 def template_of(fields: dict[str, Any], gaps: Sequence[str], source: str) -> Template | None:
@@ -92,8 +99,3 @@ def template_of(fields: dict[str, Any], gaps: Sequence[str], source: str) -> Tem
 def are_numbers(values: Iterable[Any]) -> bool:
     """Whether values are such as a template has gaps for: they bring no fields of their own."""
     return all(type(value) in (float, int) for value in values)
-
-
-def _text(value: float) -> str:
-    """A number as JSON has it."""
-    return repr(value) if isfinite(value) else reading.as_json("", value).decode()
