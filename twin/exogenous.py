@@ -171,7 +171,7 @@ class Exogenous:
 def _sampled(followed: Sampled, period_s: float, first: int, count: int) -> _Reference:
     t = period_s * np.arange(first, first + count, dtype=np.float64)
     samples = np.ascontiguousarray(followed.sample(t))
-    return _Reference(t, samples, np.isfinite(samples.reshape(count, 9)).all(axis=1))
+    return _Reference(t, samples, np.all(np.isfinite(samples), axis=(1, 2)))
 
 
 @lru_cache(maxsize=32)

@@ -70,7 +70,7 @@ def raise_to_largest(rows: Array, largest: Array) -> None:
 
 @rounding_each
 def note_last_outside(rows: Array, band: float, first: int, last: NDArray[np.int64]) -> None:
-    """Write into `last` (k,) the last place of a magnitude in rows (n, k) beyond a band; `first` is theirs."""
+    """Write into `last` (k,) where a magnitude of rows (n, k), counted from `first`, last leaves a band."""
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             if abs(rows[i, j]) > band:

@@ -36,9 +36,7 @@ class Template:
         Where it comes from, for complaints.
     """
 
-    def __init__(
-        self, parts: Sequence[str], order: Sequence[int], kind: type[Scenario], source: str
-    ) -> None:
+    def __init__(self, parts: Sequence[str], order: Sequence[int], kind: type[Scenario], source: str) -> None:
         self._first, *self._parts = parts
         self._order, self._kind, self._source = order, kind, source
         self._texts_are_checked = False

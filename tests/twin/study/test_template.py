@@ -48,7 +48,8 @@ def test_scenarios_are_the_same(values):
 
 
 @pytest.mark.parametrize(
-    ("place", "value"), [(0, -1), (0, 0.5), (1, 2**300), (1, -1.0), (2, math.inf), (3, math.nan), (4, 0), (4, -math.inf)]
+    ("place", "value"),
+    [(0, -1), (0, 0.5), (1, 2**300), (1, -1.0), (2, math.inf), (3, math.nan), (4, 0), (4, -math.inf)],
 )
 def test_complaints_are_the_same(place, value):
     values = [*SOME[:place], value, *SOME[place + 1 :]]

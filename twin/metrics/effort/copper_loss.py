@@ -11,7 +11,6 @@ from spheretwin.twin.electronics.driving.lag import drive
 from spheretwin.twin.metrics.metric import Metric, Planned
 from spheretwin.twin.metrics.reducing import add_rows, add_squares
 
-
 Array = NDArray[np.float64]
 
 

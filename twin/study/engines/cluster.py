@@ -1,6 +1,6 @@
 """Ray: rows in batches over all cores of a cluster, a process a core.
 
-A process a core, and not threads within fewer: half of a short row is Python, which threads run one at a
+A process a core, and not threads within fewer: a third of a short row is Python, which threads run one at a
 time. Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
 study names must be on every node, under the same paths, and so must the same sources and versions: a node
 that has others is refused by `spheretwin.twin.study.engines.worker`. Rows whose telemetry is kept are run by

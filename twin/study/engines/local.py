@@ -12,7 +12,7 @@ from spheretwin.twin.study.engines.engine import Engine, Order
 from spheretwin.twin.study.grid import Row
 from spheretwin.twin.study.row import Result
 
-# Rows of each thread that nobody has taken over yet: enough that none waits, few enough that no memory gathers.
+# Rows of each thread that are not taken over yet: enough that none waits, few enough that no memory gathers.
 AHEAD = 4
 
 T = TypeVar("T")
