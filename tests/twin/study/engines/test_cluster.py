@@ -91,12 +91,23 @@ def test_the_table_is_that_of_the_local_engine(study, machines, wanted, tmp_path
     assert kept.name == next((wanted / "telemetry").iterdir()).name
 
 
+def slowly(job, numbers):
+    """As a node runs a batch, but longer than it takes to kill it."""
+    import time
+
+    from spheretwin.twin.study.engines import worker
+
+    time.sleep(0.5)  # in the process of a node
+    return worker.carried_out(job, numbers)
+
+
 def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, tmp_path, monkeypatch):
     lost = []
     back = batches.Batches.lost
     monkeypatch.setattr(
         batches.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
     )
+    monkeypatch.setattr(worker, "carried_out", slowly)
     killed = []
 
     def kill(done, of):
