@@ -23,8 +23,9 @@ check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/mypy
 	$(WHEEL)/lint-imports
 
-benchmark: setup ## print the speed ratios, and hold the bounded allocation against linear programmes
+benchmark: setup ## print the speed ratios and the bars of studies, and hold the bounded allocation against linear programmes
 	$(BIN)/python tests/benchmarks/ratios.py
+	$(BIN)/python tests/benchmarks/studies.py
 	$(BIN)/python tests/benchmarks/allocation.py
 
 peers: .venv-peers/installed ## hold JAX, MJX, Drake and plain NumPy against ours, and print the times of all

@@ -190,7 +190,8 @@ UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
         '''
 import numpy as np
 
-from spheretwin.twin.metrics.metric import Metric, added
+from spheretwin.twin.metrics.metric import Metric
+from spheretwin.twin.metrics.reducing import add_rows
 
 
 class MeanLoad(Metric):
@@ -201,7 +202,8 @@ class MeanLoad(Metric):
         self.total, self.rows = np.zeros(3), 0
 
     def write(self, rows):
-        self.total, self.rows = added(self.total, rows["disturbance_Nm"]), self.rows + len(rows)
+        add_rows(np.ascontiguousarray(rows["disturbance_Nm"]), self.total)
+        self.rows += len(rows)
 
     def value(self):
         """[3] in N·m; None without a row."""

@@ -8,7 +8,8 @@ what they do not concern.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from functools import lru_cache
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,23 @@ from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Sampled, checked
 
 BLOCK_TICKS = 1000
+
+
+class _Reference(NamedTuple):
+    """What a trajectory asks for at some ticks."""
+
+    t: NDArray[np.float64]  # (n,) s
+    samples: NDArray[np.float64]  # (n, 3, 3)
+    finite: NDArray[np.bool_]  # (n,) whether they are numbers
+
+
+class _Known(NamedTuple):
+    """What is known beforehand of some ticks: all but noise."""
+
+    t: NDArray[np.float64]  # (n,) s
+    reference: NDArray[np.float64]  # (n, 3, 3)
+    disturbance: NDArray[np.float64]  # (n, 3) N·m
+    finite: NDArray[np.bool_]  # (n,) whether both are numbers
 
 
 class Exogenous:
@@ -79,17 +97,15 @@ class Exogenous:
             self._first += BLOCK_TICKS
             self._block = None
         if self._block is None:
-            ticks = np.arange(self._first, self._first + BLOCK_TICKS, dtype=np.float64)
-            self._block = self._sampled(ticks, Draws(self._draws, self._draws_of_term))
-            self._numbers = (
-                BLOCK_TICKS if _finite(self._block).all() else int(np.argmin(_finite(self._block)))
-            )
+            known = self._known(self._first, BLOCK_TICKS, Draws(self._draws, self._draws_of_term))
+            self._block = self._with_noise(known)
+            self._numbers = BLOCK_TICKS if known.finite.all() else int(np.argmin(known.finite))
         first = tick - self._first
         last = min(first + most, BLOCK_TICKS)
         block = self._block
         if last > self._numbers:
             if first >= self._numbers:
-                self._refuse(self._block, first)
+                self._refuse(block, first)
             last = self._numbers
         return Inputs(*(column[first:last] for column in block))
 
@@ -101,8 +117,8 @@ class Exogenous:
         InputError
             Reference or disturbance is beyond what a number can hold at a tick to come.
         """
-        end = self._sampled(np.array([tick], dtype=np.float64), Draws(np.ones(1), lambda _: np.ones(1)))
-        if not _finite(end).all():
+        end = self._known(tick, 1, Draws(np.ones(1), lambda _: np.ones(1)))
+        if not end.finite.all():
             self._refuse(end, 0)
 
     def state(self) -> dict[str, Any]:
@@ -121,20 +137,29 @@ class Exogenous:
         """Draws of a term of the disturbance in the present block."""
         return term_draws(self._scenario.seed, self._first, BLOCK_TICKS, place)
 
-    def _sampled(self, ticks: NDArray[np.float64], draws: Draws) -> Inputs:
+    def _known(self, first: int, count: int, draws: Draws) -> _Known:
+        """Reference and disturbance at some ticks."""
         scenario = self._scenario
-        t = scenario.controller.period_s * ticks
-        followed: Sampled = scenario.trajectory if self._own is None else self._own
-        reference = np.ascontiguousarray(followed.sample(t))
-        first, count, seed = int(ticks[0]), len(ticks), scenario.seed
-        noise = noise_rows(seed, first, count, noise_width(scenario.sensors))
+        period_s, trajectory = scenario.controller.period_s, scenario.trajectory
+        if self._own is None:
+            t, reference, finite = _sampled_once(
+                trajectory, trajectory.model_dump_json(), period_s, first, count
+            )
+        else:
+            t, reference, finite = _sampled(self._own, period_s, first, count)
+        disturbance = scenario.disturbance.sample(t, draws)
+        return _Known(t, reference, disturbance, finite & np.isfinite(disturbance).all(axis=1))
+
+    def _with_noise(self, known: _Known) -> Inputs:
+        seed, first, count = self._scenario.seed, self._first, len(known.t)
+        noise = noise_rows(seed, first, count, noise_width(self._scenario.sensors))
         of_faults = noise_rows(seed, first, count, self._width_of_faults(), FAULTS)
-        return Inputs(t, reference, scenario.disturbance.sample(t, draws), noise, of_faults)
+        return Inputs(known.t, known.reference, known.disturbance, noise, of_faults)
 
     def _width_of_faults(self) -> int:
         return draws_width(self._groups) if self._scenario.draws_for_faults else 0
 
-    def _refuse(self, rows: Inputs, row: int) -> NoReturn:
+    def _refuse(self, rows: Inputs | _Known, row: int) -> NoReturn:
         name = "disturbance" if np.isfinite(rows.reference[row]).all() else "trajectory"
         lost = np.isnan(rows.reference[row]).any() or np.isnan(rows.disturbance[row]).any()
         raise InputError(
@@ -143,8 +168,19 @@ class Exogenous:
         )
 
 
-def _finite(rows: Inputs) -> NDArray[np.bool_]:
-    """Whether each row holds numbers alone."""
-    every = np.concatenate([rows.reference.reshape(len(rows.t), 9), rows.disturbance], axis=1)
-    finite: NDArray[np.bool_] = np.isfinite(every).all(axis=1)
-    return finite
+def _sampled(followed: Sampled, period_s: float, first: int, count: int) -> _Reference:
+    t = period_s * np.arange(first, first + count, dtype=np.float64)
+    samples = np.ascontiguousarray(followed.sample(t))
+    return _Reference(t, samples, np.all(np.isfinite(samples), axis=(1, 2)))
+
+
+@lru_cache(maxsize=32)
+def _sampled_once(trajectory: Any, told: str, period_s: float, first: int, count: int) -> _Reference:
+    """As `_sampled`, kept: the rows of a study follow one trajectory, and share what it says.
+
+    `told` is what the trajectory says of itself: 0 and -0 are equal, but do not give the same bits.
+    """
+    found = _sampled(trajectory, period_s, first, count)
+    for column in found:
+        column.flags.writeable = False
+    return found

@@ -37,6 +37,7 @@ less than half of its lag, 3.1 ms; at that difference's lag, ω = 200 1/s, it ha
 but being of second order it costs the loop more phase, and AFSM swings.
 """
 
+from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -86,7 +87,8 @@ class Kalman(EstimatorParameters):
         InputError
             A density is given, and with the noise it leads to no bandwidth within range.
         """
-        of_angle, of_rate = gains(self._bandwidth(sampling) * sampling.period_s)
+        share = self._bandwidth(sampling) * sampling.period_s
+        of_angle, of_rate = _kept_gains(*share.tolist())
         numbers = [*of_angle, *(of_rate / sampling.period_s), sampling.period_s, float(self.filters_angle)]
         return Estimator(self.kind, step, np.array(numbers), np.zeros(9))
 
@@ -124,6 +126,12 @@ def gains(share: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
     deltas = [_inner(0.5 * sum_of_roots + spread), _inner(share**4 / (0.5 * sum_of_roots + spread))]
     product = np.real(deltas[0] * deltas[1])
     return np.real(deltas[0] + deltas[1]) - product, product
+
+
+@lru_cache(maxsize=32)
+def _kept_gains(*share: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """As `gains`, not to be changed: the rows of a study share the filter, and its gains take longest."""
+    return gains(np.array(share))
 
 
 def _inner(x: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -70,6 +70,10 @@ class Signal:
                 f"signal {self.name}: expected {self.size} labels or none, received {len(self.labels)}"
             )
 
+    def __hash__(self) -> int:
+        """Of the name, which Python keeps: what is known of some columns is looked up at every chunk."""
+        return hash(self.name)
+
 
 def _is_text(value: object) -> bool:
     return isinstance(value, str) and value.isprintable()

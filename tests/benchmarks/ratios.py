@@ -11,7 +11,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -19,6 +18,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import plain
+from measuring import fastest, ratio, seconds_of, tell
 
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
 from spheretwin.models import actuator as actuators
@@ -39,23 +39,6 @@ SCENARIO = "nutation"
 PLAIN_TICKS = 500
 FEW_TICKS = 900  # within one block of what comes from outside
 SESSIONS = 8
-
-
-def fastest(measures: dict[str, Callable[[], float]], rounds: int) -> dict[str, float]:
-    """Least time of each measure over several rounds in turn, s; a first round warms up."""
-    taken = {name: [] for name in measures}
-    for turn in range(rounds + 1):
-        for name, measure in measures.items():
-            seconds = measure()
-            if turn:
-                taken[name].append(seconds)
-    return {name: min(seconds) for name, seconds in taken.items()}
-
-
-def seconds_of(work: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    work()
-    return time.perf_counter() - started
 
 
 def loop_seconds() -> float:
@@ -261,36 +244,29 @@ def ratios() -> list[dict[str, object]]:
     outer = fastest({"plain": plain_seconds, "loop": loop_seconds}, rounds=3)
     bare, loop = inner["bare"], inner["loop"]
     return [
-        _row("closed loop over bare mj_step, a physics step", loop, bare, at_most=1.25),
-        _row("loop on the Lagrangian over that on MuJoCo", inner["lagrangian"], loop, at_most=0.2),
-        _row("plain Python loop over ours, a physics step", outer["plain"], outer["loop"], at_least=15),
-        _row("session ready, in bare mj_steps", inner["set-up"], bare, at_most=600),
-        _row(
+        ratio("closed loop over bare mj_step, a physics step", loop, bare, at_most=1.25),
+        ratio("loop on the Lagrangian over that on MuJoCo", inner["lagrangian"], loop, at_most=0.2),
+        ratio("plain Python loop over ours, a physics step", outer["plain"], outer["loop"], at_least=15),
+        ratio("session ready, in bare mj_steps", inner["set-up"], bare, at_most=600),
+        ratio(
             "advance(1) beyond its tick, in bare mj_steps", inner["single"] - inner["tick"], bare, at_most=3
         ),
-        _row("a run of one second over its loop", inner["brief run"], inner["brief loop"], at_most=1.35),
-        _row("one thread over two, prepared sessions", threads["one"], threads["two"], at_least=1.7),
-        _row("run that records over one that does not", runs["recorded"], runs["silent"], at_most=1.3),
-        _row("warm command with --record over without", processes["recorded"], processes["silent"]),
-        _row(
+        ratio("a run of one second over its loop", inner["brief run"], inner["brief loop"], at_most=1.35),
+        ratio("one thread over two, prepared sessions", threads["one"], threads["two"], at_least=1.7),
+        ratio("run that records over one that does not", runs["recorded"], runs["silent"], at_most=1.3),
+        ratio("warm command with --record over without", processes["recorded"], processes["silent"]),
+        ratio(
             "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2
         ),
-        _row(
+        ratio(
             "the prototype's whole chain over bare mj_step, a physics step",
             inner["prototype"] - inner["ideal"],
             bare,
             at_most=0.17,
         ),
-        _row("one torque matrix over bare mj_step", inner["G_t"], bare),
-        _row("one bounded allocation at the limit over bare mj_step", inner["bounded"], bare),
+        ratio("one torque matrix over bare mj_step", inner["G_t"], bare),
+        ratio("one bounded allocation at the limit over bare mj_step", inner["bounded"], bare),
     ]
-
-
-def _row(name, numerator_s, denominator_s, at_most=None, at_least=None):
-    value = numerator_s / denominator_s
-    ok = (at_most is None or value <= at_most) and (at_least is None or value >= at_least)
-    sides = {"numerator_s": numerator_s, "denominator_s": denominator_s}
-    return {"name": name, "value": value, "at_most": at_most, "at_least": at_least, "ok": ok, **sides}
 
 
 def main() -> int:
@@ -301,11 +277,7 @@ def main() -> int:
         print(json.dumps({"ratios": rows}))
     else:
         for row in rows:
-            bound = f"<= {row['at_most']}" if row["at_most"] else f">= {row['at_least']}"
-            bound = bound if row["at_most"] or row["at_least"] else "reported"
-            verdict = "" if row["ok"] else "  MISSED"
-            sides = f"{1e6 * row['numerator_s']:.4g} / {1e6 * row['denominator_s']:.4g} µs"
-            print(f"{row['value']:8.2f}  {bound:>8}  {row['name']} ({sides}){verdict}")
+            tell(row)
     return 0 if all(row["ok"] for row in rows) else 1
 
 

@@ -53,8 +53,8 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--engine",
         choices=tuple(ENGINES),
-        default="threads",
-        help="threads unless given; the table is the same",
+        default="local",
+        help="local, threads on this machine, unless given; the table is the same",
     )
     parser.add_argument(
         "--address",

@@ -6,9 +6,6 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.scenario.sections import Scenario
@@ -64,9 +61,3 @@ class Metric(ABC):
     def warnings(self) -> list[str]:
         """What a user should know before believing any figure of the run; one line each."""
         return []
-
-
-def added(total: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A total (k,) and rows (n, k), added one after the other: the chunks do not show in the rounding."""
-    # NumPy sums by pairs along the axis that is fast in memory alone; along the other, row after row.
-    return np.concatenate([total[None], rows]).sum(axis=0)

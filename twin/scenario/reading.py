@@ -184,15 +184,35 @@ def validated(fields: Mapping[str, Any], source: str, kind: type[Scenario] | Non
     InputError
         A field that is unknown, of the wrong type or out of range.
     """
-    if kind is None:
-        controller = fields.get("controller")
-        kind = scenario_with(controller.get("law") if isinstance(controller, Mapping) else None)
+    scenario = from_json(as_json(source, fields), source, kind or kind_of(fields))
+    check_texts(source, scenario)
+    return scenario
+
+
+def kind_of(fields: Mapping[str, Any]) -> type[Scenario]:
+    """Class of the scenarios that have the law that fields by section name.
+
+    Raises
+    ------
+    InputError
+        The law is one in a file, and cannot be had.
+    """
+    controller = fields.get("controller")
+    return scenario_with(controller.get("law") if isinstance(controller, Mapping) else None)
+
+
+def from_json(text: str | bytes, source: str, kind: type[Scenario]) -> Scenario:
+    """Scenario of JSON, checked but for its texts, which are `check_texts`'.
+
+    Raises
+    ------
+    InputError
+        A field that is unknown, of the wrong type or out of range.
+    """
     try:
-        scenario = kind.model_validate_json(_as_json(source, fields))
+        return kind.model_validate_json(text)
     except ValidationError as error:
         raise InputError(f"scenario {source}: {explain(error, kind)}") from None
-    _check_texts(source, scenario)
-    return scenario
 
 
 def _from_home(path: str) -> str:
@@ -202,8 +222,14 @@ def _from_home(path: str) -> str:
         return path
 
 
-def _as_json(source: str, fields: Mapping[str, Any]) -> bytes:
-    """Fields as JSON, so that arrays become tuples while numbers stay strictly typed."""
+def as_json(source: str, fields: Any) -> bytes:
+    """Fields as JSON, so that arrays become tuples while numbers stay strictly typed.
+
+    Raises
+    ------
+    InputError
+        They are not as TOML has them.
+    """
     try:
         return json.dumps(fields, default=as_plain, ensure_ascii=False).encode()
     except (TypeError, ValueError, RecursionError) as error:  # endless digits, bytes that are no text, depth
@@ -212,8 +238,14 @@ def _as_json(source: str, fields: Mapping[str, Any]) -> bytes:
         ) from None
 
 
-def _check_texts(source: str, scenario: Scenario) -> None:
-    """Names and paths end up in terminals, in file names and in other programs' files."""
+def check_texts(source: str, scenario: Scenario) -> None:
+    """Refuse what must not end up in terminals, in file names and in other programs' files.
+
+    Raises
+    ------
+    InputError
+        A name or a path has control characters.
+    """
     for dotted, text, _ in fields_of(scenario):
         breaks = "\n\t" if dotted == "description" else ""
         if isinstance(text, str) and not is_plain("".join(each for each in text if each not in breaks)):

@@ -13,7 +13,7 @@ def run(
     study: Study | str,
     out: Path | str | None = None,
     *,
-    engine: str = "threads",
+    engine: str = "local",
     address: str | None = None,
     threads: int | None = None,
     limit: int | None = None,
@@ -30,7 +30,7 @@ def run(
         Folder for journal and table; that of the study's name in the working folder unless given. Where a
         journal of the same study is there already, its rows are not run again.
     engine : str
-        ``threads`` of this process, or ``ray``; the table does not depend on it.
+        ``local``, threads of this process, or ``ray``; the table does not depend on it.
     address : str, optional
         For ``ray``: ``auto``, ``HOST`` or ``HOST:PORT`` of a cluster that this machine is a node of, on every
         node of which are the same sources, versions and files. One that lasts as long as the study is started

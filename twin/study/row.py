@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import re
 import shlex
 from collections.abc import Mapping
@@ -34,6 +35,7 @@ from spheretwin.twin.simulation import Run, Sink, follow
 from spheretwin.twin.study.axes.axis import Axis
 from spheretwin.twin.study.grid import Row
 from spheretwin.twin.study.study import Study
+from spheretwin.twin.study.template import Template, are_numbers, template_of
 
 ENGINE = "plant.engine"
 
@@ -72,6 +74,7 @@ class Rows:
         self.study = study
         self._telemetry = telemetry
         self._files: dict[tuple[str | None, ...], Files] = {}
+        self._templates: dict[tuple[Any, ...], Template | None] = {}
         self._fields = reading.read(study.source)
         for dotted, value in self._found(study.fields).items():
             reading.override(self._fields, dotted, value)
@@ -105,17 +108,15 @@ class Rows:
         InputError
             Its values are out of range, or do not fit each other.
         """
-        fields = copy.deepcopy(self._fields)
-        if row.law is not None:
-            law = self._found({"controller": dict(row.law)})["controller"]
-            fields["controller"] = {**_period(fields), **law}
-        for dotted, value in self._found(row.values).items():
-            self._fill_list(fields, dotted)
-            reading.override(fields, dotted, value)
-        fields["seed"] = row.seed
-        if engine or self.chooses_plant:
-            reading.override(fields, ENGINE, engine or self._fast_engine(fields))
-        return self._validated(fields)
+        if not are_numbers(row.values.values()):
+            return self._validated(self._fields_of(row, engine))
+        shape = json.dumps(row.law), tuple(row.values), engine
+        if shape not in self._templates:
+            fields = self._whole(self._fields_of(row, engine))
+            self._templates[shape] = template_of(fields, ("seed", *row.values), self.study.scenario)
+        if template := self._templates[shape]:
+            return template.scenario((row.seed, *row.values.values()))
+        return self._validated(self._fields_of(row, engine))
 
     def carried_out(self, row: Row, engine: str | None = None) -> Result:
         """Run a row; whatever goes wrong with it is its result."""
@@ -159,6 +160,20 @@ class Rows:
         for reference in self._references:
             words += ["--metric", reference]
         return shlex.join(words)
+
+    def _fields_of(self, row: Row, engine: str | None) -> dict[str, Any]:
+        """Fields of a row by section."""
+        fields = copy.deepcopy(self._fields)
+        if row.law is not None:
+            law = self._found({"controller": dict(row.law)})["controller"]
+            fields["controller"] = {**_period(fields), **law}
+        for dotted, value in self._found(row.values).items():
+            self._fill_list(fields, dotted)
+            reading.override(fields, dotted, value)
+        fields["seed"] = row.seed
+        if engine or self.chooses_plant:
+            reading.override(fields, ENGINE, engine or self._fast_engine(fields))
+        return fields
 
     def _found(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values by dotted name, the paths in them taken from where the study is."""
@@ -204,12 +219,15 @@ class Rows:
         return TelemetryFile(path, session.signals, record_of(session).metadata())
 
     def _validated(self, fields: dict[str, Any]) -> Scenario:
+        source = self.study.scenario
+        return check_events(reading.validated(self._whole(fields), source), source)
+
+    def _whole(self, fields: dict[str, Any]) -> dict[str, Any]:
+        """Fields with what their hardware says of others, and their paths as they are found from here."""
         hardware = fields.get("hardware")
         for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
             reading.override(fields, dotted, value)
-        source = self.study.scenario
-        taken = reading.beside("", fields) if self._names_files else fields
-        return check_events(reading.validated(taken, source), source)
+        return reading.beside("", fields) if self._names_files else fields
 
     def _check_axes(self) -> None:
         """Find out before the first row whether each axis names a field."""
@@ -321,8 +339,6 @@ def _own_value(name: str, metric: OwnMetric, run: Run, complaints: list[str]) ->
 
 
 def _texts(value: Any) -> list[str]:
-    import json
-
     if isinstance(value, list | tuple) and value and not any(isinstance(each, list | dict) for each in value):
         return [json.dumps(each) for each in value]
     return [value if isinstance(value, str) else json.dumps(value)]

@@ -12,7 +12,7 @@ ANY = st.floats()
 
 
 def made(seed=0, **fields):
-    return adc(AdcSection(**fields), np.random.default_rng([seed, 2, 0]))
+    return adc(AdcSection(**fields), np.random.default_rng([seed, 2, 0]).uniform(-1, 1, 2))
 
 
 def quiet(channel, volts):

@@ -34,6 +34,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.twin.electronics.driving.coil import Coil
 from spheretwin.twin.electronics.driving.relaxation import Relaxation, relaxation
+from spheretwin.twin.electronics.streams import errors
 
 # What separates the draws of this stage from those of any other under the same seed.
 STAGE = 102
@@ -115,9 +116,7 @@ def amplifier(
 
     Offsets are drawn uniformly within their bound, each from a stream of its own.
     """
-    drawn = np.zeros(groups)
-    for channel in range(groups if section.amplifier_offset_V else 0):
-        drawn[channel] = np.random.default_rng([seed, STAGE, channel]).uniform(-1, 1)
+    drawn = errors(seed, STAGE, groups, 1)[:, 0] if section.amplifier_offset_V else np.zeros(groups)
     supply_V = inf if section.supply_V is None else section.supply_V
     return Amplifier(
         supplied=section.supply_V is not None,

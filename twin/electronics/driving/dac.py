@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.twin.electronics.streams import errors
 
 # What separates the draws of this stage from those of any other under the same seed.
 STAGE = 101
@@ -79,8 +80,8 @@ def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int
     whatever the code. Each channel has its own stream: no field, group or other stage moves what it draws.
     """
     drawn = np.zeros((groups, 2 + HARMONICS))
-    for channel in range(groups if section.dac_bits else 0):  # errors of no converter are not drawn
-        drawn[channel] = np.random.default_rng([seed, STAGE, channel]).uniform(-1, 1, 2 + HARMONICS)
+    if section.dac_bits:  # errors of no converter are not drawn
+        drawn = errors(seed, STAGE, groups, 2 + HARMONICS)
     harmonics = drawn[:, 2:] / np.maximum(1.0, np.abs(drawn[:, 2:]).sum(axis=1, keepdims=True))
     codes = 2.0**section.dac_bits
     return Dac(

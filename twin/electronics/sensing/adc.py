@@ -13,7 +13,10 @@ from spheretwin.models.base.compiled import allocation_free
 from spheretwin.twin.trajectories.trajectory import CONFIG
 
 STAGE = 2
-"""Of the generators that draw the errors of this stage: ``default_rng([seed, STAGE, channel])``."""
+"""Of the streams that the errors of this stage are drawn from: ``default_rng([seed, STAGE, channel])``."""
+
+ERRORS = 2
+"""Numbers that are drawn for a channel."""
 
 CONVERSION_s = 4e-6
 """Of the ADS8364: 20 clocks at 5 MHz, from its sheet."""
@@ -73,23 +76,23 @@ class Adc(NamedTuple):
     offset_V: float
 
 
-def adc(section: AdcSection, rng: np.random.Generator) -> Adc:
+def adc(section: AdcSection, shares: NDArray[np.float64]) -> Adc:
     """Channel with an offset and a gain of its own.
 
     Parameters
     ----------
     section : AdcSection
-    rng : Generator
-        Of this channel; two numbers are taken from it, whatever the section says.
+    shares : (`ERRORS`,) array
+        Of the largest offset and of the largest error of the gain, -1 to 1, drawn for this channel.
     """
-    offset, gain = rng.uniform(-1, 1, 2)
+    offset, gain = shares.tolist()
     half = 2.0 ** (section.bits - 1)
     return Adc(
         section.step_V,
         -half,
         half - 1,
-        1 + section.gain_error * float(gain),
-        section.offset_V * float(offset),
+        1 + section.gain_error * gain,
+        section.offset_V * offset,
     )
 
 

@@ -15,6 +15,7 @@ from spheretwin.twin.electronics.sensing.adc import Adc, adc, converted
 from spheretwin.twin.electronics.sensing.encoder import Encoder, counted, encoder
 from spheretwin.twin.electronics.sensing.potentiometer import Potentiometer, potentiometer, wiper_voltage
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
+from spheretwin.twin.electronics.streams import errors, uniforms
 
 CHANNELS = 2
 """Angles that are voltages on their way: α and β."""
@@ -36,7 +37,7 @@ class Sensing(NamedTuple):
 def sensing(section: SensorsSection, seed: int) -> Sensing:
     """Sensors with errors of their own.
 
-    Each stage and channel draws them from a generator of its own: one that is switched on moves no other's.
+    Each stage and channel draws them from a stream of its own: one that is switched on moves no other's.
 
     Parameters
     ----------
@@ -45,17 +46,12 @@ def sensing(section: SensorsSection, seed: int) -> Sensing:
         Of the run: the same prototype for the same seed.
     """
     track, converter = section.potentiometer, section.adc
-
-    def rng(stage: int, channel: int) -> np.random.Generator:
-        return np.random.default_rng([seed, stage, channel])
-
+    phases = uniforms(seed, potentiometers.STAGE, CHANNELS, potentiometers.HARMONICS)
+    shares = errors(seed, adcs.STAGE, CHANNELS, adcs.ERRORS)
     return Sensing(
         np.array(section.angle_offset_rad, dtype=np.float64),
-        (
-            potentiometer(track, rng(potentiometers.STAGE, 0)),
-            potentiometer(track, rng(potentiometers.STAGE, 1)),
-        ),
-        (adc(converter, rng(adcs.STAGE, 0)), adc(converter, rng(adcs.STAGE, 1))),
+        (potentiometer(track, phases[0]), potentiometer(track, phases[1])),
+        (adc(converter, shares[0]), adc(converter, shares[1])),
         _noise_V(section),
         encoder(section.encoder),
         any(section.angle_offset_rad),

@@ -13,7 +13,7 @@ from spheretwin.models.base.compiled import allocation_free
 from spheretwin.twin.trajectories.trajectory import CONFIG
 
 STAGE = 1
-"""Of the generators that draw the errors of this stage: ``default_rng([seed, STAGE, channel])``."""
+"""Of the streams that the errors of this stage are drawn from: ``default_rng([seed, STAGE, channel])``."""
 
 HARMONICS = 4
 
@@ -77,7 +77,7 @@ class Potentiometer(NamedTuple):
     sine_rad: tuple[float, ...]  # (HARMONICS,)
 
 
-def potentiometer(section: PotentiometerSection, rng: np.random.Generator) -> Potentiometer:
+def potentiometer(section: PotentiometerSection, shares: NDArray[np.float64]) -> Potentiometer:
     """Potentiometer with a residual of its own.
 
     The residual is a sum of the first harmonics of the track, the k-th with an amplitude of 1/k² and a phase
@@ -86,11 +86,11 @@ def potentiometer(section: PotentiometerSection, rng: np.random.Generator) -> Po
     Parameters
     ----------
     section : PotentiometerSection
-    rng : Generator
-        Of this channel; four numbers are taken from it, whatever the section says.
+    shares : (HARMONICS,) array
+        Phases of the harmonics as shares of a turn, 0 to 1, drawn for this channel.
     """
     order = np.arange(1, HARMONICS + 1)
-    shape = np.exp(1j * rng.uniform(0, 2 * pi, HARMONICS)) / order**2
+    shape = np.exp(1j * (2 * pi * shares)) / order**2
     residual = section.nonlinearity_rad / _peak(shape) * shape
     return Potentiometer(
         section.volts_per_rad,

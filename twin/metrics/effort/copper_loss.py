@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.electronics.driving.lag import drive
-from spheretwin.twin.metrics.metric import Metric, Planned, added
+from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.reducing import add_rows, add_squares
+
+Array = NDArray[np.float64]
 
 
 class CopperLoss(Metric):
@@ -44,17 +49,14 @@ class CopperLoss(Metric):
         """Take the rows of one chunk, at least one."""
         self._rows += len(rows)
         if any(signal.name == "copper_loss_W" for signal in rows.signals):
-            self._told_W = added(self._told_W, rows["copper_loss_W"])
+            add_rows(np.ascontiguousarray(rows["copper_loss_W"]), self._told_W)
             return
         if not self._follows:
-            self._squares = added(self._squares, rows["current_A"] ** 2)
+            add_squares(np.ascontiguousarray(rows["current_A"]), self._squares)
             return
-        target = np.clip(rows["current_command_A"], -self._limit_A, self._limit_A)
-        distance = np.zeros_like(target)  # at the start of the tick; without a lag there is none
-        if self._first_step > 0:
-            distance = (rows["current_A"] - target) / self._first_step
-        squares = target**2 + 2 * self._tick * target * distance + self._tick_squared * distance**2
-        self._squares = added(self._squares, squares)
+        command, current = (np.ascontiguousarray(rows[f"current{each}_A"]) for each in ("_command", ""))
+        shares = self._first_step, self._tick, self._tick_squared
+        _add_lagging_squares(command, current, self._limit_A, shares, self._squares)
 
     def value(self) -> float | None:
         """In J; None without a row."""
@@ -62,3 +64,19 @@ class CopperLoss(Metric):
             return None
         heat_W = np.sum(self._resistance_ohm * self._squares) + np.sum(self._told_W)
         return float(heat_W * self.planned.period_s)
+
+
+@rounding_each
+def _add_lagging_squares(
+    command: Array, current: Array, limit_A: float, shares: tuple[float, float, float], total: Array
+) -> None:
+    """Add the mean squares over their ticks of currents that follow their commands (n, k) to a total (k,)."""
+    first_step, tick, tick_squared = shares
+    for i in range(command.shape[0]):
+        for j in range(command.shape[1]):
+            target = min(max(command[i, j], -limit_A), limit_A)
+            distance = 0.0  # at the start of the tick; without a lag there is none
+            if first_step > 0:
+                distance = (current[i, j] - target) / first_step
+            crossed = 2.0 * tick * target * distance
+            total[j] += target * target + crossed + tick_squared * (distance * distance)

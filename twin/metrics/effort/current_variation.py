@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin.metrics.metric import Metric, Planned, added
+from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.reducing import add_variation
 
 
 class CurrentVariation(Metric):
@@ -20,14 +21,15 @@ class CurrentVariation(Metric):
         super().__init__(planned)
         groups = len(planned.actuator.groups)
         self._rows, self._variation = 0, np.zeros(groups)
-        self._last = np.empty((0, groups))
+        self._last = np.zeros(groups)
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, at least one."""
+        command = np.ascontiguousarray(rows["current_command_A"])
+        if not self._rows:
+            self._last = command[0].copy()
+        add_variation(command, self._last, self._variation)
         self._rows += len(rows)
-        command = np.concatenate([self._last, rows["current_command_A"]])
-        self._variation = added(self._variation, np.abs(np.diff(command, axis=0)))
-        self._last = command[-1:].copy()
 
     def value(self) -> float | None:
         """In A/s; None with fewer than two rows."""

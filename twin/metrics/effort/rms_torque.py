@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin.metrics.metric import Metric, Planned, added
+from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.reducing import add_squares
 
 
 class RmsTorque(Metric):
@@ -22,7 +23,7 @@ class RmsTorque(Metric):
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, at least one."""
         self._rows += len(rows)
-        self._squares = added(self._squares, rows["torque_Nm"] ** 2)
+        add_squares(np.ascontiguousarray(rows["torque_Nm"]), self._squares)
 
     def value(self) -> float | None:
         """In N·m; None without a row."""

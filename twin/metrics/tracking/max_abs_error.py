@@ -7,6 +7,7 @@ import numpy as np
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.reducing import raise_to_largest
 
 
 class MaxAbsError(Metric):
@@ -20,7 +21,7 @@ class MaxAbsError(Metric):
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, at least one."""
-        self._largest = np.maximum(self._largest, np.abs(rows["error_rad"]).max(axis=0))
+        raise_to_largest(np.ascontiguousarray(rows["error_rad"]), self._largest)
 
     def value(self) -> list[float] | None:
         """[3] in rad; None without a row."""

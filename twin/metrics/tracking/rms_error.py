@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.reducing import add_squares_by_piece
 
 PIECE_TICKS = 256
 
@@ -48,10 +49,10 @@ class SquaresByPiece:
 
     def add(self, values: NDArray[np.float64]) -> None:
         """Take the next rows (n, 3)."""
-        pieces = self.piece(np.arange(self.rows, self.rows + len(values)))
-        missing = max(0, int(pieces[-1]) + 1 - len(self._sums))
+        first = self.rows - self._offset + PIECE_TICKS  # from the start of piece 0
+        missing = max(0, self.piece(self.rows + len(values) - 1) + 1 - len(self._sums))
         self._sums = np.concatenate([self._sums, np.zeros((missing, 3))])
-        np.add.at(self._sums, pieces, values**2)
+        add_squares_by_piece(np.ascontiguousarray(values), first, PIECE_TICKS, self._sums)
         self.rows += len(values)
 
     def rms(self, first: int) -> list[float] | None:
@@ -61,6 +62,6 @@ class SquaresByPiece:
         begins = max(0, (first - 1) * PIECE_TICKS + self._offset)
         return np.sqrt(self._sums[first:].sum(axis=0) / (self.rows - begins)).tolist()
 
-    def piece(self, tick: NDArray[np.int64]) -> NDArray[np.int64]:
+    def piece(self, tick: int) -> int:
         """Piece that a tick is in."""
         return (tick - self._offset) // PIECE_TICKS + 1

@@ -7,6 +7,7 @@ import numpy as np
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.reducing import note_last_outside
 
 BAND_rad = 0.01
 """The usual 5 % band around 0.2 rad, the amplitude of the shipped motions.
@@ -31,9 +32,7 @@ class SettlingTime(Metric):
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, at least one."""
-        ticks = np.arange(self._rows, self._rows + len(rows))[:, None]
-        outside = np.where(np.abs(rows["error_rad"]) > BAND_rad, ticks, -1).max(axis=0)
-        self._last_outside = np.maximum(self._last_outside, outside)
+        note_last_outside(np.ascontiguousarray(rows["error_rad"]), BAND_rad, self._rows, self._last_outside)
         self._rows += len(rows)
 
     def value(self) -> list[float | None] | None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
@@ -29,4 +27,4 @@ class TailRmsError(Metric):
 
     def value(self) -> list[float] | None:
         """[3] in rad; None without a row."""
-        return self._squares.rms(int(self._squares.piece(np.array(self._squares.rows // 2))))
+        return self._squares.rms(self._squares.piece(self._squares.rows // 2))

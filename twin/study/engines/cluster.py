@@ -1,6 +1,6 @@
 """Ray: rows in batches over all cores of a cluster, a process a core.
 
-A process a core, and not threads within fewer: half of a short row is Python, which threads run one at a
+A process a core, and not threads within fewer: a third of a short row is Python, which threads run one at a
 time. Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
 study names must be on every node, under the same paths, and so must the same sources and versions: a node
 that has others is refused by `spheretwin.twin.study.engines.worker`. Rows whose telemetry is kept are run by
@@ -24,7 +24,7 @@ from typing import Any
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown, without_breaks
-from spheretwin.twin.study.engines import threads, worker
+from spheretwin.twin.study.engines import local, worker
 from spheretwin.twin.study.engines.batches import Batches
 from spheretwin.twin.study.engines.engine import Engine, Order
 from spheretwin.twin.study.grid import Row
@@ -77,7 +77,7 @@ def carried_out(order: Order) -> Generator[tuple[Row, Result | None]]:
     here: list[int] = []
     with _connected(ray, order):
         yield from _Cluster(ray, order, here).results()
-    yield from threads.carried_out(
+    yield from local.carried_out(
         (order.grid[number] for number in here), order.work, order.threads, order.stop_requested
     )
 

@@ -1,9 +1,9 @@
 """All engines of a sweep by name: a new one is a file and a row."""
 
-from spheretwin.twin.study.engines import cluster, threads
+from spheretwin.twin.study.engines import cluster, local
 from spheretwin.twin.study.engines.engine import Engine
 
 ENGINES: dict[str, Engine] = {
-    "threads": threads.ENGINE,
+    "local": local.ENGINE,
     "ray": cluster.ENGINE,
 }

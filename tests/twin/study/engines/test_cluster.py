@@ -50,8 +50,8 @@ def study(tmp_path_factory) -> Study:
 
 @pytest.fixture(scope="module")
 def wanted(study, tmp_path_factory):
-    """Folder of the same study over threads."""
-    folder = tmp_path_factory.mktemp("threads")
+    """Folder of the same study on the local engine."""
+    folder = tmp_path_factory.mktemp("local")
     studies.run(study, folder)
     return folder
 
@@ -82,7 +82,7 @@ def same_table(folder, wanted):
     return (folder / "table.parquet").read_bytes() == (wanted / "table.parquet").read_bytes()
 
 
-def test_the_table_is_that_of_threads(study, machines, wanted, tmp_path):
+def test_the_table_is_that_of_the_local_engine(study, machines, wanted, tmp_path):
     found = run(study, tmp_path, machines)
     assert (found.rows, found.resumed) == (ROWS, 0)
     assert 0 < found.startup_s < found.wall_s
@@ -91,12 +91,23 @@ def test_the_table_is_that_of_threads(study, machines, wanted, tmp_path):
     assert kept.name == next((wanted / "telemetry").iterdir()).name
 
 
+def slowly(job, numbers):
+    """As a node runs a batch, but longer than it takes to kill it."""
+    import time
+
+    from spheretwin.twin.study.engines import worker
+
+    time.sleep(0.5)  # in the process of a node
+    return worker.carried_out(job, numbers)
+
+
 def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, tmp_path, monkeypatch):
     lost = []
     back = batches.Batches.lost
     monkeypatch.setattr(
         batches.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
     )
+    monkeypatch.setattr(worker, "carried_out", slowly)
     killed = []
 
     def kill(done, of):
@@ -166,10 +177,10 @@ def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wante
     finally:
         machines.remove_node(other)
     assert "\n" not in str(refusal.value)
-    kept, of_threads = (
+    kept, of_local = (
         (folder / journal.NAME).read_text().splitlines() for folder in (tmp_path / "out", wanted)
     )
-    assert set(kept) <= set(of_threads)
+    assert set(kept) <= set(of_local)
 
 
 def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, tmp_path):
@@ -198,8 +209,8 @@ def test_who_answers_but_is_no_cluster_is_refused(study, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"engine": "rya"}, "expected threads, ray as engine, received 'rya'; did you mean ray"),
-        ({"address": "auto"}, "expected engine ray for an address, received threads"),
+        ({"engine": "rya"}, "expected local, ray as engine, received 'rya'; did you mean ray"),
+        ({"address": "auto"}, "expected engine ray for an address, received local"),
         ({"engine": "ray", "address": "ray://there:10001"}, "expected auto, HOST or HOST:PORT"),
     ],
 )
@@ -256,5 +267,5 @@ def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
     found = studies.run(str(source), tmp_path / "out", limit=60)
     assert found.resumed >= 10
     assert (tmp_path / "out" / journal.NAME).read_bytes().startswith(before)
-    studies.run(str(source), tmp_path / "threads", limit=60)
-    assert same_table(tmp_path / "out", tmp_path / "threads")
+    studies.run(str(source), tmp_path / "local", limit=60)
+    assert same_table(tmp_path / "out", tmp_path / "local")

@@ -1,0 +1,177 @@
+"""Rows of studies: ``python tests/benchmarks/studies.py [--json]``.
+
+Whole rows of one second, from number to figures, as a sweep runs them: on two threads over one, over what a
+run of the same scenario took at an early commit of this repository, and the memory of ten thousand of them.
+Both sides of a ratio are measured in turn, several times, and the fastest of each counts.
+"""
+
+import argparse
+import io
+import json
+import os
+import subprocess
+import sys
+import tarfile
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from measuring import fastest, ratio, seconds_of, tell, tell_value
+
+from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.twin.study.engines import local
+from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import Study, load, made
+
+ROOT = Path(__file__).parents[2]
+
+EARLY = "7e0eb72"
+"""Commit whose `simulate` is measured, of before there were studies."""
+
+FOLDERS = ("models", "control", "viz", "twin")
+
+# Where the package is, then: runs the scenario once for each line that comes in, and says how long it took.
+EARLY_RUNS = """
+import sys, time
+from spheretwin.twin import scenario, simulation
+assert simulation.__file__.startswith(sys.argv[1]), simulation.__file__
+chosen = scenario.load("sinusoid", {"duration": 1.0})
+for _ in sys.stdin:
+    started = time.perf_counter()
+    simulation.simulate(chosen)
+    print(time.perf_counter() - started, flush=True)
+"""
+
+# A process counts the memory of whoever began it until it runs its own program: this one is small.
+PEAK = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
+PEAK_UNIT_BYTES = 1 if sys.platform == "darwin" else 1024
+
+# Few at a time, and often: a machine that is shared lends its second core for some milliseconds.
+AFSM_ROWS, ROBUSTNESS_ROWS, ROUNDS = 16, 12, 100
+MANY_ROWS = 10_000
+LARGEST_MB = 500
+
+
+def afsm() -> Study:
+    """Rows of the sinusoid under AFSM that differ in modelling error and seed."""
+    axis = {"field": "plant.modelling_error", "kind": "linspace", "first": 0.0, "last": 0.5, "count": 6}
+    fields = {"name": "afsm", "scenario": "sinusoid", "fields": {"duration": 1.0}, "law": [{"law": "afsm"}]}
+    return made({**fields, "axis": [axis], "seeds": 8}, "afsm")
+
+
+def rows_seconds(study: Study, count: int, threads: int) -> Callable[[], float]:
+    """Time of whole rows on some threads, s."""
+    rows, grid = Rows(study), Grid(study)
+
+    def work() -> None:
+        numbered = (grid[number] for number in range(count))
+        landed = list(local.carried_out(numbered, rows.carried_out, threads))
+        assert all(result.error is None for _, result in landed)
+
+    return lambda: seconds_of(work)
+
+
+def row_seconds(engine: str) -> Callable[[], float]:
+    """Time of one whole row on a plant, s."""
+    rows, row = Rows(afsm()), Grid(afsm())[0]
+    return lambda: seconds_of(lambda: rows.carried_out(row, engine))
+
+
+@contextmanager
+def early_seconds() -> Iterator[Callable[[], float] | None]:
+    """Time of `simulate` at the early commit, s; None where the history is not there."""
+    with tempfile.TemporaryDirectory() as folder:
+        package = Path(folder, "spheretwin")
+        if not _extracted(package):
+            yield None
+            return
+        environment = {**os.environ, "PYTHONPATH": folder, "SPHERETWIN_CACHE_DIR": str(Path(folder, "cache"))}
+        command = [sys.executable, "-c", EARLY_RUNS, folder]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+        with subprocess.Popen(command, env=environment, cwd=folder, **pipes) as process:
+
+            def work() -> float:
+                process.stdin.write("\n")
+                process.stdin.flush()
+                return float(process.stdout.readline())
+
+            yield work
+            process.stdin.close()
+
+
+def _extracted(package: Path) -> bool:
+    """Put the early package into a folder; False without the history, as in an archive of the sources."""
+    command = ["git", "-C", str(ROOT), "archive", EARLY, *FOLDERS]
+    try:
+        done = subprocess.run(command, capture_output=True, check=False)
+    except OSError:  # no git
+        return False
+    if done.returncode:
+        return False
+    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
+        archive.extractall(package, filter="data")
+    return True
+
+
+def peak_MB(rows: int) -> float:
+    """Largest memory of a process that sweeps the first rows of `robustness`, 10⁶ bytes.
+
+    Another has compiled before what it needs: that takes memory too, but once for all sweeps.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        sweep = [str(Path(sys.executable).with_name("spheretwin")), "sweep", "robustness"]
+        first = [*sweep, "--limit", "1", "--out", str(Path(folder, "first"))]
+        subprocess.run(first, check=True, capture_output=True)
+        command = [*sweep, "--limit", str(rows), "--out", str(Path(folder, "out"))]
+        done = subprocess.run(
+            [sys.executable, "-S", "-c", PEAK, *command], check=True, capture_output=True, text=True
+        )
+    return int(done.stdout) * PEAK_UNIT_BYTES / 1e6
+
+
+def ratios() -> list[dict[str, Any]]:
+    """Rows of the ratios; of those that cannot be measured there are none."""
+    found = []
+    with timers_stopped():
+        for study, count, at_least in ((afsm(), AFSM_ROWS, 1.7), (load("robustness"), ROBUSTNESS_ROWS, None)):
+            sides = {each: rows_seconds(study, count, each) for each in (1, 2)}
+            taken = fastest(sides, ROUNDS)
+            name = f"one thread over two, whole rows of 1 s, {study.name}"
+            found.append(ratio(name, taken[1] / count, taken[2] / count, at_least=at_least))
+        with early_seconds() as early:
+            if early:
+                sides = {engine: row_seconds(engine) for engine in ("lagrangian", "mujoco")}
+                taken = fastest({"early": early, **sides}, rounds=40)
+                for engine, at_most in (("lagrangian", 0.1), ("mujoco", 0.4)):
+                    name = f"row of 1 s under AFSM, {engine}, over a run of it at {EARLY}"
+                    found.append(ratio(name, taken[engine], taken["early"], at_most=at_most))
+    return found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    rows, peak = ratios(), peak_MB(MANY_ROWS)
+    if options.json:
+        print(json.dumps({"ratios": rows, "peak_MB": peak, "at_most_MB": LARGEST_MB}))
+    else:
+        for row in rows:
+            tell(row)
+        if not any(EARLY in row["name"] for row in rows):
+            print(f"not measured: a row over a run at {EARLY}, as there is no history of this repository")
+        tell_value(
+            f"{peak:.0f}", f"<= {LARGEST_MB}", f"MB at the peak of {MANY_ROWS} rows", peak <= LARGEST_MB
+        )
+    return 0 if all(row["ok"] for row in rows) and peak <= LARGEST_MB else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
