@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from spheretwin.control import law as laws
 from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
+from spheretwin.control.around.around import Around
+from spheretwin.control.around.governor import govern
 from spheretwin.control.belief import Belief, believe
 from spheretwin.control.estimation.estimator import Estimator, estimator_at
 from spheretwin.control.supervision.detector import Detector, find
@@ -65,6 +67,7 @@ class Controller(NamedTuple):
     rates: NDArray[np.float64]  # (3,) rad/s, likewise
     scratch: NDArray[np.float64]  # of the allocation
     belief: Belief
+    around: Around
     supervision: Supervision
 
 
@@ -75,6 +78,7 @@ def controller(
     current_limit_A: float,
     logged: int,
     belief: Belief,
+    around: Around,
     supervision: Supervision,
     estimator: Estimator | None = None,
 ) -> Controller:
@@ -94,6 +98,8 @@ def controller(
         Numbers of the law's state that the telemetry logs.
     belief : Belief
         Of the torque that the law's commands led to.
+    around : Around
+        What stands around the law.
     supervision : Supervision
     estimator : Estimator, optional
         Of the rates; the law is handed those that are measured unless given.
@@ -117,6 +123,7 @@ def controller(
         rates=np.zeros(3),
         scratch=np.empty((SCRATCH_ROWS, groups)),
         belief=belief,
+        around=around,
         supervision=supervision,
     )
 
@@ -190,8 +197,10 @@ def _ask_law(
     reference: NDArray[np.float64],
     measurement: NDArray[np.float64],
 ) -> bool:
-    """Let the law write its torque; whether that, and all that it logs, are numbers."""
-    torque_q = controller.torque_q
+    """Let the law write its torque; whether that, and all that it logs and is handed, are numbers."""
+    torque_q, around = controller.torque_q, controller.around
+    if around.governor.on and not govern(around.governor, measurement, reference):
+        return False
     for i in range(3):
         torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         measurement[2, i] = controller.belief.torque_q[i]

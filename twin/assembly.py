@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.control.around.around import Around
+from spheretwin.control.around.governor import governor
 from spheretwin.control.belief import belief
 from spheretwin.control.controller import Controller, Supervision, controller
 from spheretwin.control.estimation.estimator import Estimator, Sampling
@@ -127,9 +129,12 @@ def controller_of(
     """Controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
     limit_A, lag_s = nominal.current_limit_A or 0.0, nominal.time_constant_s or 0.0
-    asked = law.asks_torque or scenario.detects
-    believed = belief(asked, groups, scenario.controller.period_s, nominal.delay_s or 0.0, lag_s)
-    return controller(law, magnetics, kept, limit_A, width(law.signals), believed, supervision, estimator)
+    asked, period_s = law.asks_torque or scenario.detects, scenario.controller.period_s
+    believed = belief(asked, groups, period_s, nominal.delay_s or 0.0, lag_s)
+    around = Around(governor(scenario.controller.governor, period_s))
+    return controller(
+        law, magnetics, kept, limit_A, width(law.signals), believed, around, supervision, estimator
+    )
 
 
 def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix, wires: Wires) -> Plant:

@@ -80,6 +80,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
             parameters=tuple(law.parameters.tolist()),
+            **scenario.controller.around,
         )
     if trajectory:
         filled["trajectory"] = OwnPath(shape=name_of_own(trajectory.name))
