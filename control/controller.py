@@ -11,7 +11,9 @@ from spheretwin.control import law as laws
 from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
 from spheretwin.control.around.around import Around
+from spheretwin.control.around.feed_forward import reckon, take_off
 from spheretwin.control.around.governor import govern
+from spheretwin.control.around.prediction import advance, predict
 from spheretwin.control.belief import Belief, believe
 from spheretwin.control.estimation.estimator import Estimator, estimator_at
 from spheretwin.control.supervision.detector import Detector, find
@@ -139,7 +141,7 @@ def control_tick(
     measurement: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> float:
-    """Law, generalised torque to Cartesian (at the measured pose), allocation (by the nominal matrix).
+    """Law, generalised torque to Cartesian (at the pose handed to it), allocation (by the nominal matrix).
 
     Parameters
     ----------
@@ -153,8 +155,9 @@ def control_tick(
         Time of the tick.
     reference : (3, 3) array
         Desired angle, rate and acceleration as rows; the law may write into it.
-    measurement : (3, 3) array
-        Measured angle (rad) and rate (rad/s); the third row is filled in. The law may write into it.
+    measurement : (3, 3) or (6, 3) array
+        Measured angle (rad) and rate (rad/s); the other rows are filled in, six of them where the delay is
+        predicted over. The law may write into it.
     command : (n,) array, A
         Result: group currents asked of the amplifiers.
 
@@ -204,7 +207,17 @@ def _ask_law(
     for i in range(3):
         torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         measurement[2, i] = controller.belief.torque_q[i]
+    if around.prediction.on:
+        if not predict(around.prediction, controller.belief, controller.magnetics, measurement):
+            return False
+        advance(around.prediction, reference)
+    if around.feed.on:
+        take_off(around.feed, measurement[2])
+        reckon(around.feed, reference)
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
+    if around.feed.on:
+        for i in range(3):
+            torque_q[i] += around.feed.torque_q[i]
     for i in range(3):
         if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
             return False
@@ -226,8 +239,10 @@ def _supervise(controller: Controller, t: float) -> None:
 @compilable
 def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64]) -> float:
     """Currents for the law's torque, from the groups that may be used."""
-    groups, G = controller.supervision.groups, controller.kept.G
-    cartesian_torque(controller.pose, controller.torque_q, controller.torque_S)
+    groups, pose, G = controller.supervision.groups, controller.pose, controller.kept.G
+    if controller.around.prediction.on:
+        pose, G = controller.around.prediction.pose, controller.around.prediction.kept.G
+    cartesian_torque(pose, controller.torque_q, controller.torque_S)
     if groups.some_out[0]:
         leave_out(groups, G)
         G = groups.G
@@ -240,7 +255,7 @@ def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64
 def _ask_nothing(controller: Controller, command: NDArray[np.float64]) -> None:
     """No torque and no currents; what a law logs stays what it was, unless that is no number."""
     for i in range(3):
-        controller.torque_q[i] = controller.torque_S[i] = 0.0
+        controller.torque_q[i] = controller.torque_S[i] = controller.around.feed.torque_q[i] = 0.0
     for j in range(command.shape[0]):
         command[j] = 0.0
     for i in range(controller.logged):

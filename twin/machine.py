@@ -127,7 +127,7 @@ class Machine:
             self._sensors,
             self._plant,
             assembly.places_of(self.signals, self.law),
-            loops.Scratch(np.empty((3, 3)), np.empty((3, 3))),
+            loops.Scratch(np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))),
         )
         self._loop = for_types_of(self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.columns)))
 

@@ -66,6 +66,8 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
                     _lag_s(drive_section) if nominal.time_constant_s is None else nominal.time_constant_s
                 ),
                 "delay_s": given.delay_s if nominal.delay_s is None else nominal.delay_s,
+                "coulomb_Nm": nominal.coulomb_Nm or section.coulomb_Nm,
+                "viscous_Nm_s": nominal.viscous_Nm_s or section.viscous_Nm_s,
             }
         ),
         "plant": section.model_copy(

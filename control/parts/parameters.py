@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.control.around.feed_forward import FeedForwardSection
 from spheretwin.control.around.governor import GovernorSection
+from spheretwin.control.around.prediction import PredictionSection
 from spheretwin.control.law import Known, Law
 
 # The file of a law, shipped or its user's, finds here all that it needs of these.
@@ -20,7 +22,7 @@ from spheretwin.control.numbers import Positive as Positive
 from spheretwin.control.numbers import PositiveEach as PositiveEach
 from spheretwin.control.numbers import each as each
 
-AROUND = ("governor",)
+AROUND = ("governor", "prediction", "feed_forward")
 """Sections of a controller that stand around its law."""
 
 Level = Annotated[
@@ -49,6 +51,12 @@ class ControllerSection(BaseModel):
     )
     governor: GovernorSection = Field(
         GovernorSection(), description="bounds the acceleration of the reference"
+    )
+    prediction: PredictionSection = Field(
+        PredictionSection(), description="takes the known delay out of what the law is handed"
+    )
+    feed_forward: FeedForwardSection = Field(
+        FeedForwardSection(), description="adds torques of the nominal model to the law's"
     )
 
     @property
