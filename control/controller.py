@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 from spheretwin.control import law as laws
 from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
-from spheretwin.control.around.around import Around
-from spheretwin.control.around.feed_forward import reckon, take_off
-from spheretwin.control.around.governor import govern
-from spheretwin.control.around.prediction import advance, predict
+from spheretwin.control.around.around import Around, prepare
 from spheretwin.control.belief import Belief, believe
 from spheretwin.control.estimation.estimator import Estimator, estimator_at
 from spheretwin.control.supervision.detector import Detector, find
@@ -202,18 +199,11 @@ def _ask_law(
 ) -> bool:
     """Let the law write its torque; whether that, and all that it logs and is handed, are numbers."""
     torque_q, around = controller.torque_q, controller.around
-    if around.governor.on and not govern(around.governor, measurement, reference):
-        return False
     for i in range(3):
         torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         measurement[2, i] = controller.belief.torque_q[i]
-    if around.prediction.on:
-        if not predict(around.prediction, controller.belief, controller.magnetics, measurement):
-            return False
-        advance(around.prediction, reference)
-    if around.feed.on:
-        take_off(around.feed, measurement[2])
-        reckon(around.feed, reference)
+    if around.on and not prepare(around, controller.belief, controller.magnetics, measurement, reference):
+        return False
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
     if around.feed.on:
         for i in range(3):

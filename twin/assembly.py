@@ -149,6 +149,7 @@ def _around_of(scenario: Scenario, magnetics: TorqueModel) -> Around:
     delayed = Delayed(known.period_s, known.ahead_s, nominal.time_constant_s or 0.0, known.inertia)
     rotor = NominalRotor(known.inertia, _each(nominal.coulomb_Nm), _each(nominal.viscous_Nm_s))
     return Around(
+        section.governor.on or section.prediction.on or section.feed_forward.on,
         governor(section.governor, known.period_s),
         prediction(section.prediction, delayed, magnetics),
         feed_forward(section.feed_forward, rotor, known.period_s, known.delay_s),

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.around import feed_forward, governor, prediction
-from spheretwin.control.around.feed_forward import FeedForward
-from spheretwin.control.around.governor import Governor
-from spheretwin.control.around.prediction import Prediction
+from spheretwin.control.around.feed_forward import FeedForward, reckon, take_off
+from spheretwin.control.around.governor import Governor, govern
+from spheretwin.control.around.prediction import Prediction, advance, predict
+from spheretwin.control.belief import Belief
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.magnetics import TorqueModel
 
 Array = NDArray[np.float64]
 
@@ -18,9 +21,45 @@ Array = NDArray[np.float64]
 class Around(NamedTuple):
     """What a control tick does before and after it calls the law."""
 
+    on: bool
+    """Whether there is any of it."""
     governor: Governor
     prediction: Prediction
     feed: FeedForward
+
+
+@allocation_free
+def prepare(
+    around: Around, belief: Belief, magnetics: TorqueModel, measurement: Array, reference: Array
+) -> bool:
+    """Make of measurement and reference what the law is to be handed.
+
+    Parameters
+    ----------
+    around : Around
+        Changed in place.
+    belief : Belief
+        Of the currents, at the time of the measurement.
+    magnetics : TorqueModel
+        Nominal.
+    measurement, reference : (3, 3) arrays
+        The result too; of the measurement (6, 3) where the delay is predicted over.
+
+    Returns
+    -------
+    bool
+        Whether these are numbers.
+    """
+    if around.governor.on and not govern(around.governor, measurement, reference):
+        return False
+    if around.prediction.on:
+        if not predict(around.prediction, belief, magnetics, measurement):
+            return False
+        advance(around.prediction, reference)
+    if around.feed.on:
+        take_off(around.feed, measurement[2])
+        reckon(around.feed, reference)
+    return True
 
 
 def state_of(around: Around) -> Array:
