@@ -57,14 +57,12 @@ def belief(asked: bool, groups: int, period_s: float, delay_s: float, time_const
     period_s, delay_s, time_constant_s : float, s
         Control period, known delay, and lag L/R; 0 for none.
     """
-    periods = delay_s / period_s if asked else 0.0
-    whole = int(periods * (1 + WHOLE) + WHOLE)
-    late = max(0.0, periods - whole)
+    whole, late = whole_periods(delay_s if asked else 0.0, period_s)
     return Belief(
         asked=asked,
         late=late,
-        before=_lag(late * period_s, time_constant_s),
-        after=_lag((1 - late) * period_s, time_constant_s),
+        before=lag(late * period_s, time_constant_s),
+        after=lag((1 - late) * period_s, time_constant_s),
         commands=np.zeros((whole + 2, groups)),
         current=np.zeros(groups),
         mean=np.zeros(groups),
@@ -131,7 +129,15 @@ def restore(belief: Belief, state: NDArray[np.float64]) -> None:
     belief.torque_q[:] = state[first + groups :]
 
 
-def _lag(duration_s: float, time_constant_s: float) -> Lag:
+def whole_periods(delay_s: float, period_s: float) -> tuple[int, float]:
+    """Whole periods of a delay, and the share of a period beyond them."""
+    periods = delay_s / period_s
+    whole = int(periods * (1 + WHOLE) + WHOLE)
+    return whole, max(0.0, periods - whole)
+
+
+def lag(duration_s: float, time_constant_s: float) -> Lag:
+    """First-order lag over a duration."""
     if duration_s == 0:
         return Lag(1.0, 0.0)
     if time_constant_s == 0:

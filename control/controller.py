@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from spheretwin.control import law as laws
 from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
+from spheretwin.control.around.around import Around, prepare
 from spheretwin.control.belief import Belief, believe
 from spheretwin.control.estimation.estimator import Estimator, estimator_at
 from spheretwin.control.supervision.detector import Detector, find
@@ -65,6 +66,7 @@ class Controller(NamedTuple):
     rates: NDArray[np.float64]  # (3,) rad/s, likewise
     scratch: NDArray[np.float64]  # of the allocation
     belief: Belief
+    around: Around
     supervision: Supervision
 
 
@@ -75,6 +77,7 @@ def controller(
     current_limit_A: float,
     logged: int,
     belief: Belief,
+    around: Around,
     supervision: Supervision,
     estimator: Estimator | None = None,
 ) -> Controller:
@@ -94,6 +97,8 @@ def controller(
         Numbers of the law's state that the telemetry logs.
     belief : Belief
         Of the torque that the law's commands led to.
+    around : Around
+        What stands around the law.
     supervision : Supervision
     estimator : Estimator, optional
         Of the rates; the law is handed those that are measured unless given.
@@ -117,6 +122,7 @@ def controller(
         rates=np.zeros(3),
         scratch=np.empty((SCRATCH_ROWS, groups)),
         belief=belief,
+        around=around,
         supervision=supervision,
     )
 
@@ -132,7 +138,7 @@ def control_tick(
     measurement: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> float:
-    """Law, generalised torque to Cartesian (at the measured pose), allocation (by the nominal matrix).
+    """Law, generalised torque to Cartesian (at the pose handed to it), allocation (by the nominal matrix).
 
     Parameters
     ----------
@@ -146,8 +152,9 @@ def control_tick(
         Time of the tick.
     reference : (3, 3) array
         Desired angle, rate and acceleration as rows; the law may write into it.
-    measurement : (3, 3) array
-        Measured angle (rad) and rate (rad/s); the third row is filled in. The law may write into it.
+    measurement : (3, 3) or (6, 3) array
+        Measured angle (rad) and rate (rad/s); the other rows are filled in, six of them where the delay is
+        predicted over. The law may write into it.
     command : (n,) array, A
         Result: group currents asked of the amplifiers.
 
@@ -190,12 +197,17 @@ def _ask_law(
     reference: NDArray[np.float64],
     measurement: NDArray[np.float64],
 ) -> bool:
-    """Let the law write its torque; whether that, and all that it logs, are numbers."""
-    torque_q = controller.torque_q
+    """Let the law write its torque; whether that, and all that it logs and is handed, are numbers."""
+    torque_q, around = controller.torque_q, controller.around
     for i in range(3):
         torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
         measurement[2, i] = controller.belief.torque_q[i]
+    if around.on and not prepare(around, controller.belief, controller.magnetics, measurement, reference):
+        return False
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
+    if around.feed.on:
+        for i in range(3):
+            torque_q[i] += around.feed.torque_q[i]
     for i in range(3):
         if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
             return False
@@ -217,8 +229,10 @@ def _supervise(controller: Controller, t: float) -> None:
 @compilable
 def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64]) -> float:
     """Currents for the law's torque, from the groups that may be used."""
-    groups, G = controller.supervision.groups, controller.kept.G
-    cartesian_torque(controller.pose, controller.torque_q, controller.torque_S)
+    groups, pose, G = controller.supervision.groups, controller.pose, controller.kept.G
+    if controller.around.prediction.on:
+        pose, G = controller.around.prediction.pose, controller.around.prediction.kept.G
+    cartesian_torque(pose, controller.torque_q, controller.torque_S)
     if groups.some_out[0]:
         leave_out(groups, G)
         G = groups.G
@@ -231,7 +245,7 @@ def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64
 def _ask_nothing(controller: Controller, command: NDArray[np.float64]) -> None:
     """No torque and no currents; what a law logs stays what it was, unless that is no number."""
     for i in range(3):
-        controller.torque_q[i] = controller.torque_S[i] = 0.0
+        controller.torque_q[i] = controller.torque_S[i] = controller.around.feed.torque_q[i] = 0.0
     for j in range(command.shape[0]):
         command[j] = 0.0
     for i in range(controller.logged):

@@ -39,6 +39,8 @@ class Known(NamedTuple):
     """From a measurement to the currents that answer it, as the controller reckons with it."""
     inertia: NDArray[np.float64]
     """Principal inertias, (3,) in kg·m²."""
+    ahead_s: float = 0.0
+    """How far what the law is handed lies ahead of what was measured, where the delay is predicted over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +55,8 @@ class Law:
         ``step(t, reference, measurement, parameters, state, torque)`` writes the generalised torque
         (N·m) on (alpha, beta, gamma) into `torque` and returns nothing. `reference` holds the desired
         angle, rate and acceleration as rows (rad, rad/s, rad/s²), `measurement` angle, rate, and the
-        generalised torque (N·m) of the coils over the last period, as the controller believes it.
+        generalised torque (N·m) of the coils over the last period, as the controller believes it. Where
+        the delay is predicted over, three more rows hold what was measured: `control.around.prediction`.
         `state` is the law's memory, changed in place. A plain Python function works; one that numba
         compiles runs at the speed of the shipped laws. It must write all three torques at every call:
         one that is left out, or is no number, ends the run as ``diverged``. So does an exception in

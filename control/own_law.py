@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.parameters import LawParameters, named
+from spheretwin.control.parts.parameters import AROUND, LawParameters, named
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import load_with_digest
 from spheretwin.models.base.wording import shown
@@ -48,6 +48,9 @@ def _class_of(reference: str, found: Any, digest: str) -> type[LawParameters]:
     if isinstance(found, type) and issubclass(found, LawParameters):
         if isabstract(found):
             raise InputError(f"law {reference}: expected a class with build(known), received one without")
+        common, own = LawParameters.model_fields, found.model_fields
+        if taken := [name for name in AROUND if own[name].annotation != common[name].annotation]:
+            raise InputError(f"law {reference}: expected no parameter named {taken[0]}, received one")
         base = found
     elif isinstance(found, Law):
         base = _of_law(found)

@@ -7,6 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.control.around.around import Around
+from spheretwin.control.around.feed_forward import NominalRotor, feed_forward
+from spheretwin.control.around.governor import governor
+from spheretwin.control.around.prediction import Delayed, prediction
 from spheretwin.control.belief import belief
 from spheretwin.control.controller import Controller, Supervision, controller
 from spheretwin.control.estimation.estimator import Estimator, Sampling
@@ -65,12 +69,16 @@ def law_of(scenario: Scenario) -> Law:
 def same_known(scenario: Scenario, other: Scenario) -> bool:
     """Whether a law is told the same of both."""
     first, second = _known(scenario), _known(other)
-    return first[:2] == second[:2] and np.array_equal(first.inertia, second.inertia)
+    same = np.array_equal(first.inertia, second.inertia)
+    return same and first._replace(inertia=second.inertia) == second
 
 
 def _known(scenario: Scenario) -> Known:
-    nominal = scenario.nominal
-    return Known(scenario.controller.period_s, nominal.delay_s or 0.0, np.array(nominal.inertia_kg_m2))
+    nominal, period_s = scenario.nominal, scenario.controller.period_s
+    delay_s, inertia = nominal.delay_s or 0.0, np.array(nominal.inertia_kg_m2)
+    if scenario.controller.prediction.on:
+        return Known(period_s, 0.0, inertia, ahead_s=delay_s)
+    return Known(period_s, delay_s, inertia)
 
 
 def signals_of(scenario: Scenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
@@ -128,9 +136,29 @@ def controller_of(
     """Controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
     limit_A, lag_s = nominal.current_limit_A or 0.0, nominal.time_constant_s or 0.0
-    asked = law.asks_torque or scenario.detects
+    asked = law.asks_torque or scenario.detects or scenario.controller.prediction.on
     believed = belief(asked, groups, scenario.controller.period_s, nominal.delay_s or 0.0, lag_s)
-    return controller(law, magnetics, kept, limit_A, width(law.signals), believed, supervision, estimator)
+    around = _around_of(scenario, magnetics)
+    return controller(
+        law, magnetics, kept, limit_A, width(law.signals), believed, around, supervision, estimator
+    )
+
+
+def _around_of(scenario: Scenario, magnetics: TorqueModel) -> Around:
+    """What stands around the law of a resolved scenario."""
+    section, nominal, known = scenario.controller, scenario.nominal, _known(scenario)
+    delayed = Delayed(known.period_s, known.ahead_s, nominal.time_constant_s or 0.0, known.inertia)
+    rotor = NominalRotor(known.inertia, _each(nominal.coulomb_Nm), _each(nominal.viscous_Nm_s))
+    return Around(
+        section.governor.on or section.prediction.on or section.feed_forward.on,
+        governor(section.governor, known.period_s),
+        prediction(section.prediction, delayed, magnetics),
+        feed_forward(section.feed_forward, rotor, known.period_s, known.delay_s),
+    )
+
+
+def _each(values: tuple[float, float, float] | None) -> Array:
+    return np.array(values or (0.0, 0.0, 0.0))
 
 
 def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix, wires: Wires) -> Plant:

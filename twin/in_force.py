@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from spheretwin.control.law import Law
+from spheretwin.control.parts.parameters import AROUND
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import Signal
@@ -51,7 +52,8 @@ class InForce(NamedTuple):
                 f" {self.own_trajectory.name} is followed instead"
             )
         own_law = None if name == "controller.law" else self.own_law
-        if own_law and name.startswith("controller."):
+        of_the_law = name.startswith("controller.") and name.split(".")[1] not in AROUND
+        if own_law and of_the_law:
             raise InputError(f"session: expected no field of a shipped law, as {own_law.name} is not one")
         scenario = changed(self.scenario, name, value)
         files = files_again(self.files, self.scenario, scenario)

@@ -55,7 +55,7 @@ class Scratch(NamedTuple):
     """Working space."""
 
     reference: NDArray[np.float64]  # (3, 3), what the law is handed
-    measurement: NDArray[np.float64]  # (3, 3)
+    measurement: NDArray[np.float64]  # (3, 3), or (6, 3) where the law is handed a prediction too
 
 
 @allocation_free

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from spheretwin.control import belief as beliefs
 from spheretwin.control.allocation.registry import ALLOCATIONS
+from spheretwin.control.around import around as arounds
 from spheretwin.control.controller import Supervision
 from spheretwin.control.law import Law
 from spheretwin.control.supervision import detector, groups, watchdog
@@ -51,6 +52,7 @@ class State(NamedTuple):
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
     belief: NDArray[np.float64]
+    around: NDArray[np.float64]
     estimates: NDArray[np.float64]
     sensing: NDArray[np.float64]
     groups: NDArray[np.float64]
@@ -125,7 +127,7 @@ class Machine:
             self._sensors,
             self._plant,
             assembly.places_of(self.signals, self.law),
-            loops.Scratch(np.empty((3, 3)), np.empty((3, 3))),
+            loops.Scratch(np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))),
         )
         self._loop = for_types_of(self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.columns)))
 
@@ -177,6 +179,7 @@ class Machine:
         if made.law is self.law or (same_kind and len(memory) == len(self._controller.memory)):
             memory[:] = self._controller.memory
         beliefs.carried_on(self._controller.belief, made._controller.belief)
+        arounds.carried_on(self._controller.around, made._controller.around)
         if type(scenario.estimator) is type(self._scenario.estimator):
             made._controller.estimates.memory[:] = self._controller.estimates.memory
         return made
@@ -184,7 +187,8 @@ class Machine:
     def _law_for(self, scenario: Scenario) -> Law:
         """Law that a scenario names: the present one where nothing that it is made from has changed."""
         before = self._scenario
-        same = before.controller == scenario.controller and assembly.same_known(before, scenario)
+        same = before.controller.alone() == scenario.controller.alone()
+        same = same and assembly.same_known(before, scenario)
         return self.law if same else assembly.law_of(scenario)
 
     def state(self) -> State:
@@ -197,6 +201,7 @@ class Machine:
             parameters=controller.parameters.copy(),
             memory=controller.memory.copy(),
             belief=beliefs.state_of(controller.belief),
+            around=arounds.state_of(controller.around),
             estimates=controller.estimates.memory.copy(),
             sensing=senses.state_of(self._sensors),
             groups=groups.state_of(controller.supervision.groups),
@@ -220,6 +225,7 @@ class Machine:
         _check_length("the law's parameters", state.parameters, own.parameters)
         _check_length("the law's memory", state.memory, own.memory)
         _check_length("what the controller believes", state.belief, own.belief)
+        _check_length("what stands around the law", state.around, own.around)
         _check_length("the estimator's memory", state.estimates, own.estimates)
         _check_length("the sensors' state", state.sensing, own.sensing)
         _check_length("the groups", state.groups, own.groups)
@@ -229,6 +235,7 @@ class Machine:
         self._controller.parameters[:] = state.parameters
         self._controller.memory[:] = state.memory
         beliefs.restore(self._controller.belief, state.belief)
+        arounds.restore(self._controller.around, state.around)
         self._controller.estimates.memory[:] = state.estimates
         senses.restore(self._sensors, state.sensing)
         groups.restore(self._controller.supervision.groups, state.groups)

@@ -67,6 +67,8 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
                     lag_of(drive_section) if nominal.time_constant_s is None else nominal.time_constant_s
                 ),
                 "delay_s": given.delay_s if nominal.delay_s is None else nominal.delay_s,
+                "coulomb_Nm": nominal.coulomb_Nm or section.coulomb_Nm,
+                "viscous_Nm_s": nominal.viscous_Nm_s or section.viscous_Nm_s,
             }
         ),
         "plant": section.model_copy(
@@ -82,6 +84,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
             parameters=tuple(law.parameters.tolist()),
+            **scenario.controller.around,
         )
     if trajectory:
         filled["trajectory"] = OwnPath(shape=name_of_own(trajectory.name))

@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 
+from spheretwin.control.around.feed_forward import FeedForwardSection
+from spheretwin.control.around.governor import GovernorSection
+from spheretwin.control.around.prediction import PredictionSection
 from spheretwin.control.law import Known, Law
 
-# Gains and times beyond this are slips of the pen; their products would overflow.
-LARGEST = 1e9
+# The file of a law, shipped or its user's, finds here all that it needs of these.
+from spheretwin.control.numbers import LARGEST as LARGEST
+from spheretwin.control.numbers import NonNegative as NonNegative
+from spheretwin.control.numbers import NonNegativeEach as NonNegativeEach
+from spheretwin.control.numbers import Positive as Positive
+from spheretwin.control.numbers import PositiveEach as PositiveEach
+from spheretwin.control.numbers import each as each
 
-NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
-Positive = Annotated[float, Field(gt=0, le=LARGEST)]
-
-
-def each(value: Any) -> Any:
-    """One number for each of (alpha, beta, gamma) where only one is given for all."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return (value,) * 3
-    return tuple(value) if isinstance(value, list) else value
-
-
-NonNegativeEach = Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(each)]
-PositiveEach = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(each)]
+AROUND = ("governor", "prediction", "feed_forward")
+"""Sections of a controller that stand around its law."""
 
 Level = Annotated[
     Literal["acceleration", "torque"],
@@ -52,6 +49,24 @@ class ControllerSection(BaseModel):
     period_s: Annotated[float, Field(gt=0, le=10)] = Field(
         1e-3, description="control period, s; a whole number of physics steps"
     )
+    governor: GovernorSection = Field(
+        GovernorSection(), description="bounds the acceleration of the reference"
+    )
+    prediction: PredictionSection = Field(
+        PredictionSection(), description="takes the known delay out of what the law is handed"
+    )
+    feed_forward: FeedForwardSection = Field(
+        FeedForwardSection(), description="adds torques of the nominal model to the law's"
+    )
+
+    @property
+    def around(self) -> dict[str, Any]:
+        """Sections of what stands around the law, by name."""
+        return {name: getattr(self, name) for name in AROUND}
+
+    def alone(self) -> Self:
+        """The same with nothing around the law."""
+        return self.model_copy(update={name: type(self).model_fields[name].default for name in AROUND})
 
 
 class LawParameters(ControllerSection):

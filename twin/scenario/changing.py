@@ -76,7 +76,8 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
     value = copy.deepcopy(value)
     fields = scenario.model_dump(mode="json")
     if isinstance(scenario.controller, OwnController):
-        fields["controller"] = {"law": next(iter(LAWS)), "period_s": scenario.controller.period_s}
+        del fields["controller"]["parameters"]
+        fields["controller"]["law"] = next(iter(LAWS))
     untouched = _set_aside(fields, dotted)
     # A user's law stays the one that was read, whatever has become of its file.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)

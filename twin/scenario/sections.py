@@ -144,6 +144,12 @@ class Nominal(_Section):
     current_limit_A: Positive | None = Field(
         None, description="largest group current asked for, A; the drive's unless given"
     )
+    coulomb_Nm: NonNegativeTriple | None = Field(
+        None, description="Coulomb friction of each hinge, N·m; the plant's unless given"
+    )
+    viscous_Nm_s: NonNegativeTriple | None = Field(
+        None, description="viscous friction of each hinge, N·m·s; the plant's unless given"
+    )
     time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
         None, description="current lag that the controller reckons with, s; the drive's unless given"
     )

@@ -1,0 +1,1 @@
+"""What stands around any law, shipped or its user's, each part off unless asked for."""
