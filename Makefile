@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test check format benchmark setup clean
+.PHONY: demo test check format benchmark reproduce setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -25,6 +25,10 @@ check: .venv-wheel/installed ## format, lint, types, import layers
 benchmark: setup ## print the speed ratios, and hold the bounded allocation against linear programmes
 	$(BIN)/python tests/benchmarks/ratios.py
 	$(BIN)/python tests/benchmarks/allocation.py
+
+reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a page in reproduced/
+	$(BIN)/spheretwin reproduce all --out reproduced
+	@echo "here:      reproduced/reproduce.html"
 
 format: .venv-wheel/installed
 	$(WHEEL)/ruff format .

@@ -7,9 +7,10 @@ import pytest
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.reproduce import page
 from spheretwin.twin.reproduce.page import Chapter
+from spheretwin.twin.reproduce.planning import planned
 from spheretwin.twin.reproduce.registry import EXPERIMENTS
 from spheretwin.twin.reproduce.rows import rows
-from spheretwin.twin.reproduce.running import carried_out, failed, planned
+from spheretwin.twin.reproduce.running import carried_out, failed
 
 FACE = {
     "figure", "case", "scenario", "controller", "m", "L", "hardware", "fields", "seeds", "status", "statuses",

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from spheretwin.twin.reproduce import page
 from spheretwin.twin.reproduce.page import Chapter
-from spheretwin.twin.reproduce.running import carried_out, planned
+from spheretwin.twin.reproduce.planning import planned
+from spheretwin.twin.reproduce.running import carried_out
 from spheretwin.viz.figures.drawing import Drawing
 from tests.twin.reproduce.cases import IDEAL, experiment
 
