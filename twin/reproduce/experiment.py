@@ -33,6 +33,9 @@ class Case(NamedTuple):
     """Whether one run is all in any case, as of one of many that are drawn themselves."""
     ends: tuple[Status, ...] = (Status.COMPLETED,)
     """Statuses that are no failure."""
+    compared: bool = True
+    """Whether it may be in the sample that runs on both plants: a loop driven beyond its margin amplifies
+    what rounding leaves, and is the same on no two plants."""
 
 
 class Outcome(NamedTuple):

@@ -114,7 +114,7 @@ def sample(plan: Plan) -> list[Job]:
     chosen: list[Job] = []
     laws: set[Any] = set()
     for case in plan.cases:
-        if plant_of(case, None):  # says itself where it runs
+        if plant_of(case, None) or not case.compared:  # a plant of its own, or of no other
             continue
         law = case.fields.get("controller.law")
         for seed in range(seeds_of(case, plan.seeds)):

@@ -80,6 +80,7 @@ def _series(panel: Axes, label: str, series: Series, style: Style, hinge: int, s
         panel.plot([at, at], [paper, *ours], color=style.colour, linewidth=0.9, linestyle=":")
         panel.plot(at, paper, "_", color=INK, markersize=17, markeredgewidth=4.2)
         panel.plot(at, paper, "_", color=style.colour, markersize=15, markeredgewidth=2.4)
+        panel.plot(at, paper, style.marker, color="white", markersize=4.5, markeredgecolor=INK)
 
 
 def _legend(figure: Figure, panel: Axes, by_label: Mapping[str, Series]) -> None:

@@ -39,7 +39,7 @@ def paths(by_label: Mapping[str, Path], title: str) -> Figure:
     cells = figure.add_gridspec(2, count, height_ratios=[1.9, 1])
     looks = styles([path.law for path in by_label.values()])
     every = np.concatenate([tips for path in by_label.values() for tips in (path.tip_mm, path.desired_mm)])
-    reach, aside = (1.15 * float(np.abs(every[:, place]).max()) for place in range(2))
+    reach, aside = (1.25 * float(np.abs(every[:, place]).max()) for place in range(2))
     heights = (float(every[:, 2].min()), float(every[:, 2].max()))
     plan: Axes | None = None
     for place, (label, path) in enumerate(by_label.items()):
