@@ -98,7 +98,7 @@ class Finding(NamedTuple):
     """One line of the first page: whether something of the paper came out again."""
 
     held: bool | None
-    """None where the paper says nothing of it."""
+    """None where the paper says nothing of it, or what was found proves nothing of what it says."""
     text: str
     """What was found, and where it is not the paper's, why; without a full stop at its end."""
 

@@ -24,7 +24,7 @@ MOST_COMMANDS = 200
 """On the page; of an experiment of more rows they are in a file beside it."""
 
 FIRST = "What was reproduced, and what was not"
-MARKS = {True: "**reproduced**", False: "**not reproduced**", None: "beyond the paper"}
+MARKS = {True: "**reproduced**", False: "**not reproduced**", None: "besides"}
 
 
 class Chapter(NamedTuple):

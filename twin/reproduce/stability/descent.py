@@ -52,7 +52,7 @@ def _of_axis(run: Run, gains: AFSM, axis: int) -> tuple[Array, float]:
     s, mass = table["sliding_s"][:, axis], 1 + run.scenario.plant.modelling_error
     psi = regressor(table["qdot_rad_s"][:, axis], table["q_rad"][:, axis])
     theta = consequents(psi, s, gains.fuzzy_rate[axis], period_s)
-    v = table["torque_command_Nm"][:-1, axis] / run.scenario.nominal.inertia_kg_m2[axis]
+    v = table["torque_command_Nm"][:-1, axis] / np.array(run.scenario.nominal.inertia_kg_m2)[axis]
     needed = v - mass * np.diff(s) / period_s
     best = np.linalg.lstsq(psi[:-1], needed, rcond=CUT)[0]
     bound = np.abs(needed - psi[:-1] @ best).max()
