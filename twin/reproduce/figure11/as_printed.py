@@ -58,7 +58,7 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 def _order(outcomes: Outcomes) -> str:
     """Whether the laws of the paper are in its order, as a sentence."""
-    return "".join(f" The paper's order, {each.text}." for each in _orders(outcomes))
+    return "".join(f" T{each.text.removeprefix('t')}." for each in _orders(outcomes))
 
 
 def _orders(outcomes: Outcomes) -> list[Finding]:
@@ -70,7 +70,7 @@ def _orders(outcomes: Outcomes) -> list[Finding]:
     errors = np.array([of_axis(outcomes[name], "measured_max_abs_error", ALPHA) for name in names])
     kept, seeds = int(np.sum(np.all(np.diff(errors, axis=0) < 0, axis=0))), errors.shape[1]
     order = " > ".join(compared.label for compared in of_paper)
-    return [Finding(kept == seeds, f"{order}, holds for α under {kept} of {seeds} seeds")]
+    return [Finding(kept == seeds, f"the paper's order, {order}, holds for α under {kept} of {seeds} seeds")]
 
 
 def _sizes(outcomes: Outcomes) -> list[Finding]:
