@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test check format benchmark peers setup clean
+.PHONY: demo test check format benchmark peers reproduce setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -23,13 +23,17 @@ check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/mypy
 	$(WHEEL)/lint-imports
 
-benchmark: setup ## print the speed ratios and the bars of studies, and hold the bounded allocation against linear programmes
+benchmark: setup ## print the speed ratios and the bars of studies, hold the allocation against linear programmes
 	$(BIN)/python tests/benchmarks/ratios.py
 	$(BIN)/python tests/benchmarks/studies.py
 	$(BIN)/python tests/benchmarks/allocation.py
 
 peers: .venv-peers/installed ## hold JAX, MJX, Drake and plain NumPy against ours, and print the times of all
 	.venv-peers/bin/python tests/benchmarks/peers/compare.py
+
+reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a page in reproduced/
+	$(BIN)/spheretwin reproduce all --out reproduced
+	@echo "here:      reproduced/reproduce.html"
 
 format: .venv-wheel/installed
 	$(WHEEL)/ruff format .

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Colour = tuple[int, int, int]
+Dash = str | tuple[int, tuple[int, ...]]
 
 AXIS_COLOURS: tuple[Colour, ...] = ((235, 87, 87), (76, 190, 120), (86, 140, 245))
 """α or x, β or y, γ or z."""
@@ -35,9 +36,26 @@ LAW_COLOURS: dict[str, str] = {
 Okabe and Ito's for the paper's laws and PID; the others are where these leave most room.
 """
 
+LAW_MARKS: dict[str, tuple[str, Dash]] = {
+    "pd": ("o", ":"),
+    "pid": ("D", "-."),
+    "adaptive_fuzzy": ("s", "--"),
+    "afsm": ("^", "-"),
+}
+"""Marker and dash of the same laws, as Matplotlib writes them: what tells them apart in grey print."""
+
 OTHER_LAW = "#8a5a9e"
 
 _SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
+
+_SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
+    ("v", (0, (5, 1))),
+    ("P", (0, (1, 1))),
+    ("X", (0, (3, 1, 1, 1))),
+    ("*", (0, (7, 2))),
+    ("<", "-"),
+    (">", "--"),
+)
 
 _NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)
 
@@ -55,6 +73,12 @@ def law_colours(laws: Sequence[str]) -> dict[str, str]:
         others = [each for each in (own, *_SPARE) if each not in found.values()]
         found[law] = others[0] if others else own
     return found
+
+
+def law_marks(laws: Sequence[str]) -> dict[str, tuple[str, Dash]]:
+    """Marker and dash for each of some laws: its own by its name, or what is left where it has none."""
+    spare = iter(_SPARE_MARKS)
+    return {law: LAW_MARKS.get(law) or next(spare, _SPARE_MARKS[-1]) for law in laws}
 
 
 def group_colours(count: int) -> list[Colour]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,15 @@ from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.base.wording import did_you_mean, shown
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.commands.reporting import print_json
+from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.reproduce import page
+from spheretwin.twin.reproduce.experiment import Outcomes
+from spheretwin.twin.reproduce.memory import Memory
 from spheretwin.twin.reproduce.page import Chapter
+from spheretwin.twin.reproduce.planning import Known, Plan, known, planned
 from spheretwin.twin.reproduce.registry import EXPERIMENTS
-from spheretwin.twin.reproduce.rows import rows
-from spheretwin.twin.reproduce.running import carried_out, failed, planned
+from spheretwin.twin.reproduce.rows import plants_told, rows
+from spheretwin.twin.reproduce.running import carried_out, checked, failed, sample
 from spheretwin.viz.page.folder import prepare
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.progress import runs
@@ -46,6 +50,12 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--limit", type=_count, metavar="N", help="only the first N cases of each, to see how it goes"
     )
+    parser.add_argument(
+        "--plant",
+        choices=tuple(ENGINES),
+        help="of rows that do not name theirs; lagrangian where the model allows it unless given, and a"
+        " sample of them on mujoco too",
+    )
     parser.set_defaults(run=run)
 
 
@@ -53,28 +63,60 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the verb; True when every run ended as it should."""
     if rest:
         raise InputError(
-            f"command line: expected --out, --json, --seeds or --limit, received {' '.join(rest)}"
+            f"command line: expected --out, --json, --seeds, --limit or --plant, received {' '.join(rest)}"
         )
-    plans = [planned(EXPERIMENTS[name], options.seeds, options.limit) for name in _named(options.names)]
+    plans = [
+        planned(EXPERIMENTS[name], options.seeds, options.limit, options.plant)
+        for name in _named(options.names)
+    ]
+    of_cases = [known(plan) for plan in plans]
     if options.out:
         prepare(options.out)
     started = time.perf_counter()
-    with runs("reproduce", sum(plan.runs for plan in plans)) as done, timers_stopped():
-        found = [carried_out(plan, done) for plan in plans]
+    count = sum(plan.runs + len(sample(plan)) for plan in plans)
+    with runs("reproduce", count) as done, timers_stopped():
+        found = [_found(plan, cases, done) for plan, cases in zip(plans, of_cases, strict=True)]
     wall_s = time.perf_counter() - started
-    pairs = list(zip(plans, found, strict=True))
-    chapters = [Chapter(plan.experiment, plan.experiment.tell(outcomes)) for plan, outcomes in pairs]
+    told = [
+        rows(plan, outcomes, cases) for plan, cases, (outcomes, _) in zip(plans, of_cases, found, strict=True)
+    ]
+    chapters = [_chapter(plan, each, of_plan) for plan, each, of_plan in zip(plans, found, told, strict=True)]
     written = page.write(options.out, chapters, _command(options), versions()) if options.out else []
     if options.json:
-        told = [row for plan, outcomes in pairs for row in rows(plan, outcomes)]
-        print_json({"rows": told, "seeds": options.seeds, "wall_s": wall_s, "versions": versions()})
+        every = [row for of_plan in told for row in of_plan]
+        print_json({"rows": every, "seeds": options.seeds, "wall_s": wall_s, "versions": versions()})
     else:
         _print(chapters)
         tables.print_written(written)
-    bad = [f"{plan.experiment.name}: {each}" for plan, outcomes in pairs for each in failed(plan, outcomes)]
+    bad = [
+        f"{plan.experiment.name}: {each}"
+        for plan, (outcomes, _) in zip(plans, found, strict=True)
+        for each in failed(plan, outcomes)
+    ]
     if bad:
         print(f"spheretwin: reproduce: ended early: {'; '.join(bad)}", file=sys.stderr)
     return not bad
+
+
+def _found(
+    plan: Plan, of_cases: Mapping[str, Known], done: Callable[[str], None]
+) -> tuple[Outcomes, list[float]]:
+    """Outcomes of a plan, and how far the sample is apart that ran on both plants."""
+    memory = Memory(plan.experiment.name, {name: case.key for name, case in of_cases.items()})
+    outcomes = carried_out(plan, done, memory=memory)
+    return outcomes, checked(plan, outcomes, done, memory)
+
+
+def _chapter(plan: Plan, found: tuple[Outcomes, list[float]], told: Sequence[Mapping[str, Any]]) -> Chapter:
+    outcomes, apart = found
+    return Chapter(
+        plan.experiment,
+        plan.experiment.tell(outcomes),
+        plan.experiment.findings(outcomes),
+        [row["command"] for row in told],
+        plants_told([row["plant"] for row in told], apart),
+        plan.experiment.side_by_side(outcomes),
+    )
 
 
 def _named(names: Sequence[str]) -> list[str]:
@@ -97,7 +139,8 @@ def _named(names: Sequence[str]) -> list[str]:
 def _command(options: argparse.Namespace) -> str:
     """What makes the same page again."""
     limit = f" --limit {options.limit}" if options.limit else ""
-    return f"spheretwin reproduce {' '.join(_named(options.names))} --seeds {options.seeds}{limit}"
+    plant = f" --plant {options.plant}" if options.plant else ""
+    return f"spheretwin reproduce {' '.join(_named(options.names))} --seeds {options.seeds}{limit}{plant}"
 
 
 def _print(chapters: Sequence[Chapter]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.simulation import Run
 from spheretwin.viz.figures.drawing import Drawing
+
+if TYPE_CHECKING:
+    from spheretwin.viz.recording.flights import Flight
 
 Array = NDArray[np.float64]
 
@@ -30,6 +33,9 @@ class Case(NamedTuple):
     """Whether one run is all in any case, as of one of many that are drawn themselves."""
     ends: tuple[Status, ...] = (Status.COMPLETED,)
     """Statuses that are no failure."""
+    compared: bool = True
+    """Whether it may be in the sample that runs on both plants: a loop driven beyond its margin amplifies
+    what rounding leaves, and is the same on no two plants."""
 
 
 class Outcome(NamedTuple):
@@ -47,6 +53,11 @@ class Outcome(NamedTuple):
     def max_abs_error(self) -> Array:
         """(3,) largest error of the rotor itself."""
         return _three(self.figures["max_abs_error_rad"])
+
+    @property
+    def rms_error(self) -> Array:
+        """(3,) root mean square of the error over the run."""
+        return _three(self.figures.get("rms_error_rad"))
 
     @property
     def tail_rms_error(self) -> Array:
@@ -83,6 +94,15 @@ class Section(NamedTuple):
     """Figures, drawn only where a page is written."""
 
 
+class Finding(NamedTuple):
+    """One line of the first page: whether something of the paper came out again."""
+
+    held: bool | None
+    """None where the paper says nothing of it, or what was found proves nothing of what it says."""
+    text: str
+    """What was found, and where it is not the paper's, why; without a full stop at its end."""
+
+
 class Experiment(NamedTuple):
     """One row of the registry."""
 
@@ -97,3 +117,7 @@ class Experiment(NamedTuple):
     """What `tell` needs of a run beside its figures; the telemetry is let go."""
     more: Callable[[Sequence[Outcome]], Mapping[str, Any]] = lambda outcomes: {}
     """What the JSON says of a case's outcomes beside what it says of all."""
+    findings: Callable[[Outcomes], list[Finding]] = lambda outcomes: []
+    """What the first page says; nothing of cases that were not run."""
+    side_by_side: Callable[[Outcomes], Mapping[str, Flight]] = lambda outcomes: {}
+    """Runs of one condition for a recording, by the labels of their laws."""

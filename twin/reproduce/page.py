@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from spheretwin.twin.reproduce.experiment import Experiment, Section
+from spheretwin.models import actuator as actuators
+from spheretwin.twin.reproduce.experiment import Experiment, Finding, Section
 from spheretwin.viz.figures.drawing import Drawing
 from spheretwin.viz.page import html
 from spheretwin.viz.page import markdown as pieces
 from spheretwin.viz.page.folder import save_drawings, save_text
 
+if TYPE_CHECKING:
+    from spheretwin.viz.recording.flights import Flight
+
 TITLE = "What the paper shows, run again"
 MARKDOWN, HTML = "reproduce.md", "reproduce.html"
+
+
+MOST_COMMANDS = 200
+"""On the page; of an experiment of more rows they are in a file beside it."""
+
+FIRST = "What was reproduced, and what was not"
+MARKS = {True: "**reproduced**", False: "**not reproduced**", None: "besides"}
 
 
 class Chapter(NamedTuple):
@@ -21,10 +32,17 @@ class Chapter(NamedTuple):
 
     experiment: Experiment
     sections: Sequence[Section]
+    findings: Sequence[Finding] = ()
+    commands: Sequence[str] = ()
+    """That run each of its rows alone, under the first seed."""
+    told: str = ""
+    """On which plant the rows ran, and what says that it may be believed."""
+    flights: Mapping[str, Flight] = {}
+    """Runs for a recording, by the labels of their laws."""
 
 
 def write(folder: Path, chapters: Sequence[Chapter], command: str, versions: Mapping[str, str]) -> list[Path]:
-    """Write the page and its figures into a folder; returns both forms of the page.
+    """Write the page, its figures and its recordings into a folder; returns both forms of the page and these.
 
     Parameters
     ----------
@@ -42,11 +60,17 @@ def write(folder: Path, chapters: Sequence[Chapter], command: str, versions: Map
         A file cannot be written there.
     """
     drawn = [[[draw() for draw in section.draw] for section in chapter.sections] for chapter in chapters]
-    save_drawings(folder, (drawing for chapter in drawn for section in chapter for drawing in section))
+    every = (drawing for chapter in drawn for section in chapter for drawing in section)
+    save_drawings(folder, every, vector=True)
+    recordings = [_recorded(folder, chapter) for chapter in chapters if chapter.flights]
+    for chapter in chapters:
+        if len(chapter.commands) > MOST_COMMANDS:
+            save_text(folder / _commands_file(chapter), "\n".join([*chapter.commands, ""]))
     text = markdown(chapters, drawn, command, versions)
     return [
         save_text(folder / MARKDOWN, text),
-        save_text(folder / HTML, html.page(TITLE, text)),
+        save_text(folder / HTML, html.page(TITLE, text, folder)),
+        *recordings,
     ]
 
 
@@ -58,13 +82,48 @@ def markdown(
 ) -> str:
     """Text of the page."""
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
-    lines = [f"# {TITLE}", ""]
+    lines = [f"# {TITLE}", "", *_first(chapters)]
     for chapter, drawings in zip(chapters, drawn, strict=True):
         lines += [f"## {chapter.experiment.title}", "", chapter.experiment.shows, ""]
+        lines += [chapter.told, ""] if chapter.told else []
         for section, of_section in zip(chapter.sections, drawings, strict=True):
             lines += _section(section, of_section)
+        lines += _alone(chapter)
     lines += [f"Made by `{command}` with {used}.", ""]
     return "\n".join(lines)
+
+
+def _first(chapters: Sequence[Chapter]) -> list[str]:
+    """The first page: a line a finding."""
+    findings = [(chapter.experiment.name, finding) for chapter in chapters for finding in chapter.findings]
+    if not findings:
+        return []
+    rows = [(name, MARKS[finding.held], f"{finding.text}.") for name, finding in findings]
+    return [f"## {FIRST}", "", *pieces.table(("", "", "what was found"), rows, (False,) * 3), ""]
+
+
+def _alone(chapter: Chapter) -> list[str]:
+    """How each row is run alone."""
+    if not chapter.commands:
+        return []
+    lines = ["### Each row alone", ""]
+    if len(chapter.commands) > MOST_COMMANDS:
+        file = _commands_file(chapter)
+        said = f"The command lines of {len(chapter.commands)} rows are in [{file}]({file})"
+        return [*lines, f"{said}, in the order of the JSON.", ""]
+    said = "A line a row of the JSON, in its order, under the first seed; the others count on from it."
+    return [*lines, said, "", "```sh", *chapter.commands, "```", ""]
+
+
+def _recorded(folder: Path, chapter: Chapter) -> Path:
+    from spheretwin.viz.recording import flights
+
+    name = chapter.experiment.name
+    return flights.write(folder / f"{name}.rrd", chapter.flights, actuators.load(), chapter.experiment.title)
+
+
+def _commands_file(chapter: Chapter) -> str:
+    return f"{chapter.experiment.name}_commands.txt"
 
 
 def _section(section: Section, drawings: Iterable[Drawing]) -> list[str]:

@@ -10,36 +10,58 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.reproduce.command_line import command_line
 from spheretwin.twin.reproduce.experiment import Case, Outcome, Outcomes
-from spheretwin.twin.reproduce.running import Plan
+from spheretwin.twin.reproduce.planning import Known, Plan, known
+from spheretwin.twin.study.agreement import BOUND
 
 ERRORS = {
     "max_abs_error": lambda outcome: outcome.max_abs_error,
     "measured_max_abs_error": lambda outcome: outcome.measured_max_abs_error,
+    "rms_error": lambda outcome: outcome.rms_error,
     "tail_rms_error": lambda outcome: outcome.tail_rms_error,
 }
 """Errors of each hinge; the JSON has their median, and lowest and highest, over the seeds."""
 
 
-def rows(plan: Plan, outcomes: Outcomes) -> list[dict[str, Any]]:
-    """Rows of an experiment, in the order of its cases."""
-    return [_row(plan, case, outcomes[case.name]) for case in plan.cases]
+NAMES = {"lagrangian": "the Lagrangian", "mujoco": "MuJoCo"}
+
+EFFORT = {
+    "rms_torque_Nm": "rms_torque_range_Nm",
+    "current_variation_A_s": "current_variation_range_A_s",
+}
+"""Metrics of what a law spends; the JSON has their median, and lowest and highest, over the seeds."""
 
 
-def _row(plan: Plan, case: Case, outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    scenario = scenarios.load(case.scenario, case.fields)
+def rows(plan: Plan, outcomes: Outcomes, of_cases: Mapping[str, Known] | None = None) -> list[dict[str, Any]]:
+    """Rows of an experiment, in the order of its cases.
+
+    Parameters
+    ----------
+    plan : Plan
+    outcomes : Outcomes
+    of_cases : mapping, optional
+        `known` of the plan, where that was found out already.
+    """
+    found = of_cases or known(plan)
+    return [_row(plan, case, found[case.name], outcomes[case.name]) for case in plan.cases]
+
+
+def _row(plan: Plan, case: Case, of_case: Known, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return {
         "figure": plan.experiment.name,
         "case": case.name,
-        "scenario": scenario.name,
-        "controller": scenario.controller.law,
-        "m": scenario.plant.modelling_error,
-        "L": scenario.disturbance.load,
-        "hardware": scenario.hardware,
+        "scenario": of_case.scenario,
+        "controller": of_case.law,
+        "m": of_case.m,
+        "L": of_case.L,
+        "hardware": of_case.hardware,
+        "plant": of_case.plant,
         "fields": dict(case.fields),
+        "command": command_line(case, of_case.plant),
         "seeds": len(outcomes),
         **_errors(outcomes),
+        **_effort(outcomes),
         "status": _status(case, outcomes),
         "statuses": dict(sorted(Counter(str(outcome.status) for outcome in outcomes).items())),
         "paper": None,
@@ -57,6 +79,16 @@ def _errors(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return told
 
 
+def _effort(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    told: dict[str, Any] = {}
+    for name, of_range in EFFORT.items():
+        values = figures_named(outcomes, name)
+        numbers = values[np.isfinite(values)]
+        told[name] = float(np.median(numbers)) if len(numbers) else None
+        told[of_range] = [float(numbers.min()), float(numbers.max())] if len(numbers) else None
+    return told
+
+
 def _status(case: Case, outcomes: Sequence[Outcome]) -> Status:
     """What any run ended with that should not be, or else what most ended with."""
     ended = Counter(outcome.status for outcome in outcomes)
@@ -64,17 +96,32 @@ def _status(case: Case, outcomes: Sequence[Outcome]) -> Status:
     return unwanted[0] if unwanted else ended.most_common(1)[0][0]
 
 
+def spread(values: NDArray[np.float64] | Sequence[float], digits: int) -> str:
+    """Numbers as their median, and lowest to highest where these differ."""
+    if not len(values) or not np.all(np.isfinite(values)):
+        return "–"
+    low, middle, high = (f"{value:.{digits}f}" for value in np.quantile(values, [0, 0.5, 1]))
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
 def spread_deg(values: NDArray[np.float64] | Sequence[float], digits: int = 3) -> str:
     """Angles in rad as degrees: their median, and lowest to highest where these differ."""
-    if not np.all(np.isfinite(values)):
-        return "–"
-    low, middle, high = (f"{np.degrees(value):.{digits}f}" for value in np.quantile(values, [0, 0.5, 1]))
-    return middle if low == high else f"{middle} ({low} to {high})"
+    return spread(np.degrees(values), digits)
+
+
+def spread_mrad(values: NDArray[np.float64] | Sequence[float], digits: int = 1) -> str:
+    """Angles in rad as mrad: their median, and lowest to highest where these differ."""
+    return spread(1e3 * np.asarray(values), digits)
 
 
 def of_axis(outcomes: Sequence[Outcome], error: str, axis: int) -> NDArray[np.float64]:
     """One of `ERRORS` of one hinge for each seed, rad."""
     return np.array([ERRORS[error](outcome)[axis] for outcome in outcomes])
+
+
+def figures_named(outcomes: Sequence[Outcome], metric: str) -> NDArray[np.float64]:
+    """One metric of each seed; no number where a run has none."""
+    return np.array([outcome.figures.get(metric) for outcome in outcomes], dtype=np.float64)
 
 
 def ended(case_outcomes: Sequence[Outcome]) -> str:
@@ -83,3 +130,24 @@ def ended(case_outcomes: Sequence[Outcome]) -> str:
     if len(counted) == 1:
         return str(next(iter(counted)))
     return ", ".join(f"{count} {status}" for status, count in counted.items())
+
+
+def plants_told(plants: Sequence[str], apart: Sequence[float]) -> str:
+    """On which plants rows ran, and how far a sample is apart on both.
+
+    Parameters
+    ----------
+    plants : sequence of str
+        Of each row.
+    apart : sequence of float
+        Of each run of the sample, as `running.checked` has it.
+    """
+    counted = Counter(plants)
+    on = " and ".join(f"{count} on {NAMES.get(plant, plant)}" for plant, count in sorted(counted.items()))
+    said = f"Rows: {on}."
+    if not apart:
+        return said
+    return (
+        f"{said} {len(apart)} of their runs were made on MuJoCo too: the RMS errors differ by at most"
+        f" {max(apart):.1e} of the largest of a run's three (bound {BOUND:g})."
+    )

@@ -3,47 +3,35 @@
 from __future__ import annotations
 
 import os
+import zlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.summary import figures_of
 from spheretwin.twin.reproduce.experiment import Case, Experiment, Outcome, Outcomes
+from spheretwin.twin.reproduce.memory import Memory
+from spheretwin.twin.reproduce.planning import Plan, plant_of, scenario_of, seeds_of
 from spheretwin.twin.simulation import Run, simulate
+from spheretwin.twin.study.agreement import Ending, compare
+from spheretwin.twin.study.plants import FULL
 
 Array = NDArray[np.float64]
 
 
-class Plan(NamedTuple):
-    """What is to be run of an experiment."""
-
-    experiment: Experiment
-    cases: list[Case]
-    seeds: int
-
-    @property
-    def runs(self) -> int:
-        """How many there are."""
-        return sum(seeds_of(case, self.seeds) for case in self.cases)
-
-
-def planned(experiment: Experiment, seeds: int, limit: int | None = None) -> Plan:
-    """Plan of an experiment: all of its cases, or the first `limit` of them."""
-    return Plan(experiment, experiment.cases()[:limit], seeds)
-
-
-def seeds_of(case: Case, seeds: int) -> int:
-    """Runs of a case."""
-    return seeds if case.draws and not case.once else 1
+EVERY = 100
+"""Beside the first run of each law, one in so many runs on MuJoCo too."""
 
 
 def carried_out(
-    plan: Plan, done: Callable[[str], None] = lambda case: None, workers: int | None = None
+    plan: Plan,
+    done: Callable[[str], None] = lambda case: None,
+    workers: int | None = None,
+    memory: Memory | None = None,
 ) -> Outcomes:
     """Run every case of a plan with every seed, from 0 on.
 
@@ -54,26 +42,120 @@ def carried_out(
         Told the name of its case after each run.
     workers : int, optional
         Threads; as many as there are cores unless given. The loop holds no lock of the interpreter.
+    memory : Memory, optional
+        Of earlier runs, which are not run again; all are run unless given.
 
     Raises
     ------
     InputError
         A case cannot be run.
     """
-    jobs = [(case, seed) for case in plan.cases for seed in range(seeds_of(case, plan.seeds))]
+    jobs = [
+        Job(case, plant_of(case, plan.plant), seed)
+        for case in plan.cases
+        for seed in range(seeds_of(case, plan.seeds))
+    ]
+    found = _over_threads(plan, jobs, done, workers, memory)
+    by_case: dict[str, list[Outcome]] = {case.name: [] for case in plan.cases}
+    for job, outcome in zip(jobs, found, strict=True):
+        by_case[job.case.name].append(outcome)
+    return by_case
+
+
+class Job(NamedTuple):
+    """One run."""
+
+    case: Case
+    plant: str | None
+    """The fast one where the model allows it, if None."""
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """For complaints."""
+        return f"{self.case.name}, seed {self.seed}"
+
+
+def checked(
+    plan: Plan,
+    outcomes: Outcomes,
+    done: Callable[[str], None] = lambda case: None,
+    memory: Memory | None = None,
+) -> list[float]:
+    """Run a sample of what ran on the Lagrangian on MuJoCo too, and hold them against each other.
+
+    Returns
+    -------
+    list of float
+        How far each of the sample is apart, as `study.agreement` says; none of a run that was lost.
+
+    Raises
+    ------
+    SpheretwinError
+        One is not the same on both plants.
+    """
+    jobs = sample(plan)
+    theirs = _over_threads(plan, jobs, done, None, memory)
+    return [
+        compare(
+            f"reproduce {plan.experiment.name}: expected {job.name}",
+            _ending(outcomes[job.case.name][job.seed]),
+            _ending(other),
+            "--plant mujoco runs all on MuJoCo alone",
+        )
+        for job, other in zip(jobs, theirs, strict=True)
+    ]
+
+
+def sample(plan: Plan) -> list[Job]:
+    """Runs that are to be made on MuJoCo too: the first of each law, and some at random, but for ever."""
+    if plan.plant == FULL:
+        return []
+    chosen: list[Job] = []
+    laws: set[Any] = set()
+    for case in plan.cases:
+        if plant_of(case, None) or not case.compared:  # a plant of its own, or of no other
+            continue
+        law = case.fields.get("controller.law")
+        for seed in range(seeds_of(case, plan.seeds)):
+            if law not in laws or _lot(plan, case, seed) % EVERY == 0:
+                chosen.append(Job(case, FULL, seed))
+            laws.add(law)
+    return chosen
+
+
+def _lot(plan: Plan, case: Case, seed: int) -> int:
+    return zlib.crc32(f"{plan.experiment.name} {case.name} {seed}".encode())
+
+
+def _ending(outcome: Outcome) -> Ending:
+    return outcome.status, outcome.figures["rms_error_rad"] or [0.0] * 3
+
+
+def _over_threads(
+    plan: Plan,
+    jobs: Sequence[Job],
+    done: Callable[[str], None],
+    workers: int | None,
+    memory: Memory | None,
+) -> list[Outcome]:
+    """Outcomes in the order of the jobs, whatever that of the threads."""
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        futures = {pool.submit(_outcome, plan.experiment, *job): job for job in jobs}
+        futures = {pool.submit(_outcome, plan.experiment, job, memory): job for job in jobs}
         try:
             for future in as_completed(futures):
-                future.result()
-                done(futures[future][0].name)
+                outcome, is_new = future.result()
+                job = futures[future]
+                if memory and is_new:
+                    memory.add(job.case.name, job.plant, job.seed, outcome)
+                done(job.case.name)
         except BaseException:  # a case that cannot be run, or Ctrl-C: the others are not waited for
             pool.shutdown(cancel_futures=True)
             raise
-    found: dict[str, list[Outcome]] = {case.name: [] for case in plan.cases}
-    for future, (case, _) in futures.items():
-        found[case.name].append(future.result())
-    return found
+        finally:
+            if memory:
+                memory.save()
+    return [future.result()[0] for future in futures]
 
 
 def failed(plan: Plan, outcomes: Outcomes) -> list[str]:
@@ -86,9 +168,12 @@ def _unwanted(case: Case, outcomes: Sequence[Outcome]) -> list[Status]:
     return sorted({outcome.status for outcome in outcomes} - set(case.ends))
 
 
-def _outcome(experiment: Experiment, case: Case, seed: int) -> Outcome:
-    run = simulate(scenarios.load(case.scenario, {**case.fields, "seed": seed}))
-    return Outcome(run.status, figures_of(run), _measured_largest(run), experiment.keep(run))
+def _outcome(experiment: Experiment, job: Job, memory: Memory | None) -> tuple[Outcome, bool]:
+    """Outcome of a run, and whether it was made now."""
+    if memory and (found := memory.find(job.case.name, job.plant, job.seed)):
+        return found, False
+    run = simulate(scenario_of(job.case, job.plant, job.seed))
+    return Outcome(run.status, figures_of(run), _measured_largest(run), experiment.keep(run)), True
 
 
 def _measured_largest(run: Run) -> Array:

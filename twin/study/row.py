@@ -7,12 +7,9 @@ import json
 import re
 import shlex
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.models import mjcf
-from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.user_code import is_reference, load_function
 from spheretwin.models.base.wording import did_you_mean, shown, without_breaks
@@ -34,6 +31,7 @@ from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Run, Sink, follow
 from spheretwin.twin.study.axes.axis import Axis
 from spheretwin.twin.study.grid import Row
+from spheretwin.twin.study.plants import fast_engine
 from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.template import Template, are_numbers, template_of
 
@@ -261,9 +259,8 @@ class Rows:
     def _fast_engine(self, fields: Mapping[str, Any]) -> str:
         plant = fields.get("plant")
         section = plant if isinstance(plant, Mapping) else {}
-        named, integrator = section.get("mjcf"), section.get("integrator", "RK4")
-        path = Path(named) if isinstance(named, str) else MJCF_PATH
-        return "lagrangian" if integrator == "RK4" and _is_free_rotor(path) else "mujoco"
+        named = section.get("mjcf")
+        return fast_engine(named if isinstance(named, str) else None, section.get("integrator", "RK4"))
 
 
 def follower(metrics: Mapping[str, Metric]) -> Sink:
@@ -285,15 +282,6 @@ class _Follower:
 
     def finish(self, status: Status) -> None:
         pass
-
-
-@lru_cache(maxsize=8)
-def _is_free_rotor(path: Path) -> bool:
-    """Whether a model holds no more than the Lagrangian knows; one that cannot be read will say so itself."""
-    try:
-        return not mjcf.read(path).unknown_to_the_lagrangian
-    except InputError:
-        return False
 
 
 def _period(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -49,7 +50,7 @@ class Bounded(NamedTuple):
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG; the same figure gives the same bytes.
+    """Write a figure as PNG, or as SVG under that suffix; the same figure gives the same bytes.
 
     Raises
     ------
@@ -57,7 +58,11 @@ def save(figure: Figure, path: Path) -> None:
         The file cannot be written there.
     """
     with whole_file(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
+        if path.suffix == ".svg":
+            with rc_context({"svg.hashsalt": path.name}):
+                figure.savefig(temporary, format="svg", metadata={"Date": None})
+        else:
+            figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
 
 
 def margins(values: Mapping[str, float], title: str) -> Figure:

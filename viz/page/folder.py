@@ -27,8 +27,15 @@ def prepare(folder: Path) -> None:
     make_folder(folder)
 
 
-def save_drawings(folder: Path, drawings: Iterable[Drawing]) -> None:
+def save_drawings(folder: Path, drawings: Iterable[Drawing], *, vector: bool = False) -> None:
     """Write figures into a folder that exists.
+
+    Parameters
+    ----------
+    folder : Path
+    drawings : iterable of Drawing
+    vector : bool
+        Write each as SVG beside its PNG, too.
 
     Raises
     ------
@@ -39,6 +46,8 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing]) -> None:
 
     for drawing in drawings:
         plots.save(drawing.figure, folder / drawing.file)
+        if vector:
+            plots.save(drawing.figure, (folder / drawing.file).with_suffix(".svg"))
 
 
 def save_text(path: Path, text: str) -> Path:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import MutableMapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -32,12 +34,14 @@ th { background: var(--soft); }
 th:first-child, td:first-child { padding-left: 0.4rem; }
 img { display: block; max-width: 100%; height: auto; background: #fff; border-radius: 4px; }
 code { font-family: ui-monospace, monospace; font-size: 0.92em; background: var(--soft); padding: 0 0.2em; }
+pre { overflow: auto; max-height: 16rem; padding: 0.6rem; background: var(--soft); font-size: 0.85rem; }
+pre code { padding: 0; }
 em { color: inherit; opacity: 0.85; }
 @media (max-width: 40rem) { body { padding: 0.8rem; } th, td { padding: 0.3rem 0.45rem; } }
 """
 
 
-def page(title: str, markdown: str) -> str:
+def page(title: str, markdown: str, figures: Path | None = None) -> str:
     """Whole page.
 
     Parameters
@@ -46,10 +50,16 @@ def page(title: str, markdown: str) -> str:
         As it is, without markup.
     markdown : str
         CommonMark with tables; tags in it are shown, not obeyed.
+    figures : Path, optional
+        Folder of its figures, which are put into the page; it refers to their files unless given.
     """
     reader = MarkdownIt("commonmark", {"html": False}).enable("table")
     reader.add_render_rule("table_open", _table_opens)
     reader.add_render_rule("table_close", _table_closes)
+    tokens = reader.parse(markdown)
+    if figures:
+        _put_in(tokens, figures)
+    body = reader.renderer.render(tokens, reader.options, {})
     return "\n".join(
         [
             "<!doctype html>",
@@ -62,12 +72,21 @@ def page(title: str, markdown: str) -> str:
             "</head>",
             "<body>",
             "<main>",
-            f"{reader.render(markdown)}</main>",
+            f"{body}</main>",
             "</body>",
             "</html>",
             "",
         ]
     )
+
+
+def _put_in(tokens: Sequence[Token], folder: Path) -> None:
+    """Give each figure its bytes for its file's name, in place."""
+    for token in tokens:
+        if token.type == "image":
+            content = base64.b64encode((folder / str(token.attrs["src"])).read_bytes()).decode()
+            token.attrs["src"] = f"data:image/png;base64,{content}"
+        _put_in(token.children or (), folder)
 
 
 def _table_opens(

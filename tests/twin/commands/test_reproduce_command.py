@@ -73,7 +73,8 @@ def test_a_run_that_ends_early_exits_1_and_is_named(capsys, monkeypatch):
         (["figure11", "--seeds", "0"], ["--seeds", "from 1 to 1000", "0"]),
         (["figure11", "--seeds", "1001"], ["--seeds", "1001"]),
         (["figure11", "--limit", "few"], ["--limit", "few"]),
-        (["figure11", "--colour", "red"], ["--out, --json, --seeds or --limit", "--colour red"]),
+        (["figure11", "--colour", "red"], ["--out, --json, --seeds, --limit or --plant", "--colour red"]),
+        (["figure11", "--plant", "water"], ["--plant", "mujoco", "lagrangian", "water"]),
         (["figure11", "--out", "taken"], ["writable folder", "taken"]),
     ],
 )
@@ -87,3 +88,24 @@ def test_bad_input_is_one_line_exit_2_and_no_folder(tmp_path, monkeypatch, capsy
     for part in parts:
         assert part in line
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def test_a_law_without_what_a_figure_varies_is_bad_input(tmp_path, monkeypatch, capsys):
+    case = IDEAL._replace(fields={"controller.law": "pd", "controller.surface_slope": 5.0})
+    monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(case))
+    assert cli.main(["reproduce", "short", "--out", str(tmp_path / "page")]) == cli.BAD_INPUT
+    _, err = capsys.readouterr()
+    (line,) = err.splitlines()
+    assert "reproduce short, ideal" in line
+    assert "surface_slope" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_rows_run_on_the_plant_that_is_asked_for(capsys, monkeypatch):
+    case = IDEAL._replace(fields={"duration": 0.05})
+    monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(case))
+    for flags, plant in (([], "lagrangian"), (["--plant", "mujoco"], "mujoco")):
+        assert cli.main(["reproduce", "short", "--json", *flags]) == cli.DONE
+        (row,) = json.loads(capsys.readouterr().out)["rows"]
+        assert row["plant"] == plant
+        assert f"--plant.engine {plant}" in row["command"]

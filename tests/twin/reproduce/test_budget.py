@@ -16,7 +16,8 @@ from spheretwin.twin.reproduce.budget.stages import (
     WITH_RATES,
     WITHOUT_ERROR,
 )
-from spheretwin.twin.reproduce.running import carried_out, planned
+from spheretwin.twin.reproduce.planning import planned
+from spheretwin.twin.reproduce.running import carried_out
 from spheretwin.twin.simulation import simulate
 
 BY_NAME = {stage.name: stage for stage in STAGES}

@@ -7,14 +7,17 @@ import pytest
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.reproduce import page
 from spheretwin.twin.reproduce.page import Chapter
+from spheretwin.twin.reproduce.planning import planned
 from spheretwin.twin.reproduce.registry import EXPERIMENTS
 from spheretwin.twin.reproduce.rows import rows
-from spheretwin.twin.reproduce.running import carried_out, failed, planned
+from spheretwin.twin.reproduce.running import carried_out, failed
 
 FACE = {
     "figure", "case", "scenario", "controller", "m", "L", "hardware", "fields", "seeds", "status", "statuses",
     "paper", "max_abs_error_rad", "max_abs_error_range_rad", "measured_max_abs_error_rad",
-    "measured_max_abs_error_range_rad", "tail_rms_error_rad", "tail_rms_error_range_rad",
+    "measured_max_abs_error_range_rad", "tail_rms_error_rad", "tail_rms_error_range_rad", "rms_error_rad",
+    "rms_error_range_rad", "rms_torque_Nm", "rms_torque_range_Nm", "current_variation_A_s",
+    "current_variation_range_A_s", "plant", "command",
 }  # fmt: skip
 
 

@@ -8,8 +8,9 @@ from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.reproduce.figure11 import as_printed, by_change, drawing, figure11
 from spheretwin.twin.reproduce.figure11.changes import CHANGES
 from spheretwin.twin.reproduce.figure11.laws import BY_LAW, COMPARED, printed
+from spheretwin.twin.reproduce.planning import planned
 from spheretwin.twin.reproduce.rows import rows
-from spheretwin.twin.reproduce.running import carried_out, planned
+from spheretwin.twin.reproduce.running import carried_out
 from spheretwin.twin.simulation import simulate
 
 

@@ -1,5 +1,6 @@
 """The page of the experiments: Markdown and HTML of the same content, for any reader, from no other host."""
 
+import base64
 import re
 from html.parser import HTMLParser
 
@@ -7,8 +8,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from spheretwin.twin.reproduce import page
+from spheretwin.twin.reproduce.experiment import Finding
 from spheretwin.twin.reproduce.page import Chapter
-from spheretwin.twin.reproduce.running import carried_out, planned
+from spheretwin.twin.reproduce.planning import planned
+from spheretwin.twin.reproduce.running import carried_out
 from spheretwin.viz.figures.drawing import Drawing
 from tests.twin.reproduce.cases import IDEAL, experiment
 
@@ -48,7 +51,12 @@ def written(tmp_path_factory):
 
 def test_both_forms_and_the_figures_are_in_the_folder(written):
     folder, _, _ = written
-    assert sorted(path.name for path in folder.iterdir()) == ["reproduce.html", "reproduce.md", "short.png"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "reproduce.html",
+        "reproduce.md",
+        "short.png",
+        "short.svg",
+    ]
 
 
 def test_both_forms_have_the_same_content(written):
@@ -78,7 +86,10 @@ def test_html_asks_nobody_for_anything(written):
     asked = [
         value for _, attributes in reader.tags for key, value in attributes.items() if key in ("src", "href")
     ]
-    assert asked == ["short.png"]
+    (figure,) = asked
+    kind, _, content = figure.partition(",")
+    assert kind == "data:image/png;base64"  # the page stands alone
+    assert base64.b64decode(content) == (written[0] / "short.png").read_bytes()
     assert not re.search(r"url\(|@import|https?:", written[2])
 
 
@@ -89,3 +100,32 @@ def test_html_is_read_on_a_phone_and_in_the_dark(written):
     assert "prefers-color-scheme: dark" in html
     tags = [(tag, attributes.get("class")) for tag, attributes in reader.tags]
     assert tags[tags.index(("table", None)) - 1] == ("div", "wide")  # what is wide moves in its own box
+
+
+def test_the_first_page_says_what_was_reproduced(tmp_path):
+    made = experiment(IDEAL)
+    findings = [Finding(True, "this was"), Finding(False, "that was not | at all"), Finding(None, "more")]
+    chapters = [Chapter(made, made.tell(carried_out(planned(made, 1))), findings)]
+    text = page.write(tmp_path, chapters, "", {})[0].read_text(encoding="utf-8")
+    first = text.split("## A short one")[0]
+    assert page.FIRST in first
+    assert "| short | **reproduced** | this was. |" in first
+    assert "| short | **not reproduced** | that was not \\| at all. |" in first
+    assert "| short | besides | more. |" in first
+
+
+@pytest.mark.parametrize("count", [2, page.MOST_COMMANDS + 1])
+def test_every_row_s_command_line_is_there(tmp_path, count):
+    made = experiment(IDEAL)
+    commands = [f"spheretwin simulate tilt --seed {number}" for number in range(count)]
+    chapters = [Chapter(made, made.tell(carried_out(planned(made, 1))), [], commands, "Rows: some.")]
+    text, html = (path.read_text(encoding="utf-8") for path in page.write(tmp_path, chapters, "", {}))
+    assert "Rows: some." in text
+    file = tmp_path / "short_commands.txt"
+    if count > page.MOST_COMMANDS:
+        assert file.read_text().splitlines() == commands
+        assert "(short_commands.txt)" in text
+        assert commands[-1] not in text
+    else:
+        assert not file.exists()
+        assert all(command in text and command in html for command in commands)

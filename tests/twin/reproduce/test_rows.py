@@ -5,8 +5,8 @@ import pytest
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Outcome
+from spheretwin.twin.reproduce.planning import planned
 from spheretwin.twin.reproduce.rows import ended, of_axis, rows, spread_deg
-from spheretwin.twin.reproduce.running import planned
 from tests.twin.reproduce.cases import NOISY, allowed, experiment
 
 

@@ -8,8 +8,9 @@ import pytest
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.reproduce.planning import planned
 from spheretwin.twin.reproduce.rows import rows
-from spheretwin.twin.reproduce.running import carried_out, failed, measured_error, planned
+from spheretwin.twin.reproduce.running import carried_out, failed, measured_error
 from spheretwin.twin.simulation import simulate
 from tests.twin.reproduce.cases import IDEAL, LOST, NOISY, allowed, experiment
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.twin.reproduce.budget.stages import ALL, STAGES, Stage
-from spheretwin.twin.reproduce.experiment import Case, Experiment, Outcome, Outcomes, Section, Table
+from spheretwin.twin.reproduce.experiment import Case, Experiment, Finding, Outcome, Outcomes, Section, Table
 from spheretwin.twin.reproduce.rows import of_axis, spread_deg
 from spheretwin.viz.figures.drawing import Drawing
 
@@ -51,6 +51,12 @@ def tell(outcomes: Outcomes) -> list[Section]:
     most = "; ".join(filter(None, (_most(outcomes, law) for law in laws)))
     text = f"{HOW} By itself changes most: {most}." if most else HOW
     return [Section("One part at a time", text, tables, [lambda: _drawing(outcomes, laws)])]
+
+
+def findings(outcomes: Outcomes) -> list[Finding]:
+    """The part of the prototype that changes most, under each law."""
+    most = [text for law in LAWS if (text := _most(outcomes, law))]
+    return [Finding(None, f"one part of the prototype alone changes most: {'; '.join(most)}")] if most else []
 
 
 def _most(outcomes: Outcomes, law: str) -> str:
@@ -112,4 +118,5 @@ EXPERIMENT = Experiment(
     shows="The motion of figure 11 under every law, with each part of the prototype switched on alone.",
     cases=cases,
     tell=tell,
+    findings=findings,
 )

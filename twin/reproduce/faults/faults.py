@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from spheretwin.twin.reproduce.experiment import Experiment, Outcomes, Section
+from spheretwin.twin.reproduce.experiment import Experiment, Finding, Outcomes, Section
 from spheretwin.twin.reproduce.faults import by_groups, by_part, engines, why
+from spheretwin.twin.reproduce.faults.by_groups import found_of
 from spheretwin.twin.reproduce.faults.conditions.cases import FAULT_s, cases
-from spheretwin.twin.reproduce.faults.found import keep, more
+from spheretwin.twin.reproduce.faults.conditions.sets import pairs, singles
+from spheretwin.twin.reproduce.faults.conditions.ways import OF_GROUPS
+from spheretwin.twin.reproduce.faults.found import keep, more, tracks
 
 
 def tell(outcomes: Outcomes) -> list[Section]:
@@ -18,6 +21,17 @@ def tell(outcomes: Outcomes) -> list[Section]:
     ]
 
 
+def findings(outcomes: Outcomes) -> list[Finding]:
+    """How many of the runs with one or two open groups track, for each way to meet them."""
+    told = []
+    for way in OF_GROUPS:
+        found = found_of(outcomes, [*singles(), *pairs()], way)
+        runs = [run for _, of_set in found for run in of_set]
+        if runs:
+            told.append(f"{way.name} {[tracks(run) for run in runs].count(True)} of {len(runs)}")
+    return [Finding(None, f"runs that track with one or two groups open: {', '.join(told)}")] if told else []
+
+
 EXPERIMENT = Experiment(
     name="faults",
     title="Parts that fail in mid-flight",
@@ -27,4 +41,5 @@ EXPERIMENT = Experiment(
     tell=tell,
     keep=keep,
     more=more,
+    findings=findings,
 )

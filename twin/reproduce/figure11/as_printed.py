@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Table
+from spheretwin.twin.reproduce.experiment import Finding, Outcome, Outcomes, Section, Table
 from spheretwin.twin.reproduce.figure11 import drawing
+from spheretwin.twin.reproduce.figure11.changes import REACHED
 from spheretwin.twin.reproduce.figure11.laws import ALPHA, BETA, COMPARED, Compared, printed
 from spheretwin.twin.reproduce.rows import ended, of_axis, spread_deg
 
@@ -50,13 +51,39 @@ def _row(compared: Compared, found: Sequence[Outcome]) -> tuple[str, ...]:
     return compared.label, compared.gains, ended(found), compared.paper, *measured, *true
 
 
+def findings(outcomes: Outcomes) -> list[Finding]:
+    """Whether the paper's order came out again, and its sizes."""
+    return [*_orders(outcomes), *_sizes(outcomes)]
+
+
 def _order(outcomes: Outcomes) -> str:
+    """Whether the laws of the paper are in its order, as a sentence."""
+    return "".join(f" T{each.text.removeprefix('t')}." for each in _orders(outcomes))
+
+
+def _orders(outcomes: Outcomes) -> list[Finding]:
     """Whether the laws of the paper are in its order, seed by seed."""
     of_paper = [compared for compared in COMPARED if compared.paper_deg]
     names = [printed(compared).name for compared in of_paper]
     if not all(name in outcomes for name in names):
-        return ""
+        return []
     errors = np.array([of_axis(outcomes[name], "measured_max_abs_error", ALPHA) for name in names])
-    kept = int(np.sum(np.all(np.diff(errors, axis=0) < 0, axis=0)))
+    kept, seeds = int(np.sum(np.all(np.diff(errors, axis=0) < 0, axis=0))), errors.shape[1]
     order = " > ".join(compared.label for compared in of_paper)
-    return f" The paper's order, {order}, holds for α under {kept} of {errors.shape[1]} seeds."
+    return [Finding(kept == seeds, f"the paper's order, {order}, holds for α under {kept} of {seeds} seeds")]
+
+
+def _sizes(outcomes: Outcomes) -> list[Finding]:
+    """How large the measured errors of α are beside the paper's."""
+    told, held = [], True
+    for compared in COMPARED:
+        if not compared.paper_deg or printed(compared).name not in outcomes:
+            continue
+        errors = of_axis(outcomes[printed(compared).name], "measured_max_abs_error", ALPHA)
+        middle = float(np.degrees(np.median(errors)))
+        held = held and middle <= REACHED * compared.paper_deg
+        told.append(f"{compared.label} {middle:.2f}° (paper {compared.paper})")
+    if not told:
+        return []
+    why = "" if held else "; what brings each law there alone is in its chapter"
+    return [Finding(held, f"largest measured error of α: {', '.join(told)}{why}")]

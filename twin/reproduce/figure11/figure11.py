@@ -46,4 +46,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     tell=tell,
     keep=keep,
+    findings=as_printed.findings,
 )

@@ -31,8 +31,9 @@ from spheretwin.twin.reproduce.faults.conditions.ways import (
     TOLD,
 )
 from spheretwin.twin.reproduce.faults.found import Found, keep, more, reason, tracks
+from spheretwin.twin.reproduce.planning import planned
 from spheretwin.twin.reproduce.rows import rows
-from spheretwin.twin.reproduce.running import carried_out, failed, planned
+from spheretwin.twin.reproduce.running import carried_out, failed
 from spheretwin.twin.simulation import simulate
 
 # Nine open groups that leave a tenth of the torque needed, and a pair that is hard for who is not told.

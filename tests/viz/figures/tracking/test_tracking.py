@@ -1,0 +1,100 @@
+"""Figures of how laws track: what is drawn where, in both units, and the same bytes each time."""
+
+import numpy as np
+import pytest
+
+from spheretwin.viz.figures import plots
+from spheretwin.viz.figures.tracking import by_condition, over_time, paths
+from spheretwin.viz.figures.tracking.style import styles
+
+LAWS = ("pd", "pid", "adaptive_fuzzy", "afsm", "new_one", "other_new_one")
+HINGES = ("α", "β", "γ")
+
+
+def series(law, scale, whole=(True, True), paper=None):
+    errors = scale * np.array([0.9, 1.0, 1.2])[:, None, None] * np.array([1.0, 2.0])[:, None] * np.ones(3)
+    return by_condition.Series(law, np.array([0.0, 1.0]), errors, np.array(whole), paper or {})
+
+
+def drawn():
+    by_label = {
+        "PD": series("pd", 0.1, (True, False)),
+        "AFSM": series("afsm", 0.01, paper={1.0: (0.03, 0.04, 0.05)}),
+    }
+    return by_condition.by_condition(by_label, HINGES, "load L", "largest |error|", "title")
+
+
+def test_laws_are_told_apart_without_colour():
+    looks = styles(LAWS)
+    assert len({look.colour for look in looks.values()}) == len(LAWS)
+    assert len({(look.marker, look.dash) for look in looks.values()}) == len(LAWS)
+    assert len({look.marker for look in looks.values()}) == len(LAWS)
+    assert styles(("afsm",))["afsm"] == looks["afsm"]  # whatever stands beside it
+
+
+def test_both_axes_have_the_same_errors():
+    figure = drawn()
+    left, right = figure.axes[2], figure.axes[3]
+    np.testing.assert_allclose(np.radians(right.get_ylim()), 1e-3 * np.array(left.get_ylim()), rtol=1e-12)
+    low, high = left.get_ylim()
+    assert low < 1e3 * 0.9 * 0.01
+    assert high > 1e3 * 1.2 * 2 * 0.1
+
+
+def test_medians_and_printed_numbers_are_where_they_belong():
+    panel = drawn().axes[1]
+    lines = [np.asarray(line.get_ydata()) for line in panel.lines if line.get_label() == "AFSM"]
+    np.testing.assert_allclose(lines[0], [10.0, 20.0])
+    bars = [line for line in panel.lines if line.get_marker() == "_" and len(line.get_ydata()) == 1]
+    assert {float(line.get_ydata()[0]) for line in bars} == {40.0}  # β's
+
+
+def test_what_ended_early_is_hollow():
+    inside = {
+        (line.get_marker(), line.get_markerfacecolor())
+        for line in drawn().axes[0].lines
+        if line.get_linestyle() == "None" and len(line.get_xdata())
+    }
+    assert ("o", "white") in inside
+    assert ("^", "white") not in inside
+    assert any(text.get_text() == "ended early" for text in drawn().legends[0].get_texts())
+
+
+def test_a_course_ends_in_a_cross_where_its_run_did():
+    by_label = {
+        "PD": over_time.Course("pd", np.full((2, 3, 3), 0.5)),
+        "AFSM": over_time.Course("afsm", np.full((2, 8, 3), 0.01)),
+    }
+    panel = over_time.errors(by_label, 0.05, HINGES, "title").axes[0]
+    (cross,) = [line for line in panel.lines if line.get_marker() == "x" and len(line.get_xdata())]
+    assert float(cross.get_xdata()[0]) == pytest.approx(0.05 * 2.5)
+    assert float(cross.get_ydata()[0]) == pytest.approx(500.0)
+
+
+def test_paths_are_on_the_same_scales():
+    turn = np.linspace(0, 6, 50)
+    around = np.stack([90 * np.cos(turn), 20 * np.sin(turn), 100 + turn], axis=1)
+    by_label = {
+        "AFSM": paths.Path("afsm", around, around, True),
+        "PD": paths.Path("pd", around[:9], around, False),
+    }
+    figure = paths.paths(by_label, "title")
+    spaces, plans = figure.axes[::2], figure.axes[1::2]
+    assert {axes.name for axes in spaces} == {"3d"}
+    assert plans[0].get_xlim() == plans[1].get_xlim()
+    assert spaces[0].get_zlim() == spaces[1].get_zlim()
+    crosses = [[line for line in axes.lines if line.get_marker() == "x" and len(line.get_xdata())]
+               for axes in plans]  # fmt: skip
+    assert [len(each) for each in crosses] == [0, 1]
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg"])
+def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
+    found = []
+    for folder in ("one", "other"):
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / f"errors.{suffix}"
+        plots.save(drawn(), path)
+        found.append(path.read_bytes())
+    assert found[0] == found[1]
+    assert (b"<svg" in found[0]) == (suffix == "svg")

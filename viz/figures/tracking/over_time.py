@@ -1,0 +1,119 @@
+"""Figures over time: errors of all laws, a panel a hinge; angles beside what was asked, a column a law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.plots import FAINT, INK, WIDTH_in
+from spheretwin.viz.figures.tracking.style import on_errors, styles
+
+Array = NDArray[np.float64]
+
+LEAST_mrad = 0.2  # less is drawn as this much, on a logarithmic axis
+MARKS = 9  # markers along a line
+
+
+class Course(NamedTuple):
+    """Errors of one law."""
+
+    law: str
+    error_rad: Array  # (seeds, windows, hinges) largest within each; no numbers after the end of a run
+
+
+class Motion(NamedTuple):
+    """Angles of one run."""
+
+    law: str
+    t_s: Array  # (n,)
+    q_rad: Array  # (n, hinges)
+    desired_t_s: Array  # (m,)
+    desired_rad: Array  # (m, hinges) of the whole motion, however long the run
+    whole: bool  # whether it came to its end
+
+
+def errors(by_label: Mapping[str, Course], window_s: float, hinges: Sequence[str], title: str) -> Figure:
+    """Errors over time: the median over the seeds a line, their range a band, a cross where runs end early.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Course
+    window_s : float, s
+        Length of what each entry is the largest error of.
+    hinges : sequence of str
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 7.4), layout="constrained")
+    panels = figure.subplots(len(hinges), 1, sharex=True, squeeze=False)[:, 0]
+    looks = styles([course.law for course in by_label.values()])
+    highest = max(float(np.nanmax(1e3 * course.error_rad)) for course in by_label.values())
+    longest = max(course.error_rad.shape[1] for course in by_label.values())
+    for hinge, (panel, name) in enumerate(zip(panels, hinges, strict=True)):
+        for place, (label, course) in enumerate(by_label.items()):
+            style, of_seeds = looks[course.law], np.maximum(1e3 * course.error_rad[:, :, hinge], LEAST_mrad)
+            running = ~np.any(np.isnan(of_seeds), axis=0)
+            low, middle, high = np.quantile(of_seeds[:, running], [0, 0.5, 1], axis=0)
+            t_s = window_s * (np.flatnonzero(running) + 0.5)
+            every = max(1, longest // MARKS)
+            panel.fill_between(t_s, low, high, color=style.colour, alpha=0.2, linewidth=0)
+            panel.plot(t_s, middle, linewidth=1.3, marker=style.marker, markersize=4.5, label=label,
+                       markevery=(place * every // len(by_label), every), **style.line())  # fmt: skip
+            if len(t_s) < longest and len(t_s):
+                panel.plot(t_s[-1], middle[-1], "x", color=style.colour, markersize=9, markeredgewidth=2)
+        on_errors([panel], LEAST_mrad, 1.3 * highest)
+        panel.set_ylabel(f"|error| of {name}, mrad")
+    panels[-1].set_xlabel("time, s")
+    handles, labels = panels[0].get_legend_handles_labels()
+    if any(_ends_early(course, longest) for course in by_label.values()):
+        handles += panels[0].plot([], [], "x", color=INK, markersize=9, markeredgewidth=2, linestyle="")
+        labels.append("ended early")
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, handlelength=3.2)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _ends_early(course: Course, longest: int) -> bool:
+    return course.error_rad.shape[1] < longest or bool(np.isnan(course.error_rad).any())
+
+
+def angles(by_label: Mapping[str, Motion], hinges: Sequence[str], title: str) -> Figure:
+    """Angles and what was asked of them: a column a law, a row a hinge.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Motion
+    hinges : sequence of str
+    title : str
+    """
+    figure = Figure(figsize=(max(2.5 * len(by_label), WIDTH_in), 5.6), layout="constrained")
+    grid = figure.subplots(len(hinges), len(by_label), sharex=True, sharey="row", squeeze=False)
+    looks = styles([motion.law for motion in by_label.values()])
+    for column, (place, (label, motion)) in zip(grid.T, enumerate(by_label.items()), strict=True):
+        colour = looks[motion.law].colour
+        for hinge, panel in enumerate(column):
+            panel.plot(motion.t_s, motion.q_rad[:, hinge], color=colour, linewidth=2.2)
+            panel.plot(motion.desired_t_s, motion.desired_rad[:, hinge], color=INK, linewidth=1,
+                       linestyle=(0, (4, 2)))  # fmt: skip
+            if not motion.whole:
+                panel.plot(motion.t_s[-1], motion.q_rad[-1, hinge], "x", color=colour, markersize=9,
+                           markeredgewidth=2)  # fmt: skip
+            panel.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
+            panel.set_axisbelow(True)
+            panel.spines[["top", "right"]].set_visible(False)
+        column[0].set_title(f"({chr(ord('a') + place)}) {label}", fontsize="medium")
+        column[-1].set_xlabel("time, s")
+    for panel, name in zip(grid[:, 0], hinges, strict=True):
+        panel.set_ylabel(f"{name}, rad")
+    key = [
+        grid[0, 0].plot([], [], color=INK, linewidth=2.2, label="q, in the colour of its law")[0],
+        grid[0, 0].plot([], [], color=INK, linewidth=1, linestyle=(0, (4, 2)), label="q_d, desired")[0],
+    ]
+    if not all(motion.whole for motion in by_label.values()):
+        key += grid[0, 0].plot([], [], "x", color=INK, markersize=9, markeredgewidth=2, label="ended early")
+    figure.legend(handles=key, loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle(title, fontsize="medium")
+    return figure
