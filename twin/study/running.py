@@ -12,13 +12,14 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import make_folder
 from spheretwin.models.base.wording import did_you_mean, shown
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin.study import checking, journal, table
-from spheretwin.twin.study.basis import digest_of
+from spheretwin.twin.study import checking, table
 from spheretwin.twin.study.engines.engine import Engine, Order
 from spheretwin.twin.study.engines.registry import ENGINES
 from spheretwin.twin.study.engines.work import Work
 from spheretwin.twin.study.grid import Grid
-from spheretwin.twin.study.journal import Journal
+from spheretwin.twin.study.kept import journal
+from spheretwin.twin.study.kept.basis import digest_of
+from spheretwin.twin.study.kept.journal import Journal
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
 

@@ -14,7 +14,7 @@ from spheretwin.models.base.files import whole_file
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.scenario import reading
 from spheretwin.twin.study.grid import Grid, Row
-from spheretwin.twin.study.journal import Journal
+from spheretwin.twin.study.kept.journal import Journal
 from spheretwin.twin.study.row import Result, Rows
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
-from spheretwin.twin.study.basis import basis_of
 from spheretwin.twin.study.engines.work import Work
 from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.kept.basis import basis_of
 from spheretwin.twin.study.row import Result, Rows
 from spheretwin.twin.study.study import Study
 

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 from spheretwin.models.base.files import make_folder
 from spheretwin.twin.study import agreement
-from spheretwin.twin.study.basis import digest_of
 from spheretwin.twin.study.grid import Grid, Row
+from spheretwin.twin.study.kept.basis import digest_of
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.tuning import gains, objectives, storage, table, trial

@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.twin.study.lock import lock
+from spheretwin.twin.study.kept.lock import lock
 
 if TYPE_CHECKING:
     from optuna.storages import BaseStorage

@@ -13,8 +13,8 @@ import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.twin import study as studies
-from spheretwin.twin.study import journal
 from spheretwin.twin.study.engines import batches, cluster, worker
+from spheretwin.twin.study.kept import journal
 from spheretwin.twin.study.study import Study, load
 
 ROOT = Path(__file__).parents[4]

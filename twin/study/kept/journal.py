@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.twin.study.grid import Row
-from spheretwin.twin.study.lock import lock
+from spheretwin.twin.study.kept.lock import lock
 from spheretwin.twin.study.row import Result
 
 NAME = "journal.jsonl"
