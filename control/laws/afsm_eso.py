@@ -133,12 +133,14 @@ PRESETS: dict[str, dict[str, Any]] = {
         "boost_slope_1_s": 100.0,
         "boost_layer_rad_s": 0.05,
         "boost_bound_rad_s2": 30.0,
-        "observer_bandwidth_rad_s": (70.0, 70.0, 30.0),  # the encoder of γ has coarse steps
-        "disturbance_bandwidth_rad_s": 70.0,
-        "fast_disturbance_bandwidth_rad_s": 70.0,  # a schedule would learn noise
+        "observer_bandwidth_rad_s": (60.0, 60.0, 30.0),  # the encoder of γ has coarse steps
+        "disturbance_bandwidth_rad_s": 60.0,
+        "fast_disturbance_bandwidth_rad_s": 60.0,  # a schedule would learn noise
+        "governor": {"acceleration_rad_s2": 40.0},
+        "feed_forward": {"friction": 0.8},
     },
 }
-"""Gains by name; each of them can be given alone as well."""
+"""Fields by name; each of them can be given alone as well."""
 
 _IDEAL = {name: each(value) for name, value in PRESETS["ideal"].items()}
 
@@ -191,7 +193,7 @@ class AFSMWithObserver(LawParameters):
         if not isinstance(given, dict):
             return given
         preset = given.get("preset", "ideal")
-        return {**PRESETS.get(preset if isinstance(preset, str) else "", {}), **given}
+        return _filled(given, PRESETS.get(preset if isinstance(preset, str) else "", {}))
 
     def build(self, known: Known) -> Law:
         """Law that knows of no disturbance, and has asked for nothing, before its first tick."""
@@ -209,6 +211,16 @@ class AFSMWithObserver(LawParameters):
             [*known.inertia, *surface, *boost, *bandwidths, *self.fuzzy_adaptation, *single]
         )
         return Law(self.law, step, parameters, np.zeros(ASKED + 3 * (whole + 2)), SIGNALS, asks_torque=True)
+
+
+def _filled(given: dict[str, Any], preset: dict[str, Any]) -> dict[str, Any]:
+    """What is given, beside what a preset has for the rest; sections field by field."""
+    sections = {
+        name: {**value, **given[name]}
+        for name, value in preset.items()
+        if isinstance(value, dict) and isinstance(given.get(name), dict)
+    }
+    return {**preset, **given, **sections}
 
 
 def step(

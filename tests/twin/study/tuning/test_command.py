@@ -130,7 +130,8 @@ def test_the_command_that_is_told_runs_the_gains(small, tmp_path, capsys):
     assert told["miss"] == row["worst miss, each row"][0]
 
 
-def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys):
+def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "150")  # wide enough for headings on one line
     assert cli.main(["sweep", small, "--optimise", "--out", str(tmp_path / "out")]) == cli.DONE
     out, err = capsys.readouterr()
     assert err == ""

@@ -6,6 +6,7 @@ import pytest
 from spheretwin.viz.figures import plots
 from spheretwin.viz.figures.tracking import by_condition, over_time, paths
 from spheretwin.viz.figures.tracking.style import styles
+from spheretwin.viz.palette import law_colour
 
 LAWS = ("pd", "pid", "adaptive_fuzzy", "afsm", "new_one", "other_new_one")
 HINGES = ("α", "β", "γ")
@@ -51,12 +52,13 @@ def test_medians_and_printed_numbers_are_where_they_belong():
 
 def test_what_ended_early_is_hollow():
     inside = {
-        (line.get_marker(), line.get_markerfacecolor())
+        (line.get_markeredgecolor(), line.get_markerfacecolor())
         for line in drawn().axes[0].lines
         if line.get_linestyle() == "None" and len(line.get_xdata())
     }
-    assert ("o", "white") in inside
-    assert ("^", "white") not in inside
+    assert (law_colour("pd"), "white") in inside
+    assert (law_colour("afsm"), "white") not in inside
+    assert (law_colour("afsm"), law_colour("afsm")) in inside
     assert any(text.get_text() == "ended early" for text in drawn().legends[0].get_texts())
 
 
