@@ -72,6 +72,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from spheretwin.control.law import Known, Law
+from spheretwin.control.parts.asked import asked_before, lateness, remember
 from spheretwin.control.parts.bounded_fuzzy import Restraint, approximate_within_bounds
 from spheretwin.control.parts.extended_state_observer import Gains, Observed, observe, observer_gains
 from spheretwin.control.parts.fuzzy import CONSEQUENTS
@@ -111,9 +112,6 @@ ASKED = THETA + 3 * CONSEQUENTS
 # Share of the torque asked for that may be missing before the approximator stops learning; the coils' lag
 # alone takes some of it while the torque changes.
 SHORTFALL = 0.2
-
-# A delay that fits a whole number of periods does so to rounding only.
-WHOLE = 1e-9
 
 PRESETS: dict[str, dict[str, Any]] = {
     "ideal": {
@@ -212,14 +210,13 @@ class AFSMWithObserver(LawParameters):
         bandwidths += self.fast_disturbance_bandwidth_rad_s
         period_s = known.period_s
         kept = exp(-period_s / self.fade_s) if self.fade_s else 0.0
-        periods = known.delay_s / period_s
-        whole = int(periods * (1 + WHOLE) + WHOLE)
-        single = [period_s, kept, max(0.0, periods - whole), float(self.coupled)]
+        late, remembered = lateness(known)
+        single = [period_s, kept, late, float(self.coupled)]
         single += [self.fuzzy_dead_zone_rad_s, self.fuzzy_leakage_1_s, self.fuzzy_bound]
         parameters = np.array(
             [*known.inertia, *surface, *boost, *bandwidths, *self.fuzzy_adaptation, *single]
         )
-        return Law(self.law, step, parameters, np.zeros(ASKED + 3 * (whole + 2)), SIGNALS, asks_torque=True)
+        return Law(self.law, step, parameters, np.zeros(ASKED + remembered), SIGNALS, asks_torque=True)
 
 
 def _filled(given: dict[str, Any], preset: dict[str, Any]) -> dict[str, Any]:
@@ -246,11 +243,9 @@ def step(
         _wanted(2, motion.angle[2], motion.rate[2], learns, reference, parameters, state),
     )
     needed = torque_for(motion, wanted, nominal)
-    for i in range(state.shape[0] - 1, ASKED + 2, -1):
-        state[i] = state[i - 3]
     for axis in range(3):
         torque[axis] = needed[axis] - state[DISTURBANCE + axis]
-        state[ASKED + axis] = torque[axis]
+    remember(state[ASKED:], torque)
 
 
 @allocation_free
@@ -293,9 +288,9 @@ def _ahead(parameters: Array, state: Array, nominal: Nominal) -> Motion:
 @allocation_free
 def _gets_what_it_asks(measurement: Array, parameters: Array, state: Array) -> bool:
     """Whether the torque of the last period was about what was asked for it, so that s tells of the rotor."""
-    late, last, asked_for, missing = parameters[LATE], state.shape[0] - 3, 0.0, 0.0
+    asked_for, missing = 0.0, 0.0
     for axis in range(3):
-        asked = late * state[last + axis] + (1.0 - late) * state[last - 3 + axis]
+        asked = asked_before(state[ASKED:], axis, parameters[LATE])
         asked_for += abs(asked)
         missing += abs(asked - measurement[2, axis])
     return missing <= SHORTFALL * asked_for

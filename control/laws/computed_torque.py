@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from spheretwin.control.law import Known, Law
+from spheretwin.control.parts.asked import asked_before, lateness, remember
 from spheretwin.control.parts.integral_feedback import INTEGRAL_SIGNAL, tracking, triple_pole
 from spheretwin.control.parts.model import model_torque
 from spheretwin.control.parts.parameters import LawParameters, NonNegativeEach, PositiveEach, each, named
-from spheretwin.control.parts.windup import asked_before, lateness, remember
 
 Array = NDArray[np.float64]
 

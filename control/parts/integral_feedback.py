@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.windup import asked_before, lateness, remember, tracking_rate
+from spheretwin.control.parts.asked import asked_before, lateness, remember
+from spheretwin.control.parts.windup import tracking_rate
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 Array = NDArray[np.float64]
