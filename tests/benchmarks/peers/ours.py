@@ -1,6 +1,8 @@
 """What the peers are measured against: a run, and the rows of a study."""
 
+import os
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,10 @@ from problem import Problem, problem
 
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin import study as studies
+from spheretwin.twin.metrics.metric import Planned
+from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.session import Session
 from spheretwin.twin.study import grid, row
 from spheretwin.twin.study.study import Study, made
 
@@ -52,3 +57,31 @@ def carried_out(chosen: Study) -> dict[str, np.ndarray]:
         studies.run(chosen, Path(folder))
         table = parquet.read_table(Path(folder) / "table.parquet", columns=list(FIGURES))
     return {name: np.array(table[name].to_pylist()) for name in FIGURES}
+
+
+class Prepared:
+    """The rows of a study as a peer has them: all made ready, and of each run the same figures kept."""
+
+    def __init__(self, chosen: Study) -> None:
+        self._rows, self._grid = row.Rows(chosen), grid.Grid(chosen)
+
+    def make_ready(self) -> None:
+        """Build the session of every row, and have its reference and disturbance in place."""
+        self._sessions = [self._rows.session(self._rows.scenario(each)) for each in self._grid]
+        for session in self._sessions:
+            session.check_horizon(1)
+            session._exogenous.rows(0, 1)
+
+    def __call__(self) -> None:
+        """Run them over all cores."""
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(_flown, self._sessions))
+
+
+def _flown(session: Session) -> dict[str, object]:
+    planned = Planned(session.begun_as, session.actuator, session.begun_as.ticks)
+    metrics = {name: METRICS[name](planned) for name in FIGURES}
+    table = session.advance(session.begun_as.ticks)
+    for metric in metrics.values():
+        metric.write(table)
+    return {name: metric.value() for name, metric in metrics.items()}
