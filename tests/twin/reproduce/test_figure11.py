@@ -25,14 +25,17 @@ def found():
     return plan, carried_out(plan)
 
 
-def test_laws_are_the_paper_s_and_a_tuned_pid():
-    assert [compared.law for compared in COMPARED] == ["pd", "adaptive_fuzzy", "afsm", "pid"]
+def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
+    assert [compared.law for compared in COMPARED] == ["pd", "adaptive_fuzzy", "afsm", "pid", "afsm_eso"]
     assert f"{BANDWIDTH_rad_s:g} 1/s" in BY_LAW["pid"].gains
     for compared in COMPARED:
         scenario = scenarios.load("tilt", printed(compared).fields)
         assert scenario.hardware == "prototype"
         assert scenario.plant.payload_kg == 0.05
-        assert scenario.controller == type(scenario.controller)()  # the printed gains are the defaults
+        preset = {"preset": "prototype"} if compared.law == "afsm_eso" else {}
+        assert scenario.controller == type(scenario.controller)(
+            **preset
+        )  # printed gains are the defaults
 
 
 def test_json_has_the_paper_s_figures_in_rad(found):
@@ -66,11 +69,13 @@ def test_a_change_is_of_one_thing_alone(change):
     unchanged = scenarios.load("tilt", printed(change.compared).fields).model_dump(mode="json")
     sections = {name.split(".")[0] for name in differences(changed, unchanged)}
     assert len(sections) == 1
-    if sections != {"estimator"}:  # of which another has other fields
+    named = {name.split(".")[1] for name in differences(changed, unchanged)}
+    # Another estimator has other fields; an acceleration within bounds is of use where it becomes torque.
+    if sections != {"estimator"} and named != {"governor", "feed_forward"}:
         assert len(differences(changed, unchanged)) == 1
 
 
-def test_order_of_the_paper_is_kept_and_the_tuned_pid_is_ahead(found):
+def test_order_of_the_paper_is_kept_and_the_tuned_laws_are_ahead(found):
     _, outcomes = found
     errors = [
         [each.measured_max_abs_error[0] for each in outcomes[printed(compared).name]] for compared in COMPARED

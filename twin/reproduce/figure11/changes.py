@@ -47,6 +47,12 @@ def _rounding(law: str, rad_s2: float) -> Change:
     return Change(law, "corners rounded at", f"{rad_s2:g} rad/s²", {"trajectory.rounding_rad_s2": rad_s2})
 
 
+def _governed(law: str) -> Change:
+    """The reference bounded to an acceleration, and the torque that this takes fed forward."""
+    fields = {"controller.governor.acceleration_rad_s2": 20.0, "controller.feed_forward.inertia": 1.0}
+    return Change(law, "reference within", "20 rad/s², inertia fed forward", fields)
+
+
 def _estimator(law: str, kind: str, rad_s: float) -> Change:
     fields = {"estimator.kind": kind, "estimator.bandwidth_rad_s": rad_s}
     return Change(law, f"estimator {kind},", f"{rad_s:g} 1/s", fields)
@@ -63,6 +69,7 @@ def _ideal(law: str) -> Change:
 CHANGES = (
     Change("pd", "stiffness", "830 1/s²", {"controller.stiffness": 830.0}),  # 820: 0.555°, 840: 0.546°
     _rounding("pd", 0.3),
+    _governed("pd"),
     _estimator("pd", "difference", 100.0),
     _true_rates("pd"),
     _ideal("pd"),
@@ -70,6 +77,7 @@ CHANGES = (
     Change("adaptive_fuzzy", "K", "43 1/s", {"controller.reaching_gain": 43.0}),  # 42: 0.255°, 44: 0.245°
     Change("adaptive_fuzzy", "η", "600", {"controller.fuzzy_rate": 600.0}),  # 300: 0.305°, 1000: 0.227°
     _rounding("adaptive_fuzzy", 0.16),
+    _governed("adaptive_fuzzy"),
     _estimator("adaptive_fuzzy", "difference", 100.0),
     _true_rates("adaptive_fuzzy"),
     _ideal("adaptive_fuzzy"),
@@ -77,6 +85,7 @@ CHANGES = (
     Change("afsm", "K", "100 1/s", {"controller.reaching_gain": 100.0}),  # 90: 0.125°, 110: 0.118°
     Change("afsm", "η", "3000", {"controller.fuzzy_rate": 3000.0}),  # 1000: 0.202°
     _rounding("afsm", 0.16),
+    _governed("afsm"),
     _estimator("afsm", "kalman", 1500.0),
     _true_rates("afsm"),
     _ideal("afsm"),
@@ -85,6 +94,7 @@ CHANGES = (
     ),
     Change("afsm", "ideal hardware, K", "80 1/s", {"controller.reaching_gain": 80.0}, ideal=True),
     _rounding("pid", 0.2),
+    _governed("pid"),
     _estimator("pid", "difference", 300.0),
     _true_rates("pid"),
     _ideal("pid"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ class Compared(NamedTuple):
     relation: str = ""
     paper_axes: tuple[int, ...] = (0,)
     """For which of α, β and γ the paper tells it."""
+    fields: Mapping[str, Any] = {}
+    """Of its controller, beside its name."""
 
     @property
     def paper(self) -> str:
@@ -28,12 +31,20 @@ class Compared(NamedTuple):
         return f"{self.relation} {self.paper_deg:g}" if self.paper_deg else "–"
 
 
-# The tuned PID is the law's default, whose file says how it was tuned.
+# The tuned PID is the law's default; its file says how it was tuned, and that of AFSM-ESO how it was.
 COMPARED = (
     Compared("pd", "PD", "printed gains", 0.55, ">", (0, 1)),
     Compared("adaptive_fuzzy", "adaptive fuzzy", "printed gains", 0.25, "≈"),
     Compared("afsm", "AFSM", "printed gains", 0.12, "≈"),
     Compared("pid", "tuned PID", "triple pole at 40 1/s", None, paper_axes=()),
+    Compared(
+        "afsm_eso",
+        "AFSM-ESO",
+        "preset prototype",
+        None,
+        paper_axes=(),
+        fields={"controller.preset": "prototype"},
+    ),
 )
 BY_LAW = {compared.law: compared for compared in COMPARED}
 
@@ -54,7 +65,7 @@ def case(compared: Compared, condition: str, fields: dict[str, Any], draws: bool
     return Case(
         name=f"{compared.law}: {condition}",
         scenario=SCENARIO,
-        fields={"controller.law": compared.law, **fields},
+        fields={"controller.law": compared.law, **compared.fields, **fields},
         told={"condition": condition, **_told(compared)},
         draws=draws,
     )
