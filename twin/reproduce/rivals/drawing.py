@@ -51,7 +51,7 @@ def prototype(outcomes: Outcomes) -> Drawing:
     bare = panels[0].by_law
     for place, panel in enumerate(panels[1:], start=1):
         beside = {law: bare[law].values[bare[law].front] for law in panel.by_law if law in bare}
-        panels[place] = panel._replace(beside=beside)
+        panels[place] = panel._replace(title=f"{panel.title} (hollow: without)", beside=beside)
     figure = figures.fronts(panels, _labels(PROTOTYPE), VARIATION, len(panels))
     caption = (
         f"The tilt on the prototype, true error of the worse of α and β. {READ} Hollow,"
