@@ -39,8 +39,14 @@ Okabe and Ito's for the paper's laws and PID; the others are where these leave m
 LAW_MARKS: dict[str, tuple[str, Dash]] = {
     "pd": ("o", ":"),
     "pid": ("D", "-."),
+    "lqi": ("v", (0, (5, 1))),
+    "computed_torque": ("P", (0, (1, 1))),
+    "backstepping_sliding_mode": ("X", (0, (3, 1, 1, 1))),
+    "adrc": ("<", (0, (7, 2))),
+    "super_twisting": (">", (0, (3, 1, 1, 1, 1, 1))),
     "adaptive_fuzzy": ("s", "--"),
     "afsm": ("^", "-"),
+    "afsm_eso": ("*", (0, (9, 1))),
 }
 """Marker and dash of the same laws, as Matplotlib writes them: what tells them apart in grey print."""
 
@@ -49,12 +55,11 @@ OTHER_LAW = "#8a5a9e"
 _SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
 
 _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
-    ("v", (0, (5, 1))),
-    ("P", (0, (1, 1))),
-    ("X", (0, (3, 1, 1, 1))),
-    ("*", (0, (7, 2))),
-    ("<", "-"),
-    (">", "--"),
+    ("p", (0, (2, 1))),
+    ("h", (0, (6, 1, 1, 1))),
+    ("d", (0, (4, 4))),
+    ("8", "-"),
+    ("H", "--"),
 )
 
 _NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)

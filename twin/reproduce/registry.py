@@ -6,6 +6,7 @@ from spheretwin.twin.reproduce.faults import faults
 from spheretwin.twin.reproduce.figure8 import figure8
 from spheretwin.twin.reproduce.figure11 import figure11
 from spheretwin.twin.reproduce.readings import readings
+from spheretwin.twin.reproduce.rivals import rivals
 from spheretwin.twin.reproduce.sinusoid import figures
 from spheretwin.twin.reproduce.stability import stability
 
@@ -18,6 +19,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         figure11.EXPERIMENT,
         readings.EXPERIMENT,
         stability.EXPERIMENT,
+        rivals.EXPERIMENT,
         budget.EXPERIMENT,
         faults.EXPERIMENT,
     )

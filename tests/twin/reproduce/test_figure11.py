@@ -33,9 +33,7 @@ def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
         assert scenario.hardware == "prototype"
         assert scenario.plant.payload_kg == 0.05
         preset = {"preset": "prototype"} if compared.law == "afsm_eso" else {}
-        assert scenario.controller == type(scenario.controller)(
-            **preset
-        )  # printed gains are the defaults
+        assert scenario.controller == type(scenario.controller)(**preset)  # printed gains are the defaults
 
 
 def test_json_has_the_paper_s_figures_in_rad(found):

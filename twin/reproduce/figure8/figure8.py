@@ -72,7 +72,9 @@ def tell(outcomes: Outcomes) -> list[Section]:
             [rms(compared, found) for compared, found in ran.items()],
         ),
     ]
-    shown = {compared: found for compared, found in ran.items() if len(found[0].kept.course.t_s)}
+    shown = {
+        compared: found for compared, found in ran.items() if compared.drawn and len(found[0].kept.course.t_s)
+    }
     drawn = [lambda: drawing.angles(shown), lambda: drawing.errors(shown), lambda: drawing.paths(shown)]
     return [Section("The nutation under each law", HOW, tables, drawn if shown else [])]
 
@@ -107,6 +109,6 @@ EXPERIMENT = Experiment(
     keep=keep,
     findings=findings,
     side_by_side=lambda outcomes: side_by_side(
-        {of: outcomes[case(of).name][0] for of in COMPARED if case(of).name in outcomes}
+        {of: outcomes[case(of).name][0] for of in COMPARED if of.drawn and case(of).name in outcomes}
     ),
 )

@@ -49,6 +49,8 @@ def _draw(varied: Varied, outcomes: Outcomes) -> Drawing:
 
     by_label = {}
     for compared in COMPARED:
+        if not compared.drawn:
+            continue
         points = [at for at in varied.conditions if case(compared, at).name in outcomes]
         if not points:
             continue

@@ -13,7 +13,7 @@ SCENARIO = "sinusoid"
 WATCHED: tuple[Compared, ...] = tuple(
     compared
     for compared in COMPARED
-    if compared.law in ("afsm", "pid")  # one more joins by its name
+    if compared.law in ("afsm", "pid", "afsm_eso")  # one more joins by its name
 )
 
 LONG_s = 600.0

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.plots import FAINT, INK, WIDTH_in
@@ -16,6 +17,7 @@ Array = NDArray[np.float64]
 
 LEAST_mrad = 0.2  # less is drawn as this much, on a logarithmic axis
 MARKS = 9  # markers along a line
+OUTLINED = [withStroke(linewidth=1.6, foreground="white")]  # seen on a dark line too
 
 
 class Course(NamedTuple):
@@ -97,7 +99,7 @@ def angles(by_label: Mapping[str, Motion], hinges: Sequence[str], title: str) ->
         for hinge, panel in enumerate(column):
             panel.plot(motion.t_s, motion.q_rad[:, hinge], color=colour, linewidth=2.2)
             panel.plot(motion.desired_t_s, motion.desired_rad[:, hinge], color=INK, linewidth=1,
-                       linestyle=(0, (4, 2)))  # fmt: skip
+                       linestyle=(0, (4, 2)), path_effects=OUTLINED)  # fmt: skip
             if not motion.whole:
                 panel.plot(motion.t_s[-1], motion.q_rad[-1, hinge], "x", color=colour, markersize=9,
                            markeredgewidth=2)  # fmt: skip
