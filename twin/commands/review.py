@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import check_writable
 from spheretwin.twin.commands.reporting import print_json, warn
 from spheretwin.twin.review import columns, tolerances
 from spheretwin.twin.review.figures import figures
@@ -53,8 +54,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     _check(options)
     allowed = tolerances.load(options.tolerance) if options.tolerance else None
     first, *others = runs = [read(path) for path in options.runs]
-    over = [exceeded(first, other, allowed) for other in others] if allowed else []
     told = [figures(each) for each in runs]
+    over = [exceeded(first, other, allowed) for other in others] if allowed else []
     if options.export:
         columns.export(first, options.export)
     if options.json:
@@ -75,6 +76,7 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"command line: expected one run for --export, received {len(options.runs)}")
     if options.export:
         columns.check(options.export)
+        check_writable(options.export)
 
 
 def _print_json(told: list[dict[str, Any]], over: list[list[Exceeded]], *, held: bool) -> None:

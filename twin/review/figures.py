@@ -23,8 +23,15 @@ def figures(run: Reviewed) -> dict[str, Any]:
     Raises
     ------
     InputError
-        Its scenario is none of this version's, or its model file is no longer there.
+        Its scenario is none of this version's, or its model file is no longer there or has other coil groups.
     """
+    try:
+        return _figures(run)
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
+        raise InputError(f"review {run.path}: expected facts and rows of a run, {error!r}") from None
+
+
+def _figures(run: Reviewed) -> dict[str, Any]:
     scenario = run.record.scenario
     metrics = _metrics(run)
     work_J, copper_J = mechanical_work_J(run.table, run.period_s), metrics["copper_loss_J"]
@@ -57,10 +64,7 @@ def figures(run: Reviewed) -> dict[str, Any]:
 def _metrics(run: Reviewed) -> dict[str, Any]:
     scenario = validated(_what_metrics_take(run), str(run.path))
     gathered = Figures(Planned(scenario, files_of(scenario).actuator, scenario.ticks))
-    try:
-        gathered.write(run.table)
-    except ValueError as error:  # as where the model file has other coil groups by now
-        raise InputError(f"review {run.path}: expected rows of its model, {error}") from None
+    gathered.write(run.table)
     return gathered.values()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from typing import NamedTuple
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.file import join
-from spheretwin.models.telemetry.record import RunRecord
+from spheretwin.models.telemetry.parts import read_schema
 from spheretwin.models.telemetry.table import read_parquet
 
 RECORDINGS = (".rrd",)
@@ -83,10 +84,10 @@ def recover(path: Path, out: Path) -> Recovered:
     """
     left = found(path)
     if left.is_dir():
-        join(_parts(left), out)
-        table, metadata = read_parquet(out)
-        period_s = RunRecord.from_metadata(metadata).scenario["controller"]["period_s"]
-        return Recovered(len(table), len(table) * period_s)
+        parts = _parts(left)
+        period_s = _period_s(parts[0])
+        rows = join(parts, out)
+        return Recovered(rows, rows * period_s)
     if left.suffix in RECORDINGS or is_recording(left):
         from spheretwin.viz.recording import messages, reading  # Rerun is slow to import
 
@@ -99,6 +100,15 @@ def recover(path: Path, out: Path) -> Recovered:
         return Recovered(rows, rows * recorded.facts["sections"]["controller"]["period_s"])
     read_parquet(left, rows=False)  # what is no telemetry is told as such
     raise InputError(f"recover {left}: expected what a killed process left, received a whole telemetry file")
+
+
+def _period_s(part: Path) -> float:
+    """Control period of the run that a part is of, s."""
+    schema = read_schema(part)
+    try:
+        return float(json.loads((schema.metadata if schema else {})[b"scenario"])["controller"]["period_s"])
+    except (KeyError, ValueError, TypeError, RecursionError) as error:
+        raise InputError(f"telemetry {part}: expected a part with a run's scenario, {error!r}") from None
 
 
 def _parts(folder: Path) -> list[Path]:

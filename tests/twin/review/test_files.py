@@ -5,6 +5,9 @@ import json
 import os
 import runpy
 import shutil
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,7 @@ from spheretwin.models.telemetry.file import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import cli
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.commands.outputs import Outputs
 from spheretwin.twin.records.facts import record_of
 from spheretwin.twin.records.summary import figures_of
 from spheretwin.twin.review import leavings
@@ -117,6 +121,46 @@ def test_telemetry_of_a_killed_process_is_read_and_made_whole(tmp_path, capsys):
     assert "recovered 4096 rows, 4.096 s" in capsys.readouterr().out
     assert read(out).table.values.tobytes() == run.table.values.tobytes()
     file.close({})
+
+
+KILLED = """
+import os, signal, sys, time
+from pathlib import Path
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.commands.outputs import Outputs
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+
+folder = Path(sys.argv[1])
+session = Session(scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 6.0}))
+files = Outputs(session, folder / "run.rrd", folder / "run.parquet", live=False)
+follow(session, 5000, files.sinks)
+(part,) = folder.glob(".run.rrd.*.part")
+while part.stat().st_size < 4_000_000:  # the meshes are 2 MB of it, a thousand rows 1 MB
+    time.sleep(0.01)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_process_that_was_killed_leaves_both_files_readable(tmp_path):
+    done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)], timeout=120)
+    assert done.returncode == -signal.SIGKILL
+    telemetry, recording = read(tmp_path / "run.parquet"), read(tmp_path / "run.rrd")
+    assert (telemetry.whole, recording.whole) == (False, False)
+    rows = min(len(telemetry.table), len(recording.table))
+    assert rows >= 1000
+    for run in (telemetry, recording):
+        assert figures(run)["law"] == "afsm"
+    assert recording.table.values[:rows].tobytes() == telemetry.table.values[:rows].tobytes()
+
+
+def test_a_run_without_a_tick_is_reviewed(tmp_path):
+    session = Session(scenarios.load("hold", {**PLANT, "duration": 0.1}))
+    paths = tmp_path / "run.rrd", tmp_path / "run.parquet"
+    assert Outputs(session, *paths, live=False).close() == []
+    for path in paths:
+        told = figures(read(path))
+        assert (told["rows"], told["max_abs_error_rad"], told["energy_J"]) == (0, None, None)
 
 
 def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):
