@@ -16,7 +16,7 @@ from typing import NoReturn
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import is_plain, one_line, shown
-from spheretwin.twin.commands import crosscheck, magnetics, reproduce, simulate, sweep
+from spheretwin.twin.commands import crosscheck, magnetics, recover, reproduce, review, simulate, sweep
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -86,6 +86,8 @@ def _parser() -> argparse.ArgumentParser:
     crosscheck.add_to(verbs)
     reproduce.add_to(verbs)
     sweep.add_to(verbs)
+    review.add_to(verbs)
+    recover.add_to(verbs)
     magnetics.add_to(verbs)
     return parser
 

@@ -171,11 +171,12 @@ def _note_events(session: Session, noted: int, sinks: Sequence[Sink]) -> int:
     """Tell of the events made since then; returns how many there have been."""
     for change in session.events[noted:]:
         for sink in sinks:
-            sink.note(change.tick * session.scenario.controller.period_s, _told(change))
+            sink.note(change.tick * session.scenario.controller.period_s, change_told(change))
     return len(session.events)
 
 
-def _told(change: Change) -> str:
+def change_told(change: Change) -> str:
+    """A change as a log has it."""
     return f"{change.name} set to {change.value}"
 
 
@@ -190,7 +191,7 @@ def _make(session: Session, ticks: int, waiting: list[Change], sinks: Sequence[S
         change = waiting.pop(0)
         session.set(change.name, change.value)
         for sink in sinks:
-            sink.note(session.t_s, _told(change))
+            sink.note(session.t_s, change_told(change))
         if session.tick < _known_to(ticks, waiting):
             session.check_horizon(_known_to(ticks, waiting))
 

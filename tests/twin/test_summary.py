@@ -45,12 +45,12 @@ def test_a_run_without_a_row_has_no_figures():
 
 def test_a_function_of_the_user_s_is_one_more_figure(run):
     own = {
-        "overshoot_rad": lambda run: run.telemetry["error_rad"].max(axis=0),
+        "highest_error_rad": lambda run: run.telemetry["error_rad"].max(axis=0),
         "groups": lambda run: np.int64(len(run.actuator.groups)),
         "ended": lambda run: {"status": run.status, "at_s": run.telemetry["t_s"][-1]},
     }
     figures = figures_of(run, own)
-    assert figures["overshoot_rad"] == run.telemetry["error_rad"].max(axis=0).tolist()
+    assert figures["highest_error_rad"] == run.telemetry["error_rad"].max(axis=0).tolist()
     assert figures["groups"] == len(run.actuator.groups)
     assert figures["ended"] == {"status": "completed", "at_s": pytest.approx(0.199)}
     assert list(figures) == [*METRICS, *own]

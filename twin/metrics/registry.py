@@ -7,6 +7,7 @@ from spheretwin.twin.metrics.effort.rms_torque import RmsTorque
 from spheretwin.twin.metrics.effort.saturated_fraction import SaturatedFraction
 from spheretwin.twin.metrics.metric import Metric
 from spheretwin.twin.metrics.tracking.max_abs_error import MaxAbsError
+from spheretwin.twin.metrics.tracking.overshoot import Overshoot
 from spheretwin.twin.metrics.tracking.rms_error import RmsError
 from spheretwin.twin.metrics.tracking.settling_time import SettlingTime
 from spheretwin.twin.metrics.tracking.tail_rms_error import TailRmsError
@@ -16,6 +17,7 @@ METRICS: dict[str, type[Metric]] = {
     "rms_error_rad": RmsError,
     "tail_rms_error_rad": TailRmsError,
     "settling_time_s": SettlingTime,
+    "overshoot_rad": Overshoot,
     "max_abs_current_A": MaxAbsCurrent,
     "saturated_fraction": SaturatedFraction,
     "rms_torque_Nm": RmsTorque,

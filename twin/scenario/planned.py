@@ -17,7 +17,7 @@ def planned(scenario: Scenario) -> tuple[Change, ...]:
     """Changes that the events of a scenario make, in the order of their times, then of the file."""
     return tuple(
         Change(
-            _first_tick(event.t_s / scenario.controller.period_s),
+            first_tick(event.t_s / scenario.controller.period_s),
             event.set,
             from_now_on(event.set, copy.deepcopy(event.value), event.t_s),
         )
@@ -25,6 +25,7 @@ def planned(scenario: Scenario) -> tuple[Change, ...]:
     )
 
 
-def _first_tick(periods: float) -> int:
+def first_tick(periods: float) -> int:
+    """Tick that a time, in control periods, has come at."""
     nearest = round(periods)
     return nearest if abs(periods - nearest) <= ROUNDING else ceil(periods)

@@ -25,6 +25,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import palette
 from spheretwin.viz.recording import blueprint, scene
 from spheretwin.viz.recording.blueprint import View
+from spheretwin.viz.recording.described import COMPLETE, facts_as_json, signal_as_json
 from spheretwin.viz.recording.events import Event, Events
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.live import Viewer
@@ -93,6 +94,7 @@ class Recorder:
         self._waiting: list[Table] = []
         self._last_tips: dict[str, NDArray[np.float64]] = {}
         self._states = StateChanges()
+        self._described: set[str] = set()
         own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
         view = View(facts.duration_s, facts.current_limit_A, len(actuator.groups), own, live)
         self._recording = rr.RecordingStream(blueprint.application(view))
@@ -120,6 +122,8 @@ class Recorder:
         blueprint.log_styles(self._recording, signals)
         text = rr.TextDocument(_as_markdown(facts), media_type=rr.MediaType.MARKDOWN)
         self._recording.log(blueprint.SCENARIO, text, static=True)
+        self._recording.log(blueprint.SCENARIO, facts_as_json(facts), static=True)
+        self._describe(signals)
         if self.viewer:
             self.viewer.start()
 
@@ -215,16 +219,27 @@ class Recorder:
 
     def _write(self, rows: Table) -> None:
         index = _time_index(rows["t_s"])
-        for signal in rows.signals:
-            if signal.name != "t_s":
-                column = _scalars(rows[signal.name], signal.size)
-                self._recording.send_columns(blueprint.entity(signal.name), index, [column])
+        self._describe(rows.signals)
+        # The times last: rows that have them are whole, wherever a killed process left off.
+        for signal in sorted(rows.signals, key=lambda signal: signal.name == COMPLETE):
+            column = _scalars(rows[signal.name], signal.size)
+            self._recording.send_columns(blueprint.entity(signal.name), index, [column])
         self._write_frames(rows)
         for entity, t_s, states in self._states.of(rows):
             self._recording.send_columns(entity, _time_index(t_s), rr.StateChange.columns(state=states))
         self._log(self._events.of(rows))
         if not self.viewer:
             self._recording.flush()  # encode it here, beside the loop, rather than all at the end
+
+    def _describe(self, signals: tuple[Signal, ...]) -> None:
+        """Say of signals that come for the first time what they are; a change of law may bring some."""
+        new = [signal for signal in signals if signal.name not in self._described]
+        for signal in new:
+            described = signal_as_json(len(self._described), signal)
+            self._recording.log(blueprint.entity(signal.name), described, static=True)
+            self._described.add(signal.name)
+        if new and not self.viewer:
+            self._recording.flush()  # before their rows: what a killed process leaves says what they are
 
     def _write_frames(self, rows: Table) -> None:
         """Poses, coil colours and traces of the ticks that fall on a frame."""

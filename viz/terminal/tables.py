@@ -30,7 +30,7 @@ def print_run(law: str, planned_s: float, summary: dict[str, Any], own: Sequence
     errors = style.table(title, "tracking error, mrad (degrees)", *ANGLES)
     errors.title_style = COLOURS[status.level]
     for label, key in ERRORS.items():
-        errors.add_row(label, *(_angle(value) for value in summary[key] or ()))
+        errors.add_row(label, *(angle(value) for value in summary[key] or ()))
     settled = summary["settling_time_s"] or ()
     errors.add_row("settled after", *("never" if t is None else f"{three_digits(t)} s" for t in settled))
     console.print(errors)
@@ -66,7 +66,8 @@ def _ending(status: Status, planned_s: float, summary: dict[str, Any]) -> str:
     return f"{status} at {summary['simulated_s']:.3f} s of {planned_s:g} s{why}"
 
 
-def _angle(value_rad: float) -> str:
+def angle(value_rad: float) -> str:
+    """An angle in mrad, and in degrees behind it."""
     return f"{three_digits(1e3 * value_rad)} ({three_digits(math.degrees(value_rad))}°)"
 
 

@@ -24,6 +24,12 @@ def plain_settling(run):
         yield t_s[inside[0]] if inside else None
 
 
+def plain_overshoot(run):
+    for error in run.telemetry["error_rad"].T:
+        past = error if error[0] < 0 else -error
+        yield max(0.0, *past) if abs(error[0]) > BAND_rad else None
+
+
 def plain_variation(run):
     command, t_s = run.telemetry["current_command_A"], run.telemetry["t_s"]
     up_and_down = [np.sum(np.abs(np.diff(command[:, group]))) for group in range(command.shape[1])]
@@ -53,6 +59,7 @@ PLAIN = {
         np.mean(run.telemetry["error_rad"][run.scenario.ticks // 2 :] ** 2, axis=0)
     ),
     "settling_time_s": lambda run: list(plain_settling(run)),
+    "overshoot_rad": lambda run: list(plain_overshoot(run)),
     "max_abs_current_A": lambda run: np.abs(run.telemetry["current_A"]).max(),
     "saturated_fraction": lambda run: np.mean(run.telemetry["allocation_scale"] < 1),
     "rms_torque_Nm": lambda run: np.sqrt(np.mean(np.linalg.norm(run.telemetry["torque_Nm"], axis=1) ** 2)),
@@ -162,6 +169,17 @@ def test_settled_is_settled_for_good(still):
     assert value("settling_time_s", planned, table) == [pytest.approx(0.4), pytest.approx(0.701), None]
     table["error_rad"][:] = 0
     assert value("settling_time_s", planned, table) == [0.0, 0.0, 0.0]
+
+
+def test_only_what_is_past_the_reference_overshoots(still):
+    planned, table = still
+    table["error_rad"][:] = [-0.2, 0.2, 0.9 * BAND_rad]
+    table["error_rad"][500:] = [
+        0.03,
+        0.001,
+        -0.1,
+    ]  # the second comes near, the third had no step to overshoot
+    assert value("overshoot_rad", planned, table) == [0.03, 0.0, None]
 
 
 @pytest.mark.parametrize(("share", "lines"), [(0.05, 0), (0.051, 1)])

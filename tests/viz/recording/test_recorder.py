@@ -71,10 +71,9 @@ def test_every_signal_is_recorded_bit_for_bit(run):
     table = finished.telemetry
     ticks_ns = np.arange(len(table)) * 1_000_000
     for signal in table.signals:
-        if signal.name != "t_s":
-            times, values = rows_of(path, blueprint.entity(signal.name), "Scalars:scalars")
-            np.testing.assert_array_equal(times, ticks_ns)
-            assert values.tobytes() == np.ascontiguousarray(table[signal.name]).tobytes()
+        times, values = rows_of(path, blueprint.entity(signal.name), "Scalars:scalars")
+        np.testing.assert_array_equal(times, ticks_ns)
+        assert values.tobytes() == np.ascontiguousarray(table[signal.name]).tobytes()
 
 
 def test_rotor_turns_as_the_telemetry_says(run):

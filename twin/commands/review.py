@@ -1,0 +1,104 @@
+"""``spheretwin review RUN [RUN ...]``: look at runs again from their files; hold them to the first."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import check_writable
+from spheretwin.twin.commands.reporting import print_json, warn
+from spheretwin.twin.review import columns, tolerances
+from spheretwin.twin.review.figures import figures
+from spheretwin.twin.review.holding import Exceeded, exceeded
+from spheretwin.twin.review.run import Reviewed, read
+from spheretwin.viz.terminal import reviews, tables
+
+
+def add_to(verbs: Any) -> None:
+    """Add the verb to the command's parser."""
+    parser = verbs.add_parser(
+        "review",
+        help="look at runs again from their telemetry or recordings",
+        description="Tell facts, figures and events of runs from their own files alone; of several, their"
+        " differences from the first. Exit code 1 where a run leaves the tolerances.",
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "runs",
+        type=Path,
+        nargs="+",
+        metavar="RUN",
+        help="telemetry (.parquet) or a recording (.rrd), also one that a killed process left",
+    )
+    parser.add_argument(
+        "--tolerance",
+        metavar="FILE.toml",
+        help="hold the others against the first, signal by signal; or a shipped one:"
+        f" {', '.join(tolerances.shipped())}",
+    )
+    parser.add_argument(
+        "--export", type=Path, metavar="FILE", help="write the columns of the run as .csv or .parquet"
+    )
+    parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the verb; True when all runs are within the tolerances, if there are any."""
+    if rest:
+        raise InputError(f"command line: expected --tolerance, --export or --json, received {' '.join(rest)}")
+    _check(options)
+    allowed = tolerances.load(options.tolerance) if options.tolerance else None
+    first, *others = runs = [read(path) for path in options.runs]
+    told = [figures(each) for each in runs]
+    over = [exceeded(first, other, allowed) for other in others] if allowed else []
+    if options.export:
+        columns.export(first, options.export)
+    if options.json:
+        _print_json(told, over, held=allowed is not None)
+    else:
+        reviews.print_runs(told)
+        tables.print_written([options.export] if options.export else [])
+    warn(_recovered(each) for each in runs if not each.whole)
+    for places in filter(None, over):
+        print(f"spheretwin: review: {_first(places)}", file=sys.stderr)
+    return not any(over)
+
+
+def _check(options: argparse.Namespace) -> None:
+    if options.tolerance and len(options.runs) < 2:
+        raise InputError("command line: expected two runs or more for --tolerance, received one")
+    if options.export and len(options.runs) > 1:
+        raise InputError(f"command line: expected one run for --export, received {len(options.runs)}")
+    if options.export:
+        columns.check(options.export)
+        check_writable(options.export)
+
+
+def _print_json(told: list[dict[str, Any]], over: list[list[Exceeded]], *, held: bool) -> None:
+    """Print the runs, and where each of the others first leaves what each signal is allowed."""
+    within = not any(over) if held else None
+    print_json(
+        {"runs": told, "within_tolerance": within, "exceeded": [place for each in over for place in each]}
+    )
+
+
+def _recovered(each: Reviewed) -> str:
+    return (
+        f"{each.path} was not closed: {len(each.table)} rows, {each.simulated_s:.3f} s of the run,"
+        " were recovered"
+    )
+
+
+def _first(places: Sequence[Exceeded]) -> str:
+    first, others = places[0], len(places) - 1
+    more = f"; {others} more signal{'s' if others > 1 else ''} later" if others else ""
+    axis = f" {first.axis}" if first.axis else ""
+    return (
+        f"{first.path}: {first.signal}{axis} leaves its tolerance first at {first.t_s:.6g} s,"
+        f" by {first.by:.3g}{more}"
+    )

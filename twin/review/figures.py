@@ -1,0 +1,90 @@
+"""What a review tells of one run: facts, the metrics of every run, work and spectrum, events."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.metrics.metric import Planned
+from spheretwin.twin.records.summary import Figures
+from spheretwin.twin.review.happened import events
+from spheretwin.twin.review.run import Reviewed
+from spheretwin.twin.review.spectrum import peaks
+from spheretwin.twin.review.work import mechanical_work_J
+from spheretwin.twin.scenario.files import files_of
+from spheretwin.twin.scenario.reading import validated
+
+
+def figures(run: Reviewed) -> dict[str, Any]:
+    """All that a review tells of a run, as JSON holds it.
+
+    Raises
+    ------
+    InputError
+        Its scenario is none of this version's, or its model file is no longer there or has other coil groups.
+    """
+    try:
+        return _figures(run)
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
+        raise InputError(f"review {run.path}: expected facts and rows of a run, {error!r}") from None
+
+
+def _figures(run: Reviewed) -> dict[str, Any]:
+    scenario = run.record.scenario
+    metrics = _metrics(run)
+    work_J, copper_J = mechanical_work_J(run.table, run.period_s), metrics["copper_loss_J"]
+    return {
+        "path": str(run.path),
+        "scenario": scenario["name"],
+        "law": scenario["controller"]["law"],
+        "modelling_error": scenario["plant"]["modelling_error"],
+        "load": scenario["disturbance"]["load"],
+        "hardware": scenario["hardware"],
+        "seed": scenario["seed"],
+        "status": run.record.status,
+        "reason": _reason(run.table),
+        "whole": run.whole,
+        "rows": len(run.table),
+        "simulated_s": run.simulated_s,
+        "planned_s": scenario["duration"],
+        **metrics,
+        "mechanical_work_J": work_J,
+        "energy_J": None if work_J is None or copper_J is None else work_J + copper_J,
+        "error_peaks": {
+            angle: [{"frequency_Hz": peak.frequency_Hz, "amplitude_rad": peak.amplitude} for peak in of_axis]
+            for angle, of_axis in zip(ANGLES, _error_peaks(run), strict=True)
+        },
+        "events": [{"t_s": t_s, "level": level, "text": text} for t_s, level, text in events(run)],
+        "versions": dict(run.record.versions),
+    }
+
+
+def _metrics(run: Reviewed) -> dict[str, Any]:
+    scenario = validated(_what_metrics_take(run), str(run.path))
+    gathered = Figures(Planned(scenario, files_of(scenario).actuator, scenario.ticks))
+    gathered.write(run.table)
+    return gathered.values()
+
+
+def _what_metrics_take(run: Reviewed) -> dict[str, Any]:
+    """The run's scenario without law and trajectory, whose files may be gone: no one runs them."""
+    kept = ("name", "duration", "seed", "plant", "drive")
+    return {
+        **{name: run.record.scenario[name] for name in kept},
+        "controller": {"law": "pd", "period_s": run.period_s},
+        "trajectory": {"shape": "hold"},
+    }
+
+
+def _error_peaks(run: Reviewed) -> list[Any]:
+    return [peaks(column, run.period_s) for column in run.table["error_rad"].T]
+
+
+def _reason(table: Table) -> str | None:
+    """Why the watchdog took the currents away, if there was one and it did."""
+    for signal in table.signals:
+        if signal.name == "failsafe_reason" and len(table) and table[signal.name][-1] > 0:
+            return signal.states[int(table[signal.name][-1])]
+    return None

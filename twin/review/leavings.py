@@ -1,0 +1,117 @@
+"""What a killed process leaves of its files: found beside them, and made whole again."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.file import join
+from spheretwin.models.telemetry.parts import read_schema
+from spheretwin.models.telemetry.table import read_parquet
+
+RECORDINGS = (".rrd",)
+
+
+class Recovered(NamedTuple):
+    """How much was left."""
+
+    rows: int
+    seconds: float
+
+
+def found(path: Path) -> Path:
+    """The file of a name; where there is none, what a killed process left of it under a hidden one.
+
+    Raises
+    ------
+    InputError
+        There is nothing, or of several processes.
+    """
+    try:
+        if path.exists():
+            return path
+        left = sorted(
+            each for kind in ("parts", "part") for each in path.parent.glob(f".{path.name}.*.{kind}")
+        )
+    except (OSError, ValueError) as error:  # ValueError: a zero in the path
+        raise InputError(f"review {path}: expected the file of a run, {error}") from None
+    if len(left) == 1:
+        return left[0]
+    received = f"what {len(left)} processes left: {', '.join(map(str, left))}" if left else "none"
+    raise InputError(f"review {path}: expected the file of a run, received {received}")
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file that a killed process left is a recording's."""
+    return path.suffix == ".part" and ".rrd." in path.name
+
+
+@contextmanager
+def joined(folder: Path) -> Iterator[Path]:
+    """Give a telemetry file of the parts in a folder.
+
+    Raises
+    ------
+    InputError
+        There are none, or not a row of them is whole.
+    """
+    with tempfile.TemporaryDirectory(prefix="spheretwin-") as temporary:
+        join(_parts(folder), path := Path(temporary) / "joined.parquet")
+        yield path
+
+
+def recover(path: Path, out: Path) -> Recovered:
+    """Write what a killed process left as the file that it was to become.
+
+    Parameters
+    ----------
+    path : Path
+        The file that it did not close, its name, or the folder of its parts.
+    out : Path
+        Where to write it.
+
+    Raises
+    ------
+    InputError
+        Nothing was left, or the file is whole.
+    SpheretwinError
+        Writing failed; what was there before is untouched.
+    """
+    left = found(path)
+    if left.is_dir():
+        parts = _parts(left)
+        period_s = _period_s(parts[0])
+        rows = join(parts, out)
+        return Recovered(rows, rows * period_s)
+    if left.suffix in RECORDINGS or is_recording(left):
+        from spheretwin.viz.recording import messages, reading  # Rerun is slow to import
+
+        if messages.extent(left).ended:
+            raise InputError(
+                f"recover {left}: expected a recording that was not closed, received a whole one"
+            )
+        recorded = reading.rewrite(left, out)
+        rows = len(recorded.table)
+        return Recovered(rows, rows * recorded.facts["sections"]["controller"]["period_s"])
+    read_parquet(left, rows=False)  # what is no telemetry is told as such
+    raise InputError(f"recover {left}: expected what a killed process left, received a whole telemetry file")
+
+
+def _period_s(part: Path) -> float:
+    """Control period of the run that a part is of, s."""
+    schema = read_schema(part)
+    try:
+        return float(json.loads((schema.metadata if schema else {})[b"scenario"])["controller"]["period_s"])
+    except (KeyError, ValueError, TypeError, RecursionError) as error:
+        raise InputError(f"telemetry {part}: expected a part with a run's scenario, {error!r}") from None
+
+
+def _parts(folder: Path) -> list[Path]:
+    if parts := sorted(folder.glob("*.arrows")):
+        return parts
+    raise InputError(f"telemetry {folder}: expected a folder of parts, received one without any")

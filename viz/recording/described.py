@@ -1,0 +1,35 @@
+"""What a recording says for those who read it back: facts of the run, what each signal is."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import rerun as rr
+
+from spheretwin.models.telemetry.facts import RunFacts
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.versions import versions
+
+FACTS, SIGNAL = "facts", "signal"
+"""Names of the components below."""
+
+COMPLETE = "t_s"
+"""Signal that is recorded behind all others of its rows."""
+
+
+def facts_as_json(facts: RunFacts) -> rr.AnyValues:
+    """Facts of a run from its start, and the versions that it was made with."""
+    return rr.AnyValues(facts=json.dumps({**asdict(facts), "versions": versions()}, default=str))
+
+
+def signal_as_json(place: int, signal: Signal) -> rr.AnyValues:
+    """A signal, and its place among the columns."""
+    return rr.AnyValues(signal=json.dumps({"place": place, **asdict(signal)}))
+
+
+def signal_of(text: str) -> tuple[int, Signal]:
+    """Place and signal as they were written."""
+    fields = json.loads(text)
+    labels, states = (tuple(fields.pop(name)) for name in ("labels", "states"))
+    return fields.pop("place"), Signal(**fields, labels=labels, states=states)
