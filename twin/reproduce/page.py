@@ -24,7 +24,8 @@ MOST_COMMANDS = 200
 """On the page; of an experiment of more rows they are in a file beside it."""
 
 FIRST = "What was reproduced, and what was not"
-MARKS = {True: "**reproduced**", False: "**not reproduced**", None: "besides"}
+MARKS = {True: "**reproduced**", False: "**not reproduced**"}
+BESIDES = "What was found besides"
 
 
 class Chapter(NamedTuple):
@@ -94,12 +95,21 @@ def markdown(
 
 
 def _first(chapters: Sequence[Chapter]) -> list[str]:
-    """The first page: a line a finding."""
+    """The first page: a line a finding, those on the paper first."""
     findings = [(chapter.experiment.name, finding) for chapter in chapters for finding in chapter.findings]
-    if not findings:
-        return []
-    rows = [(name, MARKS[finding.held], f"{finding.text}.") for name, finding in findings]
-    return [f"## {FIRST}", "", *pieces.table(("", "", "what was found"), rows, (False,) * 3), ""]
+    of_paper = [(name, MARKS[each.held], f"{each.text}.") for name, each in findings if each.held is not None]
+    others = [(name, f"{each.text}.") for name, each in findings if each.held is None]
+    lines = []
+    if of_paper:
+        lines += [
+            f"## {FIRST}",
+            "",
+            *pieces.table(("", "", "of what the paper shows"), of_paper, (False,) * 3),
+            "",
+        ]
+    if others:
+        lines += [f"## {BESIDES}", "", *pieces.table(("", "what was found"), others, (False,) * 2), ""]
+    return lines
 
 
 def _alone(chapter: Chapter) -> list[str]:

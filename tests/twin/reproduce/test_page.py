@@ -111,7 +111,7 @@ def test_the_first_page_says_what_was_reproduced(tmp_path):
     assert page.FIRST in first
     assert "| short | **reproduced** | this was. |" in first
     assert "| short | **not reproduced** | that was not \\| at all. |" in first
-    assert "| short | besides | more. |" in first
+    assert "| short | more. |" in first.split(page.BESIDES)[1]
 
 
 @pytest.mark.parametrize("count", [2, page.MOST_COMMANDS + 1])

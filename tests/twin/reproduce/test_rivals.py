@@ -169,7 +169,7 @@ def test_rows_and_page_have_what_ran(short, tmp_path):
         assert (tmp_path / figure).stat().st_size > 0
         assert f"({figure})" in written
     assert "Paired on the prototype" in written
-    assert written.count("| rivals | besides |") == len(SETTINGS) + len(PROTOTYPE)
+    assert written.count("| rivals | ") == len(SETTINGS) + len(PROTOTYPE)
 
 
 def test_the_drawn_front_is_the_front(short):
