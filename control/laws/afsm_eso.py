@@ -61,7 +61,9 @@ true error of α and β on the tilt, degrees, median (worst) of 20 seeds, and va
 | PID | 0.069 (0.117) | 0.070 (0.105) | 0.063 (0.091) | 0.047 (0.069) | 0.040 (0.047) | 74.8 |
 
 Offset and gain of the converter alone make 0.045° (0.076°), which no law can see. ADRC with the same governor
-and feed-forward is level with it: what is ours there is what stands around the law.
+and feed-forward is level with it: what is ours there is what stands around the law. Of 40 trials of the study
+`tuning` none has less error and less variation than the preset; 0.7 of λ and K have 9.4 A/s for 2 % more
+error.
 """
 
 from math import exp

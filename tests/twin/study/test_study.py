@@ -15,7 +15,7 @@ PD = [{"law": "pd"}]
 def test_studies_ship_and_each_has_the_rows_that_it_says():
     assert shipped() == ["paper", "robustness", "tuning"]
     paper, robustness, tuning = (load(name) for name in shipped())
-    assert (len(Grid(paper)), len(Grid(robustness)), len(Grid(tuning))) == (108, 10_000, 30)
+    assert (len(Grid(paper)), len(Grid(robustness)), len(Grid(tuning))) == (108, 10_000, 50)
     assert [law["law"] for law in paper.law] == ["pd", "adaptive_fuzzy", "afsm"]
     assert robustness.fields["duration"] == 1.0
     for chosen in (paper, robustness, tuning):

@@ -21,8 +21,9 @@ def pid_gains():
 
 @pytest.mark.parametrize("law", SHIPPED.law, ids=lambda law: law["law"])
 def test_the_shipped_tuning_starts_with_the_laws_own_gains(law):
-    gains, default = gains_of(SHIPPED, law, Rows(SHIPPED)), LAWS[law["law"]]()
-    own = {name: tuple(value) for name, value in law.items() if name != "law"}
+    preset = {name: law[name] for name in ("preset",) if name in law}
+    gains, default = gains_of(SHIPPED, law, Rows(SHIPPED)), LAWS[law["law"]](**preset)
+    own = {name: tuple(value) for name, value in law.items() if name not in ("law", "preset")}
     for field, value in values(gains, middle(gains)).items():
         name, _, entry = field.removeprefix("controller.").partition(".")
         at = [int(entry)] if entry else [0, 1, 2]
