@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import did_you_mean
@@ -83,6 +82,8 @@ def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: floa
         np.where(none, np.inf, reference - allowed),
     )
     if ticks:
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d  # slow to import
+
         window = 2 * ticks + 1
         highest = maximum_filter1d(highest, window, axis=0, mode="nearest")
         lowest = minimum_filter1d(lowest, window, axis=0, mode="nearest")

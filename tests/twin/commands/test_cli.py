@@ -207,3 +207,20 @@ def test_what_is_not_chosen_is_not_compiled(tmp_path):
     assert any("engine" in name for name in entries)
     for part in ("bounded", "simplex", "plant-lagrangian"):
         assert not [name for name in entries if part in name], part
+
+
+# What comes with an extra, and what takes long to import though a run needs nothing of it.
+NOT_FOR_A_RUN = (
+    "matplotlib magpylib manifold3d trimesh ray optuna pinocchio control scipy.ndimage scipy.linalg rerun"
+)
+
+
+def test_a_run_imports_nothing_that_it_does_not_need():
+    asked = (
+        "import sys; from spheretwin.twin import cli;"
+        "code = cli.main(['simulate', 'hold', '--duration', '0.01', '--json']);"
+        f"found = sorted(set({NOT_FOR_A_RUN.split()!r}) & set(sys.modules));"
+        "sys.exit(f'{code} {found}')"
+    )
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, cwd="/", check=False)
+    assert done.stderr.splitlines()[-1] == "0 []"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.study_spreads import Rank
+if TYPE_CHECKING:  # Matplotlib is slow to import, and need not be there
+    from spheretwin.viz.figures.study_spreads import Rank
 
 NORMAL_95 = 1.96
 
@@ -49,6 +51,8 @@ def ranked(axes: Sequence[NDArray[np.float64]], figure: NDArray[np.float64]) -> 
     else:
         found = plain[-1, :-1]
     free = rows - among if is_partial else rows - 1
+    from spheretwin.viz.figures.study_spreads import Rank
+
     return Rank(found[: len(axes)], found[len(axes) :], NORMAL_95 / np.sqrt(free), is_partial)
 
 
