@@ -69,6 +69,14 @@ def raise_to_largest(rows: Array, largest: Array) -> None:
 
 
 @rounding_each
+def raise_to_farthest(rows: Array, direction: Array, farthest: Array) -> None:
+    """Raise `farthest` (k,) to how far rows (n, k) go in a direction (k,), 1 or -1; 0 for none."""
+    for i in range(rows.shape[0]):
+        for j in range(rows.shape[1]):
+            farthest[j] = max(farthest[j], direction[j] * rows[i, j])
+
+
+@rounding_each
 def note_last_outside(rows: Array, band: float, first: int, last: NDArray[np.int64]) -> None:
     """Write into `last` (k,) where a magnitude of rows (n, k), counted from `first`, last leaves a band."""
     for i in range(rows.shape[0]):

@@ -61,3 +61,10 @@ def test_largest_and_last_outside_are_those_of_all_rows(size):
     outside = [np.flatnonzero(np.abs(column) > 1e-3) for column in ROWS.T]
     assert last.tolist() == [places[-1] if len(places) else -1 for places in outside]
     assert last.min() == -1 < last.max()
+
+
+def test_how_far_rows_go_in_a_direction():
+    direction, farthest = np.array([1.0, -1.0, 0.0, 1.0, -1.0]), np.zeros(5)
+    for rows in chunks(7):
+        reducing.raise_to_farthest(rows, direction, farthest)
+    np.testing.assert_array_equal(farthest, np.maximum((direction * ROWS).max(axis=0), 0.0))

@@ -7,6 +7,7 @@ import numpy as np
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.metrics.metric import Metric, Planned
+from spheretwin.twin.metrics.reducing import raise_to_farthest
 from spheretwin.twin.metrics.tracking.settling_time import BAND_rad
 
 
@@ -25,11 +26,11 @@ class Overshoot(Metric):
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, at least one."""
-        error = rows["error_rad"]
+        error = np.ascontiguousarray(rows["error_rad"])
         if not self._rows:
             self._start = error[0].copy()
         self._rows += len(rows)
-        self._largest = np.maximum(self._largest, (-np.sign(self._start) * error).max(axis=0))
+        raise_to_farthest(error, -np.sign(self._start), self._largest)
 
     def value(self) -> list[float | None] | None:
         """[3] in rad; None without a row."""
