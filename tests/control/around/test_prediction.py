@@ -99,7 +99,7 @@ def test_the_torque_is_that_of_the_period_before_the_instant_predicted(delay, ac
     torque = np.zeros(3)
     for first, last in pairwise(parts):
         for i in range(3):
-            torque[i] += quad(lambda t: E_G[i] @ way.current(t), first + 1e-13, last - 1e-13)[0]  # noqa: B023
+            torque[i] += quad(lambda t, row=E_G[i]: row @ way.current(t), first + 1e-13, last - 1e-13)[0]
     # The pose turns by the rates over the delay all the same, and the matrix with it: G' v δ is what differs.
     tolerance = np.abs(E_G).max() * 18 * 8 * np.abs(V).max() * end + 1e-9
     np.testing.assert_allclose(way.measurement[2], torque / period_s, rtol=0, atol=tolerance)

@@ -1,9 +1,13 @@
 """Laws from a file of their user's: a class with parameters, a Law, a function; compiled and plain."""
 
+import os
+
 import numpy as np
 import pytest
 
+from spheretwin.control.law import Law
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin import cli
 from spheretwin.twin import scenario as scenarios
@@ -202,3 +206,33 @@ def test_what_cannot_be_had_is_told_in_one_line(tmp_path, capsys, text, name, pa
 def test_a_gain_out_of_range_names_its_field(file):
     with pytest.raises(InputError, match=r"controller\.stiffness\.1: expected greater than 0, received -2"):
         load(f"{file}:ComputedTorque", "--controller.stiffness", "1", "-2", "3")
+
+
+def test_what_a_plain_law_raises_is_told_in_one_line_and_keeps_the_json_alone(tmp_path, capsys):
+    (path := tmp_path / "plain.py").write_text(
+        "def fails(t, reference, measurement, parameters, state, torque):\n"
+        "    print('here')\n    torque[:] = 1 / 0 if t > 0.05 else 0\n"
+    )
+    assert cli.main(["simulate", "hold", "--controller.law", f"{path}:fails", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    told = [line for line in err.splitlines() if line != "here"]
+    assert told == [
+        "spheretwin: law fails: expected a torque at 0 s, received ZeroDivisionError: division by zero"
+    ]
+
+
+def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):
+    def step(t, reference, measurement, parameters, state, torque):
+        torque[:] = 0.0
+
+    from spheretwin.twin.records.facts import facts_of
+    from spheretwin.viz.recording.recorder import Recorder
+
+    law = Law("odd", step, [], np.zeros(3), (Signal("a b", "1", 3, "odd", ANGLES),))
+    with Session(scenarios.load("hold"), law) as session:
+        path = tmp_path / "odd.rrd"
+        with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
+            recorder.write(session.advance(10))
+    assert capfd.readouterr().err == ""
+    assert os.path.getsize(path) > 0

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import BinaryIO
 
-try:
+if sys.platform == "win32":
+    import msvcrt
+else:
     import fcntl
-except ImportError:  # Windows, which has `msvcrt` instead
-    fcntl = None  # type: ignore[assignment] # a module to the checker, and asked for before each use
 
 BEYOND = 1 << 62
 """Byte that is locked where a lock keeps others from reading: one that no file has."""
@@ -21,14 +22,12 @@ def lock(file: BinaryIO) -> None:
     OSError
         Another process has it.
     """
-    if fcntl is not None:
+    if sys.platform == "win32":
+        place = file.tell()
+        file.seek(BEYOND)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        finally:
+            file.seek(place)
+    else:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return
-    import msvcrt
-
-    place = file.tell()
-    file.seek(BEYOND)
-    try:
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-    finally:
-        file.seek(place)
