@@ -1,0 +1,368 @@
+"""A new member of every family: its file, its row, and where that belongs."""
+
+from typing import NamedTuple
+
+
+class Addition(NamedTuple):
+    """What is written for a new member: its file, and its row (with the import) in the family's list."""
+
+    file: str
+    text: str
+    registry: str
+    row: tuple[str, str]
+    imported: str = ""
+
+
+ADDITIONS = {
+    "law": Addition(
+        "control/laws/lazy.py",
+        '''
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.control.law import Known, Law
+from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each, named
+
+
+class Lazy(LawParameters):
+    """Proportional, and slow."""
+
+    law: Literal["lazy"] = named("lazy")
+    slackness: PositiveEach = Field(each(2.0), description="torque a unit of error, N·m")
+
+    def build(self, known: Known) -> Law:
+        return Law(self.law, step, np.array(self.slackness), np.zeros(0))
+
+
+def step(t, reference, measurement, parameters, state, torque):
+    for axis in range(3):
+        torque[axis] = -parameters[axis] * (measurement[0, axis] - reference[0, axis])
+        torque[axis] -= 0.05 * (measurement[1, axis] - reference[1, axis])
+''',
+        "control/laws/registry.py",
+        ("    | AFSMWithObserver,\n", "    | AFSMWithObserver\n    | Lazy,\n"),
+        "from spheretwin.control.laws.lazy import Lazy\n",
+    ),
+    "trajectory": Addition(
+        "twin/trajectories/shapes/ramp.py",
+        '''
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.twin.trajectories.trajectory import Shape, Triple
+
+
+class Ramp(Shape):
+    """Each axis at a rate of its own."""
+
+    shape: Literal["ramp"] = Field("ramp", description="kind of trajectory")
+    rate_rad_s: Triple = Field((0.1, 0.2, 0.3), description="rate of each axis, rad/s")
+
+    def sharp(self, t):
+        rate = np.array(self.rate_rad_s)
+        rows = [np.outer(t, rate), np.tile(rate, (len(t), 1)), np.zeros((len(t), 3))]
+        return np.stack(rows, axis=1)
+''',
+        "twin/trajectories/registry.py",
+        ("    | Waypoints,\n", "    | Waypoints\n    | Ramp,\n"),
+        "from spheretwin.twin.trajectories.shapes.ramp import Ramp\n",
+    ),
+    "disturbance": Addition(
+        "twin/disturbances/kick.py",
+        '''
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.twin.disturbances.term import Term, Torque
+
+
+class Kick(Term):
+    """One pulse."""
+
+    kind: Literal["kick"] = Field("kick", description="kind of disturbance")
+    torque_Nm: Torque = Field(0.01, description="on the second axis from 10 to 20 ms, N·m")
+
+    def sample(self, t, draws):
+        return np.outer((t >= 0.01) & (t < 0.02), [0.0, self.torque_Nm, 0.0])
+''',
+        "twin/disturbances/registry.py",
+        ("    | Random,\n", "    | Random\n    | Kick,\n"),
+        "from spheretwin.twin.disturbances.kick import Kick\n",
+    ),
+    "telemetry column": Addition(
+        "twin/columns/largest.py",
+        """
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.twin.columns.column import Columns
+
+
+@part_of_its_caller
+def write(row, controller, sensors, plant):
+    row[0] = 0.0
+    for j in range(plant.current.shape[0]):
+        row[0] = max(row[0], abs(plant.current[j]))
+
+
+SIGNALS = (Signal("largest_current_A", "A", 1, "largest group current at the end of the tick"),)
+COLUMNS = Columns(lambda groups: SIGNALS, lambda scenario: True, write)
+""",
+        "twin/columns/registry.py",
+        ("    drive.COLUMNS,\n", "    drive.COLUMNS,\n    largest.COLUMNS,\n"),
+        "from spheretwin.twin.columns import largest\n",
+    ),
+    "plant": Addition(
+        "twin/plant/stiff.py",
+        """
+from typing import NamedTuple
+
+import numpy as np
+
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.twin.plant.rotor import EngineKind
+
+
+class Integrators(NamedTuple):
+    step_s: float
+    inertia: np.ndarray
+    q: np.ndarray
+    qdot: np.ndarray
+    torque_S: np.ndarray
+    torque_q: np.ndarray
+    warnings: np.ndarray
+
+
+class Uncoupled:
+    def __init__(self, setting):
+        self.setting = setting
+
+    def start(self, q, qdot):
+        self.q, self.qdot = np.array(q, float), np.array(qdot, float)
+        inertia = self.setting.actuator.inertia
+        none = np.zeros(1, np.int32)
+        return Integrators(
+            self.setting.step_s, inertia, self.q, self.qdot, np.zeros(3), np.zeros(3), none
+        )
+
+    def state(self):
+        return np.concatenate([self.q, self.qdot])
+
+    def restore(self, state):
+        self.q[:], self.qdot[:] = state[:3], state[3:]
+
+
+@allocation_free
+def step(rotor):
+    for i in range(3):
+        rotor.qdot[i] += rotor.step_s * (rotor.torque_S[i] + rotor.torque_q[i]) / rotor.inertia[i]
+        rotor.q[i] += rotor.step_s * rotor.qdot[i]
+
+
+UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
+""",
+        "twin/plant/registry.py",
+        ("        lagrangian.LAGRANGIAN,\n", "        lagrangian.LAGRANGIAN,\n        stiff.UNCOUPLED,\n"),
+        "from spheretwin.twin.plant import stiff\n",
+    ),
+    "metric": Addition(
+        "twin/metrics/effort/mean_load.py",
+        '''
+import numpy as np
+
+from spheretwin.twin.metrics.metric import Metric
+from spheretwin.twin.metrics.reducing import add_rows
+
+
+class MeanLoad(Metric):
+    """Mean disturbance on each axis, N·m."""
+
+    def __init__(self, planned):
+        super().__init__(planned)
+        self.total, self.rows = np.zeros(3), 0
+
+    def write(self, rows):
+        add_rows(np.ascontiguousarray(rows["disturbance_Nm"]), self.total)
+        self.rows += len(rows)
+
+    def value(self):
+        """[3] in N·m; None without a row."""
+        return (self.total / self.rows).tolist() if self.rows else None
+''',
+        "twin/metrics/registry.py",
+        (
+            '    "copper_loss_J": CopperLoss,\n',
+            '    "copper_loss_J": CopperLoss,\n    "mean_load_Nm": MeanLoad,\n',
+        ),
+        "from spheretwin.twin.metrics.effort.mean_load import MeanLoad\n",
+    ),
+    "check": Addition(
+        "twin/crosscheck/units.py",
+        """
+from typing import NamedTuple
+
+from spheretwin.models.base.check import Check
+from spheretwin.twin.crosscheck.part import Part
+
+
+class Units(NamedTuple):
+    checks: list[Check]
+
+
+def examine(subject):
+    value = float(abs(subject.actuator.inertia).max())
+    return Units([Check("inertia is small", "largest inertia, kg·m²", 1, value, 1.0, "it fits a hand")])
+
+
+PART = Part("units", examine)
+""",
+        "twin/crosscheck/suite.py",
+        ("    closed_loop.PART,\n", "    closed_loop.PART,\n    units.PART,\n"),
+        "from spheretwin.twin.crosscheck import units\n",
+    ),
+    "figure": Addition(
+        "twin/crosscheck/figures/names.py",
+        """
+from spheretwin.viz.figures.drawing import Drawing
+
+
+def draw(evidence):
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    figure.text(0.1, 0.5, ", ".join(check.name for check in evidence.checks))
+    return Drawing("names.png", "Names of the checks.", figure)
+""",
+        "twin/crosscheck/figures/registry.py",
+        ("    closed_loop.draw,\n", "    closed_loop.draw,\n    names.draw,\n"),
+        "from spheretwin.twin.crosscheck.figures import names\n",
+    ),
+    "experiment": Addition(
+        "twin/reproduce/holding.py",
+        """
+from spheretwin.twin.reproduce.experiment import Case, Experiment, Section, Table
+
+
+def cases():
+    laws = ("pd", "lazy")
+    return [Case(law, "hold", {"controller.law": law, "duration": 0.05}, draws=False) for law in laws]
+
+
+def tell(outcomes):
+    rows = [(name, str(found[0].status)) for name, found in outcomes.items()]
+    return [Section("All", "They hold.", [Table("Ends", ("law", "status"), rows)])]
+
+
+EXPERIMENT = Experiment("holding", "Holding on", "Laws that hold on.", cases, tell)
+""",
+        "twin/reproduce/registry.py",
+        ("        budget.EXPERIMENT,\n", "        budget.EXPERIMENT,\n        holding.EXPERIMENT,\n"),
+        "from spheretwin.twin.reproduce import holding\n",
+    ),
+    "status": Addition(
+        "",
+        "",
+        "models/telemetry/status.py",
+        (
+            '    INTERRUPTED = "interrupted",',
+            '    BORED = "bored", Level.WARN, "nothing went on any more"\n    INTERRUPTED = "interrupted",',
+        ),
+    ),
+    "estimator": Addition(
+        "control/estimation/rough.py",
+        '''
+from typing import Literal
+
+import numpy as np
+
+from spheretwin.control.estimation.estimator import Derived, Estimator, EstimatorParameters, Sampling, named
+
+
+class Rough(EstimatorParameters):
+    """The backward difference as it is."""
+
+    kind: Literal["rough"] = named("rough")
+
+    def build(self, sampling: Sampling) -> Estimator:
+        return Estimator(self.kind, step, np.array([sampling.period_s]), np.full(3, np.nan))
+
+    def derived(self, sampling: Sampling) -> Derived:
+        T = sampling.period_s
+        return Derived(np.full(3, np.sqrt(2) / T), np.full(3, T / 2))
+
+
+def step(angle, parameters, state, rate):
+    for axis in range(3):
+        rate[axis] = (angle[axis] - state[axis]) / parameters[0] if state[axis] == state[axis] else 0.0
+        state[axis] = angle[axis]
+''',
+        "control/estimation/registry.py",
+        ("    | Differentiator,\n", "    | Differentiator\n    | Rough,\n"),
+        "from spheretwin.control.estimation.rough import Rough\n",
+    ),
+    "fault": Addition(
+        "twin/faults/targets/fuse.py",
+        """
+from spheretwin.twin.electronics.driving.undriven import OPEN
+from spheretwin.twin.faults.target import Mode, Target
+
+
+def _blow(effects, strike):
+    effects.drive.acts[0] = True
+    effects.drive.contact[strike.place] = OPEN
+
+
+TARGET = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
+""",
+        "twin/faults/targets/registry.py",
+        ("        supply.TARGET,\n", "        supply.TARGET,\n        fuse.TARGET,\n"),
+        "from spheretwin.twin.faults.targets import fuse\n",
+    ),
+    "axis": Addition(
+        "twin/study/axes/triangular.py",
+        '''
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from spheretwin.twin.study.axes.axis import DrawnAxis, Number
+
+
+class Triangular(DrawnAxis):
+    """Most often at its lower end."""
+
+    kind: Literal["triangular"] = Field("triangular", description="how the values are chosen")
+    low: Number = Field(description="lower bound, the most frequent")
+    width: Number = Field(description="from there to the upper bound")
+
+    def drawn(self, uniform):
+        return self.low + self.width * (1 - np.sqrt(1 - uniform))
+''',
+        "twin/study/axes/registry.py",
+        ("    | Normal,\n", "    | Normal\n    | Triangular,\n"),
+        "from spheretwin.twin.study.axes.triangular import Triangular\n",
+    ),
+    "allocation": Addition(
+        "control/allocation/halved.py",
+        '''
+from spheretwin.control.allocation.least_norm import allocate
+
+
+def halved(G, torque_S, limit, current, scratch):
+    """Least-norm currents up to half of the limit."""
+    share = allocate(G, torque_S, 0.5 * limit, current)
+    return share
+''',
+        "control/allocation/registry.py",
+        ('    "bounded": bounded,\n', '    "bounded": bounded,\n    "halved": halved,\n'),
+        "from spheretwin.control.allocation.halved import halved\n",
+    ),
+}
+
+# An editable install would be found before the copy.
