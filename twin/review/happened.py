@@ -11,7 +11,7 @@ from spheretwin.twin.review.run import Reviewed
 from spheretwin.twin.scenario.changing import from_now_on
 from spheretwin.twin.scenario.planned import first_tick
 from spheretwin.twin.simulation import change_told
-from spheretwin.viz.recording.events import Event, Events
+from spheretwin.viz.recording.parts.events import Event, Events
 
 
 def events(run: Reviewed) -> list[Event]:

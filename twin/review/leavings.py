@@ -89,7 +89,7 @@ def recover(path: Path, out: Path) -> Recovered:
         rows = join(parts, out)
         return Recovered(rows, rows * period_s)
     if left.suffix in RECORDINGS or is_recording(left):
-        from spheretwin.viz.recording import messages, reading  # Rerun is slow to import
+        from spheretwin.viz.reading import messages, reading  # Rerun is slow to import
 
         if messages.extent(left).ended:
             raise InputError(

@@ -13,7 +13,7 @@ from spheretwin.models.telemetry.record import RunRecord
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.twin.review import leavings
-from spheretwin.viz.recording.events import Event
+from spheretwin.viz.recording.parts.events import Event
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def _of_telemetry(path: Path, table: Table, metadata: dict[str, str], *, whole: 
 
 
 def _of_recording(path: Path) -> Reviewed:
-    from spheretwin.viz.recording import reading  # Rerun is slow to import
+    from spheretwin.viz.reading import reading  # Rerun is slow to import
 
     facts, table, log, whole = reading.read(path)
     statuses = {status.told: status for status in Status}

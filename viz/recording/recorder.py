@@ -10,9 +10,7 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
-from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
@@ -22,19 +20,14 @@ from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Level, Status, named
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz import palette
-from spheretwin.viz.recording import blueprint, scene
-from spheretwin.viz.recording.blueprint import View
-from spheretwin.viz.recording.described import COMPLETE, facts_as_json, signal_as_json
-from spheretwin.viz.recording.events import Event, Events
+from spheretwin.viz.layout.layout import layout
+from spheretwin.viz.layout.view import View, application
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.live import Viewer
-from spheretwin.viz.recording.states import StateChanges
-
-Index = list[rr.TimeColumn]
-
-# What only the eye needs: poses, coil colours, traces.
-FRAME_RATE_Hz = 60.0
+from spheretwin.viz.recording.parts.log import log_lines
+from spheretwin.viz.recording.parts.part import Subject
+from spheretwin.viz.recording.parts.registry import PARTS
+from spheretwin.viz.scene.meshes import read_meshes
 
 # Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
 # does not gather in memory.
@@ -42,8 +35,6 @@ PENDING_CHUNKS = 3
 
 # Rerun keeps some bytes of each chunk to the end of a recording. Chunks therefore grow with it, up to this.
 MOST_ROWS = 12_288
-
-_SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
 
 
 class Recorder:
@@ -86,18 +77,15 @@ class Recorder:
         live: bool = False,
     ) -> None:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
-        self._actuator, self._facts = actuator, facts
-        scene.read_meshes(facts.mjcf)  # a run needs no mesh, and would find out only now that one is missing
+        subject = Subject(actuator, signals, facts)
+        read_meshes(facts.mjcf)  # a run needs no mesh, and would find out only now that one is missing
         self._path = path
-        self._events = Events()
-        self._next_frame = self._handed_over = 0
+        self._parts = [part(subject) for part in PARTS]
+        self._handed_over = 0
         self._waiting: list[Table] = []
-        self._last_tips: dict[str, NDArray[np.float64]] = {}
-        self._states = StateChanges()
-        self._described: set[str] = set()
         own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
         view = View(facts.duration_s, facts.current_limit_A, len(actuator.groups), own, live)
-        self._recording = rr.RecordingStream(blueprint.application(view))
+        self._recording = rr.RecordingStream(application(view))
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self._output = OutputFile(path) if path else None
         self._pipe = _pipe_to(self._output) if self._output and PIPE_PATHS.is_dir() else None
@@ -106,24 +94,18 @@ class Recorder:
         self._room = Semaphore(PENDING_CHUNKS)
         self._fault: str | None = None
         self._closed = False
-        self._submit(self._connect, signals, view)
+        self._submit(self._connect, view)
 
-    def _connect(self, signals: tuple[Signal, ...], view: View) -> None:
+    def _connect(self, view: View) -> None:
         """Open the sinks, log all that stays the same, then let a viewer in."""
-        facts = self._facts
         sinks: list[Any] = []
         if self._output:
             sinks.append(rr.FileSink((self._pipe or self._output).path))
         if self.viewer:
             sinks.append(self.viewer.sink)
-        self._recording.set_sinks(*sinks, default_blueprint=blueprint.layout(view))
-        self._recording.send_recording_name(f"{facts.name}, {facts.law}")
-        scene.log_static(self._recording, self._actuator, facts.mjcf, facts.payload_kg)
-        blueprint.log_styles(self._recording, signals)
-        text = rr.TextDocument(_as_markdown(facts), media_type=rr.MediaType.MARKDOWN)
-        self._recording.log(blueprint.SCENARIO, text, static=True)
-        self._recording.log(blueprint.SCENARIO, facts_as_json(facts), static=True)
-        self._describe(signals)
+        self._recording.set_sinks(*sinks, default_blueprint=layout(view))
+        for part in self._parts:
+            part.begin(self._recording)
         if self.viewer:
             self.viewer.start()
 
@@ -149,13 +131,14 @@ class Recorder:
     def note(self, t_s: float, text: str) -> None:
         """Record what happened before the tick at `t_s`."""
         self._hand_over()
-        self._submit(lambda: self._log([(t_s, Level.INFO, text)]))
+        self._submit(log_lines, self._recording, [(t_s, Level.INFO, text)])
 
     def finish(self, status: Status) -> None:
         """Record how the run ended."""
         ending = named(status)  # a name that is none is told here, not in the recorder's thread
         self._hand_over()
-        self._submit(lambda: self._log([self._events.end(ending)]))
+        for part in self._parts:
+            self._submit(part.finish, self._recording, ending)
 
     def close(self) -> None:
         """Complete the file and give it its name; end the live viewer. A second time does nothing.
@@ -218,66 +201,10 @@ class Recorder:
             self._room.release()
 
     def _write(self, rows: Table) -> None:
-        index = _time_index(rows["t_s"])
-        self._describe(rows.signals)
-        # The times last: rows that have them are whole, wherever a killed process left off.
-        for signal in sorted(rows.signals, key=lambda signal: signal.name == COMPLETE):
-            column = _scalars(rows[signal.name], signal.size)
-            self._recording.send_columns(blueprint.entity(signal.name), index, [column])
-        self._write_frames(rows)
-        for entity, t_s, states in self._states.of(rows):
-            self._recording.send_columns(entity, _time_index(t_s), rr.StateChange.columns(state=states))
-        self._log(self._events.of(rows))
+        for part in self._parts:
+            part.write(self._recording, rows)
         if not self.viewer:
             self._recording.flush()  # encode it here, beside the loop, rather than all at the end
-
-    def _describe(self, signals: tuple[Signal, ...]) -> None:
-        """Say of signals that come for the first time what they are; a change of law may bring some."""
-        new = [signal for signal in signals if signal.name not in self._described]
-        for signal in new:
-            described = signal_as_json(len(self._described), signal)
-            self._recording.log(blueprint.entity(signal.name), described, static=True)
-            self._described.add(signal.name)
-        if new and not self.viewer:
-            self._recording.flush()  # before their rows: what a killed process leaves says what they are
-
-    def _write_frames(self, rows: Table) -> None:
-        """Poses, coil colours and traces of the ticks that fall on a frame."""
-        t = rows["t_s"]
-        frame = np.floor(t * FRAME_RATE_Hz + 1e-6).astype(np.int64)
-        new = frame >= np.concatenate([[self._next_frame], frame[:-1] + 1])
-        if not np.any(new):
-            return
-        self._next_frame = int(frame[-1]) + 1
-        index, q = _time_index(t[new]), rows["q_rad"][new]
-        for body, quaternion in scene.body_quaternions(q).items():
-            # Translation too in every row: a row that has only one of the two resets the other.
-            pose = rr.Transform3D.columns(translation=np.zeros((len(q), 3)), quaternion=quaternion)
-            self._recording.send_columns(f"{scene.WORLD}/{body}", index, pose)
-        self._recording.send_columns(scene.COILS, index, self._coil_colours(rows["current_A"][new]))
-        self._send_trace(scene.TIP, index, q)
-        self._send_trace(scene.TIP_DESIRED, index, rows["q_ref_rad"][new])
-
-    def _coil_colours(self, current_A: NDArray[np.float64]) -> rr.ComponentColumnList:
-        colours = palette.current_colours(current_A, self._facts.current_limit_A)  # (n, groups, 3)
-        coils = np.empty((len(current_A), len(self._actuator.coil_axes), 3), dtype=np.uint8)
-        for side in range(2):  # both coils of a group carry its current
-            coils[:, self._actuator.groups[:, side]] = colours
-        return rr.Mesh3D.columns(albedo_texture_buffer=coils.reshape(len(coils), -1))
-
-    def _send_trace(self, entity: str, index: Index, q: NDArray[np.float64]) -> None:
-        """One short segment a frame; the view shows those of the last seconds."""
-        tips = scene.shaft_tip(q, self._actuator)
-        before = np.concatenate([self._last_tips.get(entity, tips[:1]), tips[:-1]])
-        self._last_tips[entity] = tips[-1:]
-        segments = np.stack([before, tips], axis=1)  # (n, 2, 3)
-        self._recording.send_columns(entity, index, rr.LineStrips3D.columns(strips=_strips(segments)))
-
-    def _log(self, events: list[Event]) -> None:
-        if events:
-            t_s, level, text = zip(*events, strict=True)
-            lines = rr.TextLog.columns(text=list(text), level=list(level))
-            self._recording.send_columns(blueprint.EVENTS, _time_index(np.array(t_s)), lines)
 
 
 def _pipe_to(output: OutputFile) -> FilePipe:
@@ -286,34 +213,3 @@ def _pipe_to(output: OutputFile) -> FilePipe:
     except OSError as error:
         output.discard()
         raise InputError(f"output: expected a writable path, {error}") from None
-
-
-def _scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
-    """What `rr.Scalars.columns` makes of (n, size) values, at half its price."""
-    batch = rr.components.ScalarBatch(values.ravel())
-    return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
-
-
-def _strips(segments: NDArray[np.float64]) -> pa.Array:
-    """Arrow form of equally long line strips (n, points, 3); Rerun's own conversion takes them one by one."""
-    kind = rr.components.LineStrip3DBatch([]).as_arrow_array().type
-    flat = pa.array(segments.ravel().astype(np.float32))
-    points = pa.FixedSizeListArray.from_arrays(flat, type=kind.value_type)
-    starts = np.arange(len(segments) + 1, dtype=np.int32) * segments.shape[1]
-    return pa.ListArray.from_arrays(pa.array(starts), points, type=kind)
-
-
-def _time_index(t_s: NDArray[np.float64]) -> Index:
-    """Times in whole nanoseconds: Rerun would cut the fraction of seconds off, a nanosecond too early."""
-    nanoseconds = np.round(t_s * 1e9).astype("timedelta64[ns]")
-    return [rr.TimeColumn(blueprint.TIMELINE, duration=nanoseconds)]
-
-
-def _as_markdown(facts: RunFacts) -> str:
-    """All that the run depends on, as a table for each section."""
-    lines = [f"# {facts.name}", "", facts.description, ""]
-    for title, fields in facts.sections.items():
-        lines += [f"## {title}", "", "| field | value |", "|---|---|"]
-        lines += [f"| {key} | {'' if value is None else value} |" for key, value in fields.items()]
-        lines.append("")
-    return "\n".join(lines)

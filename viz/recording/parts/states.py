@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
-
-ROOT = "states"
+from spheretwin.viz.layout.paths import STATES
+from spheretwin.viz.recording.columns import time_index
+from spheretwin.viz.recording.parts.part import Part, Subject
 
 
 class Lane(NamedTuple):
@@ -48,5 +49,18 @@ class StateChanges:
 
 
 def _entity(signal: Signal, place: int) -> str:
-    names = [ROOT, signal.name, *signal.labels[place : place + 1]]
+    names = [STATES, signal.name, *signal.labels[place : place + 1]]
     return "/".join(rr.escape_entity_path_part(name.replace(" ", "-")) for name in names)
+
+
+class States(Part):
+    """Lanes of a timeline."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._changes = StateChanges()
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the changes of a chunk."""
+        for entity, t_s, states in self._changes.of(rows):
+            recording.send_columns(entity, time_index(t_s), rr.StateChange.columns(state=states))

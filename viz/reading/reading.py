@@ -21,18 +21,12 @@ from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, offsets, width
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table, allocated
-from spheretwin.viz.recording.blueprint import (
-    EVENTS,
-    SCENARIO,
-    TELEMETRY,
-    TIMELINE,
-    View,
-    application,
-    layout,
-)
-from spheretwin.viz.recording.described import COMPLETE, FACTS, SIGNAL, signal_of
-from spheretwin.viz.recording.events import Event
-from spheretwin.viz.recording.messages import whole_messages
+from spheretwin.viz.layout.layout import layout
+from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY, TIMELINE
+from spheretwin.viz.layout.view import View, application
+from spheretwin.viz.reading.messages import whole_messages
+from spheretwin.viz.recording.parts.described import COMPLETE, FACTS, SIGNAL, signal_of
+from spheretwin.viz.recording.parts.events import Event
 
 VALUES = "Scalars:scalars"
 

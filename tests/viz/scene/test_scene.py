@@ -13,14 +13,16 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import palette
-from spheretwin.viz.recording import scene
+from spheretwin.viz.scene.meshes import read_meshes
+from spheretwin.viz.scene.paths import COILS, WORLD
+from spheretwin.viz.scene.poses import body_quaternions, shaft_tip
 
 poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
 
 
 @given(poses)
 def test_bodies_turn_hinge_by_hinge(q):
-    quaternions = scene.body_quaternions(q)
+    quaternions = body_quaternions(q)
     alone = {"outer_ring": [1, 0, 0], "inner_ring": [1, 1, 0], "rotor": [1, 1, 1]}
     for body, hinges in alone.items():
         matrix = Rotation.from_quat(quaternions[body][0]).as_matrix()
@@ -30,7 +32,7 @@ def test_bodies_turn_hinge_by_hinge(q):
 @given(q=poses)
 def test_shaft_tip_is_the_model_s(actuator, q):
     expected = rotation(q[0]) @ actuator.shaft_tip_m
-    np.testing.assert_allclose(scene.shaft_tip(q, actuator)[0], expected, atol=1e-15)
+    np.testing.assert_allclose(shaft_tip(q, actuator)[0], expected, atol=1e-15)
 
 
 OFF_AXIS = '<site name="shaft_tip" class="marker" pos="0.021 -0.013 0.11"/>'
@@ -64,12 +66,12 @@ def test_a_tip_off_the_spin_axis_is_drawn_where_the_engine_has_it(off_axis, q):
     data.qpos[:] = q[0]
     mujoco.mj_kinematics(model, data)
     # Three rotations of a tenth of a metre, each rounded once or twice.
-    np.testing.assert_allclose(scene.shaft_tip(q, bent)[0], data.site("shaft_tip").xpos, atol=4e-16)
+    np.testing.assert_allclose(shaft_tip(q, bent)[0], data.site("shaft_tip").xpos, atol=4e-16)
 
 
 def test_a_tip_off_the_spin_axis_circles_as_the_rotor_spins(off_axis):
     gamma = np.linspace(0, 2 * np.pi, 9)[:-1]
-    tips = scene.shaft_tip(np.stack([0 * gamma, 0 * gamma, gamma], axis=1), off_axis[2])
+    tips = shaft_tip(np.stack([0 * gamma, 0 * gamma, gamma], axis=1), off_axis[2])
     np.testing.assert_allclose(tips[:, 2], 0.11, atol=1e-16)
     np.testing.assert_allclose(np.hypot(tips[:, 0], tips[:, 1]), np.hypot(0.021, 0.013), rtol=1e-14)
     np.testing.assert_allclose(tips.mean(axis=0)[:2], 0, atol=1e-16)
@@ -98,13 +100,13 @@ UPPER, LOWER, MIDDLE = (
 def test_each_drawn_coil_looks_up_the_pixel_of_the_actuator_s_coil_there(tmp_path, edits):
     path = edited(tmp_path / "mine.xml", *edits)
     axes = actuators.load(path).coil_axes
-    mesh = scene.read_meshes(path)[scene.COILS]
+    mesh = read_meshes(path)[COILS]
     vertices = np.array(mesh.vertex_positions.as_arrow_array().to_pylist())
     across = np.array(mesh.vertex_texcoords.as_arrow_array().to_pylist())[:, 0]
     drawn, place = np.unique(across, return_inverse=True)
     text = path.read_text(encoding="utf-8")
     assert len(drawn) == 12 * sum(layer in text for layer in (UPPER, MIDDLE, LOWER))
-    shipped = scene.read_meshes(actuators.MJCF_PATH)[scene.COILS].vertex_positions.as_arrow_array()
+    shipped = read_meshes(actuators.MJCF_PATH)[COILS].vertex_positions.as_arrow_array()
     assert 36 * len(vertices) == 12 * text.count('<geom name="coil_') * len(shipped)  # none is left out
     for i, share in enumerate(drawn):
         centre = vertices[place == i].mean(axis=0)
@@ -113,8 +115,8 @@ def test_each_drawn_coil_looks_up_the_pixel_of_the_actuator_s_coil_there(tmp_pat
 
 
 def test_meshes_stand_where_the_model_puts_them(actuator):
-    meshes = scene.read_meshes(actuators.MJCF_PATH)
-    coils = np.array(meshes[scene.COILS].vertex_positions.as_arrow_array().to_pylist())
+    meshes = read_meshes(actuators.MJCF_PATH)
+    coils = np.array(meshes[COILS].vertex_positions.as_arrow_array().to_pylist())
     centres = coils.reshape(36, -1, 3).mean(axis=1)
     directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
     # Each coil's vertices are symmetric about its axis, to the rounding of the mesh files.
@@ -122,9 +124,9 @@ def test_meshes_stand_where_the_model_puts_them(actuator):
 
 
 def test_all_poles_are_drawn_in_the_colour_of_their_polarity(actuator):
-    meshes = scene.read_meshes(actuators.MJCF_PATH)
+    meshes = read_meshes(actuators.MJCF_PATH)
     for polarity, name in ((1, "north"), (-1, "south")):
-        mesh = meshes[f"{scene.WORLD}/rotor/pole_upper_{name}0"]
+        mesh = meshes[f"{WORLD}/rotor/pole_upper_{name}0"]
         vertices = np.array(mesh.vertex_positions.as_arrow_array().to_pylist())
         centres = vertices.reshape(8, -1, 3).mean(axis=1)
         directions = centres / np.linalg.norm(centres, axis=1, keepdims=True)
@@ -144,8 +146,8 @@ def test_current_colours_tell_sign_and_size():
 
 def height(mjcf):
     """Largest coordinate of all that is drawn but the coils, m."""
-    meshes = scene.read_meshes(mjcf)
-    drawn = [mesh.vertex_positions for name, mesh in meshes.items() if name != scene.COILS]
+    meshes = read_meshes(mjcf)
+    drawn = [mesh.vertex_positions for name, mesh in meshes.items() if name != COILS]
     return max(np.max(positions.as_arrow_array().to_pylist()) for positions in drawn)
 
 

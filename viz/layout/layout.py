@@ -2,66 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
 from spheretwin.viz import palette
-from spheretwin.viz.recording import scene
-from spheretwin.viz.recording.states import ROOT as STATES
-
-TIMELINE = "sim_time"
-TELEMETRY = "telemetry"
-SCENARIO = "scenario"
-EVENTS = "events"
+from spheretwin.viz.layout.paths import EVENTS, SCENARIO, STATES, TELEMETRY, TIMELINE, entity
+from spheretwin.viz.layout.view import View
+from spheretwin.viz.scene import paths as scene
 
 TRAIL_S = 2.0
-
-
-def entity(signal: str) -> str:
-    """Entity that holds a signal, at the full rate of the control ticks."""
-    return f"{TELEMETRY}/{rr.escape_entity_path_part(signal)}"
-
-
-def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
-    """Log names with units and colours of every plotted signal."""
-    for signal in signals:
-        names = [
-            f"{_short(signal)} {label} [{signal.unit}]".replace("  ", " ") for label in signal.labels or ("",)
-        ]
-        style = rr.SeriesLines(names=names, colors=_colours(signal), widths=[1.5] * len(names))
-        recording.log(entity(signal.name), style, static=True)
-
-
-class View(NamedTuple):
-    """What the layout of a run's recording is made for."""
-
-    duration_s: float
-    """Length of the time axes."""
-    current_limit_A: float
-    """Range of the current axis."""
-    groups: int
-    """Coil groups, each with a current."""
-    own: tuple[Signal, ...]
-    """Signals that not every run has, each in a tab; the sliding variable among the plots."""
-    live: bool
-    """Follow the run instead of playing from its start."""
-
-
-def application(view: View) -> str:
-    """Application id of recordings with one layout.
-
-    A viewer keeps one layout for each application: under a common id the second recording that it opens
-    would be shown in the first one's, with its length and its tabs. Of letters, digits and dashes only, else
-    the viewer changes it.
-    """
-    names = [(signal.name, bool(signal.states)) for signal in view.own]
-    key = repr((view.duration_s, view.current_limit_A, view.groups, names, view.live))
-    return f"spheretwin-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
 
 
 @lru_cache(maxsize=4)
@@ -157,18 +109,3 @@ def _actuator_view() -> rrb.Spatial3DView:
         ),
         overrides={f"/{scene.TIP}": trail(TRAIL_S), f"/{scene.TIP_DESIRED}": trail(TRAIL_S)},
     )
-
-
-def _short(signal: Signal) -> str:
-    """Name without its unit, which stands in brackets behind it."""
-    for suffix in ("_rad_s", "_rad", "_Nm", "_A", "_s"):
-        if signal.name.endswith(suffix):
-            return signal.name.removesuffix(suffix)
-    return signal.name
-
-
-def _colours(signal: Signal) -> list[palette.Colour]:
-    if signal.size == 3 and signal.labels in ((), ANGLES, AXES):
-        desired = signal.name.endswith(("_ref_rad", "_ref_rad_s")) or signal.name == "disturbance_Nm"
-        return list(palette.DESIRED_COLOURS if desired else palette.AXIS_COLOURS)
-    return palette.group_colours(signal.size)

@@ -13,8 +13,8 @@ from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow
+from spheretwin.viz.recording.parts.states import StateChanges
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.viz.recording.states import StateChanges
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),

@@ -1,4 +1,4 @@
-"""The actuator's meshes in a recording, taken from the model file, and the poses that move them."""
+"""The actuator's meshes in a recording, taken from the model file."""
 
 from __future__ import annotations
 
@@ -12,17 +12,10 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.mjcf import fingerprint
-from spheretwin.viz import palette
-
-WORLD = "world"
-COILS = f"{WORLD}/coils"
-MOVING = ("outer_ring", "inner_ring", "rotor")
-TIP = f"{WORLD}/shaft_tip"
-TIP_DESIRED = f"{WORLD}/shaft_tip_desired"
+from spheretwin.viz.scene.paths import COILS, WORLD
 
 
 @dataclass(frozen=True)
@@ -49,41 +42,6 @@ def read_meshes(mjcf: Path) -> dict[str, rr.Mesh3D]:
         A mesh is missing or broken.
     """
     return _meshes(mjcf, fingerprint(mjcf))
-
-
-def log_static(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, payload_kg: float) -> None:
-    """Log everything that keeps its shape: meshes by body and colour, coils as one mesh."""
-    recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for entity, mesh in read_meshes(mjcf).items():
-        recording.log(entity, mesh, static=True)
-    if payload_kg > 0:
-        mount = [actuator.payload_mount_m]
-        weight = rr.Cylinders3D(lengths=[0.014], radii=[0.011], centers=mount, colors=[palette.TRACE])
-        recording.log(f"{WORLD}/rotor/payload", weight, static=True)
-    _style_traces(recording)
-
-
-def body_quaternions(q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Orientation of each moving body, as (n, 4) quaternions x, y, z, w.
-
-    Parameters
-    ----------
-    q : (n, 3) array, rad
-        Hinge angles.
-    """
-    about_x, about_y, about_z = (_about(axis, q[:, axis]) for axis in range(3))
-    inner = _product(about_x, about_y)
-    return {"outer_ring": about_x, "inner_ring": inner, "rotor": _product(inner, about_z)}
-
-
-def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
-    """Position of the shaft's tip, wherever in the rotor it is: (n, 3) in m, for hinge angles (n, 3)."""
-    (ca, cb, cg), (sa, sb, sg) = np.cos(q).T, np.sin(q).T
-    x, y, z = actuator.shaft_tip_m
-    x, y = cg * x - sg * y, sg * x + cg * y  # about z, then y, then x
-    x, z = cb * x + sb * z, cb * z - sb * x
-    y, z = ca * y - sa * z, sa * y + ca * z
-    return np.stack([x, y, z], axis=1)
 
 
 @lru_cache(maxsize=2)
@@ -184,22 +142,3 @@ def _coil_mesh(coils: list[tuple[int, Drawn]], count: int) -> rr.Mesh3D:
             width=count, height=1, color_model="RGB", channel_datatype="U8"
         ),
     )
-
-
-def _style_traces(recording: rr.RecordingStream) -> None:
-    for entity, colour, width in ((TIP, palette.TRACE, 2.0), (TIP_DESIRED, palette.DESIRED_TRACE, 1.0)):
-        style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width))
-        recording.log(entity, style, static=True)
-
-
-def _about(axis: int, angle: NDArray[np.float64]) -> NDArray[np.float64]:
-    quaternion = np.zeros((len(angle), 4))
-    quaternion[:, axis], quaternion[:, 3] = np.sin(angle / 2), np.cos(angle / 2)
-    return quaternion
-
-
-def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quaternion product: first b, then a."""
-    vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + np.cross(a[:, :3], b[:, :3])
-    scalar = a[:, 3] * b[:, 3] - np.sum(a[:, :3] * b[:, :3], axis=1)
-    return np.concatenate([vector, scalar[:, None]], axis=1)
