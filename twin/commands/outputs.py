@@ -12,6 +12,7 @@ from spheretwin.models.telemetry.file import TelemetryFile
 from spheretwin.twin.records.facts import facts_of, record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink
+from spheretwin.viz.layout.view import OVERVIEW
 
 if TYPE_CHECKING:
     from spheretwin.viz.recording.recorder import Recorder
@@ -42,6 +43,8 @@ class Outputs:
         Files to write.
     live : bool
         Serve a viewer on 127.0.0.1.
+    view : str
+        What of the recording is open at first.
 
     Attributes
     ----------
@@ -54,7 +57,14 @@ class Outputs:
         A file cannot be made, or the model cannot be drawn; nothing is left behind.
     """
 
-    def __init__(self, session: Session, record: Path | None, telemetry: Path | None, live: bool) -> None:
+    def __init__(
+        self,
+        session: Session,
+        record: Path | None,
+        telemetry: Path | None,
+        live: bool,
+        view: str = OVERVIEW,
+    ) -> None:
         self._session = session
         self.record, self.telemetry = record, telemetry
         self._file: TelemetryFile | None = None
@@ -62,7 +72,7 @@ class Outputs:
             self._begun = record_of(session)
             self._file = TelemetryFile(telemetry, session.signals, self._begun.metadata())
         # The recorder last: it alone leaves something where it is made and another is refused.
-        self._recorder = _recorder(session, record, live) if record or live else None
+        self._recorder = _recorder(session, record, live, view) if record or live else None
 
     @property
     def sinks(self) -> list[Sink]:
@@ -87,11 +97,11 @@ class Outputs:
         return faults
 
 
-def _recorder(session: Session, path: Path | None, live: bool) -> Recorder:
+def _recorder(session: Session, path: Path | None, live: bool, view: str) -> Recorder:
     from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
     facts = facts_of(session.begun_as)
-    recorder = Recorder(session.actuator, session.signals, facts, path=path, live=live)
+    recorder = Recorder(session.actuator, session.signals, facts, path=path, live=live, shown=view)
     if recorder.viewer:
         print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
     return recorder

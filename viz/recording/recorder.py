@@ -8,6 +8,7 @@ from pathlib import Path
 from threading import Semaphore
 from types import TracebackType
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import rerun as rr
@@ -17,11 +18,11 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile
 from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.facts import RunFacts
-from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Level, Status, named
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.layout import layout
-from spheretwin.viz.layout.view import View, application
+from spheretwin.viz.layout.layout import opening_layout
+from spheretwin.viz.layout.view import OVERVIEW, View, application
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.live import Viewer
 from spheretwin.viz.recording.parts.log import log_lines
@@ -60,6 +61,8 @@ class Recorder:
         Recording to write.
     live : bool
         Serve a viewer on 127.0.0.1.
+    shown : str
+        The view that is open at first, one of `VIEWS`.
 
     Raises
     ------
@@ -75,17 +78,16 @@ class Recorder:
         *,
         path: Path | None = None,
         live: bool = False,
+        shown: str = OVERVIEW,
     ) -> None:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
-        subject = Subject(actuator, signals, facts)
+        subject = Subject(actuator, signals, facts, live, shown, uuid4().hex)
         read_meshes(facts.mjcf)  # a run needs no mesh, and would find out only now that one is missing
         self._path = path
         self._parts = [part(subject) for part in PARTS]
         self._handed_over = 0
         self._waiting: list[Table] = []
-        own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
-        view = View(facts.duration_s, facts.current_limit_A, len(actuator.groups), own, live)
-        self._recording = rr.RecordingStream(application(view))
+        self._recording = rr.RecordingStream(application(subject.view))
         self._recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self._output = OutputFile(path) if path else None
         self._pipe = _pipe_to(self._output) if self._output and PIPE_PATHS.is_dir() else None
@@ -94,7 +96,7 @@ class Recorder:
         self._room = Semaphore(PENDING_CHUNKS)
         self._fault: str | None = None
         self._closed = False
-        self._submit(self._connect, view)
+        self._submit(self._connect, subject.view)
 
     def _connect(self, view: View) -> None:
         """Open the sinks, log all that stays the same, then let a viewer in."""
@@ -103,7 +105,7 @@ class Recorder:
             sinks.append(rr.FileSink((self._pipe or self._output).path))
         if self.viewer:
             sinks.append(self.viewer.sink)
-        self._recording.set_sinks(*sinks, default_blueprint=layout(view))
+        self._recording.set_sinks(*sinks, default_blueprint=opening_layout(view))
         for part in self._parts:
             part.begin(self._recording)
         if self.viewer:
