@@ -56,7 +56,7 @@ class Survey:
 
 
 def watched(signals: tuple[Signal, ...]) -> dict[str, int]:
-    """Signals that are plotted in ranges of the run's own, whose bounds are kept therefore; with their sizes."""
+    """Signals that are plotted in ranges of the run's own, of which bounds are kept; with their sizes."""
     plotted = (signal for signal in signals if not signal.states)
     return {signal.name: signal.size for signal in plotted if signal.name not in _OF_FIXED_RANGE}
 
