@@ -17,6 +17,9 @@ DESIRED_COLOURS: tuple[Colour, ...] = ((150, 78, 78), (62, 112, 80), (70, 96, 15
 
 BACKGROUND: Colour = (20, 22, 26)
 TRACE: Colour = (255, 190, 60)
+NORTH: Colour = (232, 234, 238)
+SOUTH: Colour = (70, 74, 82)
+PAYLOAD: Colour = (126, 96, 150)
 DESIRED_TRACE: Colour = (130, 136, 146)
 
 LAW_COLOURS: dict[str, str] = {
