@@ -12,7 +12,6 @@ from spheretwin.viz.scene.solids import joined, turned
 # What a coil looks like beside its numbers: a winding between two flanges.
 SECTIONS = 20
 FLANGE_SHARE = 0.07  # of the length
-CHAMFER_SHARE = 0.35  # of a flange
 RECESS_SHARE = 0.12  # of the winding's depth
 
 Array = NDArray[np.float64]
@@ -57,8 +56,7 @@ def _outline(coil: Coil) -> list[tuple[float, float]]:
     bore, radius, half = coil.inner_radius_m, coil.outer_radius_m, coil.length_m / 2
     flange = FLANGE_SHARE * coil.length_m
     winding, edge = radius - RECESS_SHARE * (radius - bore), half - flange
-    c = CHAMFER_SHARE * flange
-    above = [(winding, edge), (radius, edge), (radius, half - c), (radius - c, half), (bore, half)]
+    above = [(winding, edge), (radius, edge), (radius, half), (bore, half)]
     below = [(distance, -height) for distance, height in reversed(above)]
     return [*below, *above, below[0]]
 

@@ -10,15 +10,18 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from spheretwin.models.actuator import read_magnet_and_coil
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.mjcf import fingerprint
 from spheretwin.viz import palette
+from spheretwin.viz.scene import gltf
 from spheretwin.viz.scene.coils import coil_mesh
-from spheretwin.viz.scene.paths import COILS, WORLD
-from spheretwin.viz.scene.solids import Drawn
+from spheretwin.viz.scene.paths import WORLD
+
+Array = NDArray[np.float64]
 
 POLES = {1: ("poles_north", palette.NORTH), -1: ("poles_south", palette.SOUTH)}
 """Name and colour of poles by their polarity."""
@@ -26,13 +29,35 @@ POLES = {1: ("poles_north", palette.NORTH), -1: ("poles_south", palette.SOUTH)}
 FRAME = "frame"
 """Name of a mesh that has that of its body."""
 
+DECIMALS = 7
+"""Of vertices in m: what a mesh file holds, and equal where they were equal there, which compresses."""
+
 
 class Piece(NamedTuple):
-    """What is drawn under one name."""
+    """What is drawn under one name: copies of one mesh."""
 
-    mesh: rr.Mesh3D
-    poses: rr.InstancePoses3D | None = None
-    """Of each copy, in the frame of the body that carries them; None where the mesh is in its place."""
+    positions: Array  # (n, 3) m, as in the mesh's file
+    triangles: NDArray[np.int64]  # (m, 3), counter-clockwise from outside
+    colour: palette.Colour
+    rotations: Array  # (copies, 3, 3), into the frame of the body that carries them
+    translations: Array  # (copies, 3) m
+
+    def archetypes(self) -> tuple[rr.Asset3D, rr.InstancePoses3D]:
+        """In the form in which a recording takes it."""
+        contents = gltf.binary(self.positions, self.triangles)
+        return (
+            rr.Asset3D(contents=contents, media_type=gltf.MEDIA_TYPE, albedo_factor=self.colour),
+            rr.InstancePoses3D(translations=self.translations, mat3x3=self.rotations),
+        )
+
+
+class Meshes(NamedTuple):
+    """What is drawn of a model."""
+
+    coils: rr.Mesh3D | None
+    """All of them, turned from their numbers; None where the model draws none."""
+    others: dict[str, Piece]
+    """By entity."""
 
 
 class Look(NamedTuple):
@@ -44,25 +69,22 @@ class Look(NamedTuple):
     colour: palette.Colour
 
 
-def read_meshes(mjcf: Path) -> dict[str, Piece]:
+def read_meshes(mjcf: Path) -> Meshes:
     """Read what is drawn of a model, which a run does without; once while no file that it names has changed.
 
-    Returns
-    -------
-    dict of Piece
-        By entity: one for all coils, turned from their numbers; and one for each mesh of a body, named after
-        the mesh, with as many copies of it as the model has. Poles are named and coloured by their polarity.
+    A piece is a mesh of a body in one colour, named after the mesh. Poles are named and coloured by their
+    polarity.
 
     Raises
     ------
     InputError
         A mesh is missing or broken.
     """
-    return _pieces(mjcf, fingerprint(mjcf))
+    return _meshes(mjcf, fingerprint(mjcf))
 
 
 @lru_cache(maxsize=2)
-def _pieces(mjcf: Path, _: str) -> dict[str, Piece]:
+def _meshes(mjcf: Path, _: str) -> Meshes:
     mujoco.mj_clearCache(mujoco.mj_getCache())  # it misses a mesh edited within a second
     try:
         # Not `models.mjcf.read`: it leaves out what is only drawn, which is all that is wanted here.
@@ -81,19 +103,19 @@ def _pieces(mjcf: Path, _: str) -> dict[str, Piece]:
             coils.append(geom)
         else:
             others[_look(model, data, geom)].append(geom)
-    pieces = {COILS: _coils(model, data, coils, mjcf)} if coils else {}
+    pieces: dict[str, Piece] = {}
     for look, geoms in others.items():
         pieces[_free(_entity(model, look), pieces)] = _piece(model, data, look, geoms)
-    return pieces
+    return Meshes(_coils(model, data, coils, mjcf) if coils else None, pieces)
 
 
-def _coils(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], mjcf: Path) -> Piece:
+def _coils(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], mjcf: Path) -> rr.Mesh3D:
     sites = _sites(model, "coil_")
     places = [_nearest(data, geom, sites) for geom in geoms]
     at = [sites[place] for place in places]
     axes = data.site_xmat[at].reshape(-1, 3, 3)[:, :, 2]
     _, coil = read_magnet_and_coil(mjcf)
-    return Piece(coil_mesh(coil, data.site_xpos[at], axes, places, len(sites)))
+    return coil_mesh(coil, data.site_xpos[at], axes, places, len(sites))
 
 
 def _look(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Look:
@@ -122,35 +144,27 @@ def _free(entity: str, taken: dict[str, Piece]) -> str:
 
 
 def _piece(model: mujoco.MjModel, data: mujoco.MjData, look: Look, geoms: list[int]) -> Piece:
-    drawn, body = _drawn(model, look.mesh), _carrier(model, look.body)
+    vertex, face = model.mesh_vertadr[look.mesh], model.mesh_faceadr[look.mesh]
+    body = _carrier(model, look.body)
     R_SB, p_SB = data.xmat[body].reshape(3, 3), data.xpos[body]
-    # MuJoCo moves meshes to their own centre, and the geoms' poses move them back.
-    rotations = R_SB.T @ data.geom_xmat[geoms].reshape(-1, 3, 3)
-    translations = (data.geom_xpos[geoms] - p_SB) @ R_SB
-    if len(geoms) == 1:
-        return Piece(_as_mesh(drawn.placed(rotations[0], translations[0]), look.colour))
-    poses = rr.InstancePoses3D(translations=translations, mat3x3=rotations)
-    return Piece(_as_mesh(drawn, look.colour), poses)
-
-
-def _drawn(model: mujoco.MjModel, mesh: int) -> Drawn:
-    vertex, normal, face = model.mesh_vertadr[mesh], model.mesh_normaladr[mesh], model.mesh_faceadr[mesh]
-    faces = slice(face, face + model.mesh_facenum[mesh])
-    corners = np.stack([model.mesh_face[faces].ravel(), model.mesh_facenormal[faces].ravel()], axis=1)
-    # A vertex on a sharp edge has a normal for each side, so it is drawn once for each.
-    code, triangles = np.unique(corners @ [1 << 32, 1], return_inverse=True)
-    positions = model.mesh_vert[vertex + (code >> 32)]
-    normals = model.mesh_normal[normal + (code & 0xFFFFFFFF)]
-    return Drawn(positions, normals, triangles.reshape(-1, 3))
-
-
-def _as_mesh(drawn: Drawn, colour: palette.Colour) -> rr.Mesh3D:
-    return rr.Mesh3D(
-        vertex_positions=drawn.positions,
-        vertex_normals=drawn.normals,
-        triangle_indices=drawn.triangles,
-        albedo_factor=colour,
+    # MuJoCo turns and moves meshes to their own axes and centre, and the geoms' poses back.
+    R_FM, p_FM = _matrix(model.mesh_quat[look.mesh]), model.mesh_pos[look.mesh]
+    in_file = model.mesh_vert[vertex : vertex + model.mesh_vertnum[look.mesh]] @ R_FM.T + p_FM
+    rotations = R_SB.T @ data.geom_xmat[geoms].reshape(-1, 3, 3) @ R_FM.T
+    return Piece(
+        positions=np.round(in_file, DECIMALS),
+        triangles=model.mesh_face[face : face + model.mesh_facenum[look.mesh]].astype(np.int64),
+        colour=look.colour,
+        rotations=rotations,
+        translations=(data.geom_xpos[geoms] - p_SB) @ R_SB - rotations @ p_FM,
     )
+
+
+def _matrix(quaternion: Array) -> Array:
+    """Rotation matrix of a quaternion w, x, y, z."""
+    flat = np.empty(9)
+    mujoco.mju_quat2Mat(flat, quaternion)
+    return flat.reshape(3, 3)
 
 
 def _carrier(model: mujoco.MjModel, body: int) -> int:

@@ -14,7 +14,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import palette
 from spheretwin.viz.scene.meshes import read_meshes
-from spheretwin.viz.scene.paths import COILS, WORLD
+from spheretwin.viz.scene.paths import WORLD
 from spheretwin.viz.scene.poses import body_quaternions, shaft_tip
 
 poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
@@ -84,13 +84,7 @@ def positions(mesh):
 
 def placed(piece):
     """Vertices of each copy of a piece in the frame of what carries it: (copies, n, 3) in m."""
-    vertices = positions(piece.mesh)
-    if piece.poses is None:
-        return vertices[None]
-    # Rerun keeps matrices column by column.
-    matrices = np.array(piece.poses.mat3x3.as_arrow_array().to_pylist()).reshape(-1, 3, 3).swapaxes(1, 2)
-    moved = np.array(piece.poses.translations.as_arrow_array().to_pylist())
-    return np.einsum("cij,nj->cni", matrices, vertices) + moved[:, None]
+    return np.einsum("cij,nj->cni", piece.rotations, piece.positions) + piece.translations[:, None]
 
 
 UPPER, LOWER, MIDDLE = (
@@ -116,13 +110,13 @@ UPPER, LOWER, MIDDLE = (
 def test_each_drawn_coil_looks_up_the_pixel_of_the_actuator_s_coil_there(tmp_path, edits):
     path = edited(tmp_path / "mine.xml", *edits)
     axes = actuators.load(path).coil_axes
-    mesh = read_meshes(path)[COILS].mesh
+    mesh = read_meshes(path).coils
     vertices = positions(mesh)
     across = np.array(mesh.vertex_texcoords.as_arrow_array().to_pylist())[:, 0]
     drawn, place = np.unique(across, return_inverse=True)
     text = path.read_text(encoding="utf-8")
     assert len(drawn) == 12 * sum(layer in text for layer in (UPPER, MIDDLE, LOWER))
-    shipped = positions(read_meshes(actuators.MJCF_PATH)[COILS].mesh)
+    shipped = positions(read_meshes(actuators.MJCF_PATH).coils)
     assert 36 * len(vertices) == 12 * text.count('<geom name="coil_') * len(shipped)  # none is left out
     for i, share in enumerate(drawn):
         centre = vertices[place == i].mean(axis=0)
@@ -131,7 +125,7 @@ def test_each_drawn_coil_looks_up_the_pixel_of_the_actuator_s_coil_there(tmp_pat
 
 
 def test_coils_stand_where_the_model_puts_them_and_fill_their_numbers(actuator):
-    coils = positions(read_meshes(actuators.MJCF_PATH)[COILS].mesh).reshape(36, -1, 3)
+    coils = positions(read_meshes(actuators.MJCF_PATH).coils).reshape(36, -1, 3)
     centres = coils.mean(axis=1)
     # Each coil's vertices are symmetric about its axis and its middle, to single precision.
     np.testing.assert_allclose(centres, actuator.coil.distance_m * actuator.coil_axes, atol=1e-7)
@@ -145,7 +139,7 @@ def test_coils_stand_where_the_model_puts_them_and_fill_their_numbers(actuator):
 
 
 def test_faces_and_normals_of_a_coil_point_outward(actuator):
-    mesh = read_meshes(actuators.MJCF_PATH)[COILS].mesh
+    mesh = read_meshes(actuators.MJCF_PATH).coils
     corners = positions(mesh)[np.array(mesh.triangle_indices.as_arrow_array().to_pylist())]
     normals = np.array(mesh.vertex_normals.as_arrow_array().to_pylist())
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -161,7 +155,7 @@ def test_faces_and_normals_of_a_coil_point_outward(actuator):
 
 
 def test_all_poles_are_drawn_in_the_grey_of_their_polarity(actuator):
-    pieces = read_meshes(actuators.MJCF_PATH)
+    pieces = read_meshes(actuators.MJCF_PATH).others
     for polarity, name, grey in ((1, "north", palette.NORTH), (-1, "south", palette.SOUTH)):
         piece = pieces[f"{WORLD}/rotor/poles_{name}"]
         axes = actuator.pole_axes[actuator.pole_polarity == polarity]
@@ -171,8 +165,7 @@ def test_all_poles_are_drawn_in_the_grey_of_their_polarity(actuator):
         match = directions @ axes.T > 1 - 1e-6
         np.testing.assert_array_equal(match.sum(axis=0), 1)
         np.testing.assert_array_equal(match.sum(axis=1), 1)
-        (colour,) = piece.mesh.albedo_factor.as_arrow_array().to_pylist()
-        assert colour == int.from_bytes([*grey, 255], "big")
+        assert piece.colour == grey
     for red, green, blue in (palette.NORTH, palette.SOUTH):
         assert max(red, green, blue) - min(red, green, blue) < 16  # no hue: red and blue are currents
     assert min(palette.NORTH) > 2.5 * max(palette.SOUTH)
@@ -194,10 +187,10 @@ def test_every_mesh_is_named_and_stands_where_the_engine_has_it():
     model = mujoco.MjModel.from_xml_path(str(actuators.MJCF_PATH))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    pieces = read_meshes(actuators.MJCF_PATH)
+    pieces = read_meshes(actuators.MJCF_PATH).others
     names = ["stator/frame", "outer_ring/frame", "inner_ring/frame"]
     names += [f"rotor/{part}" for part in ("ball", "hoop", "shaft", "poles_north", "poles_south")]
-    assert list(pieces) == [COILS, *(f"{WORLD}/{name}" for name in names)]
+    assert list(pieces) == [f"{WORLD}/{name}" for name in names]
     for geom in range(model.ngeom):
         body, name = model.body(model.geom_bodyid[geom]).name, model.geom(geom).name
         if name.startswith(("pole", "coil")) or model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_MESH:
@@ -224,7 +217,7 @@ def test_meshes_without_names_have_those_of_their_files_and_move_with_what_carri
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    pieces = read_meshes(path)
+    pieces = read_meshes(path).others
     alone, pair = (pieces[f"{WORLD}/rotor/tool/{name}"] for name in ("shaft", "shaft_2"))
     mine = [i for i in range(model.ngeom) if model.body(model.geom_bodyid[i]).name == "tool"]
     drawn = [*placed(alone), *placed(pair)]
@@ -243,7 +236,7 @@ def test_current_colours_tell_sign_and_size():
 
 def height(mjcf):
     """Largest coordinate of all that is drawn but the coils, m."""
-    return max(np.max(placed(piece)) for name, piece in read_meshes(mjcf).items() if name != COILS)
+    return max(np.max(placed(piece)) for piece in read_meshes(mjcf).others.values())
 
 
 def metre_up(line):
