@@ -16,10 +16,10 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import palette
-from spheretwin.viz.layout.layout import TRAIL_S
 from spheretwin.viz.layout.paths import TIMELINE
 from spheretwin.viz.scene.paths import WORLD
 from spheretwin.viz.scene.poses import shaft_tip
+from spheretwin.viz.scene.traces import TRAIL_S
 
 Array = NDArray[np.float64]
 

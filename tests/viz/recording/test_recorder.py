@@ -102,15 +102,6 @@ def test_both_coils_of_a_group_show_its_current(run):
         np.testing.assert_array_equal(colours[:, session.actuator.groups[:, side]], expected)
 
 
-def test_trace_follows_the_shaft_tip(run, actuator):
-    path, _, finished = run
-    times, strips = rows_of(path, scene.TIP, "LineStrips3D:strips")
-    q = finished.telemetry["q_rad"][times // 1_000_000]
-    tips = np.array([rotation(pose) @ actuator.shaft_tip_m for pose in q])
-    np.testing.assert_allclose(strips[:, 3:], tips, atol=1e-7)
-    np.testing.assert_allclose(strips[1:, :3], tips[:-1], atol=1e-7)
-
-
 def static_text(path, entity, component):
     for chunk in RrdReader(path).stream().filter(content=f"/{entity}", is_static=True):
         batch = chunk.to_record_batch()
