@@ -13,6 +13,7 @@ from spheretwin.viz.recording.parts.part import Subject
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.recording.thinning import Firsts
 from spheretwin.viz.recording.viewer.broadcast import Broadcast
+from spheretwin.viz.recording.viewer.framing import HEADER_BYTES, messages
 from spheretwin.viz.recording.viewer.server import ViewerServer
 
 # More than a plot has pixels for; few enough for a viewer that draws in software.
@@ -70,11 +71,11 @@ class LiveView(Stream):
 
     def send(self) -> None:
         """Give viewers what was recorded since the last time."""
-        piece = self._bytes.read() or b""
+        encoded = self._bytes.read() or b""
         if not self._begun:
             self._begun = True
-            self._broadcast.begin(piece)
-        elif piece:
+            self._broadcast.begin(encoded[:HEADER_BYTES] + messages(encoded))
+        elif piece := messages(encoded):
             self._broadcast.send(piece)
 
     def complete(self) -> None:

@@ -37,11 +37,10 @@ _OUTSIDE = re.compile(r"<link\b[^>]*https://[^>]*>\s*")
 
 # Ends the program as soon as whoever wanted its files is gone, even by SIGKILL: then its input ends.
 _SUPERVISED = """
-import subprocess, sys
+import os, subprocess, sys, threading
 program = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
-sys.stdin.read()
-program.kill()
-program.wait()
+threading.Thread(target=lambda: (os.read(0, 1), program.kill()), daemon=True).start()
+os._exit(program.wait() != 0)
 """
 
 

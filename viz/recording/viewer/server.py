@@ -47,9 +47,7 @@ class ViewerServer:
                 else:
                     self.send_error(404)
 
-        self._server = ThreadingHTTPServer((HOST, 0), Handler)
-        self._server.daemon_threads = True
-        self._server.block_on_close = False  # a viewer that takes nothing would keep the end waiting
+        self._server = _Server((HOST, 0), Handler)
         self._thread = Thread(target=self._server.serve_forever, name="viewer server", daemon=True)
         self._thread.start()
 
@@ -62,6 +60,16 @@ class ViewerServer:
         """Serve nobody any more."""
         self._server.shutdown()
         self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    """Answers each request in a thread that nobody waits for: a viewer may take nothing for ever."""
+
+    daemon_threads = True
+    block_on_close = False
+
+    def handle_error(self, *_: object) -> None:
+        """Leave the terminal to the run: a viewer was closed amid its request."""
 
 
 class _Handler(BaseHTTPRequestHandler):
