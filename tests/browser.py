@@ -336,10 +336,15 @@ class Page:
             self.requests.append(url)
 
     def _found(self, place):
-        found = self.at(place)
-        if found is None:
-            raise BrowserError(f"nothing on the page at {place}")
-        return found
+        """Where it is once it is there, and no longer slides into its place."""
+        until, found = time.monotonic() + PATIENCE_S, None
+        while True:
+            before, found = found, self.at(place)
+            if found is not None and (found == before or not isinstance(place, str)):
+                return found
+            if time.monotonic() > until:
+                raise BrowserError(f"nothing on the page at {place}")
+            time.sleep(0.05)
 
     def _mouse(self, kind, x, y, **more):
         button = "none" if kind == "mouseMoved" and "buttons" not in more else "left"

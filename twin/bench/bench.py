@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import Table
@@ -106,6 +107,11 @@ class Bench:
         self._open = True
         self._rows: deque[Table] = deque(maxlen=500)
         self._state = self._picture(None)
+
+    @property
+    def actuator(self) -> Actuator:
+        """Of the present run."""
+        return self._session.actuator
 
     def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> Ticket:
         """Tell it something; never waits, whatever is asked.
@@ -213,6 +219,7 @@ class Bench:
 
     def _picture(self, row: Table | None) -> State:
         session, groups = self._session, len(self._session.actuator.groups)
+
         def of(name: str, size: int = 3) -> Any:
             return tuple(row[name][0].tolist()) if row else (0.0,) * size
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -30,9 +31,7 @@ def turned(outline: Sequence[tuple[float, float]], sections: int) -> Solid:
     """
     angles = np.linspace(0.0, 2 * pi, sections + 1)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return joined(
-        [_strip(circle, *ends) for ends in zip(outline[:-1], outline[1:], strict=True) if ends[0] != ends[1]]
-    )
+    return joined([_strip(circle, *ends) for ends in pairwise(outline)])
 
 
 def tube(inner: float, outer: float, low: float, high: float, sections: int) -> Solid:
@@ -80,9 +79,7 @@ def bar(lengths: tuple[float, float, float]) -> Solid:
     return joined([*sides, *far])
 
 
-def _strip(
-    circle: NDArray[np.float64], start: tuple[float, float], end: tuple[float, float]
-) -> Solid:
+def _strip(circle: NDArray[np.float64], start: tuple[float, float], end: tuple[float, float]) -> Solid:
     """What one straight piece of an outline sweeps, with vertices of its own."""
     rings = [
         np.column_stack([radius * circle, np.full(len(circle), height)]) for radius, height in (start, end)

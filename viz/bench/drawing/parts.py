@@ -1,4 +1,4 @@
-"""The actuator in few triangles, from its own numbers: some 10,000, so that a browser without a GPU moves it."""
+"""The actuator in some 9,000 triangles, from its own numbers: a browser without a GPU moves them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.viz.bench.solids import Solid, bar, cylinder, joined, reversed_, tube, turned, zone
+from spheretwin.viz.bench.drawing.solids import Solid, bar, cylinder, joined, reversed_, tube, turned, zone
 
 COIL_SECTIONS = 16
 POLE_SECTIONS = 14
@@ -50,7 +50,9 @@ class Parts:
     def triangles(self, actuator: Actuator) -> int:
         """How many a browser draws, copies counted."""
         once = (self.stator, self.outer_ring, self.inner_ring, self.rotor, self.shaft)
-        copies = len(actuator.pole_axes) * len(self.pole.faces) + len(actuator.coil_axes) * len(self.coil.faces)
+        copies = len(actuator.pole_axes) * len(self.pole.faces) + len(actuator.coil_axes) * len(
+            self.coil.faces
+        )
         return sum(len(solid.faces) for solid in once) + copies
 
 
@@ -87,7 +89,9 @@ def _ball(radius: float) -> Solid:
     below = turned([(rim_inside, -cut), (rim, -cut)], RING_SECTIONS)
     width = ARM * radius
     arms = [bar(lengths) for lengths in ((2 * rim_inside, width, width), (width, 2 * rim_inside, width))]
-    lifted = [Solid(arm.vertices + np.float32([0, 0, cut - width]), arm.faces) for arm in arms]
+    lifted = [
+        Solid(arm.vertices + np.array([0, 0, cut - width], dtype=np.float32), arm.faces) for arm in arms
+    ]
     return joined([outer, inner, above, below, *lifted])
 
 

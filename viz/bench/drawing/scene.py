@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import palette
-from spheretwin.viz.bench.parts import parts_of, quaternions_along
-from spheretwin.viz.bench.solids import Solid
+from spheretwin.viz.bench.drawing.parts import parts_of, quaternions_along
+from spheretwin.viz.bench.drawing.solids import Solid
 
 STEEL = (150, 156, 166)
 FRAME = (70, 76, 86)
 BALL = (196, 200, 206)
-NORTH, SOUTH = (205, 92, 84), (92, 124, 196)
+# Muted, beside the colours of the currents.
+NORTH, SOUTH = (120, 72, 70), (72, 82, 112)
 GHOST_OPACITY = 0.3
 
 # Of the ball's radius.
 TIP_RADIUS = 0.12
 
-TRAIL_POINTS = 150
+TRAIL_POINTS = 80
 
 
 class Scene:
@@ -135,6 +136,24 @@ class Scene:
         if len(points) > 1:
             self._line.points = np.stack([points[:-1], points[1:]], axis=1)
 
+    def pose_towards(self, point_m: tuple[float, float, float], gamma_rad: float) -> list[float]:
+        """Hinge angles, rad, that turn the shaft to where its tip was dragged, for a tip on the rotor's z.
+
+        Parameters
+        ----------
+        point_m : (3,) floats, m
+            Anywhere on the way from the joint through the tip.
+        gamma_rad : float, rad
+            The angle about the shaft, which a point does not say.
+        """
+        x, y, z = np.array(point_m) / max(float(np.linalg.norm(point_m)), 1e-9)
+        return [float(np.arctan2(-y, z)), float(np.arcsin(np.clip(x, -1.0, 1.0))), gamma_rad]
+
+    def group_of(self, coil: int | None) -> int | None:
+        """Group of a coil that was clicked, by its place; None where there is none."""
+        found = np.flatnonzero((self._actuator.groups == coil).any(axis=1))
+        return int(found[0]) if len(found) else None
+
     def forget(self) -> None:
         """Begin the tip's way anew."""
         self._trail.clear()
@@ -154,12 +173,12 @@ def _light(api: viser.SceneApi) -> None:
     """Few lights, no shadows and no mirrored surroundings: these cost half the frames without a GPU."""
     api.configure_default_lights(enabled=False)
     api.configure_environment_map(None)
-    api.add_light_ambient("/light/all", intensity=0.9)
+    api.add_light_ambient("/light/all", intensity=0.5)
     for name, intensity, position in _LAMPS:
         api.add_light_directional(f"/light/{name}", intensity=intensity, position=position, cast_shadow=False)
 
 
-_LAMPS = (("key", 2.0, (0.6, -0.8, 1.0)), ("fill", 0.8, (-1.0, 0.3, 0.4)))
+_LAMPS = (("key", 2.6, (0.6, -0.8, 1.0)), ("fill", 0.8, (-1.0, 0.3, 0.4)))
 
 
 def _mesh(
