@@ -51,11 +51,14 @@ class Faults:
             fault |= {name: True for name, box in (("detect", detect), ("known", known)) if box.value}
             hand.tell(event, "add_fault", note, fault=fault)
 
-        on_press(target, retarget)
+        hand.on_change(target, retarget)
+        for line in (mode, value, detect, known):
+            hand.on_change(line)
         on_press(add, add_fault)
         self._list = gui.add_html("")
         self._shown: tuple[str, ...] | None = None
         place = gui.add_number("place", 0, min=0, step=1)
+        hand.on_change(place)
         one = gui.add_button("Clear the one at this place")
         on_press(one, lambda event: hand.tell(event, "clear_faults", note, place=int(place.value)))
         hand.button(gui, "Clear all", "clear_faults")

@@ -178,9 +178,11 @@ class _Visitor(servers.ServerConnection):
 
 
 Name = Annotated[str, msgspec.Meta(max_length=256)]
-Two = tuple[float, float]
-Three = tuple[float, float, float]
-Four = tuple[float, float, float, float]
+# No number of a page's is without end, and none is not a number.
+Number = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
+Two = tuple[Number, Number]
+Three = tuple[Number, Number, Number]
+Four = tuple[Number, Number, Number, Number]
 
 
 class _Message(msgspec.Struct, tag_field="type", forbid_unknown_fields=True):
@@ -190,9 +192,9 @@ class _Message(msgspec.Struct, tag_field="type", forbid_unknown_fields=True):
 class _Camera(_Message, tag="ViewerCameraMessage"):
     wxyz: Four
     position: Three
-    fov: float
-    near: float
-    far: float
+    fov: Number
+    near: Number
+    far: Number
     image_height: int
     image_width: int
     look_at: Three
@@ -202,9 +204,9 @@ class _Camera(_Message, tag="ViewerCameraMessage"):
 class _Value(msgspec.Struct, forbid_unknown_fields=True):
     value: (
         bool
-        | float
+        | Number
         | Annotated[str, msgspec.Meta(max_length=4096)]
-        | Annotated[list[float], msgspec.Meta(max_length=3)]
+        | Annotated[list[Number], msgspec.Meta(max_length=3)]
     )
 
 

@@ -62,51 +62,95 @@ class Hand:
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._lock = threading.Lock()
-        self._open: list[tuple[str, Ticket, Note | None]] = []
-        self._refused, self._until = "", 0.0
+        self._open: list[tuple[Ticket, Note | None]] = []
+        self._refused, self._until_s = "", 0.0
+        self._warned_s: dict[int, float] = {}
 
     @property
     def refused(self) -> str:
         """What was refused last and belongs to no field; empty after a while."""
-        return self._refused if time.monotonic() < self._until else ""
+        return self._refused if time.monotonic() < self._until_s else ""
 
     def tell(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> None:
         """Tell the bench one thing in the name of the page that an event comes from."""
+        if name not in ANYONES and not self._operates(event):
+            self._warn(event)
+            return
         ticket = self._bench.command(name, client=client_name(event.client_id), **arguments)
         with self._lock:
-            self._open = [*self._open[-MOST_TICKETS:], (name, ticket, beside)]
+            self._open = [*self._open[-MOST_TICKETS:], (ticket, beside)]
 
     def complain(self, text: str, beside: Note | None = None) -> None:
         """Show why something never became a command."""
         if beside:
             beside.say(text)
         else:
-            self._refused, self._until = text, time.monotonic() + SHOWN_S
+            self._refused, self._until_s = text, time.monotonic() + SHOWN_S
 
     def settle(self) -> None:
         """Show what became of commands since."""
         with self._lock:
-            settled = [each for each in self._open if each[1].done]
-            self._open = [each for each in self._open if not each[1].done]
-        for _, ticket, beside in settled:
+            settled = [each for each in self._open if each[0].done]
+            self._open = [each for each in self._open if not each[0].done]
+        for ticket, beside in settled:
             if ticket.refused:
                 self.complain(ticket.refused, beside)
             elif beside:
                 beside.say(None)
 
-    def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> viser.GuiButtonHandle:
+    def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> Any:
         """Add a button that is one command without arguments."""
         button = gui.add_button(label, **more)
         on_press(button, lambda event: self.tell(event, name))
         return button
 
+    def on_change(self, line: Any, act: Callable[[Event], None] | None = None) -> None:
+        """Take what the operator writes or moves; give anybody else's page back what it was.
+
+        Parameters
+        ----------
+        line : viser's handle
+            Of a field, a slider or a box, which all pages share.
+        act : callable, optional
+            Called with the event of each change.
+        """
+        accepted = line.value
+
+        @line.on_update
+        async def _(event: Event) -> None:
+            nonlocal accepted
+            if event.client_id is not None and not self._operates(event):
+                line.value = accepted
+                self._warn(event)
+                return
+            accepted = line.value
+            if act and event.client_id is not None:
+                act(event)
+
+    def _operates(self, event: Event) -> bool:
+        return self._bench.state().operator in (None, client_name(event.client_id))
+
+    def _warn(self, event: Event) -> None:
+        """Tell a page that only watches, and no other, why nothing happens; not at every key."""
+        now = time.monotonic()
+        if now - self._warned_s.get(event.client_id, -SHOWN_S) >= SHOWN_S:
+            self._warned_s[event.client_id] = now
+            event.client.add_notification(
+                "This page watches", "Another one operates; ask it, above.", auto_close_seconds=SHOWN_S
+            )
+
+
+ANYONES = ("stop", "ask", "hello", "leave", "beat")
+"""Commands that the bench takes from pages that watch too."""
+
 
 def on_press(button: Any, act: Callable[[Event], None]) -> None:
-    """Call a function at each press, or change of a value, on the server's own thread, in order."""
+    """Call a function at each press of a button, on the server's own thread, in order."""
 
-    @button.on_click if hasattr(button, "on_click") else button.on_update
+    @button.on_click
     async def _(event: Event) -> None:
-        act(event)
+        if event.client_id is not None:
+            act(event)
 
 
 def client_name(number: int) -> str:

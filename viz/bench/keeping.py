@@ -30,6 +30,8 @@ class Keeping:
             recording = gui.add_text("recording", "bench.rrd", hint="for Rerun; empty for none")
             telemetry = gui.add_text("telemetry", "bench.parquet", hint="runs again from it; empty for none")
             record = gui.add_button("Record from now on", color="red")
+            for line in (recording, telemetry):
+                hand.on_change(line)
             told = Note(gui, record.order + 0.5)
 
             def begin(event: Event) -> None:
@@ -43,18 +45,21 @@ class Keeping:
             load = gui.add_button("Load it")
             file = gui.add_text("save as", "bench.toml")
             save = gui.add_button("Save the present settings")
+            for line in (source, file):
+                hand.on_change(line)
             saved = Note(gui, save.order + 0.5)
             on_press(load, lambda event: hand.tell(event, "load", saved, source=source.value))
             on_press(save, lambda event: hand.tell(event, "save", saved, file=file.value))
         with gui.add_folder("as a command line"):
-            line: Any = gui.add_text("copy", "", multiline=True)
+            shown: Any = gui.add_text("copy", "", multiline=True)
 
             def tell_line(event: Event) -> None:
-                line.value = bench.command_line()
+                shown.value = bench.command_line()
 
             on_press(gui.add_button("Show it as it is now"), tell_line)
         with gui.add_folder("snapshot"):
             name = gui.add_text("name", "last")
+            hand.on_change(name)
             keep, back = gui.add_button("Take one"), gui.add_button("Back to it")
             note = Note(gui, back.order + 0.5)
             on_press(keep, lambda event: hand.tell(event, "snapshot", note, name=name.value))

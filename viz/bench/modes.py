@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from math import degrees, pi, radians
 from typing import Any
 
@@ -23,6 +24,9 @@ STEP_DEG = 1.0
 FASTEST_JOG_DEG_S = 60.0
 
 ONLY_THIS_A = 1.0
+
+# A slider that has just been moved, by a hand or by the twin, is left alone for so long.
+FOLLOWED_S = 0.5
 
 
 class Modes:
@@ -66,7 +70,6 @@ class Modes:
 
     def _point(self, gui: viser.GuiApi, actuator: Actuator) -> None:
         with gui.add_folder("point: or drag the tip, or ← ↑ ↓ →"):
-            note = None
             self._angles = []
             for axis, (low, high) in zip(AXES, actuator.hinge_range_rad.tolist(), strict=True):
                 low, high = max(low, -pi), min(high, pi)
@@ -75,29 +78,29 @@ class Modes:
                 )
             note = Note(gui, self._angles[-1].order + 0.5)
             for slider in self._angles:
-                on_press(slider, lambda event: self._go(event, [each.value for each in self._angles], note))
+                self._hand.on_change(slider, lambda event: self._go(event, note))
             rate = gui.add_number("rate, rad/s", 2.0, step=0.1, hint="largest, of the way to a pose")
             acceleration = gui.add_number("acceleration, rad/s²", 20.0, step=1.0)
             limits = Note(gui, acceleration.order + 0.5)
-            on_press(
+            self._hand.on_change(
                 rate, lambda event: self._hand.tell(event, "limits", limits, rate_rad_s=event.target.value)
             )
-            on_press(
+            self._hand.on_change(
                 acceleration,
                 lambda event: self._hand.tell(
                     event, "limits", limits, acceleration_rad_s2=event.target.value
                 ),
             )
 
-    def _go(self, event: Event, angles_deg: list[float], note: Note | None) -> None:
-        self._hand.tell(event, "point", note, pose_rad=[radians(angle) for angle in angles_deg])
+    def _go(self, event: Event, note: Note) -> None:
+        self._hand.tell(event, "point", note, pose_rad=[radians(slider.value) for slider in self._angles])
 
     def _follow(self, gui: viser.GuiApi, choices: Choices) -> None:
         with gui.add_folder("trajectory", expand_by_default=False):
             present = self._bench.state().shape
             shapes = list(dict.fromkeys([*choices.shapes, present]))
             shape = gui.add_dropdown("shape", shapes, initial_value=present)
-            form = Form(gui, "Follow this", whole=True)
+            form = Form(gui, self._hand, "Follow this", whole=True)
 
             def follow(event: Event, fields: dict[str, str]) -> None:
                 try:
@@ -109,7 +112,7 @@ class Modes:
 
             form.on_apply(follow)
             form.show(choices.shape(present))
-            on_press(shape, lambda event: form.show(choices.shape(event.target.value)))
+            self._hand.on_change(shape, lambda event: form.show(choices.shape(event.target.value)))
 
     def _jog(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("jog: rates of the hinges", expand_by_default=False):
@@ -117,7 +120,7 @@ class Modes:
             self._rates = [gui.add_slider(f"{axis}, °/s", -most, most, 1.0, 0.0) for axis in AXES]
             note = Note(gui, self._rates[-1].order + 0.5)
             for slider in self._rates:
-                on_press(
+                self._hand.on_change(
                     slider,
                     lambda event: self._hand.tell(
                         event, "jog", note, rates_rad_s=[radians(each.value) for each in self._rates]
@@ -130,6 +133,7 @@ class Modes:
         with gui.add_folder("manual currents", expand_by_default=False):
             gui.add_markdown("In this mode, click a coil for its group alone.")
             chosen = gui.add_slider("group", 0, groups - 1, 1, 0)
+            self._hand.on_change(chosen)
             alone = gui.add_button(f"Only this one, at {ONLY_THIS_A:g} A")
             note = Note(gui, alone.order + 0.5)
             on_press(
@@ -143,7 +147,7 @@ class Modes:
                     gui.add_slider(f"{group:02}, A", -limit, limit, 0.05, 0.0) for group in range(groups)
                 ]
             for slider in sliders:
-                on_press(
+                self._hand.on_change(
                     slider,
                     lambda event: self._hand.tell(
                         event, "manual", note, currents_A=[float(each.value) for each in sliders]
@@ -153,6 +157,7 @@ class Modes:
     def _replay(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("replay", expand_by_default=False):
             file = gui.add_text("file", "", hint="telemetry (.parquet) or recording (.rrd) on this machine")
+            self._hand.on_change(file)
             play = gui.add_button("Show it")
             note = Note(gui, play.order + 0.5)
             on_press(play, lambda event: self._hand.tell(event, "replay", note, file=file.value))
@@ -184,9 +189,11 @@ class Modes:
 
 
 def _follow(slider: Any, value: float) -> None:
-    """Set a slider that a person has not touched; a message only where it moves visibly."""
+    """Set a slider that nobody has just touched, where it moves visibly."""
+    if time.time() - slider.update_timestamp < FOLLOWED_S:
+        return
     value = min(max(round(value, 1), slider.min), slider.max)
-    if abs(slider.value - value) >= slider.step / 2:
+    if not abs(slider.value - value) < slider.step / 2:
         slider.value = value
 
 

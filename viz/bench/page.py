@@ -117,7 +117,7 @@ class Page:
             running = gui.add_button_group("run", ("start", "pause", "step", "reset"))
             on_press(running, lambda event: self._hand.tell(event, str(event.target.value)))
             speed = gui.add_dropdown("speed", list(SPEEDS), initial_value="1×")
-            on_press(
+            self._hand.on_change(
                 speed,
                 lambda event: self._hand.tell(event, "speed", factor=SPEEDS.get(event.target.value, 1.0)),
             )
@@ -158,7 +158,7 @@ class Page:
         @self._server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
             self._bench.command("hello", client=client_name(client.client_id))
-            ask = client.gui.add_button("Ask to take over", visible=False, order=-1e6)
+            ask = client.gui.add_button("Ask to operate", visible=False, order=-1e6)
             on_press(ask, lambda event: self._hand.tell(event, "ask"))
             give = client.gui.add_button("", visible=False, order=-1e6, color="orange")
 
@@ -189,7 +189,7 @@ class Page:
             name = client_name(number)
             self._bench.command("beat", client=name)
             with contextlib.suppress(RuntimeError):  # the page has gone meanwhile
-                ask.visible = state.operator not in (None, name) and name not in state.asking
+                ask.visible = state.operator != name and name not in state.asking
                 give.visible = state.operator == name and bool(state.asking)
                 if give.visible:
                     give.label = f"Let {state.asking[0]} operate"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -21,6 +22,8 @@ class Form:
     ----------
     gui : viser.GuiApi
         In the container it is to be in.
+    hand : Hand
+        Who takes what is written.
     apply : str
         What its button says.
     whole : bool
@@ -32,8 +35,8 @@ class Form:
         Under all of them.
     """
 
-    def __init__(self, gui: viser.GuiApi, apply: str, whole: bool = False) -> None:
-        self._gui, self._whole = gui, whole
+    def __init__(self, gui: viser.GuiApi, hand: Hand, apply: str, whole: bool = False) -> None:
+        self._gui, self._hand, self._whole = gui, hand, whole
         self._settings: list[Setting] = []
         self._lines: dict[str, Any] = {}
         self._notes: dict[str, Note] = {}
@@ -92,6 +95,8 @@ class Form:
             note.remove()
         with self._form:
             self._lines = {each.name: self._line(each) for each in settings}
+            for line in self._lines.values():
+                self._hand.on_change(line)
             self._notes = {name: Note(self._gui, line.order + 0.5) for name, line in self._lines.items()}
 
     def _line(self, setting: Setting) -> Any:
@@ -129,6 +134,7 @@ class Settings:
         twin: viser.GuiTabHandle,
     ) -> None:
         self._gui, self._hand, self._choices = gui, hand, choices
+        self._showing = threading.Lock()
         self._known_law = ""
         self._laws: Any
         self._gains: Form
@@ -139,8 +145,11 @@ class Settings:
         self.show()
 
     def show(self) -> None:
-        """Show what is in force now."""
-        settings = self._choices.settings()
+        """Show what is in force now; called by the page, and by a person's choice of a section."""
+        with self._showing:
+            self._show(self._choices.settings())
+
+    def _show(self, settings: list[Setting]) -> None:
         law = next(each for each in settings if each.name == LAW)
         if self._known_law != law.text:
             self._known_law = law.text
@@ -153,9 +162,10 @@ class Settings:
     def _law(self, gui: viser.GuiApi) -> None:
         self._laws = gui.add_dropdown("law", self._choices.laws)
         own = gui.add_text("or your own", "", hint="FILE.py:NAME, on this machine")
+        self._hand.on_change(own)
         take = gui.add_button("Take your own")
         note = Note(gui, take.order + 0.5)
-        on_press(self._laws, lambda event: self._set(event, LAW, event.target.value, note))
+        self._hand.on_change(self._laws, lambda event: self._set(event, LAW, event.target.value, note))
         on_press(take, lambda event: self._set(event, LAW, own.value, note))
         self._gains = self._form(gui, "Set gains")
         defaults = gui.add_button("Gains as they come")
@@ -168,11 +178,11 @@ class Settings:
         sections = list(dict.fromkeys(_section(each.name) for each in settings if each.name not in OFTEN))
         sections = [each for each in sections if each not in ELSEWHERE]
         self._sections = gui.add_dropdown("section", sections, initial_value=FIRST_SECTION)
-        on_press(self._sections, lambda event: self.show())
+        self._hand.on_change(self._sections, lambda event: self.show())
         self._fields = self._form(gui, "Set these")
 
     def _form(self, gui: viser.GuiApi, apply: str) -> Form:
-        form = Form(gui, apply)
+        form = Form(gui, self._hand, apply)
 
         def set_all(event: Event, fields: dict[str, str]) -> None:
             for name, text in fields.items():
