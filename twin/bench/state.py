@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.session import Session
 
 Three = tuple[float, float, float]
 
@@ -127,3 +133,78 @@ class State:
     asking: tuple[str, ...]
     refused: str | None
     waiting: int
+
+
+VECTORS = (
+    "q_rad",
+    "qdot_rad_s",
+    "q_ref_rad",
+    "qdot_ref_rad_s",
+    "error_rad",
+    "torque_command_Nm",
+    "torque_Nm",
+    "disturbance_Nm",
+    "current_command_A",
+    "current_A",
+)
+
+
+class Shown(NamedTuple):
+    """The row that is shown."""
+
+    row: Table | None
+    """None before the first."""
+    tick: int
+    period_s: float
+    current_limit_A: float
+
+
+def pictured(shown: Shown, session: Session, **others: Any) -> State:
+    """Picture of a row, and of what is told beside it; of a session before its first, where there is none."""
+    return State(
+        **others,
+        tick=shown.tick,
+        period_s=shown.period_s,
+        current_limit_A=shown.current_limit_A,
+        **(_at_start(session) if shown.row is None else _of_row(shown.row, shown.current_limit_A)),
+    )
+
+
+def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
+    error_rad = float(np.linalg.norm(row["error_rad"][0]))
+    largest_A = float(np.abs(row["current_command_A"][0]).max())
+    warm = any(signal.name == "coil_temperature_degC" for signal in row.signals)
+    return {
+        "t_s": float(row["t_s"][0]),
+        **{name: tuple(row[name][0].tolist()) for name in VECTORS},
+        "error_mrad": 1e3 * error_rad,
+        "error_deg": float(np.degrees(error_rad)),
+        "temperature_C": tuple(row["coil_temperature_degC"][0].tolist()) if warm else None,
+        "torque_margin": max(0.0, 1.0 - largest_A / limit_A) if limit_A else 1.0,
+        "saturated": bool(row["allocation_scale"][0] < 1.0),
+    }
+
+
+def _at_start(session: Session) -> dict[str, Any]:
+    reference = session.scenario.trajectory.sample(np.array([session.t_s]))[0]
+    error = session.q_rad - reference[0]
+    groups = (0.0,) * len(session.actuator.groups)
+    none = (0.0, 0.0, 0.0)
+    return {
+        "t_s": session.t_s,
+        "q_rad": tuple(session.q_rad.tolist()),
+        "qdot_rad_s": tuple(session.qdot_rad_s.tolist()),
+        "q_ref_rad": tuple(reference[0].tolist()),
+        "qdot_ref_rad_s": tuple(reference[1].tolist()),
+        "error_rad": tuple(error.tolist()),
+        "error_mrad": float(1e3 * np.linalg.norm(error)),
+        "error_deg": float(np.degrees(np.linalg.norm(error))),
+        "torque_command_Nm": none,
+        "torque_Nm": none,
+        "disturbance_Nm": none,
+        "current_command_A": groups,
+        "current_A": groups,
+        "temperature_C": None,
+        "torque_margin": 1.0,
+        "saturated": False,
+    }
