@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.base.wording import one_line, without_breaks
@@ -112,6 +113,11 @@ class Bench:
         self._told = FaultLines()
         self._history = self._new_history()
         self._state = self._picture()
+
+    @property
+    def actuator(self) -> Actuator:
+        """Of the present run."""
+        return self._desk.session.actuator
 
     def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> Ticket:
         """Tell it something; never waits, whatever is asked.

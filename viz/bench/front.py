@@ -108,6 +108,9 @@ class _Door(servers.serve):
             create_connection=_Visitor,
             max_size=LARGEST_MESSAGE,
             compression=None,
+            # A browser opens sockets to be ready, and says nothing: these shall not hold up the end.
+            open_timeout=1.0,
+            close_timeout=1.0,
             logger=_SILENT,
             server_header=None,
         )

@@ -45,8 +45,8 @@ class Keeping:
             load = gui.add_button("Load it")
             file = gui.add_text("save as", "bench.toml")
             save = gui.add_button("Save the present settings")
-            for line in (source, file):
-                hand.on_change(line)
+            hand.on_change(source)
+            hand.on_change(file)
             saved = Note(gui, save.order + 0.5)
             on_press(load, lambda event: hand.tell(event, "load", saved, source=source.value))
             on_press(save, lambda event: hand.tell(event, "save", saved, file=file.value))

@@ -175,10 +175,9 @@ class Modes:
     def _picture(self) -> None:
         @self._scene.handle.on_drag
         async def _(event: Event) -> None:
-            gamma = self._bench.state().q_ref_rad[2]
-            self._hand.tell(
-                event, "point", pose_rad=self._scene.pose_towards(event.end_position, float(gamma))
-            )
+            gamma = float(self._bench.state().q_ref_rad[2])
+            pose = self._scene.pose_under(event.end_position, event.client.camera.position, gamma)
+            self._hand.tell(event, "point", pose_rad=pose)
 
         @self._scene.coils.on_click
         async def _(event: Event) -> None:

@@ -57,19 +57,15 @@ class Page:
     """
 
     def __init__(self, bench: Bench, choices: Choices, port: int) -> None:
-        self._bench, self._hand = bench, Hand(bench)
+        self._bench, self._choices, self._hand = bench, choices, Hand(bench)
         self._server = front.serve(port, TITLE)
         self._watching: dict[int, Any] = {}
-        gui = self._server.gui
-        gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
-        gui.set_panel_label(TITLE)
-        self._scene = Scene(self._server.scene, bench.actuator)
-        _look(self._server)
-        self._twin_panel(gui)
-        self._curves_panel(gui)
-        self._controls(gui, choices)
-        self._pages()
         self._frame = 0
+        self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        self._server.gui.set_panel_label(TITLE)
+        _look(self._server)
+        self._build()
+        self._pages()
 
     @property
     def address(self) -> str:
@@ -86,6 +82,10 @@ class Page:
 
     def draw(self) -> None:
         """Show the latest state, once."""
+        if self._bench.actuator is not self._drawn:  # another model was loaded
+            self._server.scene.reset()
+            self._server.gui.reset()
+            self._build()
         state = self._bench.state()
         self._hand.settle()
         with self._server.atomic():
@@ -108,11 +108,20 @@ class Page:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _build(self) -> None:
+        """Make all that the pages share."""
+        gui = self._server.gui
+        self._drawn = self._bench.actuator
+        self._scene = Scene(self._server.scene, self._drawn)
+        self._twin_panel(gui)
+        self._curves_panel(gui)
+        self._controls(gui, self._choices)
+
     def _twin_panel(self, gui: viser.GuiApi) -> None:
         panel = gui.add_panel()
-        with panel.add_tab("twin"):
+        with panel.add_tab("status"):
             # On top: whatever is scrolled, it stays in view.
-            self._hand.button(gui, "STOP  (space)", "stop", color="red")
+            self._hand.button(gui, "STOP (space)", "stop", color="red")
             self._status = gui.add_html("")
             running = gui.add_button_group("run", ("start", "pause", "step", "reset"))
             on_press(running, lambda event: self._hand.tell(event, str(event.target.value)))

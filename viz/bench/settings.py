@@ -212,7 +212,7 @@ OFTEN = ("allocation", "disturbance.load", "plant.payload_kg", "plant.modelling_
 FIRST_SECTION = "plant"
 
 # The law and its gains, the shape and the faults have tabs of their own; the rest is no setting.
-ELSEWHERE = ("controller", "trajectory", "fault", "event", "name", "description", "scenario")
+ELSEWHERE = ("controller", "trajectory", "fault", "event", "manual", "name", "description")
 
 
 def _section(name: str) -> str:

@@ -107,7 +107,7 @@ def _alarms(state: Any) -> list[str]:
         alarms.append(_badge("STOPPED", BAD))
     if state.status == "failsafe":
         alarms.append(_badge("FAILSAFE", BAD))
-    if state.mode == "fault" or state.reason:
+    elif state.reason and state.mode != "fault":
         alarms.append(_badge("FAULT", BAD))
     if state.saturated:
         alarms.append(_badge("SATURATED", WARN))

@@ -63,6 +63,8 @@ class Bench:
                 self.told.append((name, client, arguments))
             if name == "hello" and self.now.operator is None:
                 self.now.operator = client
+            if name == "leave" and self.now.operator == client:
+                self.now.operator = None
         return SimpleNamespace(done=True, refused=self.refused.get(name))
 
     def commands(self):

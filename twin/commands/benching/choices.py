@@ -25,6 +25,9 @@ from spheretwin.viz.bench.machine import Choices, Setting
 
 TRAJECTORY = "trajectory"
 
+# What tells the shapes apart, and the way to a shape, which the bench makes.
+NO_SHAPE = ("shape", "approach")
+
 
 def choices_of(bench: Bench) -> Choices:
     """All that a page of a bench offers."""
@@ -56,7 +59,7 @@ def shape_settings(name: str, bench: Bench) -> list[Setting]:
     kind = SHAPES.get(name)
     if kind is None:
         return []
-    known = present if present.get("shape") == name else {}
+    known = _gathered(present) if present.get("shape") == name else {}
     return [
         Setting(
             field,
@@ -66,7 +69,7 @@ def shape_settings(name: str, bench: Bench) -> list[Setting]:
             _literals(info.annotation),
         )
         for field, info in kind.model_fields.items()
-        if field != "shape"
+        if field not in NO_SHAPE
     ]
 
 
@@ -88,6 +91,21 @@ def read(name: str, text: str) -> Any:
     if any(token.startswith("--") for token in tokens):
         raise InputError(f"{name}: expected a value, received {text}")
     return flags.overrides([f"--{name}", *tokens])[name]
+
+
+def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a shape, those in lists of tables as one list each."""
+    found: dict[str, Any] = {}
+    for dotted, value in fields.items():
+        name, _, inside = dotted.partition(".")
+        place, _, last = inside.partition(".")
+        if not inside:
+            found[name] = value
+        elif place.isdigit():
+            rows = found.setdefault(name, [])
+            rows.extend({} for _ in range(int(place) + 1 - len(rows)))
+            rows[int(place)][last] = value
+    return found
 
 
 def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> Setting:

@@ -25,6 +25,8 @@ TIP_RADIUS = 0.12
 
 TRAIL_POINTS = 80
 
+SMALLEST_M = 1e-9
+
 
 class Scene:
     """What moves, and what can be taken hold of.
@@ -136,17 +138,28 @@ class Scene:
         if len(points) > 1:
             self._line.points = np.stack([points[:-1], points[1:]], axis=1)
 
-    def pose_towards(self, point_m: tuple[float, float, float], gamma_rad: float) -> list[float]:
-        """Hinge angles, rad, that turn the shaft to where its tip was dragged, for a tip on the rotor's z.
+    def pose_under(
+        self, point_m: tuple[float, float, float], eye_m: NDArray[np.float64], gamma_rad: float
+    ) -> list[float]:
+        """Hinge angles, rad, that bring the tip under a pointer; for a tip on the rotor's z.
 
         Parameters
         ----------
         point_m : (3,) floats, m
-            Anywhere on the way from the joint through the tip.
+            Where the pointer is, at any depth.
+        eye_m : (3,) array, m
+            Of the one who sees it.
         gamma_rad : float, rad
-            The angle about the shaft, which a point does not say.
+            The angle about the shaft, which a pointer does not say.
         """
-        x, y, z = np.array(point_m) / max(float(np.linalg.norm(point_m)), 1e-9)
+        ahead = np.array(point_m) - eye_m
+        ahead /= max(float(np.linalg.norm(ahead)), SMALLEST_M)
+        reach_m = float(np.linalg.norm(self._actuator.shaft_tip_m))
+        middle = float(eye_m @ ahead)
+        # Where the line of sight meets the sphere of the tip first; beside it, where it comes closest.
+        half = np.sqrt(max(0.0, middle**2 - float(eye_m @ eye_m) + reach_m**2))
+        met = eye_m + (-middle - half if middle < -half else half - middle) * ahead
+        x, y, z = met / max(float(np.linalg.norm(met)), SMALLEST_M)
         return [float(np.arctan2(-y, z)), float(np.arcsin(np.clip(x, -1.0, 1.0))), gamma_rad]
 
     def group_of(self, coil: int | None) -> int | None:
