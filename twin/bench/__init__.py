@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.bench.commands import COMMANDS, checked
 from spheretwin.twin.bench.desk import Desk
 from spheretwin.twin.bench.history import History
-from spheretwin.twin.bench.keeping import Files, Keeping
+from spheretwin.twin.bench.keeping import Files, Keeping, warm
 from spheretwin.twin.bench.modes import Limits
 from spheretwin.twin.bench.operators import Operators
 from spheretwin.twin.bench.pace import Pace
@@ -39,6 +40,9 @@ from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import change_told
 
 CLIENTS = ("hello", "beat", "ask", "leave", "grant")
+
+# How long a thread may keep the interpreter from the loop's: of Python's own 5 ms, three make a chunk late.
+SWITCH_s = 1e-3
 
 # How often a bench at rest looks for clients that are gone.
 REST_s = 0.02
@@ -193,8 +197,14 @@ class Bench:
         return self._turn(ticks)
 
     def begin(self) -> None:
-        """Run in a thread of its own from now on."""
+        """Run in a thread of its own from now on.
+
+        Until `close`, the interpreter goes from thread to thread every millisecond.
+        """
         if self._thread is None and self._open:
+            self._switch_s = sys.getswitchinterval()
+            sys.setswitchinterval(SWITCH_s)
+            self._worker.submit(warm)
             self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)
             self._thread.start()
 
@@ -202,8 +212,9 @@ class Bench:
         """End the thread, and complete what is being recorded."""
         self._open = False
         self._wake.set()
-        if self._thread:
+        if self._thread and self._thread.is_alive():
             self._thread.join()
+            sys.setswitchinterval(self._switch_s)
         self._worker.shutdown()
         self._end_keeping(None)
         for keeping in list(self._keepings):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import threading
+from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ LENGTH_s = 10.0
 
 
 class History:
-    """Rows of the signals that every run has, the newest ones alone.
+    """Rows of the signals that every run has, the newest ones alone; whoever reads it delays no one.
 
     Parameters
     ----------
@@ -27,28 +27,21 @@ class History:
 
     def __init__(self, groups: int, period_s: float) -> None:
         self._signals = common_signals(groups)
+        self._width = width(self._signals)
         self._each = max(1, round(1 / (RATE_Hz * period_s)))
-        rows = round(LENGTH_s * RATE_Hz)
-        self._lock = threading.Lock()
-        self._ring = np.empty((rows, width(self._signals)))
-        self._written = 0
+        self._rows: deque[NDArray[np.float64]] = deque(maxlen=round(LENGTH_s * RATE_Hz))
 
     def write(self, first_tick: int, rows: Table) -> None:
-        """Take those of some rows that are due, whatever the chunks."""
-        names = [signal.name for signal in self._signals]
-        due = rows.values[-first_tick % self._each :: self._each][-len(self._ring) :]
-        if rows.signals[: len(names)] != self._signals:
-            parts = [rows[name].reshape(len(rows), -1) for name in names]
-            due = np.concatenate(parts, axis=1)[-first_tick % self._each :: self._each][-len(self._ring) :]
-        with self._lock:
-            places = (self._written + np.arange(len(due))) % len(self._ring)
-            self._ring[places] = due[:, : self._ring.shape[1]]
-            self._written += len(due)
+        """Take those of some rows that are due, whatever the chunks; they must not change any more."""
+        due = rows.values[-first_tick % self._each :: self._each]
+        # A run begins its rows with these signals; a recording may have them in another order.
+        if rows.signals[: len(self._signals)] != self._signals:
+            parts = [rows[signal.name].reshape(len(rows), -1) for signal in self._signals]
+            due = np.concatenate(parts, axis=1)[-first_tick % self._each :: self._each]
+        self._rows.extend(due[-(self._rows.maxlen or 0) :, : self._width].copy())
 
     def read(self) -> dict[str, NDArray[np.float64]]:
         """The rows by signal, oldest first; a copy."""
-        with self._lock:
-            kept = min(self._written, len(self._ring))
-            rows = self._ring[(self._written - kept + np.arange(kept)) % len(self._ring)]
-        table = Table(self._signals, rows)
-        return {signal.name: table[signal.name].copy() for signal in self._signals}
+        rows = list(self._rows)  # at once: the writer may be at work in another thread
+        table = Table(self._signals, np.array(rows).reshape(len(rows), self._width))
+        return {signal.name: table[signal.name] for signal in self._signals}

@@ -44,13 +44,12 @@ class Files:
         self.paths = tuple(path for path in (recording, telemetry) if path)
         if not self.paths:
             raise InputError("bench: expected a file to record into, received none")
+        warm()
         for path in self.paths:
             check_writable(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
             raise InputError(f"output: expected a path of its own for each file, received {recording} twice")
         self.telemetry = telemetry
-        if telemetry:
-            import pyarrow.parquet  # noqa: F401 - slow, and the loop must not wait for it
         self.recorder = _recorder(session, recording) if recording else None
 
     def discard(self) -> None:
@@ -134,6 +133,13 @@ class Keeping:
             self.faults.append(without_breaks(error) or type(error).__name__)
         finally:
             self._room.release()
+
+
+def warm() -> None:
+    """Import what a recording needs: slow, and no chunk must wait for it."""
+    import pyarrow.parquet  # noqa: F401
+
+    from spheretwin.viz.recording import recorder  # noqa: F401
 
 
 def _recorder(session: Session, path: Path) -> Recorder:
