@@ -229,6 +229,10 @@ class Page:
             raise BrowserError(f"{url}: {answer['errorText']}")
         self.wait_for("document.readyState == 'complete'")
 
+    def front(self):
+        """Bring it before the others: what is hidden is hardly drawn."""
+        self.command("Page.bringToFront")
+
     def close(self):
         """Close it."""
         self._browser.command("Target.closeTarget", targetId=self._target)
@@ -278,18 +282,22 @@ class Page:
 
     def click(self, place):
         """Press and let go the left button."""
+        self.front()
         x, y = self._found(place)
         for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
             self._mouse(kind, x, y, clickCount=0 if kind == "mouseMoved" else 1)
 
-    def drag(self, start, end, steps=10):
-        """Press at one place, move to another in steps, let go there."""
+    def drag(self, start, end, steps=10, pause_s=0.03):
+        """Press at one place, move to another in steps, let go there; a pause after each lets it be drawn."""
+        self.front()
         (x, y), (to_x, to_y) = self._found(start), self._found(end)
         self._mouse("mouseMoved", x, y)
+        time.sleep(pause_s)
         self._mouse("mousePressed", x, y, clickCount=1)
         for step in range(1, steps + 1):
             share = step / steps
             self._mouse("mouseMoved", x + share * (to_x - x), y + share * (to_y - y), buttons=1)
+            time.sleep(pause_s)
         self._mouse("mouseReleased", to_x, to_y, clickCount=1)
 
     def key(self, name):
@@ -336,10 +344,15 @@ class Page:
             self.requests.append(url)
 
     def _found(self, place):
-        found = self.at(place)
-        if found is None:
-            raise BrowserError(f"nothing on the page at {place}")
-        return found
+        """Where it is once it is there, and no longer slides into its place."""
+        until, found = time.monotonic() + PATIENCE_S, None
+        while True:
+            before, found = found, self.at(place)
+            if found is not None and (found == before or not isinstance(place, str)):
+                return found
+            if time.monotonic() > until:
+                raise BrowserError(f"nothing on the page at {place}")
+            time.sleep(0.05)
 
     def _mouse(self, kind, x, y, **more):
         button = "none" if kind == "mouseMoved" and "buttons" not in more else "left"

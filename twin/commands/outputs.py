@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.records.facts import facts_of, record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink
@@ -77,6 +79,8 @@ class Outputs:
         Serve a viewer on 127.0.0.1.
     record_rate_Hz : float, optional
         Rows a second that the recording keeps beside those that stand out; every row unless given.
+    first_tick : int
+        Tick of the first row that the files keep.
 
     Attributes
     ----------
@@ -98,12 +102,13 @@ class Outputs:
         telemetry: Path | None,
         live: bool,
         record_rate_Hz: float | None = None,
+        first_tick: int = 0,
     ) -> None:
-        self._session = session
+        self._session, self._first_tick = session, first_tick
         self.record, self.telemetry = record, telemetry
         self._file: TelemetryFile | None = None
         if telemetry:
-            self._begun = record_of(session)
+            self._begun = record_of(session, first_tick=first_tick)
             self._file = TelemetryFile(telemetry, session.signals, self._begun.metadata())
         self._live = _live_view(session) if live else None
         # The recorder last: it alone leaves something where it is made and another is refused.
@@ -117,7 +122,8 @@ class Outputs:
     @property
     def sinks(self) -> list[Sink]:
         """To be handed the telemetry."""
-        return [sink for sink in (self._file, self._recorder, self._live) if sink]
+        sinks: list[Sink] = [sink for sink in (self._file, self._recorder, self._live) if sink]
+        return [_From(self._first_tick, sink) for sink in sinks] if self._first_tick else sinks
 
     def close(self) -> list[SpheretwinError]:
         """Complete every file; returns what went wrong."""
@@ -135,11 +141,32 @@ class Outputs:
                 self.record = None
         if self._file:
             try:
-                self._file.close(record_of(self._session, self._begun).metadata())
+                record = record_of(self._session, self._begun, self._first_tick)
+                self._file.close(record.metadata())
             except SpheretwinError as error:
                 faults.append(error)
                 self.telemetry = None
         return faults
+
+
+class _From:
+    """Hands a sink the rows from a tick on."""
+
+    def __init__(self, first_tick: int, sink: Sink) -> None:
+        self._left, self._sink = first_tick, sink
+
+    def write(self, rows: Table) -> None:
+        passed = min(self._left, len(rows))
+        self._left -= passed
+        if passed < len(rows):
+            self._sink.write(rows.rows(passed, len(rows)))
+
+    def note(self, t_s: float, text: str) -> None:
+        if not self._left:
+            self._sink.note(t_s, text)
+
+    def finish(self, status: Status) -> None:
+        self._sink.finish(status)
 
 
 def _live_view(session: Session) -> LiveView:

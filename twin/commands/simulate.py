@@ -93,7 +93,14 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
-        files = Outputs(session, options.record, options.telemetry, options.live, options.record_rate)
+        files = Outputs(
+            session,
+            options.record,
+            options.telemetry,
+            options.live,
+            record_rate_Hz=options.record_rate,
+            first_tick=plan.first_tick,
+        )
         try:
             with progress, timers_stopped(), _code_of_the_user(session, options.json):
                 status = follow(
