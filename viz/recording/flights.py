@@ -16,7 +16,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import palette
-from spheretwin.viz.layout.layout import TRAIL_S
+from spheretwin.viz.layout.actuator_view import TRAIL_S
 from spheretwin.viz.layout.paths import TIMELINE
 from spheretwin.viz.scene.paths import WORLD
 from spheretwin.viz.scene.poses import shaft_tip
