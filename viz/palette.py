@@ -26,6 +26,23 @@ PAYLOAD: Colour = (176, 136, 226)
 FAILURE: Colour = (255, 45, 85)
 DESIRED_TRACE: Colour = (130, 136, 146)
 
+ASKED: Colour = (240, 240, 240)
+"""What was asked for, drawn thin over what came of it."""
+
+PLAIN: Colour = (200, 204, 212)
+"""What belongs to no axis and to no current."""
+
+GROUP: Colour = (160, 130, 110)
+"""Each of many coil groups, where only their spread matters."""
+
+BELIEVED: Colour = (255, 190, 60)
+"""What the controller takes for true."""
+
+FINE: Colour = (48, 84, 70)
+WARNING: Colour = (214, 140, 30)
+FAILURE: Colour = (205, 60, 150)
+"""States; red is an axis, and a current."""
+
 LAW_COLOURS: dict[str, str] = {
     "pd": "#0072b2",
     "pid": "#e69f00",

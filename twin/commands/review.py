@@ -98,8 +98,8 @@ def _recovered(each: Reviewed) -> str:
 def _thinned(each: Reviewed) -> str:
     return (
         f"{each.path} keeps {each.rate_Hz:g} rows a second and those that stand out: extremes and events are"
-        " those of the run; all other figures are of these rows, each held until the next, and the variation of"
-        " the commands is too low"
+        " those of the run; all other figures are of these rows, each held until the next, and the variation"
+        " of the commands is too low"
     )
 
 
