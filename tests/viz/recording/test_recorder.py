@@ -27,7 +27,8 @@ from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TIMELINE, entity
 from spheretwin.viz.recording import recorder as recording
-from spheretwin.viz.recording.recorder import PENDING_CHUNKS, Recorder
+from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.recording.stream import PENDING_CHUNKS
 from spheretwin.viz.scene import paths as scene
 
 SIGNALS = common_signals(18)
