@@ -11,7 +11,7 @@ from typing import Any
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.twin.commands.reporting import print_json, warn
-from spheretwin.twin.review import columns, tolerances
+from spheretwin.twin.review import columns, merging, tolerances
 from spheretwin.twin.review.figures import figures
 from spheretwin.twin.review.holding import Exceeded, exceeded
 from spheretwin.twin.review.run import Reviewed, read
@@ -43,6 +43,12 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--export", type=Path, metavar="FILE", help="write the columns of the run as .csv or .parquet"
     )
+    parser.add_argument(
+        "--merge",
+        type=Path,
+        metavar="OUT.rrd",
+        help="write all runs side by side as one new recording, with a layout that compares them",
+    )
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
     parser.set_defaults(run=run)
 
@@ -50,7 +56,9 @@ def add_to(verbs: Any) -> None:
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the verb; True when all runs are within the tolerances, if there are any."""
     if rest:
-        raise InputError(f"command line: expected --tolerance, --export or --json, received {' '.join(rest)}")
+        raise InputError(
+            f"command line: expected --tolerance, --export, --merge or --json, received {' '.join(rest)}"
+        )
     _check(options)
     allowed = tolerances.load(options.tolerance) if options.tolerance else None
     first, *others = runs = [read(path) for path in options.runs]
@@ -58,11 +66,13 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     over = [exceeded(first, other, allowed) for other in others] if allowed else []
     if options.export:
         columns.export(first, options.export)
+    if options.merge:
+        merging.merge(runs, options.merge)
     if options.json:
         _print_json(told, over, held=allowed is not None)
     else:
         reviews.print_runs(told)
-        tables.print_written([options.export] if options.export else [])
+        tables.print_written([path for path in (options.export, options.merge) if path])
     warn(_recovered(each) for each in runs if not each.whole)
     for places in filter(None, over):
         print(f"spheretwin: review: {_first(places)}", file=sys.stderr)
@@ -77,6 +87,11 @@ def _check(options: argparse.Namespace) -> None:
     if options.export:
         columns.check(options.export)
         check_writable(options.export)
+    if options.merge and len(options.runs) < 2:
+        raise InputError("command line: expected two runs or more for --merge, received one")
+    if options.merge:
+        merging.check(options.merge, options.runs)
+        check_writable(options.merge)
 
 
 def _print_json(told: list[dict[str, Any]], over: list[list[Exceeded]], *, held: bool) -> None:

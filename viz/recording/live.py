@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
-import sys
 import urllib.parse
-from pathlib import Path
 
 import rerun as rr
-import rerun_cli
 
 from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.viz.recording.program import PROGRAM
 
 HOST = "127.0.0.1"
 
@@ -39,18 +37,17 @@ class Viewer:
 
     def start(self) -> None:
         """Serve the page."""
-        program = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
         options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(self._web_port), self.sink.uri]
         try:
             self._process = subprocess.Popen(
-                [program, *options],
+                [PROGRAM, *options],
                 env={**os.environ, "RERUN_APP_ONLY": "true", "RUST_LOG": "error"},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
         except OSError as error:
-            raise SpheretwinError(f"viewer: expected Rerun's viewer at {program}, {error}") from None
+            raise SpheretwinError(f"viewer: expected Rerun's viewer at {PROGRAM}, {error}") from None
 
     def close(self) -> None:
         """End the page's server."""

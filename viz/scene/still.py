@@ -13,7 +13,13 @@ from spheretwin.viz.scene.paths import TIP, TIP_DESIRED, WORLD
 
 
 def log_static(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, payload_kg: float) -> None:
-    """Log everything that keeps its shape: meshes by body and colour, coils as one mesh."""
+    """Log everything that keeps its shape, and the looks of the traces."""
+    log_shapes(recording, actuator, mjcf, payload_kg)
+    style_traces(recording, palette.TRACE)
+
+
+def log_shapes(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, payload_kg: float) -> None:
+    """Log meshes by body and colour, coils as one mesh."""
     recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for entity, mesh in read_meshes(mjcf).items():
         recording.log(entity, mesh, static=True)
@@ -21,10 +27,10 @@ def log_static(recording: rr.RecordingStream, actuator: Actuator, mjcf: Path, pa
         mount = [actuator.payload_mount_m]
         weight = rr.Cylinders3D(lengths=[0.014], radii=[0.011], centers=mount, colors=[palette.TRACE])
         recording.log(f"{WORLD}/rotor/payload", weight, static=True)
-    _style_traces(recording)
 
 
-def _style_traces(recording: rr.RecordingStream) -> None:
-    for entity, colour, width in ((TIP, palette.TRACE, 2.0), (TIP_DESIRED, palette.DESIRED_TRACE, 1.0)):
-        style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(width))
+def style_traces(recording: rr.RecordingStream, colour: palette.Colour) -> None:
+    """Log how the trace of the shaft's tip, in a colour, and that of where it should be look."""
+    for entity, of_trace, width in ((TIP, colour, 2.0), (TIP_DESIRED, palette.DESIRED_TRACE, 1.0)):
+        style = rr.LineStrips3D.from_fields(colors=[of_trace], radii=rr.Radius.ui_points(width))
         recording.log(entity, style, static=True)
