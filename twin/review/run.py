@@ -13,6 +13,7 @@ from spheretwin.models.telemetry.record import RunRecord
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.twin.review import leavings
+from spheretwin.twin.review.journal import logged
 from spheretwin.viz.recording.parts.events import Event
 
 
@@ -84,10 +85,10 @@ def _of_recording(path: Path) -> Reviewed:
 
     facts, table, log, whole = reading.read(path)
     statuses = {status.told: status for status in Status}
-    # Without ticks: what was set on the way is text in a recording, and cannot be run again.
-    record = RunRecord(
-        _scenario(facts), (), 0, {}, facts["versions"], statuses.get(log[-1][2] if log else "")
-    )
+    scenario, ticks = _scenario(facts), len(table)
+    journal = logged(log, scenario, float(scenario["controller"]["period_s"]), ticks)
+    status = statuses.get(log[-1][2] if log else "")
+    record = RunRecord(scenario, journal, ticks, {}, facts["versions"], status)
     return Reviewed(path, record, table, tuple(log), whole, record.metadata())
 
 

@@ -20,6 +20,8 @@ class Run(NamedTuple):
     label: str
     """What a legend says: file, law, what else is not the same in all."""
     law: str
+    period_s: float
+    """Between two rows."""
     table: Table
     """Its telemetry, with a row at least."""
     record: Mapping[str, str]

@@ -18,7 +18,7 @@ FIRST = {
     "name": "scenario",
     "seed": "seed",
 }
-MOST, LEGEND = 6, 40
+MOST, LEGEND = 6, 48
 """Differences that are told, and characters of a legend's line."""
 LONGEST, LONGEST_STEM = 24, 40
 """Of a value that is told, and of a file's name."""

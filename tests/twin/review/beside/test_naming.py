@@ -1,6 +1,6 @@
 """What a legend says of runs: no more than what tells them apart."""
 
-from spheretwin.twin.review.naming import differing
+from spheretwin.twin.review.beside.naming import differing
 
 SCENARIO = {
     "name": "tilt",

@@ -9,7 +9,7 @@ from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.facts import RunFacts
-from spheretwin.twin.review import naming
+from spheretwin.twin.review.beside import naming
 from spheretwin.twin.review.figures import actuator_of
 from spheretwin.twin.review.happened import events
 from spheretwin.twin.review.run import Reviewed
@@ -73,7 +73,8 @@ def beside(runs: Sequence[Reviewed]) -> list[Run]:
             raise InputError(f"review {run.path}: expected a run of at least one tick to draw, received none")
     told = zip(runs, naming.names(runs), naming.labels(runs, naming.LEGEND), strict=True)
     return [
-        Run(name, label, _law(run), run.table, run.metadata, tuple(events(run))) for run, name, label in told
+        Run(name, label, _law(run), run.period_s, run.table, run.metadata, tuple(events(run)))
+        for run, name, label in told
     ]
 
 

@@ -15,14 +15,14 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.twin import cli
-from spheretwin.twin.review import merging
+from spheretwin.twin.review.beside import merging
 from spheretwin.twin.review.run import read
 from spheretwin.viz.compared.quantities import QUANTITIES
 from spheretwin.viz.layout.paths import TIMELINE
 from spheretwin.viz.merged.bodies import Ghost
 
 # By its path: the tests are no package.
-written = runpy.run_path(str(Path(__file__).with_name("runs.py")))["written"]
+written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
 
 APART_mrad = 3.0
 
