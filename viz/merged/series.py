@@ -22,8 +22,14 @@ def send_line(
     colour: palette.Colour,
     width: float = 1.5,
 ) -> None:
-    """Send one line of a plot, (n,)."""
-    recording.log(entity, rr.SeriesLines(names=[label], colors=[colour], widths=[width]), static=True)
+    """Send one line of a plot, (n,); of ticks that share a pixel, the lowest and the highest are drawn."""
+    look = rr.SeriesLines(
+        names=[label],
+        colors=[colour],
+        widths=[width],
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
+    recording.log(entity, look, static=True)
     for first in range(0, len(t_s), MOST_ROWS):
         rows = slice(first, first + MOST_ROWS)
         recording.send_columns(entity, time_index(t_s[rows]), [scalars(values[rows], 1)])

@@ -15,15 +15,20 @@ def test_a_law_has_its_colour_and_another_run_of_it_another():
     assert colours[3] == palette.OTHER_LAW
 
 
+@pytest.mark.parametrize("law", ["afsm", "afsm_eso"])
 @pytest.mark.parametrize("count", [2, 5, 6, 7, 30])
-def test_no_two_runs_of_one_law_have_one_colour(count):
-    assert len(set(run_colours(["afsm"] * count))) == count
+def test_no_two_runs_of_one_law_have_one_colour_on_any_ground(law, count):
+    colours = run_colours([law] * count)
+    assert len(set(colours)) == len(set(map(on_dark, colours))) == count
 
 
 def test_all_are_seen_on_a_dark_ground_and_told_apart():
     colours = [on_dark(colour) for colour in palette.LAW_COLOURS.values()]
-    grounds = [palette.BACKGROUND, palette.DESIRED_TRACE]
     for place, colour in enumerate(colours):
-        # Of 441 from black to white: text and lines of a third of it stand out; hues of a tenth differ.
-        assert math.dist(colour, palette.BACKGROUND) > 147
-        assert all(math.dist(colour, other) > 30 for other in [*colours[:place], grounds[1]])
+        # Of 441 from black to white; the nearest two laws differ by 44, the nearest to the ground by 120.
+        assert math.dist(colour, palette.BACKGROUND) > 120
+        assert all(math.dist(colour, other) > 40 for other in [*colours[:place], palette.DESIRED_TRACE])
+
+
+def test_what_is_bright_stays_as_it_is():
+    assert on_dark("#e69f00") == (0xE6, 0x9F, 0x00)

@@ -15,6 +15,7 @@ FIRST = {
     "plant.modelling_error": "m",
     "disturbance.load": "L",
     "hardware": "hardware",
+    "fault": "fault",
     "name": "scenario",
     "seed": "seed",
 }
@@ -27,6 +28,7 @@ LONGEST, LONGEST_STEM = 24, 40
 GOES_WITH = {
     "name": ("description", "duration", "trajectory."),
     "controller.law": ("controller.",),
+    "plant.modelling_error": ("plant.modelling_torque_Nm",),
     "hardware": ("sensors.", "estimator.", "drive.", "watchdog.", "plant.", "nominal."),
 }
 
@@ -83,7 +85,10 @@ def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, s
 
 
 def _text(value: Any) -> str:
-    """As a person writes it: a whole number without a point."""
+    """As a person writes it: a whole number without a point, of entries of a list what they name."""
     if isinstance(value, str):
         return value
+    if isinstance(value, list) and all(isinstance(each, Mapping) for each in value):
+        words = [" ".join(word for word in each.values() if isinstance(word, str)) for each in value]
+        return " + ".join(words) or "none"
     return f"{value:g}" if isinstance(value, float) and value == float(f"{value:g}") else json.dumps(value)

@@ -53,7 +53,7 @@ def over_time(runs: Sequence[Run], leading: Sequence[int], quantities: Sequence[
         for trace in asked:
             trace.hoverinfo, trace.hovertemplate = "skip", None
         axis = {"range": quantity.limits} if quantity.limits else {}
-        panels.append(Panel(escape(quantity.heading), [*asked, *lines], axis))
+        panels.append(Panel(_text(quantity.heading), [*asked, *lines], axis))
     panels += _currents(runs)
     panels.append(_happened(runs, colours))
     return stacked(panels, "time [s]")
@@ -117,7 +117,7 @@ def _currents(runs: Sequence[Run]) -> list[Panel]:
         trace = plotly.Heatmap(z=_small(few.values.T), x0=float(run.table["t_s"][0]) + step_s / 2, dx=step_s,
                                colorscale=BLUE_TO_RED, zmin=-largest_A, zmax=largest_A, showscale=False,
                                meta=f"{place}", hovertemplate=hover)  # fmt: skip
-        title = f"currents by group, up to ±{largest_A:.3g} A: {escape(run.label)}"
+        title = f"currents by group, up to ±{largest_A:.3g} A: {_text(run.label)}"
         panels.append(Panel(title, [trace], {"autorange": "reversed", "dtick": max(1, groups // 6)}))
     return panels
 
@@ -127,7 +127,7 @@ def _happened(runs: Sequence[Run], colours: Sequence[str]) -> Panel:
     traces = []
     for place, (run, colour) in enumerate(zip(runs, colours, strict=True)):
         times = [each[0] for each in run.events]
-        text = [escape(f"{t_s:.4g} s: {text}") for t_s, _, text in run.events]
+        text = [_text(f"{t_s:.4g} s: {text}") for t_s, _, text in run.events]
         symbols = ["circle" if level == "INFO" else "triangle-up" for _, level, _ in run.events]
         traces.append(plotly.Scatter(x=times, y=[place + 1] * len(times), mode="markers", text=text,
                                      marker={"color": colour, "size": 9, "symbol": symbols},
@@ -139,3 +139,8 @@ def _happened(runs: Sequence[Run], colours: Sequence[str]) -> Panel:
 def _small(values: Array) -> np.ndarray:
     """In half the bytes: seven digits are more than a plot shows."""
     return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def _text(text: str) -> str:
+    """Text in which no tag is obeyed; quotes stay, which the library would show as they are written."""
+    return escape(text, quote=False)

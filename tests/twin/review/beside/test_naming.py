@@ -44,3 +44,11 @@ def test_what_goes_with_the_hardware_is_not_told_beside_it():
 
 def test_a_field_that_one_lacks_is_none_there():
     assert differing([SCENARIO, {**SCENARIO, "watch": 1}]) == [["watch none"], ["watch 1"]]
+
+
+def test_faults_are_told_by_what_they_name():
+    faults = [{"target": "coil.07", "mode": "open", "start_s": 1.0}, {"target": "group.3", "mode": "stuck"}]
+    assert differing([{**SCENARIO, "fault": faults}, {**SCENARIO, "fault": []}]) == [
+        ["fault coil.07 ope…roup.3 stuck"],
+        ["fault none"],
+    ]
