@@ -17,6 +17,13 @@ DESIRED_COLOURS: tuple[Colour, ...] = ((150, 78, 78), (62, 112, 80), (70, 96, 15
 
 BACKGROUND: Colour = (20, 22, 26)
 TRACE: Colour = (255, 190, 60)
+NORTH: Colour = (232, 234, 238)
+SOUTH: Colour = (70, 74, 82)
+COIL_TORQUE: Colour = (240, 242, 245)
+LOAD: Colour = (80, 210, 205)
+PAYLOAD: Colour = (176, 136, 226)
+"""Of the weight on the shaft, and of the torque that it has."""
+FAILURE: Colour = (255, 45, 85)
 DESIRED_TRACE: Colour = (130, 136, 146)
 
 LAW_COLOURS: dict[str, str] = {
@@ -64,6 +71,14 @@ _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
 )
 
 _NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)
+
+
+def mixed(colour: Colour, other: Colour, share: float) -> Colour:
+    """A colour with a share of another."""
+    red, green, blue = (
+        round((1 - share) * own + share * its) for own, its in zip(colour, other, strict=True)
+    )
+    return red, green, blue
 
 
 def law_colour(law: str) -> str:

@@ -82,6 +82,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         reviews.print_runs(told)
         tables.print_written([path for path in (options.export, options.merge, page) if path])
     warn(_recovered(each) for each in runs if not each.whole)
+    warn(_thinned(each) for each in runs if each.rate_Hz)
     for places in filter(None, over):
         print(f"spheretwin: review: {_first(places)}", file=sys.stderr)
     return not any(over)
@@ -121,6 +122,14 @@ def _recovered(each: Reviewed) -> str:
     return (
         f"{each.path} was not closed: {len(each.table)} rows, {each.simulated_s:.3f} s of the run,"
         " were recovered"
+    )
+
+
+def _thinned(each: Reviewed) -> str:
+    return (
+        f"{each.path} keeps {each.rate_Hz:g} rows a second and those that stand out: extremes and events are"
+        " those of the run; all other figures are of these rows, each held until the next, and the variation"
+        " of the commands is too low"
     )
 
 

@@ -38,7 +38,7 @@ def figures(run: Reviewed) -> dict[str, Any]:
 def _figures(run: Reviewed) -> dict[str, Any]:
     scenario = run.record.scenario
     metrics = _metrics(run)
-    work_J, copper_J = mechanical_work_J(run.table, run.period_s), metrics["copper_loss_J"]
+    work_J, copper_J = mechanical_work_J(run.every_tick, run.period_s), metrics["copper_loss_J"]
     return {
         "path": str(run.path),
         "scenario": scenario["name"],
@@ -51,6 +51,7 @@ def _figures(run: Reviewed) -> dict[str, Any]:
         "reason": _reason(run.table),
         "whole": run.whole,
         "rows": len(run.table),
+        "record_rate_Hz": run.rate_Hz,
         "simulated_s": run.simulated_s,
         "planned_s": scenario["duration"],
         **metrics,
@@ -68,7 +69,7 @@ def _figures(run: Reviewed) -> dict[str, Any]:
 def _metrics(run: Reviewed) -> dict[str, Any]:
     scenario = validated(_what_metrics_take(run), str(run.path))
     gathered = Figures(Planned(scenario, files_of(scenario).actuator, scenario.ticks))
-    gathered.write(run.table)
+    gathered.write(run.every_tick)
     return gathered.values()
 
 
@@ -94,7 +95,7 @@ def _what_metrics_take(run: Reviewed) -> dict[str, Any]:
 
 
 def _error_peaks(run: Reviewed) -> list[Any]:
-    return [peaks(column, run.period_s) for column in run.table["error_rad"].T]
+    return [peaks(column, run.period_s) for column in run.every_tick["error_rad"].T]
 
 
 def _reason(table: Table) -> str | None:

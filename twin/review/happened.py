@@ -20,8 +20,8 @@ def events(run: Reviewed) -> list[Event]:
         found, end = list(run.log[:-1] if ended else run.log), list(run.log[-1:] if ended else ())
     else:
         log = Events()
-        found = log.of(run.table) if len(run.table) else []
-        found += [(t_s, Level.INFO, text) for t_s, text in FaultLines().of(run.table)]
+        found = log.of(run.every_tick) if len(run.table) else []
+        found += [(t_s, Level.INFO, text) for t_s, text in FaultLines().of(run.every_tick)]
         found += [(each.tick * run.period_s, Level.INFO, change_told(each)) for each in _changes(run)]
         end = [log.end(ended)] if ended else []
     return [*sorted(found, key=lambda event: (event[0], event[2])), *end]
@@ -29,5 +29,5 @@ def events(run: Reviewed) -> list[Event]:
 
 def _changes(run: Reviewed) -> Iterator[Change]:
     """Changes that its scenario planned and that it came to, and those that were made by hand."""
-    yield from planned(run.record.scenario, run.period_s, len(run.table))
+    yield from planned(run.record.scenario, run.period_s, len(run.every_tick))
     yield from run.record.journal

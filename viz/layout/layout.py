@@ -8,12 +8,9 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from spheretwin.viz import palette
+from spheretwin.viz.layout.actuator_view import actuator_view
 from spheretwin.viz.layout.paths import EVENTS, SCENARIO, STATES, TELEMETRY, TIMELINE, entity
 from spheretwin.viz.layout.view import View
-from spheretwin.viz.scene import paths as scene
-
-TRAIL_S = 2.0
 
 
 @lru_cache(maxsize=4)
@@ -69,7 +66,7 @@ def layout(view: View) -> rrb.Blueprint:
     )
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(_actuator_view(), currents, row_shares=[3, 1]),
+            rrb.Vertical(actuator_view(), currents, row_shares=[3, 1]),
             rrb.Vertical(plots, texts, row_shares=[3, 1]),
             column_shares=[4, 5],
         ),
@@ -83,29 +80,4 @@ def layout(view: View) -> rrb.Blueprint:
         rrb.SelectionPanel(state="hidden"),
         auto_views=False,
         auto_layout=False,
-    )
-
-
-def _actuator_view() -> rrb.Spatial3DView:
-    boundary = rrb.TimeRangeBoundary
-
-    def trail(seconds: float) -> rrb.VisibleTimeRanges:
-        return rrb.VisibleTimeRanges(
-            timeline=TIMELINE,
-            start=boundary.cursor_relative(seconds=-seconds),
-            end=boundary.cursor_relative(),
-        )
-
-    return rrb.Spatial3DView(
-        origin=f"/{scene.WORLD}",
-        name="actuator",
-        background=list(palette.BACKGROUND),
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=[0.13, -0.13, 0.20],
-            look_target=[0, 0, 0.025],
-            eye_up=[0, 0, 1],
-        ),
-        overrides={f"/{scene.TIP}": trail(TRAIL_S), f"/{scene.TIP_DESIRED}": trail(TRAIL_S)},
     )

@@ -18,7 +18,7 @@ from spheretwin.viz import palette
 from spheretwin.viz.compared.colours import on_dark
 from spheretwin.viz.layout.paths import TIMELINE
 from spheretwin.viz.merged.layout import time_axis, trail_behind
-from spheretwin.viz.merged.series import send_line, send_path, send_point, style_point
+from spheretwin.viz.merged.series import send_line, send_path, send_point, style_path, style_point
 from spheretwin.viz.merged.stream import recorded
 from spheretwin.viz.scene.paths import WORLD
 from spheretwin.viz.scene.poses import shaft_tip
@@ -85,7 +85,8 @@ def _send_tip(
     below = f"{WORLD}/{_part(label)}"
     style_point(recording, f"{below}/tip", label, colour)
     send_point(recording, f"{below}/tip", t_s, tips)
-    send_path(recording, f"{below}/path", t_s, tips, colour)
+    style_path(recording, f"{below}/path", colour)
+    send_path(recording, f"{below}/path", t_s, tips, tips[:1])
 
 
 def _layout(flights: Mapping[str, Flight]) -> rrb.Blueprint:

@@ -9,12 +9,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spheretwin.viz import palette
-from spheretwin.viz.layout.layout import TRAIL_S
 from spheretwin.viz.layout.paths import EVENTS, STATES, TIMELINE
-from spheretwin.viz.merged.bodies import POINT, ROTOR
-from spheretwin.viz.scene.paths import TIP, TIP_DESIRED, WORLD
+from spheretwin.viz.merged.bodies import ROTOR
+from spheretwin.viz.scene.paths import WORLD
+from spheretwin.viz.scene.traces import TRAIL_S
 
-COMPARE, DESIRED, RUNS = "compare", "desired", "runs"
+COMPARE, DESIRED, RUNS, TIP = "compare", "desired", "runs", "tip"
 """Parts of the paths of entities, behind the name of a run but for `RUNS`."""
 
 # Plots that share a row are too narrow for names; the one that has a row of its own tells them.
@@ -110,21 +110,21 @@ def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
 
 def _bodies(view: View) -> rrb.Spatial3DView:
     first, *ghosts = view.runs
-    traces = [f"/{run}/{TIP}" for run in view.runs] + [f"/{run}/{TIP_DESIRED}" for run in view.leaders]
-    others = [*(f"/{run}/{POINT}" for run in view.runs), *(f"/{run}/{ROTOR}/**" for run in ghosts)]
+    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{run}/{DESIRED}/{TIP}" for run in view.leaders]
+    drawn = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
     return rrb.Spatial3DView(
         origin="/",
-        contents=[f"/{first}/{WORLD}/**", f"- /{first}/{TIP_DESIRED}", *traces, *others],
+        contents=[*drawn, *(f"{tip}/**" for tip in tips)],
         name="run 1 in the actuator, the others as ghosts",
         background=list(palette.BACKGROUND),
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=[0.13, -0.13, 0.20],
-            look_target=[0, 0, 0.025],
+            position=[0.16, -0.16, 0.22],
+            look_target=[0, 0, 0.02],
             eye_up=[0, 0, 1],
         ),
-        overrides={trace: trail_behind() for trace in traces},
+        overrides={f"{tip}/path": trail_behind() for tip in tips},
     )
 
 

@@ -16,8 +16,8 @@ from spheretwin.viz.compared.desired import leaders
 from spheretwin.viz.compared.quantities import Quantity, drawn
 from spheretwin.viz.compared.run import Run
 from spheretwin.viz.layout.paths import SCENARIO
-from spheretwin.viz.merged.bodies import Body, Ghost
-from spheretwin.viz.merged.layout import COMPARE, DESIRED, RUNS, Plot, View, application, layout
+from spheretwin.viz.merged.bodies import Tip, body
+from spheretwin.viz.merged.layout import COMPARE, DESIRED, RUNS, TIP, Plot, View, application, layout
 from spheretwin.viz.merged.series import send_line
 from spheretwin.viz.merged.stream import Below, recorded
 from spheretwin.viz.recording.parts.log import log_lines
@@ -71,8 +71,16 @@ def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: st
         recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
         for place, (run, subject, colour) in enumerate(zip(runs, subjects, colours, strict=True)):
             below = cast(rr.RecordingStream, Below(recording, run.name))
-            body = (Ghost if place else Body)(subject, place + 1, colour)
-            _write_parts(below, run, [Signals(subject), body, States(subject)])
+            parts = [
+                Signals(subject),
+                body(subject, colour, ghost=place > 0),
+                Tip(subject, TIP, "q_rad", f"{place + 1}", colour),
+                States(subject),
+            ]
+            if place in leading:
+                wanted = f"{DESIRED}/{TIP}"
+                parts.append(Tip(subject, wanted, "q_ref_rad", "", palette.DESIRED_TRACE))
+            _write_parts(below, run, parts)
             for each in quantities:
                 entity, t_s, values = f"{COMPARE}/{each.name}", run.table["t_s"], each.of(run.table)
                 send_line(below, entity, run.label, t_s, values, colour)

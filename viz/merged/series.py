@@ -46,12 +46,26 @@ def send_point(recording: rr.RecordingStream, entity: str, t_s: Array, positions
     recording.send_columns(entity, time_index(t_s), rr.Points3D.columns(positions=positions))
 
 
-def send_path(
-    recording: rr.RecordingStream, entity: str, t_s: Array, positions: Array, colour: palette.Colour
-) -> None:
-    """Send the path of a point, (n, 3) in m, as a short segment a row."""
+def style_path(recording: rr.RecordingStream, entity: str, colour: palette.Colour) -> None:
+    """Say how a path looks that is sent later."""
     style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.5))
     recording.log(entity, style, static=True)
-    before = np.concatenate([positions[:1], positions[:-1]])
-    segments = strips(np.stack([before, positions], axis=1))
+
+
+def send_path(
+    recording: rr.RecordingStream, entity: str, t_s: Array, positions: Array, before: Array
+) -> None:
+    """Send the path of a point as a short segment a row.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+    entity : str
+    t_s : (n,) array, s
+    positions : (n, 3) array, m
+    before : (1, 3) or (0, 3) array, m
+        Where it was before, if it was.
+    """
+    starts = np.concatenate([before if len(before) else positions[:1], positions[:-1]])
+    segments = strips(np.stack([starts, positions], axis=1))
     recording.send_columns(entity, time_index(t_s), rr.LineStrips3D.columns(strips=segments))

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 
+import rerun_cli
+
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.viz.recording.program import PROGRAM
+
+PROGRAM = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
 
 # With less it has found something that the reader finds again, and says on one line.
 _PANICS = 100

@@ -60,8 +60,14 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
     recording.write(path, compared, subjects, _told(runs))
 
 
-def beside(runs: Sequence[Reviewed]) -> list[Run]:
+def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
     """Runs as they are drawn beside each other.
+
+    Parameters
+    ----------
+    runs : sequence of Reviewed
+    every_tick : bool
+        With a row a tick, also where a file does not keep every one.
 
     Raises
     ------
@@ -73,7 +79,15 @@ def beside(runs: Sequence[Reviewed]) -> list[Run]:
             raise InputError(f"review {run.path}: expected a run of at least one tick to draw, received none")
     told = zip(runs, naming.names(runs), naming.labels(runs, naming.LEGEND), strict=True)
     return [
-        Run(name, label, _law(run), run.period_s, run.table, run.metadata, tuple(events(run)))
+        Run(
+            name,
+            label,
+            _law(run),
+            run.period_s,
+            run.every_tick if every_tick else run.table,
+            run.metadata,
+            tuple(events(run)),
+        )
         for run, name, label in told
     ]
 
@@ -87,6 +101,7 @@ def _facts(run: Reviewed) -> RunFacts:
         duration_s=scenario["duration"],
         current_limit_A=scenario["drive"]["current_limit_A"] or 0.0,
         payload_kg=scenario["plant"]["payload_kg"],
+        gravity_m_s2=scenario["plant"]["gravity_m_s2"],
         mjcf=Path(scenario["plant"]["mjcf"] or MJCF_PATH),
         sections={},
     )

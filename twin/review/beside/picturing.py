@@ -51,7 +51,7 @@ def write(runs: Sequence[Reviewed], told: Sequence[dict[str, Any]], into: Path) 
     """
     from spheretwin.viz.page.interactive import drawing, page  # what draws is slow to import
 
-    compared = beside(runs)
+    compared = beside(runs, every_tick=True)
     tables = [run.table for run in compared]
     leading, quantities = leaders(tables), drawn(tables)
     spectra = [_spectra(run) for run in runs]
@@ -103,7 +103,7 @@ def _spectra(run: Reviewed) -> list[Spectrum]:
     return [
         Spectrum(*amplitudes(column, run.period_s), [(peak.frequency_Hz, peak.amplitude) for peak in
                  peaks(column, run.period_s)])
-        for column in 1e3 * run.table["error_rad"].T
+        for column in 1e3 * run.every_tick["error_rad"].T
     ]  # fmt: skip
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from enum import Enum
+from typing import ClassVar, NamedTuple
 
 import rerun as rr
 
@@ -13,6 +14,15 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 
 
+class Rows(Enum):
+    """Which rows of a run a part is given."""
+
+    ALL = "all"
+    """Every row, at once: for what thins them itself, or must not miss any."""
+    KEPT = "kept"
+    """Those that the recording keeps, whole; known some seconds later where it is thinned."""
+
+
 class Subject(NamedTuple):
     """What is recorded."""
 
@@ -21,6 +31,8 @@ class Subject(NamedTuple):
     signals: tuple[Signal, ...]
     """Columns of the telemetry at the start; a change of law may bring others."""
     facts: RunFacts
+    rate_Hz: float | None = None
+    """Rows a second that are kept beside those that stand out; None for every row."""
 
 
 class Part:
@@ -30,7 +42,14 @@ class Part:
     ----------
     subject : Subject
         What is recorded.
+
+    Attributes
+    ----------
+    rows : Rows
+        Which rows `write` is given.
     """
+
+    rows: ClassVar[Rows] = Rows.ALL
 
     def __init__(self, subject: Subject) -> None:
         self.subject = subject

@@ -1,10 +1,22 @@
 """The parts of a recording, in the order in which a chunk is recorded: one row each."""
 
-from spheretwin.viz.recording.parts.actuator import MovingActuator
 from spheretwin.viz.recording.parts.log import Log
+from spheretwin.viz.recording.parts.moving.actuator import MovingActuator
+from spheretwin.viz.recording.parts.moving.ending import Ending
+from spheretwin.viz.recording.parts.moving.torques import Torques
+from spheretwin.viz.recording.parts.moving.traces import Traces
 from spheretwin.viz.recording.parts.part import Part
 from spheretwin.viz.recording.parts.scenario import ScenarioText
 from spheretwin.viz.recording.parts.signals import Signals
 from spheretwin.viz.recording.parts.states import States
 
-PARTS: tuple[type[Part], ...] = (ScenarioText, Signals, MovingActuator, States, Log)
+PARTS: tuple[type[Part], ...] = (
+    ScenarioText,
+    Signals,
+    MovingActuator,
+    Traces,
+    Torques,
+    Ending,
+    States,
+    Log,
+)

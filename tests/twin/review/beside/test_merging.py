@@ -133,8 +133,8 @@ def test_the_layout_names_only_what_there_is(merged):
 def test_every_run_has_a_body_and_one_alone_has_the_whole_actuator(merged):
     for place, name in enumerate(("first", "moved", "slow", "other"), start=1):
         assert f"/run_{place}_{name}/world/rotor/ball" in merged.entities
-        assert f"/run_{place}_{name}/world/shaft_tip/point" in merged.entities
-        assert (f"/run_{place}_{name}/world/stator/stator" in merged.entities) == (place == 1)
+        assert f"/run_{place}_{name}/tip/point" in merged.entities
+        assert (f"/run_{place}_{name}/world/coils" in merged.entities) == (place == 1)
 
 
 def test_nothing_but_the_file_is_left(merged):
