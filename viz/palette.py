@@ -23,7 +23,6 @@ COIL_TORQUE: Colour = (224, 92, 178)
 LOAD: Colour = (26, 168, 160)
 PAYLOAD: Colour = (26, 168, 160)
 """Of the weight on the shaft, and of the torque that it has."""
-FAILURE: Colour = (255, 45, 85)
 DESIRED_TRACE: Colour = (130, 136, 146)
 
 ASKED: Colour = (240, 240, 240)
@@ -76,7 +75,8 @@ LAW_MARKS: dict[str, tuple[str, Dash]] = {
 
 OTHER_LAW = "#8a5a9e"
 
-_SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
+SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
+"""Where a law's own colour is taken."""
 
 _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
     ("p", (0, (2, 1))),
@@ -107,7 +107,7 @@ def law_colours(laws: Sequence[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for law in laws:
         own = law_colour(law.split(",")[0])
-        others = [each for each in (own, *_SPARE) if each not in found.values()]
+        others = [each for each in (own, *SPARE) if each not in found.values()]
         found[law] = others[0] if others else own
     return found
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
@@ -26,7 +29,8 @@ def figures(run: Reviewed) -> dict[str, Any]:
         Its scenario is none of this version's, or its model file is no longer there or has other coil groups.
     """
     try:
-        return _figures(run)
+        with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
+            return _figures(run)
     except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
         raise InputError(f"review {run.path}: expected facts and rows of a run, {error!r}") from None
 
@@ -67,6 +71,17 @@ def _metrics(run: Reviewed) -> dict[str, Any]:
     gathered = Figures(Planned(scenario, files_of(scenario).actuator, scenario.ticks))
     gathered.write(run.every_tick)
     return gathered.values()
+
+
+def actuator_of(run: Reviewed) -> Actuator:
+    """The actuator of a run, as its files say now.
+
+    Raises
+    ------
+    InputError
+        Its model file is no longer there.
+    """
+    return files_of(validated(_what_metrics_take(run), str(run.path))).actuator
 
 
 def _what_metrics_take(run: Reviewed) -> dict[str, Any]:

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.status import Level
 from spheretwin.twin.faults.told import FaultLines
+from spheretwin.twin.review.journal import planned
 from spheretwin.twin.review.run import Reviewed
-from spheretwin.twin.scenario.changing import from_now_on
-from spheretwin.twin.scenario.planned import first_tick
 from spheretwin.twin.simulation import change_told
 from spheretwin.viz.recording.parts.events import Event, Events
 
@@ -30,7 +29,5 @@ def events(run: Reviewed) -> list[Event]:
 
 def _changes(run: Reviewed) -> Iterator[Change]:
     """Changes that its scenario planned and that it came to, and those that were made by hand."""
-    for event in run.record.scenario.get("event", ()):
-        if (tick := first_tick(event["t_s"] / run.period_s)) < len(run.every_tick):
-            yield Change(tick, event["set"], from_now_on(event["set"], event["value"], event["t_s"]))
+    yield from planned(run.record.scenario, run.period_s, len(run.every_tick))
     yield from run.record.journal

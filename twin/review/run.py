@@ -14,7 +14,8 @@ from spheretwin.models.telemetry.record import RunRecord
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.twin.review import leavings
-from spheretwin.twin.review.held import held
+from spheretwin.twin.review.held import held, ticks_of
+from spheretwin.twin.review.journal import logged
 from spheretwin.viz.recording.parts.events import Event
 
 # In the metadata of columns that were exported of a recording that does not keep every row.
@@ -99,10 +100,11 @@ def _of_recording(path: Path) -> Reviewed:
 
     facts, table, log, whole = reading.read(path)
     statuses = {status.told: status for status in Status}
-    # Without ticks: what was set on the way is text in a recording, and cannot be run again.
-    record = RunRecord(
-        _scenario(facts), (), 0, {}, facts["versions"], statuses.get(log[-1][2] if log else "")
-    )
+    scenario, status = _scenario(facts), statuses.get(log[-1][2] if log else "")
+    period_s = float(scenario["controller"]["period_s"])
+    ticks = int(ticks_of(table, period_s)[-1]) + 1 if len(table) else 0
+    journal = logged(log, scenario, period_s, ticks)
+    record = RunRecord(scenario, journal, ticks, {}, facts["versions"], status)
     rate_Hz, metadata = facts.get(RATE), record.metadata()
     if rate_Hz:
         metadata = {**metadata, _RATE: repr(rate_Hz)}
