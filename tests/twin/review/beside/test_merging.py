@@ -202,3 +202,17 @@ def test_a_result_that_cannot_be_completed_leaves_nothing(files, tmp_path, monke
     with pytest.raises(BaseException, match="a panic"):
         merging.merge(runs, tmp_path / "out.rrd")
     assert os.listdir(tmp_path) == []
+
+
+def test_a_recording_that_keeps_some_rows_gives_those_and_no_others(files, tmp_path):
+    path, out = tmp_path / "thin.rrd", tmp_path / "out.rrd"
+    run = ["simulate", "hold", "--plant.engine", "lagrangian", "--duration", "0.5", "--json"]
+    assert cli.main([*run, "--record", str(path), "--record-rate", "20"]) == 0
+    assert cli.main(["review", str(path), str(files["first"]), "--merge", str(out)]) == 0
+    thin = read(path)
+    assert len(thin.table) < len(thin.every_tick) == 500
+    assert thin.record.ticks == 500
+    found = Merged(out)
+    for signal in thin.table.signals:
+        column = thin.table[signal.name].reshape(len(thin.table), -1)
+        assert found.values(f"/run_1_thin/telemetry/{signal.name}").tobytes() == column.tobytes()
