@@ -98,9 +98,9 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
 
 
 def test_what_was_asked_for_is_there_once(merged):
-    leading = {entity.split("/")[1] for entity in merged.entities if "/desired/" in entity}
+    leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/asked/")}
     assert leading == {"run_3_slow"}  # the longest of runs that were asked for the same
-    wanted = merged.values("/run_3_slow/desired/angle_α_rad")
+    wanted = merged.values("/asked/run_3_slow/angle_α_rad")
     assert np.array_equal(wanted, merged.values("/run_3_slow/telemetry/q_ref_rad")[:, :1])
 
 
