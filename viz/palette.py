@@ -17,14 +17,30 @@ DESIRED_COLOURS: tuple[Colour, ...] = ((150, 78, 78), (62, 112, 80), (70, 96, 15
 
 BACKGROUND: Colour = (20, 22, 26)
 TRACE: Colour = (255, 190, 60)
-NORTH: Colour = (232, 234, 238)
-SOUTH: Colour = (70, 74, 82)
-COIL_TORQUE: Colour = (240, 242, 245)
-LOAD: Colour = (80, 210, 205)
-PAYLOAD: Colour = (176, 136, 226)
+NORTH: Colour = (150, 155, 163)
+SOUTH: Colour = (44, 47, 54)
+COIL_TORQUE: Colour = (224, 92, 178)
+LOAD: Colour = (26, 168, 160)
+PAYLOAD: Colour = (26, 168, 160)
 """Of the weight on the shaft, and of the torque that it has."""
-FAILURE: Colour = (255, 45, 85)
 DESIRED_TRACE: Colour = (130, 136, 146)
+
+ASKED: Colour = (240, 240, 240)
+"""What was asked for, drawn thin over what came of it."""
+
+PLAIN: Colour = (200, 204, 212)
+"""What belongs to no axis and to no current."""
+
+GROUP: Colour = (160, 130, 110)
+"""Each of many coil groups, where only their spread matters."""
+
+BELIEVED: Colour = (255, 190, 60)
+"""What the controller takes for true."""
+
+FINE: Colour = (48, 84, 70)
+WARNING: Colour = (214, 140, 30)
+FAILURE: Colour = (205, 60, 150)
+"""States; red is an axis, and a current."""
 
 LAW_COLOURS: dict[str, str] = {
     "pd": "#0072b2",

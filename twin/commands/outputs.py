@@ -16,6 +16,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.records.facts import facts_of, record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink
+from spheretwin.viz.layout.view import OVERVIEW
 
 if TYPE_CHECKING:
     from spheretwin.viz.recording.live import LiveView
@@ -77,6 +78,8 @@ class Outputs:
         Files to write.
     live : bool
         Serve a viewer on 127.0.0.1.
+    view : str
+        What of the recording is open at first.
     record_rate_Hz : float, optional
         Rows a second that the recording keeps beside those that stand out; every row unless given.
     first_tick : int
@@ -101,6 +104,7 @@ class Outputs:
         record: Path | None,
         telemetry: Path | None,
         live: bool,
+        view: str = OVERVIEW,
         record_rate_Hz: float | None = None,
         first_tick: int = 0,
     ) -> None:
@@ -110,10 +114,10 @@ class Outputs:
         if telemetry:
             self._begun = record_of(session, first_tick=first_tick)
             self._file = TelemetryFile(telemetry, session.signals, self._begun.metadata())
-        self._live = _live_view(session) if live else None
+        self._live = _live_view(session, view) if live else None
         # The recorder last: it alone leaves something where it is made and another is refused.
         try:
-            self._recorder = _recorder(session, record, record_rate_Hz) if record else None
+            self._recorder = _recorder(session, record, view, record_rate_Hz) if record else None
         except SpheretwinError:
             if self._live:
                 self._live.close()
@@ -169,16 +173,16 @@ class _From:
         self._sink.finish(status)
 
 
-def _live_view(session: Session) -> LiveView:
+def _live_view(session: Session, view: str) -> LiveView:
     from spheretwin.viz.recording.live import LiveView  # Rerun is slow to import
 
-    live = LiveView(session.actuator, session.signals, facts_of(session.begun_as))
+    live = LiveView(session.actuator, session.signals, facts_of(session.begun_as), shown=view)
     print(f"watch: {live.address}", file=sys.stderr, flush=True)
     return live
 
 
-def _recorder(session: Session, path: Path, rate_Hz: float | None) -> Recorder:
+def _recorder(session: Session, path: Path, view: str, rate_Hz: float | None) -> Recorder:
     from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
     facts = facts_of(session.begun_as)
-    return Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz)
+    return Recorder(session.actuator, session.signals, facts, path=path, shown=view, rate_Hz=rate_Hz)

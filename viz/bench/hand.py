@@ -80,6 +80,11 @@ class Hand:
         with self._lock:
             self._open = [*self._open[-MOST_TICKETS:], (ticket, beside)]
 
+    def tell_chosen(self, event: Event) -> None:
+        """Tell the bench what a group of buttons has as its value."""
+        if event.target.value in event.target.options:
+            self.tell(event, event.target.value)
+
     def complain(self, text: str, beside: Note | None = None) -> None:
         """Show why something never became a command."""
         if beside:

@@ -50,7 +50,7 @@ class Modes:
         self._hand, self._bench, self._scene = hand, bench, scene
         actuator = bench.actuator
         modes = gui.add_button_group("mode", ("off", "hold", "trajectory"))
-        on_press(modes, lambda event: hand.tell(event, str(event.target.value)))
+        on_press(modes, hand.tell_chosen)
         self._point(gui, actuator)
         self._follow(gui, choices)
         self._jog(gui)

@@ -124,7 +124,7 @@ class Page:
             self._hand.button(gui, "STOP (space)", "stop", color="red")
             self._status = gui.add_html("")
             running = gui.add_button_group("run", ("start", "pause", "step", "reset"))
-            on_press(running, lambda event: self._hand.tell(event, str(event.target.value)))
+            on_press(running, self._hand.tell_chosen)
             speed = gui.add_dropdown("speed", list(SPEEDS), initial_value="1×")
             self._hand.on_change(
                 speed,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import TIMELINE
 from spheretwin.viz.scene import paths as scene
 from spheretwin.viz.scene.torques import SCALE
@@ -12,11 +11,10 @@ from spheretwin.viz.scene.traces import TRACES, Trace
 
 
 def actuator_view() -> rrb.Spatial3DView:
-    """View of all that moves, and of the traces of the last seconds."""
+    """View of all that moves, and of the traces of the last seconds, on the ground of the viewer's theme."""
     return rrb.Spatial3DView(
         origin=f"/{scene.WORLD}",
         name=f"actuator; {SCALE}",
-        background=list(palette.BACKGROUND),
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,

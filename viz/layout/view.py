@@ -5,7 +5,12 @@ from __future__ import annotations
 import hashlib
 from typing import NamedTuple
 
-from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
+
+OVERVIEW = "overview"
+
+VIEW_NAMES = (OVERVIEW, "control", "coils", "hardware", "compare", "scenario")
+"""What a recording has in tabs; kept apart from the views, for Rerun is slow to import."""
 
 
 class View(NamedTuple):
@@ -18,18 +23,27 @@ class View(NamedTuple):
     groups: int
     """Coil groups, each with a current."""
     own: tuple[Signal, ...]
-    """Signals that not every run has, each in a tab; the sliding variable among the plots."""
+    """Signals that not every run has."""
     live: bool
     """Follow the run instead of playing from its start."""
+    shown: str = OVERVIEW
+    """The view that is open at first."""
+    run: str = ""
+    """What tells the recording from others, for figures of its run stand in the layout."""
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of all signals."""
+        return COMMON_NAMES | {signal.name for signal in self.own}
 
 
 def application(view: View) -> str:
     """Application id of recordings with one layout.
 
     A viewer keeps one layout for each application: under a common id the second recording that it opens
-    would be shown in the first one's, with its length and its tabs. Of letters, digits and dashes only, else
-    the viewer changes it.
+    would be shown in the first one's, with its length, its ranges and its tabs. Of letters, digits and dashes
+    only, else the viewer changes it.
     """
     names = [(signal.name, bool(signal.states)) for signal in view.own]
-    key = repr((view.duration_s, view.current_limit_A, view.groups, names, view.live))
+    key = repr((*view._replace(own=()), names))
     return f"spheretwin-{hashlib.sha256(key.encode()).hexdigest()[:12]}"

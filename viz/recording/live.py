@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from uuid import uuid4
+
 import rerun as rr
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.layout.layout import layout
+from spheretwin.viz.layout.layout import opening_layout
+from spheretwin.viz.layout.view import OVERVIEW
 from spheretwin.viz.recording.parts.part import Subject
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.recording.thinning import Firsts
@@ -37,6 +40,8 @@ class LiveView(Stream):
         Columns of the telemetry.
     facts : RunFacts
         For the text panel, the axes and the drawing.
+    shown : str
+        The view that is open at first, one of `VIEWS`.
 
     Raises
     ------
@@ -46,9 +51,11 @@ class LiveView(Stream):
         Rerun's viewer is not there.
     """
 
-    def __init__(self, actuator: Actuator, signals: tuple[Signal, ...], facts: RunFacts) -> None:
-        subject = Subject(actuator, signals, facts, LIVE_RATE_Hz)
-        super().__init__(subject, Firsts(LIVE_RATE_Hz), live=True)
+    def __init__(
+        self, actuator: Actuator, signals: tuple[Signal, ...], facts: RunFacts, *, shown: str = OVERVIEW
+    ) -> None:
+        subject = Subject(actuator, signals, facts, True, shown, uuid4().hex, LIVE_RATE_Hz)
+        super().__init__(subject, Firsts(LIVE_RATE_Hz))
         self._together = max(1, round(_TOGETHER_S / facts.sections["controller"]["period_s"]))
         self._bytes = rr.binary_stream(self.recording)
         self._broadcast = Broadcast()
@@ -63,7 +70,7 @@ class LiveView(Stream):
 
     def connect(self) -> None:
         """Send the layout before all else."""
-        self.recording.send_blueprint(layout(self.view))
+        self.recording.send_blueprint(opening_layout(self.view))
 
     def due(self) -> int:
         """Rows that are recorded together."""

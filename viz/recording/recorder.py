@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from uuid import uuid4
 
 import rerun as rr
 
@@ -11,7 +12,8 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.layout.layout import layout
+from spheretwin.viz.layout.layout import opening_layout
+from spheretwin.viz.layout.view import OVERVIEW
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.parts.part import Subject
 from spheretwin.viz.recording.stream import Stream
@@ -39,6 +41,8 @@ class Recorder(Stream):
         For the text panel, the axes and the drawing.
     path : Path
         Recording to write.
+    shown : str
+        The view that is open at first, one of `VIEWS`.
     rate_Hz : float, optional
         Rows a second that are kept beside those that stand out; every row unless given.
 
@@ -55,10 +59,12 @@ class Recorder(Stream):
         facts: RunFacts,
         *,
         path: Path,
+        shown: str = OVERVIEW,
         rate_Hz: float | None = None,
     ) -> None:
         thinning = FirstsAndExtremes(rate_Hz) if rate_Hz else Thinning()
-        super().__init__(Subject(actuator, signals, facts, rate_Hz), thinning, live=False)
+        subject = Subject(actuator, signals, facts, False, shown, uuid4().hex, rate_Hz)
+        super().__init__(subject, thinning)
         self._path = path
         self._output = OutputFile(path)
         self._pipe = _pipe_to(self._output) if PIPE_PATHS.is_dir() else None
@@ -67,7 +73,7 @@ class Recorder(Stream):
     def connect(self) -> None:
         """Open the file."""
         sink = rr.FileSink((self._pipe or self._output).path)
-        self.recording.set_sinks(sink, default_blueprint=layout(self.view))
+        self.recording.set_sinks(sink, default_blueprint=opening_layout(self.view))
 
     def due(self) -> int:
         """Rows that are recorded together: more as the recording grows."""

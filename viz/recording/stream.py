@@ -13,10 +13,9 @@ import numpy as np
 import rerun as rr
 
 from spheretwin.models.base.wording import without_breaks
-from spheretwin.models.telemetry.signals import COMMON_NAMES
 from spheretwin.models.telemetry.status import Level, Status, named
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.view import View, application
+from spheretwin.viz.layout.view import application
 from spheretwin.viz.recording.parts.log import log_lines
 from spheretwin.viz.recording.parts.part import Rows, Subject
 from spheretwin.viz.recording.parts.registry import PARTS
@@ -40,8 +39,6 @@ class Stream(ABC):
         What is recorded.
     thinning : Thinning
         Which rows are kept for the parts that do not need all.
-    live : bool
-        The view follows the run instead of playing it from its start.
 
     Attributes
     ----------
@@ -60,12 +57,12 @@ class Stream(ABC):
         A mesh of the model cannot be read.
     """
 
-    def __init__(self, subject: Subject, thinning: Thinning, *, live: bool) -> None:
+    def __init__(self, subject: Subject, thinning: Thinning) -> None:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
-        actuator, signals, facts, *_ = subject
-        read_meshes(facts.mjcf)  # a run needs no mesh, and would find out only now that one is missing
-        own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
-        self.view = View(facts.duration_s, facts.current_limit_A, len(actuator.groups), own, live)
+        read_meshes(
+            subject.facts.mjcf
+        )  # a run needs no mesh, and would find out only now that one is missing
+        self.view = subject.view
         self.recording = rr.RecordingStream(application(self.view))
         self.recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.fault: str | None = None

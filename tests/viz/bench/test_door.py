@@ -202,18 +202,27 @@ def handles(page):
     return sorted(page._server.gui._gui_input_handle_from_uuid)
 
 
-def press_stop(page, bench, visitor):
-    """Press STOP as a page does, and wait until it is heard: so is then all that was sent before it."""
-    handles_of = page._server.gui._gui_input_handle_from_uuid
-    stop = next(uuid for uuid, handle in handles_of.items() if handle.label == "STOP (space)")
-    before = bench.commands().count(("stop", {}))
-    visitor.send(
-        msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": stop, "updates": {"value": True}})
-    )
-    until = time.monotonic() + 30  # a flood before it waits for its turn
-    while bench.commands().count(("stop", {})) == before:
+def handle_of(page, label):
+    """Name of what has a label, as the server has it."""
+    known = page._server.gui._gui_input_handle_from_uuid.items()
+    return next(uuid for uuid, handle in known if handle.label == label)
+
+
+def changed(name, **updates):
+    return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": name, "updates": updates})
+
+
+def wait_for(condition):
+    until = time.monotonic() + 30  # a flood waits for its turn
+    while not condition():
         assert time.monotonic() < until
         time.sleep(0.01)
+
+
+def wait_until_all_is_heard(page, bench, visitor):
+    """Send a number that is no other, and wait for it: messages are heard in their order."""
+    visitor.send(changed(handle_of(page, "rate, rad/s"), value=0.123456))
+    wait_for(lambda: ("limits", {"rate_rad_s": 0.123456}) in bench.commands())
 
 
 def test_whatever_is_sent_it_goes_on(page, bench, capfd):
@@ -237,9 +246,8 @@ def test_whatever_is_sent_it_goes_on(page, bench, capfd):
             visitor.send(message)
         for name in handles(page):
             for value in (True, 1.5, "no such", [1.0, 2.0, 3.0]):
-                message = {"type": "GuiUpdateMessage", "uuid": name, "updates": {"value": value}}
-                visitor.send(msgspec.msgpack.encode(message))
-        press_stop(page, bench, visitor)
+                visitor.send(changed(name, value=value))
+        wait_until_all_is_heard(page, bench, visitor)
         assert len(bench.commands()) > 30  # there are more buttons and sliders than that
         visitor.send(b"x" * (front.LARGEST_MESSAGE + 1))
         with pytest.raises(ConnectionClosed):
@@ -254,9 +262,10 @@ def test_no_message_takes_stop_away(page, bench):
         visitor.send(msgspec.msgpack.encode(CAMERA))
         for updates in ({"removed": True}, {"update_cb": []}, {"value": True, "removed": True}):
             for name in handles(page):
-                message = {"type": "GuiUpdateMessage", "uuid": name, "updates": updates}
-                visitor.send(msgspec.msgpack.encode(message))
-        press_stop(page, bench, visitor)
+                visitor.send(changed(name, **updates))
+        assert bench.commands() == []
+        visitor.send(changed(handle_of(page, "STOP (space)"), value=True))
+        wait_for(lambda: bench.commands() == [("stop", {})])
 
 
 def test_only_what_a_page_sends_passes():
@@ -290,16 +299,11 @@ def test_fifty_pages_come_and_go(page):
 def test_a_flood_waits_in_its_own_socket(page, bench):
     """Thousands of moves of a slider hold up neither the server nor another page."""
     before = len(bench.told)
-    name = next(
-        uuid
-        for uuid, handle in page._server.gui._gui_input_handle_from_uuid.items()
-        if getattr(handle, "label", "") == "α, °"
-    )
-    moves = [{"type": "GuiUpdateMessage", "uuid": name, "updates": {"value": 0.01 * i}} for i in range(5000)]
+    name = handle_of(page, "α, °")
     with socket_to(page) as flooding:
         flooding.send(msgspec.msgpack.encode(CAMERA))
-        for move in moves:
-            flooding.send(msgspec.msgpack.encode(move))
+        for i in range(5000):
+            flooding.send(changed(name, value=0.01 * i))
         begun = time.monotonic()
         assert is_alive(page)
         waited_s = time.monotonic() - begun

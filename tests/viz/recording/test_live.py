@@ -1,4 +1,4 @@
-"""A run that is watched: at most 100 rows a second, the same telemetry whoever watches, and nothing outside."""
+"""A run that is watched: 100 rows a second at most, the same telemetry whoever watches, nothing outside."""
 
 import os
 import signal
@@ -101,6 +101,7 @@ def test_a_killed_run_leaves_no_server():
     """Nothing that it started goes on: the kernel closes its ports, and no process has its mark."""
     mark = f"LIVE_MARK_{os.getpid()}"
     command = [sys.executable, "-m", "spheretwin.twin.cli", "simulate", "hold", "--live", "--duration", "60"]
+    command += ["--plant.engine", "lagrangian"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, mark: "1"}
     )

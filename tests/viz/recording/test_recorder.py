@@ -148,7 +148,7 @@ def test_leaving_the_workspace_is_an_event(tmp_path):
 def test_recording_carries_its_blueprint_and_name(run):
     path, *_ = run
     reader = RrdReader(path)
-    assert len(reader.blueprints()) == 1
+    assert len(reader.blueprints()) == 2  # of the run as it goes on, and with its ranges once it has ended
     assert reader.recordings()[0].application_id.startswith("spheretwin-")
 
 
@@ -363,19 +363,17 @@ def test_strict_mode_is_on(run):
     assert rr.strict_mode()
 
 
-def test_recordings_share_an_application_only_where_they_share_a_layout(tmp_path):
-    """A viewer keeps one layout for each application."""
+def test_every_recording_is_an_application_of_its_own(tmp_path):
+    """A viewer keeps one layout for each application, and figures of the run stand in the layout."""
 
     def application(name, **changes):
         recorded(path := tmp_path / f"{name}.rrd", **changes)
         return RrdReader(path).recordings()[0].application_id
 
-    first = application("a", duration=0.02)
-    assert application("b", duration=0.02, seed=3) == first
-    others = [
-        application("c", duration=0.03),
-        application("d", duration=0.02, **{"controller.law": "pd"}),
-        application("e", duration=0.02, **{"drive.current_limit_A": 4}),
+    found = [
+        application("a", duration=0.02),
+        application("b", duration=0.02),
+        application("c", duration=0.02, **{"controller.law": "pd"}),
     ]
-    assert len({first, *others}) == 4
-    assert all(set(each) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for each in (first, *others))
+    assert len(set(found)) == 3
+    assert all(set(each) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for each in found)

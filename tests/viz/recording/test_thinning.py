@@ -1,4 +1,4 @@
-"""What a thinned recording keeps: whole rows, all that stands out, the same however the rows come in chunks."""
+"""What a thinned recording keeps: whole rows, all that stands out, however the rows come in chunks."""
 
 import numpy as np
 import pytest

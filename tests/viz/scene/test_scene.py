@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import palette
+from spheretwin.viz.scene.marks import ALONG, current_scale, current_scale_labels
 from spheretwin.viz.scene.meshes import read_meshes
 from spheretwin.viz.scene.paths import WORLD
 from spheretwin.viz.scene.poses import body_quaternions, shaft_tip
@@ -77,9 +78,10 @@ def test_a_tip_off_the_spin_axis_circles_as_the_rotor_spins(off_axis):
     np.testing.assert_allclose(tips.mean(axis=0)[:2], 0, atol=1e-16)
 
 
-def positions(mesh):
-    """Vertices of a mesh, (n, 3) in m."""
-    return np.array(mesh.vertex_positions.as_arrow_array().to_pylist())
+def positions(drawn):
+    """Vertices of a mesh or places of points, (n, 3) in m."""
+    batch = drawn.vertex_positions if hasattr(drawn, "vertex_positions") else drawn.positions
+    return np.array(batch.as_arrow_array().to_pylist())
 
 
 def placed(piece):
@@ -168,7 +170,7 @@ def test_all_poles_are_drawn_in_the_grey_of_their_polarity(actuator):
         assert piece.colour == grey
     for red, green, blue in (palette.NORTH, palette.SOUTH):
         assert max(red, green, blue) - min(red, green, blue) < 16  # no hue: red and blue are currents
-    assert min(palette.NORTH) > 2.5 * max(palette.SOUTH)
+    assert min(palette.NORTH) > 2.5 * max(palette.SOUTH)  # and told apart by lightness alone
 
 
 def world_positions(model, data, geom):
@@ -232,6 +234,20 @@ def test_current_colours_tell_sign_and_size():
     assert full[0] > small[0] > idle[0]
     assert negative[2] > full[2]
     np.testing.assert_array_equal(palette.current_colours(np.array([100.0]), 8.0)[0], full)
+
+
+def test_the_scale_has_the_colours_that_coils_have_at_its_currents():
+    scale, labels = current_scale(), current_scale_labels(6.0)
+    colours = np.array(scale.vertex_colors.as_arrow_array().to_pylist())
+    shown = np.stack([colours >> 24, colours >> 16 & 255, colours >> 8 & 255], axis=1)
+    along = positions(scale) @ ALONG
+    share = 2 * (along - along.min()) / np.ptp(along) - 1
+    # Single precision moves a share by 1e-6, and near none the root of it by a step of eight bits.
+    np.testing.assert_allclose(shown, palette.current_colours(6.0 * share, 6.0), atol=1)
+    texts = labels.labels.as_arrow_array().to_pylist()
+    at = 2 * (positions(labels) @ ALONG - along.min()) / np.ptp(along) - 1
+    np.testing.assert_allclose([float(text.removesuffix("A")) for text in texts], 6.0 * at, atol=1e-5)
+    assert (texts[0], texts[-1]) == ("-6 A", "+6 A")
 
 
 def height(mjcf):

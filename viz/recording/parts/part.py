@@ -9,9 +9,10 @@ import rerun as rr
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.facts import RunFacts
-from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.layout.view import OVERVIEW, View
 
 
 class Rows(Enum):
@@ -31,8 +32,27 @@ class Subject(NamedTuple):
     signals: tuple[Signal, ...]
     """Columns of the telemetry at the start; a change of law may bring others."""
     facts: RunFacts
+    live: bool = False
+    """Whether it is watched while it runs."""
+    shown: str = OVERVIEW
+    """The view of it that is open at first."""
+    run: str = ""
+    """What tells this recording from all others."""
     rate_Hz: float | None = None
     """Rows a second that are kept beside those that stand out; None for every row."""
+
+    @property
+    def view(self) -> View:
+        """What its layout is made for."""
+        return View(
+            self.facts.duration_s,
+            self.facts.current_limit_A,
+            len(self.actuator.groups),
+            tuple(signal for signal in self.signals if signal.name not in COMMON_NAMES),
+            self.live,
+            self.shown,
+            self.run,
+        )
 
 
 class Part:

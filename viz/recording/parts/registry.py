@@ -1,5 +1,9 @@
 """The parts of a recording, in the order in which a chunk is recorded: one row each."""
 
+from spheretwin.viz.recording.parts.drawn.currents import Currents
+from spheretwin.viz.recording.parts.drawn.limits import Limits
+from spheretwin.viz.recording.parts.drawn.phase_plane import PhasePlane
+from spheretwin.viz.recording.parts.drawn.quantities import Quantities
 from spheretwin.viz.recording.parts.log import Log
 from spheretwin.viz.recording.parts.moving.actuator import MovingActuator
 from spheretwin.viz.recording.parts.moving.ending import Ending
@@ -18,5 +22,9 @@ PARTS: tuple[type[Part], ...] = (
     Torques,
     Ending,
     States,
+    Limits,
     Log,
+    Currents,
+    PhasePlane,
+    Quantities,  # the last: when a run has ended it sends the layout
 )

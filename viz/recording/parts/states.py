@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
+from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import STATES
 from spheretwin.viz.recording.columns import time_index
 from spheretwin.viz.recording.parts.part import Part, Subject
@@ -21,6 +22,7 @@ class Lane(NamedTuple):
     entity: str
     t_s: NDArray[np.float64]
     states: list[str]
+    possible: tuple[str, ...]
 
 
 class StateChanges:
@@ -43,6 +45,7 @@ class StateChanges:
                 _entity(signal, int(place)),
                 rows["t_s"][changed[:, place]],
                 [signal.states[int(value)] for value in values[changed[:, place], place]],
+                signal.states,
             )
             for place in np.flatnonzero(changed.any(axis=0))
         ]
@@ -59,8 +62,15 @@ class States(Part):
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
         self._changes = StateChanges()
+        self._styled: set[str] = set()
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the changes of a chunk."""
-        for entity, t_s, states in self._changes.of(rows):
+        for entity, t_s, states, possible in self._changes.of(rows):
+            if entity not in self._styled:
+                self._styled.add(entity)
+                fine, *others = possible
+                colours = [palette.FINE, *[palette.FAILURE] * len(others)]
+                style = rr.StateConfiguration(values=[fine, *others], colors=colours)
+                recording.log(entity, style, static=True)
             recording.send_columns(entity, time_index(t_s), rr.StateChange.columns(state=states))

@@ -1,4 +1,4 @@
-"""What Rerun's encoder gives at each reading, a whole recording with its beginning and end, as a part of one."""
+"""The messages of what Rerun's encoder gives at each reading, which is a whole recording every time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording that grows: every reader gets it in order, in memory that is bounded, and none is waited for."""
+"""A recording that grows: readers get it in order, in memory that is bounded, and none is waited for."""
 
 import itertools
 import threading

@@ -16,9 +16,8 @@ from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow
-from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import TIMELINE
-from spheretwin.viz.recording import recorder as recording
+from spheretwin.viz.recording import stream
 from spheretwin.viz.recording.parts.moving.actuator import MovingActuator
 from spheretwin.viz.recording.parts.moving.ending import Ending
 from spheretwin.viz.recording.parts.moving.torques import Torques
@@ -92,9 +91,10 @@ def test_the_ages_of_what_is_shown_of_the_way_meet(actuator):
     way = [trace for trace in TRACES if trace.signal == "q_rad"]
     assert [trace.newest_s for trace in way] == [0.0, *(trace.oldest_s for trace in way[:-1])]
     assert way[-1].oldest_s == TRAIL_S
-    lightness = [sum(trace.colour) for trace in way]
-    assert lightness == sorted(lightness, reverse=True)
-    assert lightness[-1] > sum(palette.BACKGROUND)
+    saturation = [max(trace.colour) - min(trace.colour) for trace in way]
+    widths = [trace.width for trace in way]
+    assert saturation == sorted(set(saturation), reverse=True)
+    assert widths == sorted(set(widths), reverse=True)
 
 
 def arrows(path):
@@ -239,7 +239,7 @@ def size(path, duration_s):
 
 
 def test_what_moves_takes_fifteen_kilobytes_a_second(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "PARTS", (MovingActuator, Traces, Torques, Ending))
+    monkeypatch.setattr(stream, "PARTS", (MovingActuator, Traces, Torques, Ending))
     bytes_each_s = (size(tmp_path / "long.rrd", 45.0) - size(tmp_path / "short.rrd", 15.0)) / 30
     # A fifth of what a thinned recording may take; below half of it, something is missing.
     assert 7_500 < bytes_each_s < 15_000
