@@ -27,7 +27,9 @@ MODES = {
 
 
 def bench(name="sinusoid", **changes):
-    return Bench(scenarios.load(name, QUIET | {key.replace("__", "."): value for key, value in changes.items()}))
+    return Bench(
+        scenarios.load(name, QUIET | {key.replace("__", "."): value for key, value in changes.items()})
+    )
 
 
 def said(bench, command, **arguments):
