@@ -13,6 +13,7 @@ from spheretwin.control.allocation.bounded import SCRATCH_ROWS
 from spheretwin.control.around.around import Around, prepare
 from spheretwin.control.belief import Belief, believe
 from spheretwin.control.estimation.estimator import Estimator, estimator_at
+from spheretwin.control.manual import Manual, ask_by_hand
 from spheretwin.control.supervision.detector import Detector, find
 from spheretwin.control.supervision.groups import Groups, leave_out
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
@@ -68,6 +69,7 @@ class Controller(NamedTuple):
     belief: Belief
     around: Around
     supervision: Supervision
+    manual: Manual
 
 
 def controller(
@@ -79,6 +81,7 @@ def controller(
     belief: Belief,
     around: Around,
     supervision: Supervision,
+    manual: Manual,
     estimator: Estimator | None = None,
 ) -> Controller:
     """Controller at the start of a run.
@@ -100,6 +103,8 @@ def controller(
     around : Around
         What stands around the law.
     supervision : Supervision
+    manual : Manual
+        Currents that are asked for instead of the law's, if there are any.
     estimator : Estimator, optional
         Of the rates; the law is handed those that are measured unless given.
     """
@@ -124,6 +129,7 @@ def controller(
         belief=belief,
         around=around,
         supervision=supervision,
+        manual=manual,
     )
 
 
@@ -161,9 +167,10 @@ def control_tick(
     Returns
     -------
     float
-        Share of the law's torque that `command` gives; `LOST` where the law gave no torque, or one beyond
-        `LARGEST_TORQUE_Nm`, or logs what is no number, and no watchdog is there to take the currents away.
-        Where it does, nothing is asked for, and all of it is given.
+        Share of the law's torque that `command` gives, or the least share of a current by hand; `LOST` where
+        the law gave no torque, or one beyond `LARGEST_TORQUE_Nm`, or logs what is no number, and no
+        watchdog is there to take the currents away. Where it does, nothing is asked for, and all of it is
+        given.
     """
     pose, estimates = controller.pose, controller.estimates
     if estimates.made:
@@ -175,15 +182,18 @@ def control_tick(
         watch(watchdog, pose, controller.rates)
     keep_torque_matrix(pose, controller.magnetics, controller.kept)
     _supervise(controller, t)
-    if watchdog.halt[0] == GO and not _ask_law(controller, law, t, reference, measurement):
+    asks_law = watchdog.halt[0] == GO and not controller.manual.on
+    if asks_law and not _ask_law(controller, law, t, reference, measurement):
         if not watchdog.on:
             return LOST
         trip(watchdog, _COMMAND)
     share = 1.0
-    if watchdog.halt[0] == GO:
+    if asks_law and watchdog.halt[0] == GO:
         share = _allocate(controller, allocate, command)
     else:
         _ask_nothing(controller, command)
+        if watchdog.halt[0] == GO:
+            share = ask_by_hand(controller.manual, controller.current_limit_A, command)
     if controller.belief.asked:
         believe(controller.belief, pose, controller.kept.G, command)
     return share

@@ -11,7 +11,7 @@ FOLDERS = ("models", "control", "viz", "twin", "tests")
 MOST_FILES = 12
 
 # The face of a package: what users import from there is defined there.
-FACES = {"twin/scenario", "twin/study"}
+FACES = {"twin/bench", "twin/scenario", "twin/study"}
 
 CACHES = {"__pycache__", ".hypothesis", ".DS_Store"}
 

@@ -15,6 +15,7 @@ from spheretwin.control.belief import belief
 from spheretwin.control.controller import Controller, Supervision, controller
 from spheretwin.control.estimation.estimator import Estimator, Sampling
 from spheretwin.control.law import Known, Law
+from spheretwin.control.manual import manual
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown, without_breaks
@@ -139,8 +140,9 @@ def controller_of(
     asked = law.asks_torque or scenario.detects or scenario.controller.prediction.on
     believed = belief(asked, groups, scenario.controller.period_s, nominal.delay_s or 0.0, lag_s)
     around = _around_of(scenario, magnetics)
+    by_hand = manual(scenario.manual, groups)
     return controller(
-        law, magnetics, kept, limit_A, width(law.signals), believed, around, supervision, estimator
+        law, magnetics, kept, limit_A, width(law.signals), believed, around, supervision, by_hand, estimator
     )
 
 

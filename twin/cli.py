@@ -17,12 +17,15 @@ from typing import NoReturn
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import is_plain, one_line, shown
 from spheretwin.twin.commands import crosscheck, magnetics, recover, reproduce, review, simulate, sweep
+from spheretwin.twin.commands.benching import verb
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit code."""
+    # What goes wrong in Rerun is raised, or found where its files end: its own log would only repeat it.
+    os.environ.setdefault("RUST_LOG", "off")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters
@@ -83,6 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"spheretwin {version('spheretwin')}")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
     simulate.add_to(verbs)
+    verb.add_to(verbs)
     crosscheck.add_to(verbs)
     reproduce.add_to(verbs)
     sweep.add_to(verbs)

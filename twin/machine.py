@@ -137,6 +137,11 @@ class Machine:
         return self._moving.stepped.q.copy()
 
     @property
+    def qdot_rad_s(self) -> NDArray[np.float64]:
+        """Hinge rates now, (3,) in rad/s."""
+        return self._moving.stepped.qdot.copy()
+
+    @property
     def reason(self) -> Reason:
         """Why a watchdog has taken the currents away, if one has."""
         return REASONS[int(self._controller.supervision.watchdog.reason[0])]
@@ -161,7 +166,8 @@ class Machine:
         """Machine of another scenario that carries on what this one is in the midst of.
 
         A law that stays keeps its memory, and its parameters, which it may have changed. With other gains, or
-        told of another nominal model, it keeps its memory where that is still of the same size.
+        told of another nominal model, it keeps its memory where that is still of the same size. After
+        currents by hand it begins anew, as does what stands around it.
         """
         same = scenario.plant == self._scenario.plant
         moving = self._moving if same else _carried_on(self._moving, scenario, files)
@@ -172,17 +178,22 @@ class Machine:
         drivings.carried_on(self._plant.driving, made._plant.driving, self._last.command)
         senses.carried_on(self._sensors, made._sensors, self._last.q, self._last.noise)
         _supervised_on(self._controller.supervision, made._controller.supervision)
-        if made.law is self.law:
-            made._controller.parameters[:] = self._controller.parameters
-        memory = made._controller.memory
-        same_kind = own_law is None and type(scenario.controller) is type(self._scenario.controller)
-        if made.law is self.law or (same_kind and len(memory) == len(self._controller.memory)):
-            memory[:] = self._controller.memory
+        if scenario.manual.on or not self._scenario.manual.on:
+            self._law_carried_on(made, own_law)
         beliefs.carried_on(self._controller.belief, made._controller.belief)
-        arounds.carried_on(self._controller.around, made._controller.around)
         if type(scenario.estimator) is type(self._scenario.estimator):
             made._controller.estimates.memory[:] = self._controller.estimates.memory
         return made
+
+    def _law_carried_on(self, made: Machine, own_law: Law | None) -> None:
+        """Let the law of another machine, and what stands around it, go on from where these are."""
+        before, after = self._controller, made._controller
+        same_kind = own_law is None and type(made._scenario.controller) is type(self._scenario.controller)
+        if made.law is self.law:
+            after.parameters[:] = before.parameters
+        if made.law is self.law or (same_kind and len(after.memory) == len(before.memory)):
+            after.memory[:] = before.memory
+        arounds.carried_on(before.around, after.around)
 
     def _law_for(self, scenario: Scenario) -> Law:
         """Law that a scenario names: the present one where nothing that it is made from has changed."""

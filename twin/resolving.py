@@ -90,7 +90,7 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
         filled["trajectory"] = OwnPath(shape=name_of_own(trajectory.name))
     made = scenario.model_copy(update=filled)
     _check_pose(made.plant.initial_rad or (0.0, 0.0, 0.0), actuator)
-    _check_groups(section, actuator)
+    _check_groups(made, actuator)
     _check_faults(made.fault, actuator)
     return made
 
@@ -157,12 +157,12 @@ def _check_pose(pose: Triple, actuator: Actuator) -> None:
             )
 
 
-def _check_groups(section: PlantSection, actuator: Actuator) -> None:
+def _check_groups(scenario: Scenario, actuator: Actuator) -> None:
     groups = len(actuator.groups)
-    if section.group_gain is not None and len(section.group_gain) != groups:
-        raise InputError(
-            f"scenario: expected plant.group_gain for {groups} groups, received {len(section.group_gain)}"
-        )
+    lists = {"plant.group_gain": scenario.plant.group_gain, "manual.currents_A": scenario.manual.currents_A}
+    for name, given in lists.items():
+        if given is not None and len(given) != groups:
+            raise InputError(f"scenario: expected {name} for {groups} groups, received {len(given)}")
 
 
 def _check_faults(faults: tuple[Fault, ...], actuator: Actuator) -> None:

@@ -132,6 +132,11 @@ class Session:
         return self._machine.q_rad
 
     @property
+    def qdot_rad_s(self) -> NDArray[np.float64]:
+        """Hinge rates now, (3,) in rad/s."""
+        return self._machine.qdot_rad_s
+
+    @property
     def signals(self) -> tuple[Signal, ...]:
         """Columns of the telemetry: the common ones, those of its stages, then the law's own."""
         return self._machine.signals

@@ -35,6 +35,8 @@ class RunRecord:
         Digest of each model and curve by its path; None for one that could not be read.
     versions : mapping of str
         Of Python and of every package that a figure may depend on.
+    first_tick : int
+        Control tick of the first row; those before were not kept.
     status : Status, optional
         How the run ended; None while it goes on, and in what a killed run leaves.
     """
@@ -45,6 +47,7 @@ class RunRecord:
     files: Mapping[str, str | None]
     versions: Mapping[str, str]
     status: Status | None = None
+    first_tick: int = 0
 
     def metadata(self) -> dict[str, str]:
         """The record as texts by name, as a file keeps them."""
@@ -55,6 +58,8 @@ class RunRecord:
             "files": json.dumps(self.files),
             "versions": json.dumps(self.versions),
         }
+        if self.first_tick:
+            texts["first_tick"] = str(self.first_tick)
         return texts if self.status is None else {**texts, "status": str(self.status)}
 
     @classmethod
@@ -76,4 +81,5 @@ class RunRecord:
             files=json.loads(texts.get("files", "{}")),
             versions=json.loads(texts.get("versions", "{}")),
             status=named(texts["status"]) if "status" in texts else None,
+            first_tick=int(texts.get("first_tick", "0")),
         )

@@ -50,6 +50,13 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help=f"{names}, or a .toml file")
     parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="write a Rerun recording")
+    parser.add_argument(
+        "--record-rate",
+        type=outputs.rate_Hz,
+        metavar="HZ",
+        help="rows a second that the recording keeps, and besides all that stand out in any 10 s; every one"
+        " unless given",
+    )
     parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
     parser.add_argument(
         "--live", action="store_true", help="run at the pace of the clock, with a viewer on 127.0.0.1"
@@ -91,11 +98,20 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         )
     own = OwnMetrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
+    outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
         figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
-        files = Outputs(session, options.record, options.telemetry, options.live, options.view or OVERVIEW)
+        files = Outputs(
+            session,
+            options.record,
+            options.telemetry,
+            options.live,
+            options.view or OVERVIEW,
+            options.record_rate,
+            plan.first_tick,
+        )
         try:
             with progress, timers_stopped(), _code_of_the_user(session, options.json):
                 status = follow(

@@ -33,12 +33,13 @@ def facts_of(scenario: Scenario) -> RunFacts:
         duration_s=scenario.duration,
         current_limit_A=scenario.drive.current_limit_A or 0.0,
         payload_kg=scenario.plant.payload_kg,
+        gravity_m_s2=scenario.plant.gravity_m_s2,
         mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
         sections=_sections(scenario.model_dump(mode="json")),
     )
 
 
-def record_of(session: Session, before: RunRecord | None = None) -> RunRecord:
+def record_of(session: Session, before: RunRecord | None = None, first_tick: int = 0) -> RunRecord:
     """What a run says of itself in its telemetry file, but for how it ended.
 
     Parameters
@@ -47,6 +48,8 @@ def record_of(session: Session, before: RunRecord | None = None) -> RunRecord:
         The run. Paths are told as they are from the root, so that it can be replayed from any folder.
     before : RunRecord, optional
         Record of the same run when it began: what its files held then is what counts.
+    first_tick : int
+        Tick from which on the rows are kept.
     """
     scenario = reading.beside(os.getcwd(), session.begun_as.model_dump(mode="json"))
     journal = tuple(map(_from_root, session.journal))
@@ -54,7 +57,7 @@ def record_of(session: Session, before: RunRecord | None = None) -> RunRecord:
     for path, dotted in files_of(scenario, journal):
         if path not in digests:
             digests[path] = digest(dotted, path)
-    return RunRecord(scenario, journal, session.tick, digests, versions())
+    return RunRecord(scenario, journal, session.tick, digests, versions(), first_tick=first_tick)
 
 
 def files_of(scenario: dict[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:

@@ -22,6 +22,8 @@ class Plan(NamedTuple):
     scenario: Scenario
     ticks: int
     journal: tuple[Change, ...]
+    first_tick: int = 0
+    """Of the first row that is kept."""
 
 
 def read(path: Path) -> Plan:
@@ -62,7 +64,7 @@ def _plan(record: RunRecord, source: str) -> Plan:
         )
     named = facts.files_of(scenario.model_dump(mode="json"), record.journal)
     _check_files(named, record.files, source)
-    return Plan(scenario, record.ticks, record.journal)
+    return Plan(scenario, record.ticks, record.journal, record.first_tick)
 
 
 def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | None], source: str) -> None:

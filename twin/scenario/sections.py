@@ -12,6 +12,7 @@ from spheretwin.control.estimation.ideal import Ideal
 from spheretwin.control.estimation.registry import AnyEstimator
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.registry import AnyLaw
+from spheretwin.control.manual import ManualSection
 from spheretwin.control.parts.parameters import LARGEST, ControllerSection, NonNegative, Positive
 from spheretwin.control.supervision.detector import DetectorSection
 from spheretwin.control.supervision.watchdog import WatchdogSection
@@ -184,6 +185,7 @@ class Scenario(_Section):
     )
     trajectory: SerializeAsAny[Trajectory]
     controller: SerializeAsAny[AnyLaw] = AFSM()
+    manual: ManualSection = ManualSection()
     nominal: Nominal = Nominal()
     sensors: SensorsSection = SensorsSection()
     estimator: SerializeAsAny[AnyEstimator] = Ideal()

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from spheretwin.twin.trajectories.shapes.chirp import Chirp
 from spheretwin.twin.trajectories.shapes.hold import Hold
+from spheretwin.twin.trajectories.shapes.jog import Jog
 from spheretwin.twin.trajectories.shapes.multisine import Multisine
 from spheretwin.twin.trajectories.shapes.nutation import Nutation
 from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
@@ -19,6 +20,7 @@ Trajectory = Annotated[
     | Nutation
     | Tilt
     | Hold
+    | Jog
     | Chirp
     | Multisine
     | Steps

@@ -5,24 +5,22 @@ from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown, without_breaks
-from spheretwin.models.telemetry.series import LONGEST_s
+from spheretwin.twin.trajectories.approach import Approach
+
+# The file of a shape finds here all that it needs of these.
+from spheretwin.twin.trajectories.numbers import CONFIG as CONFIG
+from spheretwin.twin.trajectories.numbers import LARGEST as LARGEST
+from spheretwin.twin.trajectories.numbers import ZERO as ZERO
+from spheretwin.twin.trajectories.numbers import Bounded as Bounded
+from spheretwin.twin.trajectories.numbers import Time as Time
+from spheretwin.twin.trajectories.numbers import Triple as Triple
 from spheretwin.twin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded, told
 
-CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-# Far beyond any motion of the actuator, and far from where squares of numbers overflow.
-LARGEST = 1e4
-
-Bounded = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Triple = tuple[Bounded, Bounded, Bounded]
-Time = Annotated[float, Field(ge=0, le=LONGEST_s)]
 Samples = NDArray[np.float64]
-
-ZERO: Triple = (0.0, 0.0, 0.0)
 
 
 class Sampled(Protocol):
@@ -52,6 +50,9 @@ class Shape(BaseModel):
         None,
         description="acceleration that rounds corners (start from rest, jumps), rad/s²; sharp unless given",
     )
+    approach: Approach | None = Field(
+        None, description="way to the shape from another motion; it begins at 0 s unless given"
+    )
 
     def sample(self, t: NDArray[np.float64]) -> Samples:
         """Desired motion at times `t` (s).
@@ -61,10 +62,13 @@ class Shape(BaseModel):
         (n, 3, 3) array
             Angle (rad), rate (rad/s) and acceleration (rad/s²) as rows, for each time.
         """
-        samples = self.sharp(t)
-        if self.rounding_rad_s2 is None:
-            return samples
-        return rounded(samples, t, self._start(), self.corners(), self.rounding_rad_s2)
+        if self.approach is not None:
+            return self.approach.join(self.led_to, t)
+        return self._rounded(t, self._start())
+
+    def led_to(self, t: NDArray[np.float64]) -> Samples:
+        """Motion at times of its own that a way to it leads to: it meets the rates at the start by itself."""
+        return self._rounded(t, np.zeros(3))
 
     @abstractmethod
     def sharp(self, t: NDArray[np.float64]) -> Samples:
@@ -89,9 +93,15 @@ class Shape(BaseModel):
         """What a user may want to know of the motion beside its parameters; one line each."""
         return []
 
+    def _rounded(self, t: NDArray[np.float64], start_rad_s: NDArray[np.float64]) -> Samples:
+        samples = self.sharp(t)
+        if self.rounding_rad_s2 is None:
+            return samples
+        return rounded(samples, t, start_rad_s, self.corners(), self.rounding_rad_s2)
+
     def _start(self) -> NDArray[np.float64]:
-        """Rates (3,) with which it begins, where the rotor is at rest."""
-        return self.sharp(np.zeros(1))[0, 1]
+        """Rates (3,) with which it begins, where the rotor is at rest; an approach meets them by itself."""
+        return np.zeros(3) if self.approach else self.sharp(np.zeros(1))[0, 1]
 
     def _check(self) -> None:
         """Refuse what the fields cannot refuse one by one."""

@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import TIMELINE
 from spheretwin.viz.scene import paths as scene
-
-TRAIL_S = 2.0
+from spheretwin.viz.scene.torques import SCALE
+from spheretwin.viz.scene.traces import TRACES, Trace
 
 
 def actuator_view() -> rrb.Spatial3DView:
-    """View of all that moves, and of the traces of the last seconds."""
-    boundary = rrb.TimeRangeBoundary
-
-    def trail(seconds: float) -> rrb.VisibleTimeRanges:
-        return rrb.VisibleTimeRanges(
-            timeline=TIMELINE,
-            start=boundary.cursor_relative(seconds=-seconds),
-            end=boundary.cursor_relative(),
-        )
-
+    """View of all that moves, and of the traces of the last seconds, on the ground of the viewer's theme."""
     return rrb.Spatial3DView(
         origin=f"/{scene.WORLD}",
-        name="actuator",
-        background=list(palette.BACKGROUND),
+        name=f"actuator; {SCALE}",
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,
-            position=[0.13, -0.13, 0.20],
-            look_target=[0, 0, 0.025],
+            position=[0.16, -0.16, 0.22],
+            look_target=[0, 0, 0.02],
             eye_up=[0, 0, 1],
         ),
-        overrides={f"/{scene.TIP}": trail(TRAIL_S), f"/{scene.TIP_DESIRED}": trail(TRAIL_S)},
+        overrides={f"/{trace.entity}": _ages(trace) for trace in TRACES},
+    )
+
+
+def _ages(trace: Trace) -> rrb.VisibleTimeRanges:
+    boundary = rrb.TimeRangeBoundary
+    return rrb.VisibleTimeRanges(
+        timeline=TIMELINE,
+        start=boundary.cursor_relative(seconds=-trace.oldest_s),
+        end=boundary.cursor_relative(seconds=-trace.newest_s),
     )

@@ -25,6 +25,7 @@ from spheretwin.viz.layout.layout import layout
 from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY, TIMELINE
 from spheretwin.viz.layout.view import View, application
 from spheretwin.viz.reading.messages import whole_messages
+from spheretwin.viz.reading.survival import check_readable
 from spheretwin.viz.recording.parts.described import COMPLETE, FACTS, SIGNAL, signal_of
 from spheretwin.viz.recording.parts.events import Event
 
@@ -146,6 +147,7 @@ def _chunks(path: Path) -> Iterator[tuple[Iterable[Chunk], bool]]:
     try:
         with whole_messages(path) as (readable, extent), warnings.catch_warnings():
             warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # that it has no footer is told here
+            check_readable(readable, path)
             yield RrdReader(readable).stream(), extent.ended
     except (SpheretwinError, KeyboardInterrupt, SystemExit):
         raise

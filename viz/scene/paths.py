@@ -3,5 +3,9 @@
 WORLD = "world"
 COILS = f"{WORLD}/coils"
 MOVING = ("outer_ring", "inner_ring", "rotor")
-TIP = f"{WORLD}/shaft_tip"
-TIP_DESIRED = f"{WORLD}/shaft_tip_desired"
+TORQUES = f"{WORLD}/torques"
+FAILURE = f"{WORLD}/failure"
+AXES = f"{WORLD}/axes"
+ROTOR_AXES = f"{WORLD}/rotor/axes"
+PAYLOAD = f"{WORLD}/rotor/payload"
+CURRENT_SCALE = f"{WORLD}/current_scale"

@@ -27,7 +27,8 @@ from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TIMELINE, entity
 from spheretwin.viz.recording import recorder as recording
-from spheretwin.viz.recording.recorder import PENDING_CHUNKS, Recorder
+from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.recording.stream import PENDING_CHUNKS
 from spheretwin.viz.scene import paths as scene
 
 SIGNALS = common_signals(18)
@@ -100,15 +101,6 @@ def test_both_coils_of_a_group_show_its_current(run):
     expected = palette.current_colours(current, session.scenario.drive.current_limit_A)
     for side in range(2):
         np.testing.assert_array_equal(colours[:, session.actuator.groups[:, side]], expected)
-
-
-def test_trace_follows_the_shaft_tip(run, actuator):
-    path, _, finished = run
-    times, strips = rows_of(path, scene.TIP, "LineStrips3D:strips")
-    q = finished.telemetry["q_rad"][times // 1_000_000]
-    tips = np.array([rotation(pose) @ actuator.shaft_tip_m for pose in q])
-    np.testing.assert_allclose(strips[:, 3:], tips, atol=1e-7)
-    np.testing.assert_allclose(strips[1:, :3], tips[:-1], atol=1e-7)
 
 
 def static_text(path, entity, component):

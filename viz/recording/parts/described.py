@@ -14,13 +14,17 @@ from spheretwin.models.telemetry.versions import versions
 FACTS, SIGNAL = "facts", "signal"
 """Names of the components below."""
 
+RATE = "record_rate_Hz"
+"""Among the facts: rows a second that are kept beside those that stand out; null for every row."""
+
 COMPLETE = "t_s"
 """Signal that is recorded behind all others of its rows."""
 
 
-def facts_as_json(facts: RunFacts) -> rr.AnyValues:
-    """Facts of a run from its start, and the versions that it was made with."""
-    return rr.AnyValues(facts=json.dumps({**asdict(facts), "versions": versions()}, default=str))
+def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
+    """Facts of a run from its start, the versions that it was made with, and the rate of the rows kept."""
+    described = {**asdict(facts), RATE: rate_Hz, "versions": versions()}
+    return rr.AnyValues(facts=json.dumps(described, default=str))
 
 
 def signal_as_json(place: int, signal: Signal) -> rr.AnyValues:

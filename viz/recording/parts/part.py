@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from enum import Enum
+from typing import ClassVar, NamedTuple
 
 import rerun as rr
 
@@ -12,6 +13,15 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.view import OVERVIEW, View
+
+
+class Rows(Enum):
+    """Which rows of a run a part is given."""
+
+    ALL = "all"
+    """Every row, at once: for what thins them itself, or must not miss any."""
+    KEPT = "kept"
+    """Those that the recording keeps, whole; known some seconds later where it is thinned."""
 
 
 class Subject(NamedTuple):
@@ -28,6 +38,8 @@ class Subject(NamedTuple):
     """The view of it that is open at first."""
     run: str = ""
     """What tells this recording from all others."""
+    rate_Hz: float | None = None
+    """Rows a second that are kept beside those that stand out; None for every row."""
 
     @property
     def view(self) -> View:
@@ -50,7 +62,14 @@ class Part:
     ----------
     subject : Subject
         What is recorded.
+
+    Attributes
+    ----------
+    rows : Rows
+        Which rows `write` is given.
     """
+
+    rows: ClassVar[Rows] = Rows.ALL
 
     def __init__(self, subject: Subject) -> None:
         self.subject = subject

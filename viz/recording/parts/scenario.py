@@ -19,7 +19,7 @@ class ScenarioText(Part):
         recording.send_recording_name(f"{facts.name}, {facts.law}")
         text = rr.TextDocument(_as_markdown(facts), media_type=rr.MediaType.MARKDOWN)
         recording.log(SCENARIO, text, static=True)
-        recording.log(SCENARIO, facts_as_json(facts), static=True)
+        recording.log(SCENARIO, facts_as_json(facts, self.subject.rate_Hz), static=True)
 
 
 def _as_markdown(facts: RunFacts) -> str:

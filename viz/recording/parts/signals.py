@@ -1,4 +1,4 @@
-"""The telemetry itself: every signal at the rate of its rows, bit for bit, and what it is."""
+"""The telemetry itself: every signal in each row that is kept, bit for bit, and what it is."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from spheretwin.viz.layout.paths import entity
 from spheretwin.viz.layout.styles import log_styles
 from spheretwin.viz.recording.columns import scalars, time_index
 from spheretwin.viz.recording.parts.described import COMPLETE, signal_as_json
-from spheretwin.viz.recording.parts.part import Part, Subject
+from spheretwin.viz.recording.parts.part import Part, Rows, Subject
 
 
 class Signals(Part):
     """Every column of the telemetry."""
+
+    rows = Rows.KEPT
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)

@@ -3,7 +3,8 @@
 import numpy as np
 from rerun.chunk import RrdReader
 
-from spheretwin.viz.recording.flights import TIMELINE, Flight, write
+from spheretwin.viz.layout.paths import TIMELINE
+from spheretwin.viz.merged.flights import Flight, write
 
 
 def flight(law, ticks):

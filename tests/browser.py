@@ -1,0 +1,394 @@
+"""A browser for tests: headless Chromium, driven by its own protocol over one socket.
+
+    with Browser() as browser:
+        page = browser.open(address)
+        page.wait_for("document.title != ''")
+        page.click("button.start")
+        page.screenshot(path)
+        assert page.console == [] and page.outside == []
+
+Nothing is downloaded: it is the Chromium that the machine has. Names of other hosts do not resolve in it:
+a page that asks for one shows it among its requests and gets nothing.
+"""
+
+import base64
+import itertools
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import threading
+import time
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+needs_a_browser = pytest.mark.skipif(
+    not CHROMIUM, reason="no Chromium on this machine: its page is not tried"
+)
+
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+    "--remote-debugging-port=0",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost",
+)
+
+HERE = ("127.0.0.1", "localhost", "::1")
+
+# Addresses of what a page holds itself.
+WITHIN = ("data:", "blob:", "about:")
+
+# What a page may need at most where two cores are shared with the rest of the tests.
+PATIENCE_S = 60.0
+
+_KEYS = {
+    " ": ("Space", 32),
+    "Enter": ("Enter", 13),
+    "Escape": ("Escape", 27),
+    "Tab": ("Tab", 9),
+    "Backspace": ("Backspace", 8),
+}
+_ARROWS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
+
+
+class BrowserError(AssertionError):
+    """The browser refused a command, or a page did not become what was waited for."""
+
+
+class Browser:
+    """A Chromium with a profile of its own, gone with all it kept when the block ends.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of its pages, pixels.
+    flags : str
+        More of Chromium's own flags.
+    """
+
+    def __init__(self, size=(1280, 800), flags=()):
+        self.size = size
+        self._flags = flags
+        self._answers, self._pages = {}, {}
+        self._ids = itertools.count(1)
+        self._arrived = threading.Condition()
+        self._ended = False
+
+    def __enter__(self):
+        self._profile = tempfile.mkdtemp(prefix="browser-")
+        command = [CHROMIUM, *FLAGS, *self._flags, f"--user-data-dir={self._profile}", "about:blank"]
+        quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        self._process = subprocess.Popen(
+            command, env={**os.environ, "HOME": self._profile, "TMPDIR": self._profile}, **quiet
+        )
+        try:
+            self._socket = connect(self._address(), max_size=None, compression=None, proxy=None)
+        except BaseException:
+            self._end()
+            raise
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        return self
+
+    def __exit__(self, *_):
+        self._socket.close()
+        self._reader.join()
+        self._end()
+
+    def open(self, url, size=None):
+        """Open a page and wait until it is loaded.
+
+        Parameters
+        ----------
+        url : str
+            What to open.
+        size : (int, int), optional
+            Width and height of this page.
+        """
+        target = self.command("Target.createTarget", url="about:blank")["targetId"]
+        session = self.command("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        page = Page(self, session, target)
+        self._pages[session] = page
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            page.command(f"{domain}.enable")
+        page.command("Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True)
+        page.resize(*(size or self.size))
+        page.go(url)
+        return page
+
+    def command(self, method, session=None, **parameters):
+        """Send one command of the protocol and return its result."""
+        number = self._post(method, session, parameters)
+        with self._arrived:
+            self._arrived.wait_for(lambda: number in self._answers or self._ended, PATIENCE_S)
+            answer = self._answers.pop(number, None)
+        if answer is None:
+            raise BrowserError(f"{method}: no answer")
+        if "error" in answer:
+            raise BrowserError(f"{method}: {answer['error']['message']}")
+        return answer["result"]
+
+    def _address(self):
+        port = Path(self._profile, "DevToolsActivePort")
+        until = time.monotonic() + PATIENCE_S
+        while not (port.exists() and len(lines := port.read_text().split()) == 2):
+            if self._process.poll() is not None or time.monotonic() > until:
+                raise BrowserError(f"{CHROMIUM} did not start: exit code {self._process.poll()}")
+            time.sleep(0.02)
+        return f"ws://127.0.0.1:{lines[0]}{lines[1]}"
+
+    def _post(self, method, session, parameters):
+        number = next(self._ids)
+        message = {"id": number, "method": method, "params": parameters}
+        self._socket.send(json.dumps(message if session is None else {**message, "sessionId": session}))
+        return number
+
+    def _read(self):
+        try:
+            for text in self._socket:
+                message = json.loads(text)
+                with self._arrived:
+                    if "id" in message:
+                        self._answers[message["id"]] = message
+                    elif page := self._pages.get(message.get("sessionId")):
+                        self._heard(page, message["method"], message["params"])
+                    self._arrived.notify_all()
+        except ConnectionClosed:
+            pass
+        finally:
+            with self._arrived:
+                self._ended = True
+                self._arrived.notify_all()
+
+    def _heard(self, page, method, parameters):
+        if method == "Target.attachedToTarget":  # a worker: what it asks for is the page's too
+            worker = parameters["sessionId"]
+            self._pages[worker] = page
+            for domain in ("Runtime", "Network", "Log"):
+                self._post(f"{domain}.enable", worker, {})
+            again = {"autoAttach": True, "waitForDebuggerOnStart": True, "flatten": True}
+            self._post("Target.setAutoAttach", worker, again)
+            self._post("Runtime.runIfWaitingForDebugger", worker, {})
+        else:
+            page.heard(method, parameters)
+
+    def _end(self):
+        self._process.terminate()
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        shutil.rmtree(self._profile, ignore_errors=True)
+
+
+class Page:
+    """One page.
+
+    Attributes
+    ----------
+    requests : list of str
+        Addresses that it, or a worker of it, has asked for, sockets included; not what it holds itself.
+    console : list of str
+        Warnings, errors and uncaught exceptions, each with its level first.
+    """
+
+    def __init__(self, browser, session, target):
+        self._browser, self._session, self._target = browser, session, target
+        self.requests, self.console = [], []
+
+    @property
+    def outside(self):
+        """What it has asked of another machine."""
+        return [url for url in self.requests if urlsplit(url).hostname not in HERE]
+
+    @property
+    def errors(self):
+        """What is worse than a warning on its console."""
+        return [line for line in self.console if not line.startswith("warning:")]
+
+    def command(self, method, **parameters):
+        """Send one command of the protocol to this page."""
+        return self._browser.command(method, self._session, **parameters)
+
+    def go(self, url):
+        """Go to an address and wait until it is loaded."""
+        answer = self.command("Page.navigate", url=url)
+        if "errorText" in answer:
+            raise BrowserError(f"{url}: {answer['errorText']}")
+        self.wait_for("document.readyState == 'complete'")
+
+    def front(self):
+        """Bring it before the others: what is hidden is hardly drawn."""
+        self.command("Page.bringToFront")
+
+    def close(self):
+        """Close it."""
+        self._browser.command("Target.closeTarget", targetId=self._target)
+
+    def resize(self, width, height):
+        """Give it a size in pixels."""
+        self.command(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
+
+    def evaluate(self, javascript):
+        """Value of an expression, as JSON holds it; a promise is waited for."""
+        answer = self.command(
+            "Runtime.evaluate", expression=javascript, returnByValue=True, awaitPromise=True, userGesture=True
+        )
+        if "exceptionDetails" in answer:
+            told = answer["exceptionDetails"]
+            raise BrowserError(told.get("exception", {}).get("description", told["text"]))
+        return answer["result"].get("value")
+
+    def wait_for(self, javascript, patience_s=PATIENCE_S):
+        """Wait until an expression is true, and return its value."""
+        until = time.monotonic() + patience_s
+        while not (value := self.evaluate(javascript)):
+            if time.monotonic() > until:
+                raise BrowserError(f"not within {patience_s:g} s: {javascript}")
+            time.sleep(0.05)
+        return value
+
+    def text(self):
+        """What can be read on it."""
+        return self.evaluate("document.body.innerText")
+
+    def at(self, place):
+        """Middle of an element, pixels; a place that is a pair of numbers already stays.
+
+        Parameters
+        ----------
+        place : str or (float, float)
+            A CSS selector, `text=WORDS` for the innermost element with these words, or x and y.
+        """
+        return self.evaluate(_MIDDLE % json.dumps(place)) if isinstance(place, str) else place
+
+    def click(self, place):
+        """Press and let go the left button."""
+        self.front()
+        x, y = self._found(place)
+        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+            self._mouse(kind, x, y, clickCount=0 if kind == "mouseMoved" else 1)
+
+    def drag(self, start, end, steps=10, pause_s=0.03):
+        """Press at one place, move to another in steps, let go there; a pause after each lets it be drawn."""
+        self.front()
+        (x, y), (to_x, to_y) = self._found(start), self._found(end)
+        self._mouse("mouseMoved", x, y)
+        time.sleep(pause_s)
+        self._mouse("mousePressed", x, y, clickCount=1)
+        for step in range(1, steps + 1):
+            share = step / steps
+            self._mouse("mouseMoved", x + share * (to_x - x), y + share * (to_y - y), buttons=1)
+            time.sleep(pause_s)
+        self._mouse("mouseReleased", to_x, to_y, clickCount=1)
+
+    def key(self, name):
+        """Press and let go a key: a character, or a name as `ArrowUp`."""
+        code, number = _KEYS.get(name) or (name, _ARROWS.get(name) or ord(name.upper()))
+        pressed = {"key": name, "code": code, "windowsVirtualKeyCode": number}
+        written = {"text": name} if len(name) == 1 else {}
+        self.command("Input.dispatchKeyEvent", type="keyDown", **pressed, **written)
+        self.command("Input.dispatchKeyEvent", type="keyUp", **pressed)
+
+    def write(self, text):
+        """Write text where the cursor is."""
+        self.command("Input.insertText", text=text)
+
+    def screenshot(self, path):
+        """Keep what it looks like as a PNG file."""
+        image = self.command("Page.captureScreenshot", format="png")["data"]
+        Path(path).write_bytes(base64.b64decode(image))
+        return Path(path)
+
+    def frames_per_second(self, seconds=2.0):
+        """How often it draws, over some seconds."""
+        return self.evaluate(_FRAMES % (1000 * seconds))
+
+    def heard(self, method, parameters):
+        """Keep one event of the browser's."""
+        match method:
+            case "Network.requestWillBeSent":
+                self._asked(parameters["request"]["url"])
+            case "Network.webSocketCreated":
+                self._asked(parameters["url"])
+            case "Runtime.exceptionThrown":
+                told = parameters["exceptionDetails"]
+                self.console.append(f"error: {told.get('exception', {}).get('description', told['text'])}")
+            case "Runtime.consoleAPICalled" if parameters["type"] in ("error", "warning", "assert"):
+                words = [str(each.get("value", each.get("description"))) for each in parameters["args"]]
+                self.console.append(f"{parameters['type']}: {' '.join(words)}")
+            case "Log.entryAdded" if parameters["entry"]["level"] in ("error", "warning"):
+                entry = parameters["entry"]
+                self.console.append(f"{entry['level']}: {entry['text']} {entry.get('url', '')}".strip())
+
+    def _asked(self, url):
+        if not url.startswith(WITHIN):
+            self.requests.append(url)
+
+    def _found(self, place):
+        """Where it is once it is there, and no longer slides into its place."""
+        until, found = time.monotonic() + PATIENCE_S, None
+        while True:
+            before, found = found, self.at(place)
+            if found is not None and (found == before or not isinstance(place, str)):
+                return found
+            if time.monotonic() > until:
+                raise BrowserError(f"nothing on the page at {place}")
+            time.sleep(0.05)
+
+    def _mouse(self, kind, x, y, **more):
+        button = "none" if kind == "mouseMoved" and "buttons" not in more else "left"
+        self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, **more)
+
+
+_MIDDLE = """(() => {
+  const place = %s;
+  let element = null;
+  if (place.startsWith("text=")) {
+    const words = place.slice(5);
+    const all = [...document.querySelectorAll("body *")].filter(
+      (each) => each.innerText?.trim() === words && each.getClientRects().length);
+    element = all[all.length - 1];
+  } else {
+    element = document.querySelector(place);
+  }
+  if (!element) return null;
+  element.scrollIntoView({block: "nearest"});
+  const box = element.getBoundingClientRect();
+  return [box.x + box.width / 2, box.y + box.height / 2];
+})()"""
+
+_FRAMES = """new Promise((done) => {
+  const began = performance.now();
+  let frames = 0;
+  const draw = () => {
+    const passed = performance.now() - began;
+    if (passed > %f) done(frames / passed * 1000);
+    else { frames += 1; requestAnimationFrame(draw); }
+  };
+  requestAnimationFrame(draw);
+})"""

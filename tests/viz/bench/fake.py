@@ -1,0 +1,123 @@
+"""A bench that does nothing but note what it is told, and a page of it."""
+
+import contextlib
+import threading
+from types import SimpleNamespace
+
+import numpy as np
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.base.errors import InputError
+from spheretwin.viz.bench.machine import Choices, Setting
+from spheretwin.viz.bench.page import Page
+
+GROUPS = 18
+
+STATE = {
+    "mode": "hold",
+    "running": True,
+    "stopped": False,
+    "scenario": "hold",
+    "law": "afsm",
+    "shape": "hold",
+    "t_s": 1.25,
+    "speed": 1.0,
+    "realtime_factor": 0.998,
+    "chunks": 60,
+    "missed": 2,
+    "q_rad": (0.1, -0.2, 0.3),
+    "q_ref_rad": (0.1, -0.1, 0.3),
+    "error_mrad": 100.0,
+    "error_deg": 5.7296,
+    "current_A": tuple(np.linspace(-2.0, 2.0, GROUPS)),
+    "current_limit_A": 8.0,
+    "temperature_C": None,
+    "torque_margin": 0.75,
+    "saturated": False,
+    "status": "running",
+    "reason": None,
+    "faults": (),
+    "pending": (),
+    "recording": (),
+    "kept": (),
+    "note": None,
+    "operator": None,
+    "watching": (),
+    "asking": (),
+}
+
+
+class Bench:
+    """Every command is noted and done, but the refused; the state is what a test makes it."""
+
+    actuator = actuators.load()
+
+    def __init__(self, refused=(), **state):
+        self.told, self.refused = [], dict(refused)
+        self.now = SimpleNamespace(**STATE | state)
+        self._lock = threading.Lock()
+
+    def command(self, name, /, *, client=None, **arguments):
+        with self._lock:
+            if name != "beat":
+                self.told.append((name, client, arguments))
+            if name == "hello" and self.now.operator is None:
+                self.now.operator = client
+            if name == "leave" and self.now.operator == client:
+                self.now.operator = None
+        return SimpleNamespace(done=True, refused=self.refused.get(name))
+
+    def commands(self):
+        """Names and arguments of what it was told, but for who is there."""
+        return [(name, given) for name, _, given in self.told if name not in ("hello", "leave")]
+
+    def state(self):
+        return self.now
+
+    def history(self):
+        t_s = np.linspace(0.0, 1.0, 50)
+        angles = np.stack([np.sin(t_s), np.cos(t_s), t_s], axis=1)
+        return {"t_s": t_s, "error_rad": 1e-3 * angles, "torque_command_Nm": angles}
+
+    def command_line(self):
+        return "spheretwin simulate hold"
+
+
+SETTINGS = [
+    Setting("controller.law", "afsm", "afsm", "law", ("pd", "afsm")),
+    Setting("controller.stiffness", "4 4 4", "1 1 1", "stiffness, N·m/rad"),
+    Setting("controller.known", "true", "false", "whether"),
+    Setting("disturbance.load", "0", "0", "load"),
+    Setting("plant.step_s", "0.0005", "0.0005", "physics step, s"),
+]
+
+
+def read(name, text):
+    if text == "unreadable":
+        raise InputError(f"{name}: expected a value, received {text}")
+    return text
+
+
+CHOICES = Choices(
+    settings=lambda: SETTINGS,
+    shape=lambda name: [Setting("amplitude", "0.2", "0.2", "rad")] if name == "sinusoid" else [],
+    read=read,
+    scenarios=("hold", "nutation"),
+    shapes=("hold", "sinusoid"),
+    laws=("pd", "afsm"),
+    targets={"coil.00": ("open", "short"), "supply": ("off",)},
+)
+
+
+@contextlib.contextmanager
+def shown(bench, port=0):
+    """A page that follows a bench, in a thread of its own."""
+    ended = threading.Event()
+    with Page(bench, CHOICES, port) as page:
+        following = threading.Thread(target=page.show, args=(ended.is_set,))
+        following.start()
+        try:
+            yield page
+        finally:
+            ended.set()
+            following.join()

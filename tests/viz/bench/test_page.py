@@ -1,0 +1,161 @@
+"""The page in a browser: a touch is a command, the state is what is shown, nothing leaves the machine."""
+
+import time
+
+import numpy as np
+import pytest
+
+from spheretwin.models.kinematics import rotation
+from tests.browser import Browser, needs_a_browser
+from tests.viz.bench import fake
+from tests.viz.bench.on_page import STATUS, errors, on_screen, opened, write
+
+pytestmark = needs_a_browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with Browser() as found:
+        yield found
+
+
+def told(bench, count):
+    """All that a bench was told, once it is so much."""
+    until = time.monotonic() + 20.0  # a click crosses two processes on shared cores
+    while len(bench.commands()) < count and time.monotonic() < until:
+        time.sleep(0.02)
+    return bench.commands()
+
+
+def tip(bench, q_rad):
+    return rotation(np.array(q_rad)) @ bench.actuator.shaft_tip_m
+
+
+def test_a_touch_is_a_command(browser):
+    bench = fake.Bench()
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        tab.click("text=start")
+        assert told(bench, 1) == [("start", {})]
+        tab.key(" ")  # the button that was clicked has the focus: the space bar is STOP all the same
+        assert told(bench, 2)[1:] == [("stop", {})]
+        tab.key("ArrowUp")
+        ((name, given),) = told(bench, 3)[2:]
+        assert name == "point"
+        assert given["pose_rad"] == pytest.approx([0.1 - np.radians(1.0), -0.1, 0.3], abs=1e-12)
+        assert errors(tab) == []
+        assert tab.outside == []
+        assert len(tab.requests) == 2  # the page and its socket
+        tab.close()
+
+
+def test_the_tip_is_dragged_where_the_pointer_is(browser):
+    bench = fake.Bench()
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        time.sleep(1.0)  # the picture is drawn, and its camera told
+        wanted = np.array([0.3, 0.2, 0.3])
+        tab.drag(
+            on_screen(page, tab, tip(bench, bench.now.q_ref_rad)), on_screen(page, tab, tip(bench, wanted))
+        )
+        # A pixel is 5 mrad of the shaft as the page comes up; it is pointed at to one, from one.
+        arrived = [("point", {"pose_rad": pytest.approx(wanted, abs=1e-2)})]
+        until = time.monotonic() + 20.0
+        while bench.commands()[-1:] != arrived and time.monotonic() < until:
+            time.sleep(0.05)
+        assert bench.commands()[-1:] == arrived
+        tab.close()
+
+
+def test_a_coil_that_is_clicked_gets_a_current_of_its_own_by_hand_only(browser):
+    bench = fake.Bench()
+    actuator = bench.actuator
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        time.sleep(1.0)
+        (client,) = page._server.get_clients().values()
+        nearest = int(np.argmax(actuator.coil_axes @ client.camera.position))  # nothing stands before it
+        axis, coil = actuator.coil_axes[nearest], actuator.coil
+        beside = np.cross(axis, [0.0, 0.0, 1.0])
+        end = (coil.distance_m + coil.length_m / 2) * axis  # on its end, between bore and rim
+        middle = (coil.inner_radius_m + coil.outer_radius_m) / 2
+        at = on_screen(page, tab, end + middle * beside / np.linalg.norm(beside))
+        tab.click(at)
+        time.sleep(0.5)
+        assert bench.commands() == []
+        bench.now.mode = "manual"
+        tab.click(at)
+        (group,) = np.flatnonzero((actuator.groups == nearest).any(axis=1)).tolist()
+        assert told(bench, 1) == [("manual", {"group": group, "current_A": 1.0})]
+        tab.close()
+
+
+def test_what_is_wrong_is_said_in_words_and_harms_nothing(browser):
+    bench = fake.Bench(
+        mode="fault", status="failsafe", reason="<img src=x onerror=alert(1)>", saturated=True, stopped=True
+    )
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        shown = tab.evaluate(f"{STATUS}.innerText")
+        for word in (
+            "FAULT",
+            "FAILSAFE",
+            "STOPPED",
+            "SATURATED",
+            "1.250 s",
+            "100.00 mrad",
+            "5.730°",
+            "2 of 60",
+        ):
+            assert word in shown
+        assert bench.now.reason in shown
+        bench.now.mode, bench.now.reason, bench.now.status = "hold", None, "running"
+        tab.wait_for(f"!{STATUS}.innerText.includes('FAULT')")
+        assert "FAILSAFE" not in tab.evaluate(f"{STATUS}.innerText")
+        assert errors(tab) == []
+        tab.close()
+
+
+def test_a_value_is_refused_beside_its_field(browser):
+    bench = fake.Bench(refused={"set": "controller.stiffness: expected a value ≥ 0, received -1"})
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        tab.click("text=law")
+        write(tab, "stiffness", "-1")
+        tab.click("text=Set gains")
+        assert told(bench, 1) == [("set", {"name": "controller.stiffness", "value": "-1"})]
+        tab.wait_for("document.body.innerText.includes('expected a value ≥ 0, received -1')")
+        bench.refused.clear()
+        write(tab, "stiffness", "5")
+        tab.click("text=Set gains")
+        tab.wait_for("!document.body.innerText.includes('received -1')")
+        tab.close()
+
+
+def test_one_page_operates_and_gives_over(browser):
+    bench = fake.Bench()
+    with fake.shown(bench) as page:
+        first, second = opened(browser, page), opened(browser, page)
+        second.wait_for("document.body.innerText.includes('Ask to operate')")
+        second.click("text=start")
+        second.wait_for("document.body.innerText.includes('This page watches')")
+        assert bench.commands() == []
+        second.click("text=STOP (space)")
+        assert told(bench, 1) == [("stop", {})]
+        second.click("text=Ask to operate")
+        assert told(bench, 2)[1:] == [("ask", {})]
+        bench.now.asking = ("page 1",)
+        first.click("text=Let page 1 operate")
+        assert told(bench, 3)[2:] == [("grant", {"to": "page 1"})]
+        first.close()
+        second.close()
+
+
+def test_a_page_comes_back_by_itself(browser):
+    bench = fake.Bench()
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        page._server._websock_server.disconnect_all_clients()
+        bench.now.t_s = 77.0
+        tab.wait_for(f"{STATUS}?.innerText.includes('77.000 s')")
+        tab.close()

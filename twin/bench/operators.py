@@ -1,0 +1,122 @@
+"""Who may command: one client operates, others watch, and may ask to take over."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
+
+GONE_s = 2.0
+"""Silence after which a client is taken to be gone."""
+
+MOST_CLIENTS = 64
+
+
+class Operators:
+    """Clients by their ids, and which of them operates.
+
+    Parameters
+    ----------
+    gone_s : float, s
+        Silence after which a client is gone.
+    clock : callable
+        Seconds that never go back.
+
+    Notes
+    -----
+    The first to come operates. Who asks while nobody does, operates from then on; else the first of those
+    who have asked does so when the operator leaves, is gone, or gives over to it.
+    """
+
+    def __init__(self, gone_s: float = GONE_s, clock: Callable[[], float] = time.monotonic) -> None:
+        self._gone_s, self._clock = gone_s, clock
+        self._lock = threading.RLock()
+        self._seen: dict[str, float] = {}
+        self._asking: list[str] = []
+        self.operator: str | None = None
+
+    @property
+    def watching(self) -> tuple[str, ...]:
+        """Clients that do not operate."""
+        with self._lock:
+            return tuple(client for client in self._seen if client != self.operator)
+
+    @property
+    def asking(self) -> tuple[str, ...]:
+        """Those of them that ask to operate, the first one first."""
+        with self._lock:
+            return tuple(self._asking)
+
+    def say(self, name: str, client: str | None, to: str | None = None) -> None:
+        """Take note of what a client says: ``hello``, ``beat``, ``ask``, ``leave`` or ``grant``.
+
+        Raises
+        ------
+        InputError
+            It does not say who it is, there are too many, or it gives over what it has not, or to nobody.
+        """
+        if client is None:
+            raise InputError(f"bench: expected {name} of a client, received none")
+        with self._lock:
+            if name == "leave":
+                self._drop(client)
+                return
+            self._note(client)
+            if name == "ask":
+                self._ask(client)
+            elif name == "grant":
+                self._grant(client, to)
+
+    def check(self, client: str | None) -> None:
+        """Find out whether a client may command; whoever does not say who it is has the bench in hand.
+
+        Raises
+        ------
+        InputError
+            Another one operates, or nobody does.
+        """
+        if client is not None and client != self.operator:
+            raise InputError(
+                f"bench: expected a command of {self.operator or 'a client that operates'},"
+                f" received one of {shown(client)}"
+            )
+
+    def look(self) -> bool:
+        """Drop clients that are gone; True where the operator was one of them."""
+        now = self._clock()
+        with self._lock:
+            gone = [client for client, seen_s in self._seen.items() if now - seen_s > self._gone_s]
+            lost = self.operator in gone
+            for client in gone:
+                self._drop(client)
+        return lost
+
+    def _note(self, client: str) -> None:
+        if client not in self._seen and len(self._seen) >= MOST_CLIENTS:
+            raise InputError(f"bench: expected at most {MOST_CLIENTS} clients, received one more")
+        first = not self._seen
+        self._seen[client] = self._clock()
+        if first:
+            self.operator = client
+
+    def _ask(self, client: str) -> None:
+        if self.operator is None:
+            self.operator = client
+        elif client != self.operator and client not in self._asking:
+            self._asking.append(client)
+
+    def _grant(self, client: str, to: str | None) -> None:
+        self.check(client)
+        if to not in self._seen:
+            raise InputError(f"bench: expected one of {', '.join(self._seen)}, received {shown(to)}")
+        self.operator = to
+        self._asking = [asking for asking in self._asking if asking != to]
+
+    def _drop(self, client: str) -> None:
+        self._seen.pop(client, None)
+        self._asking = [asking for asking in self._asking if asking != client]
+        if client == self.operator:
+            self.operator = self._asking.pop(0) if self._asking else None

@@ -1,0 +1,105 @@
+"""The clock of a bench: how many ticks are due, when the next are, and how many came late."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+
+from spheretwin.twin.bench.commands import FASTEST
+
+CHUNK_s = 0.02
+"""Wall time from one chunk to the next."""
+
+# A chunk longer than this would keep STOP waiting.
+LONGEST_s, SHORT_s = 0.01, 0.004
+MOST_TICKS = 4096
+
+# Beyond it, time that was lost is not made up for.
+LATE_s = 5 * CHUNK_s
+
+WINDOW_s = 1.0
+
+
+class Pace:
+    """Pace of one bench.
+
+    Parameters
+    ----------
+    clock : callable
+        Seconds that never go back.
+
+    Attributes
+    ----------
+    speed : float
+        Wanted, as a multiple of the clock's.
+    chunks, missed : int
+        Chunks that had a deadline, and those that were late: done after the next one was due.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self.speed = 1.0
+        self.chunks = self.missed = 0
+        self._most = 20
+        self._due: float | None = None
+        self._done: deque[tuple[float, float]] = deque()
+
+    @property
+    def fastest(self) -> bool:
+        """Whether it goes as fast as it can."""
+        return self.speed >= FASTEST
+
+    @property
+    def missed_share(self) -> float:
+        """Share of the chunks that were late."""
+        return self.missed / self.chunks if self.chunks else 0.0
+
+    def reached(self) -> float:
+        """Simulated over wall time in the last second; 0 while time stands still."""
+        now = self._clock()
+        recent = [(at, t_s) for at, t_s in self._done if now - at <= WINDOW_s]
+        if len(recent) < 2:
+            return 0.0
+        return (recent[-1][1] - recent[0][1]) / max(now - recent[0][0], 1e-9)
+
+    def clear(self) -> None:
+        """Count anew."""
+        self.chunks = self.missed = 0
+        self.rest()
+
+    def rest(self) -> None:
+        """Time stands still: nothing is due."""
+        self._due = None
+        self._done.clear()
+
+    def ticks(self, period_s: float) -> int:
+        """Control ticks of the next chunk."""
+        if self.fastest:
+            return self._most
+        return max(1, min(round(CHUNK_s * self.speed / period_s), self._most))
+
+    def wait_s(self) -> float:
+        """Time until the next chunk is due, s; 0 where it is."""
+        if self._due is None:
+            self._due = self._clock()
+        return 0.0 if self.fastest else max(0.0, self._due - self._clock())
+
+    def ran(self, ticks: int, period_s: float, t_s: float, took_s: float) -> None:
+        """Take note of a chunk: its ticks, the time it reached, and the wall time that it took."""
+        now = self._clock()
+        self._done.append((now, t_s))
+        while now - self._done[0][0] > WINDOW_s:
+            self._done.popleft()
+        if took_s > LONGEST_s:
+            self._most = max(1, self._most // 2)
+        elif took_s < SHORT_s and ticks == self._most:
+            self._most = min(2 * self._most, MOST_TICKS)
+        if self.fastest or self._due is None:
+            self._due = now
+            return
+        self._due += ticks * period_s / self.speed
+        self.chunks += 1
+        if now > self._due:
+            self.missed += 1
+            self._due = max(self._due, now - LATE_s)

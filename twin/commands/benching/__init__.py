@@ -1,0 +1,1 @@
+"""The verb `bench`, and what its page has to choose from."""

@@ -1,0 +1,1 @@
+"""The bench's page: the twin that runs, seen and driven from a browser."""

@@ -1,0 +1,1 @@
+"""The actuator in few triangles, for a browser without a GPU."""

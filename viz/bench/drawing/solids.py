@@ -1,0 +1,95 @@
+"""Solids of few triangles: outlines turned about z, sharp at their corners and smooth around."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A mesh whose vertices are shared only where its surface is smooth."""
+
+    vertices: NDArray[np.float32]  # (n, 3) m
+    faces: NDArray[np.uint32]  # (m, 3)
+
+
+def turned(outline: Sequence[tuple[float, float]], sections: int) -> Solid:
+    """Surface of revolution about z.
+
+    Parameters
+    ----------
+    outline : sequence of (float, float), m
+        Points (distance from z, height), upward on the outside.
+    sections : int
+        Around z.
+    """
+    angles = np.linspace(0.0, 2 * pi, sections + 1)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return joined([_strip(circle, *ends) for ends in pairwise(outline)])
+
+
+def tube(inner: float, outer: float, low: float, high: float, sections: int) -> Solid:
+    """Hollow cylinder about z between two heights."""
+    return turned([(inner, low), (outer, low), (outer, high), (inner, high), (inner, low)], sections)
+
+
+def cylinder(radius: float, low: float, high: float, sections: int) -> Solid:
+    """Cylinder about z between two heights."""
+    return turned([(0.0, low), (radius, low), (radius, high), (0.0, high)], sections)
+
+
+def zone(radius: float, low: float, high: float, steps: int, sections: int) -> Solid:
+    """Part of a sphere between two heights, smooth in both directions."""
+    latitudes = np.linspace(np.arcsin(low / radius), np.arcsin(high / radius), steps + 1)
+    angles = np.linspace(0.0, 2 * pi, sections + 1)
+    latitude, angle = np.meshgrid(latitudes, angles, indexing="ij")
+    across = radius * np.cos(latitude)
+    points = np.stack([across * np.cos(angle), across * np.sin(angle), radius * np.sin(latitude)], axis=-1)
+    return Solid(points.reshape(-1, 3).astype(np.float32), _grid(steps + 1, sections + 1))
+
+
+def joined(solids: Sequence[Solid]) -> Solid:
+    """One of several."""
+    first = np.cumsum([0, *(len(solid.vertices) for solid in solids[:-1])]).astype(np.uint32)
+    return Solid(
+        np.concatenate([solid.vertices for solid in solids]),
+        np.concatenate([solid.faces + start for solid, start in zip(solids, first, strict=True)]),
+    )
+
+
+def reversed_(solid: Solid) -> Solid:
+    """The same, seen from inside."""
+    return Solid(solid.vertices, solid.faces[:, ::-1].copy())
+
+
+def bar(lengths: tuple[float, float, float]) -> Solid:
+    """Box about the origin."""
+    square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+    two = np.array([[0, 1, 2], [0, 2, 3]])
+    # Each pair of sides is the first, its axes in cyclic order; the far one is its image, seen from behind.
+    near = [np.roll(square, shift, axis=1) * np.array(lengths) / 2 for shift in range(3)]
+    sides = [Solid(corners.astype(np.float32), two.astype(np.uint32)) for corners in near]
+    far = [Solid(-side.vertices, side.faces[:, ::-1].copy()) for side in sides]
+    return joined([*sides, *far])
+
+
+def _strip(circle: NDArray[np.float64], start: tuple[float, float], end: tuple[float, float]) -> Solid:
+    """What one straight piece of an outline sweeps, with vertices of its own."""
+    rings = [
+        np.column_stack([radius * circle, np.full(len(circle), height)]) for radius, height in (start, end)
+    ]
+    return Solid(np.concatenate(rings).astype(np.float32), _grid(2, len(circle)))
+
+
+def _grid(rows: int, columns: int) -> NDArray[np.uint32]:
+    """Two triangles for each cell of a grid of vertices, rows upward and columns counter-clockwise."""
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
+    c, d = corner[1:, 1:].ravel(), corner[1:, :-1].ravel()
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]).astype(np.uint32)

@@ -1,0 +1,219 @@
+"""The bench's page: every button is one command, everything shown is the bench's latest state."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from spheretwin.viz.bench import front
+from spheretwin.viz.bench.drawing.scene import Scene
+from spheretwin.viz.bench.faults import Faults
+from spheretwin.viz.bench.hand import Event, Hand, client_name, on_press
+from spheretwin.viz.bench.keeping import Keeping
+from spheretwin.viz.bench.machine import Bench, Choices
+from spheretwin.viz.bench.modes import Modes
+from spheretwin.viz.bench.plots import Plots
+from spheretwin.viz.bench.settings import Settings
+from spheretwin.viz.bench.status import currents_html, scale_html, status_html
+
+FRAME_S = 1 / 25
+"""The picture moves this often; words and curves every so many frames, the fields' values rarely."""
+
+FRAMES_A_STATUS = 3
+FRAMES_A_SETTING = 25
+
+LEFT_WIDTH, RIGHT_WIDTH = 255, 290
+STATUS_HEIGHT = 370
+
+SPEEDS = {"0.1×": 0.1, "0.2×": 0.2, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "10×": 10.0}
+SPEEDS["as fast as possible"] = 1e6
+
+TITLE = "bench"
+
+
+class Page:
+    """A page of one bench, on this machine alone.
+
+    ``with Page(bench, choices, port) as page: page.show(until)``
+
+    Parameters
+    ----------
+    bench : Bench
+        What it drives and shows.
+    choices : Choices
+        What there is to choose from.
+    port : int
+        Where it is served; 0 for any that is free.
+
+    Raises
+    ------
+    InputError
+        The port is taken.
+    """
+
+    def __init__(self, bench: Bench, choices: Choices, port: int) -> None:
+        self._bench, self._choices, self._hand = bench, choices, Hand(bench)
+        self._server = front.serve(port, TITLE)
+        self._watching: dict[int, Any] = {}
+        self._frame = 0
+        self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        self._server.gui.set_panel_label(TITLE)
+        _look(self._server)
+        self._build()
+        self._pages()
+
+    @property
+    def address(self) -> str:
+        """To open in a browser."""
+        return front.address(self._server)
+
+    def show(self, ended: Callable[[], bool]) -> None:
+        """Follow the bench until it is told to end."""
+        due = time.monotonic()
+        while not ended():
+            self.draw()
+            due = max(due + FRAME_S, time.monotonic())  # late: skip, never catch up
+            time.sleep(max(0.0, due - time.monotonic()))
+
+    def draw(self) -> None:
+        """Show the latest state, once."""
+        if self._bench.actuator is not self._drawn:  # another model was loaded
+            self._server.scene.reset()
+            self._server.gui.reset()
+            self._build()
+        state = self._bench.state()
+        self._hand.settle()
+        with self._server.atomic():
+            self._scene.move(
+                np.array(state.q_rad), _desired(state), np.array(state.current_A), state.current_limit_A
+            )
+            if self._frame % FRAMES_A_STATUS == 0:
+                self._tell(state)
+            if self._frame % FRAMES_A_SETTING == 0:
+                self._renew(state)
+        self._frame += 1
+
+    def close(self) -> None:
+        """End the server."""
+        front.stop(self._server)
+
+    def __enter__(self) -> Page:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _build(self) -> None:
+        """Make all that the pages share."""
+        gui = self._server.gui
+        self._drawn = self._bench.actuator
+        self._scene = Scene(self._server.scene, self._drawn)
+        self._twin_panel(gui)
+        self._curves_panel(gui)
+        self._controls(gui, self._choices)
+
+    def _twin_panel(self, gui: viser.GuiApi) -> None:
+        panel = gui.add_panel()
+        with panel.add_tab("status"):
+            # On top: whatever is scrolled, it stays in view.
+            self._hand.button(gui, "STOP (space)", "stop", color="red")
+            self._status = gui.add_html("")
+            running = gui.add_button_group("run", ("start", "pause", "step", "reset"))
+            on_press(running, self._hand.tell_chosen)
+            speed = gui.add_dropdown("speed", list(SPEEDS), initial_value="1×")
+            self._hand.on_change(
+                speed,
+                lambda event: self._hand.tell(event, "speed", factor=SPEEDS.get(event.target.value, 1.0)),
+            )
+        panel.dock_left()
+        panel.set_width(LEFT_WIDTH)
+        panel.set_height(STATUS_HEIGHT)
+        self._panel = panel
+        stop = gui.add_command("STOP", hotkey="space")
+
+        @stop.on_trigger
+        async def _(event: Event) -> None:
+            self._hand.tell(event, "stop")
+
+    def _curves_panel(self, gui: viser.GuiApi) -> None:
+        panel = gui.add_panel()
+        with panel.add_tab("curves"):
+            self._currents = gui.add_html("")
+            gui.add_html(scale_html(self._bench.state().current_limit_A))
+            self._plots = Plots(gui)
+        panel.dock_below(self._panel)
+
+    def _controls(self, gui: viser.GuiApi, choices: Choices) -> None:
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("move"):
+            self._modes = Modes(gui, self._hand, self._bench, choices, self._scene)
+        law, twin = tabs.add_tab("law"), tabs.add_tab("twin")
+        self._settings = Settings(gui, self._hand, choices, law, twin)
+        with tabs.add_tab("faults"):
+            self._faults = Faults(gui, self._hand, choices)
+        with tabs.add_tab("keep"):
+            Keeping(gui, self._hand, self._bench, choices)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(RIGHT_WIDTH)
+
+    def _pages(self) -> None:
+        """Say who comes and who goes; a page that watches gets a button of its own."""
+
+        @self._server.on_client_connect
+        async def _(client: viser.ClientHandle) -> None:
+            self._bench.command("hello", client=client_name(client.client_id))
+            ask = client.gui.add_button("Ask to operate", visible=False, order=-1e6)
+            on_press(ask, lambda event: self._hand.tell(event, "ask"))
+            give = client.gui.add_button("", visible=False, order=-1e6, color="orange")
+
+            def grant(event: Event) -> None:
+                for name in self._bench.state().asking[:1]:
+                    self._hand.tell(event, "grant", to=name)
+
+            on_press(give, grant)
+            self._watching[client.client_id] = (ask, give)
+
+        @self._server.on_client_disconnect
+        async def _(client: viser.ClientHandle) -> None:
+            self._watching.pop(client.client_id, None)
+            self._bench.command("leave", client=client_name(client.client_id))
+
+    def _tell(self, state: Any) -> None:
+        _renewed(self._status, status_html(state, self._hand.refused, self._hand.waits_for))
+        _renewed(self._currents, currents_html(state.current_A, state.current_limit_A, state.temperature_C))
+        if state.running:
+            self._scene.trail(np.array(state.q_rad))
+            self._plots.show(self._bench.history())
+        self._modes.show(state)
+        self._faults.show(state)
+
+    def _renew(self, state: Any) -> None:
+        self._settings.show()
+        for number, (ask, give) in list(self._watching.items()):
+            name = client_name(number)
+            self._bench.command("beat", client=name)
+            with contextlib.suppress(RuntimeError):  # the page has gone meanwhile
+                ask.visible = state.operator != name and name not in state.asking
+                give.visible = state.operator == name and bool(state.asking)
+                if give.visible:
+                    give.label = f"Let {state.asking[0]} operate"
+
+
+def _desired(state: Any) -> Any:
+    return None if state.mode in ("off", "manual", "fault") else np.array(state.q_ref_rad)
+
+
+def _renewed(html: Any, content: str) -> None:
+    if html.content != content:
+        html.content = content
+
+
+def _look(server: viser.ViserServer) -> None:
+    """From where the shaft, all rows of coils and the ball between them are seen."""
+    camera = server.initial_camera
+    camera.position, camera.look_at, camera.near = (0.15, -0.22, 0.15), (0.0, 0.0, 0.02), 0.01
