@@ -54,7 +54,8 @@ class Quantities(Part):
         """Record what bins the rows of a chunk have completed."""
         facts = self.subject.facts
         given = Rows(rows, self._before or rows.rows(0, 1), self.subject.actuator, facts.current_limit_A)
-        values = {quantity.name: quantity.values(given) for quantity in self._quantities}
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that diverged ends in what is no number
+            values = {quantity.name: quantity.values(given) for quantity in self._quantities}
         self._before = Table(rows.signals, rows.values[-1:].copy())
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
         columns = np.concatenate([*values.values(), self._picked.of(rows)], axis=1)
