@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
@@ -18,6 +17,7 @@ from spheretwin.twin.review.spectrum import peaks
 from spheretwin.twin.review.work import mechanical_work_J
 from spheretwin.twin.scenario.files import files_of
 from spheretwin.twin.scenario.reading import validated
+from spheretwin.twin.scenario.sections import Scenario
 
 
 def figures(run: Reviewed) -> dict[str, Any]:
@@ -67,21 +67,21 @@ def _figures(run: Reviewed) -> dict[str, Any]:
 
 
 def _metrics(run: Reviewed) -> dict[str, Any]:
-    scenario = validated(_what_metrics_take(run), str(run.path))
+    scenario = of_the_actuator(run)
     gathered = Figures(Planned(scenario, files_of(scenario).actuator, scenario.ticks))
     gathered.write(run.every_tick)
     return gathered.values()
 
 
-def actuator_of(run: Reviewed) -> Actuator:
-    """The actuator of a run, as its files say now.
+def of_the_actuator(run: Reviewed) -> Scenario:
+    """What a run's scenario says of plant and drive; its law and trajectory, which may be gone, are others.
 
     Raises
     ------
     InputError
-        Its model file is no longer there.
+        It is none of this version's.
     """
-    return files_of(validated(_what_metrics_take(run), str(run.path))).actuator
+    return validated(_what_metrics_take(run), str(run.path))
 
 
 def _what_metrics_take(run: Reviewed) -> dict[str, Any]:

@@ -14,8 +14,11 @@ from spheretwin.viz.merged.bodies import ROTOR
 from spheretwin.viz.scene.paths import WORLD
 from spheretwin.viz.scene.traces import TRAIL_S
 
-COMPARE, DESIRED, RUNS, TIP = "compare", "desired", "runs", "tip"
+COMPARE, RUNS, TIP = "compare", "runs", "tip"
 """Parts of the paths of entities, behind the name of a run but for `RUNS`."""
+
+ASKED = "asked"
+"""Part of a path before the name of a run: a viewer draws lines in the order of their paths, this below all."""
 
 # Plots that share a row are too narrow for names; the one that has a row of its own tells them.
 NAMED, BESIDE_TEXTS = "whole", "more"
@@ -96,7 +99,7 @@ def _plots(view: View, group: str) -> list[rrb.TimeSeriesView]:
 
 
 def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
-    wanted = [f"/{run}/{DESIRED}/{plot.name}" for run in view.leaders] if plot.desired else []
+    wanted = [f"/{ASKED}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
     return rrb.TimeSeriesView(
         origin="/",
         contents=[*wanted, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
@@ -110,7 +113,7 @@ def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
 
 def _bodies(view: View) -> rrb.Spatial3DView:
     first, *ghosts = view.runs
-    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{run}/{DESIRED}/{TIP}" for run in view.leaders]
+    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{ASKED}/{run}/{TIP}" for run in view.leaders]
     drawn = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
     return rrb.Spatial3DView(
         origin="/",

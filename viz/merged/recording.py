@@ -17,7 +17,7 @@ from spheretwin.viz.compared.quantities import Quantity, drawn
 from spheretwin.viz.compared.run import Run
 from spheretwin.viz.layout.paths import SCENARIO
 from spheretwin.viz.merged.bodies import Tip, body
-from spheretwin.viz.merged.layout import COMPARE, DESIRED, RUNS, TIP, Plot, View, application, layout
+from spheretwin.viz.merged.layout import ASKED, COMPARE, RUNS, TIP, Plot, View, application, layout
 from spheretwin.viz.merged.series import send_line
 from spheretwin.viz.merged.stream import Below, recorded
 from spheretwin.viz.recording.parts.log import log_lines
@@ -77,36 +77,48 @@ def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: st
                 Tip(subject, TIP, "q_rad", f"{place + 1}", colour),
                 States(subject),
             ]
-            if place in leading:
-                wanted = f"{DESIRED}/{TIP}"
-                parts.append(Tip(subject, wanted, "q_ref_rad", "", palette.DESIRED_TRACE))
-            _write_parts(below, run, parts)
+            _write_run(below, run, parts)
             for each in quantities:
                 entity, t_s, values = f"{COMPARE}/{each.name}", run.table["t_s"], each.of(run.table)
                 send_line(below, entity, run.label, t_s, values, colour)
-            if place in leading:
-                _send_desired(below, run, quantities, alone=len(leading) == 1)
+        for place in leading:
+            run, asked = runs[place], Below(recording, f"{ASKED}/{runs[place].name}")
+            _write_asked(
+                cast(rr.RecordingStream, asked), run, subjects[place], quantities, alone=len(leading) == 1
+            )
     return path
 
 
-def _write_parts(recording: rr.RecordingStream, run: Run, parts: Sequence[Part]) -> None:
+def _write_run(recording: rr.RecordingStream, run: Run, parts: Sequence[Part]) -> None:
     """What a recording of the run alone has, but for the text of its scenario."""
     recording.log(SCENARIO, rr.AnyValues(record=json.dumps(dict(run.record))), static=True)
     log_lines(recording, list(run.events))
     for part in parts:
-        part.begin(recording)
-        for rows in _chunks(run.table):
-            part.write(recording, rows)
+        _write_part(recording, run, part)
 
 
-def _send_desired(
-    recording: rr.RecordingStream, run: Run, quantities: Sequence[Quantity], *, alone: bool
+def _write_asked(
+    recording: rr.RecordingStream,
+    run: Run,
+    subject: Subject,
+    quantities: Sequence[Quantity],
+    *,
+    alone: bool,
 ) -> None:
-    label = DESIRED if alone else f"{DESIRED} of {run.label}"
+    """What was asked for: lines, and the path of the tip."""
+    colour, label = palette.DESIRED_TRACE, "asked for" if alone else f"asked for in {run.label}"
+    _write_part(recording, run, Tip(subject, TIP, "q_ref_rad", "", colour))
     for each in quantities:
         if each.desired:
-            path, values = f"{DESIRED}/{each.name}", each.desired(run.table)
-            send_line(recording, path, label, run.table["t_s"], values, palette.DESIRED_TRACE, width=3.0)
+            send_line(
+                recording, each.name, label, run.table["t_s"], each.desired(run.table), colour, width=3.0
+            )
+
+
+def _write_part(recording: rr.RecordingStream, run: Run, part: Part) -> None:
+    part.begin(recording)
+    for rows in _chunks(run.table):
+        part.write(recording, rows)
 
 
 def _chunks(table: Table) -> Iterator[Table]:

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.twin.review.beside import naming
-from spheretwin.twin.review.figures import actuator_of
+from spheretwin.twin.review.figures import of_the_actuator
 from spheretwin.twin.review.happened import events
 from spheretwin.twin.review.run import Reviewed
+from spheretwin.twin.scenario.files import files_of
+from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.viz.compared.run import Run
 
 SUFFIX = ".rrd"
@@ -56,8 +60,12 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
                 f"review {run.path}: expected an actuator of {groups[0]} coil groups as the first run has,"
                 f" received one of {count}"
             )
-    subjects = [Subject(actuator_of(run), run.table.signals, _facts(run)) for run in runs]
-    recording.write(path, compared, subjects, _told(runs))
+    subjects = [
+        Subject(files_of(scenario).actuator, run.table.signals, _facts(scenario, _law(run)))
+        for run, scenario in zip(runs, map(of_the_actuator, runs), strict=True)
+    ]
+    with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
+        recording.write(path, compared, subjects, _told(runs))
 
 
 def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
@@ -92,17 +100,16 @@ def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
     ]
 
 
-def _facts(run: Reviewed) -> RunFacts:
-    scenario = run.record.scenario
+def _facts(scenario: Scenario, law: str) -> RunFacts:
     return RunFacts(
-        name=scenario["name"],
-        description=scenario["description"],
-        law=_law(run),
-        duration_s=scenario["duration"],
-        current_limit_A=scenario["drive"]["current_limit_A"] or 0.0,
-        payload_kg=scenario["plant"]["payload_kg"],
-        gravity_m_s2=scenario["plant"]["gravity_m_s2"],
-        mjcf=Path(scenario["plant"]["mjcf"] or MJCF_PATH),
+        name=scenario.name,
+        description=scenario.description,
+        law=law,
+        duration_s=scenario.duration,
+        current_limit_A=scenario.drive.current_limit_A or 0.0,
+        payload_kg=scenario.plant.payload_kg,
+        gravity_m_s2=scenario.plant.gravity_m_s2,
+        mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
         sections={},
     )
 

@@ -7,6 +7,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from spheretwin.twin.review.beside.merging import beside
 from spheretwin.twin.review.run import Reviewed
 from spheretwin.twin.review.spectrum import amplitudes, peaks
@@ -56,11 +58,13 @@ def write(runs: Sequence[Reviewed], told: Sequence[dict[str, Any]], into: Path) 
     leading, quantities = leaders(tables), drawn(tables)
     spectra = [_spectra(run) for run in runs]
     title = compared[0].label if len(runs) == 1 else f"{len(runs)} runs"
-    folder.save_drawings(into, _drawings(compared, leading, quantities, spectra), vector=True)
+    with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
+        folder.save_drawings(into, _drawings(compared, leading, quantities, spectra), vector=True)
+        over_time = drawing.over_time(compared, leading, quantities)
     content = page.page(
         title,
         compared,
-        drawing.over_time(compared, leading, quantities),
+        over_time,
         drawing.of_errors(compared, spectra),
         _above(title, compared, drawing.points_each(compared, leading, quantities)),
         _below(compared, told),

@@ -98,9 +98,9 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
 
 
 def test_what_was_asked_for_is_there_once(merged):
-    leading = {entity.split("/")[1] for entity in merged.entities if "/desired/" in entity}
+    leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/asked/")}
     assert leading == {"run_3_slow"}  # the longest of runs that were asked for the same
-    wanted = merged.values("/run_3_slow/desired/angle_α_rad")
+    wanted = merged.values("/asked/run_3_slow/angle_α_rad")
     assert np.array_equal(wanted, merged.values("/run_3_slow/telemetry/q_ref_rad")[:, :1])
 
 
@@ -202,3 +202,17 @@ def test_a_result_that_cannot_be_completed_leaves_nothing(files, tmp_path, monke
     with pytest.raises(BaseException, match="a panic"):
         merging.merge(runs, tmp_path / "out.rrd")
     assert os.listdir(tmp_path) == []
+
+
+def test_a_recording_that_keeps_some_rows_gives_those_and_no_others(files, tmp_path):
+    path, out = tmp_path / "thin.rrd", tmp_path / "out.rrd"
+    run = ["simulate", "hold", "--plant.engine", "lagrangian", "--duration", "0.5", "--json"]
+    assert cli.main([*run, "--record", str(path), "--record-rate", "20"]) == 0
+    assert cli.main(["review", str(path), str(files["first"]), "--merge", str(out)]) == 0
+    thin = read(path)
+    assert len(thin.table) < len(thin.every_tick) == 500
+    assert thin.record.ticks == 500
+    found = Merged(out)
+    for signal in thin.table.signals:
+        column = thin.table[signal.name].reshape(len(thin.table), -1)
+        assert found.values(f"/run_1_thin/telemetry/{signal.name}").tobytes() == column.tobytes()
