@@ -58,7 +58,13 @@ WITHIN = ("data:", "blob:", "about:")
 # What a page may need at most where two cores are shared with the rest of the tests.
 PATIENCE_S = 60.0
 
-_KEYS = {" ": ("Space", 32), "Enter": ("Enter", 13), "Escape": ("Escape", 27), "Tab": ("Tab", 9)}
+_KEYS = {
+    " ": ("Space", 32),
+    "Enter": ("Enter", 13),
+    "Escape": ("Escape", 27),
+    "Tab": ("Tab", 9),
+    "Backspace": ("Backspace", 8),
+}
 _ARROWS = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
 
 

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -110,6 +111,7 @@ class Bench:
         self._running, self._steps, self._noted = False, 0, (0, 0)
         self._warm: set[tuple[str, object]] = set()
         self._stops: list[Ticket] = []
+        self._outcomes: list[tuple[Ticket, str | None]] = []
         self._preparing: tuple[Waiting, Future[Any]] | None = None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="bench")
         self._thread: threading.Thread | None = None
@@ -262,22 +264,38 @@ class Bench:
         done = 0
         try:
             self._take_commands()
+            self._settle()
             done = self._run(ticks)
             self._look_around()
         except Exception as error:
             self._desk.fail(error)
+            self._running, self._steps = False, 0
+        self._settle()
+        self._show()
+        return done
+
+    def _show(self) -> None:
+        """Make the next picture; where it cannot be made, the last one says so."""
         try:
             self._state = self._picture()
         except Exception as error:
-            self._refused = f"{type(error).__name__}: {without_breaks(error)}"
-        return done
+            self._state = replace(self._state, mode="fault", reason=_told(error))
+
+    def _settle(self) -> None:
+        """Say what became of the commands, once it can be seen."""
+        if not self._outcomes:
+            return
+        self._show()
+        outcomes, self._outcomes = self._outcomes, []
+        for ticket, refused in outcomes:
+            ticket.settle(refused)
 
     def _take_commands(self) -> None:
         """Act on what waits, in its order; what is prepared beside the loop keeps the others waiting."""
         while self._stops:
             self._player, self._note = None, "STOP: currents are taken away until reset"
             self._desk.stop()
-            self._stops.pop(0).settle()
+            self._outcomes.append((self._stops.pop(0), None))
         while self._open:
             if self._preparing:
                 command, future = self._preparing
@@ -302,9 +320,9 @@ class Bench:
         except Exception as error:  # files and laws of the user's may raise whatever they will
             told = f"{error}" if isinstance(error, SpheretwinError) else _told(error)
             self._refused = told
-            command.ticket.settle(told)
+            self._outcomes.append((command.ticket, told))
             return
-        command.ticket.settle()
+        self._outcomes.append((command.ticket, None))
 
     def _to_prepare(self, command: Waiting) -> Callable[[], Any] | None:
         """What a command needs that takes longer than a chunk; what it says is refused, is."""

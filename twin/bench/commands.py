@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
@@ -9,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, c
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import did_you_mean, shown
+from spheretwin.twin.scenario.explaining import explain
+from spheretwin.twin.scenario.reading import as_plain
 from spheretwin.twin.trajectories.trajectory import Triple
 
 _CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -99,13 +102,14 @@ def checked(name: object, arguments: Mapping[str, Any]) -> dict[str, Any]:
             f"bench: expected one of {', '.join(COMMANDS)}, received {shown(name)}"
             f"{did_you_mean(str(name), COMMANDS)}"
         )
-    kind = COMMANDS[name]
+    kind = COMMANDS[name].arguments
+    if unknown := [field for field in arguments if field not in kind.model_fields]:
+        known = ", ".join(kind.model_fields) or "no arguments"
+        raise InputError(f"bench: {name}: expected {known}, received {unknown[0]}")
     try:
-        found = kind.arguments.model_validate(arguments, strict=False)
+        found = kind.model_validate_json(json.dumps(arguments, default=as_plain))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(
-            f"bench: {name}: {first['msg']} in {where}, received {shown(first['input'])}"
-        ) from None
-    return {field: getattr(found, field) for field in type(found).model_fields}
+        raise InputError(f"bench: {name}: {explain(error, kind)}") from None
+    except (TypeError, ValueError, RecursionError) as error:  # digits or depth without end
+        raise InputError(f"bench: {name}: expected arguments as JSON has them, {error}") from None
+    return {field: getattr(found, field) for field in kind.model_fields}

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 import viser
 
@@ -14,6 +14,9 @@ from spheretwin.viz.bench.machine import Bench, Ticket
 
 # How long a refusal that belongs to no field stays.
 SHOWN_S = 8.0
+
+# What waits for so long is said to: the first time, a law or a fault may have to be compiled.
+LONG_S = 0.5
 
 # Somebody who floods the bench sees no more than this of what becomes of it.
 MOST_TICKETS = 200
@@ -50,6 +53,15 @@ class Note:
 _REFUSED = "color:#ff8787;font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em;overflow-wrap:anywhere"
 
 
+class Asked(NamedTuple):
+    """A command that waits."""
+
+    name: str
+    ticket: Ticket
+    beside: Note | None
+    since_s: float
+
+
 class Hand:
     """Passes commands on, and follows what becomes of them.
 
@@ -62,7 +74,7 @@ class Hand:
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._lock = threading.Lock()
-        self._open: list[tuple[Ticket, Note | None]] = []
+        self._open: list[Asked] = []
         self._refused, self._until_s = "", 0.0
         self._warned_s: dict[int, float] = {}
 
@@ -71,6 +83,12 @@ class Hand:
         """What was refused last and belongs to no field; empty after a while."""
         return self._refused if time.monotonic() < self._until_s else ""
 
+    @property
+    def waits_for(self) -> str:
+        """The command that has waited for longest, where that is long enough to be seen; else nothing."""
+        since_s = time.monotonic() - LONG_S
+        return next((each.name for each in self._open if each.since_s < since_s), "")
+
     def tell(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> None:
         """Tell the bench one thing in the name of the page that an event comes from."""
         if name not in ANYONES and not self._operates(event):
@@ -78,7 +96,7 @@ class Hand:
             return
         ticket = self._bench.command(name, client=client_name(event.client_id), **arguments)
         with self._lock:
-            self._open = [*self._open[-MOST_TICKETS:], (ticket, beside)]
+            self._open = [*self._open[-MOST_TICKETS:], Asked(name, ticket, beside, time.monotonic())]
 
     def tell_chosen(self, event: Event) -> None:
         """Tell the bench what a group of buttons has as its value."""
@@ -95,13 +113,13 @@ class Hand:
     def settle(self) -> None:
         """Show what became of commands since."""
         with self._lock:
-            settled = [each for each in self._open if each[0].done]
-            self._open = [each for each in self._open if not each[0].done]
-        for ticket, beside in settled:
-            if ticket.refused:
-                self.complain(ticket.refused, beside)
-            elif beside:
-                beside.say(None)
+            settled = [each for each in self._open if each.ticket.done]
+            self._open = [each for each in self._open if not each.ticket.done]
+        for each in settled:
+            if each.ticket.refused:
+                self.complain(each.ticket.refused, each.beside)
+            elif each.beside:
+                each.beside.say(None)
 
     def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> Any:
         """Add a button that is one command without arguments."""

@@ -184,7 +184,7 @@ class Page:
             self._bench.command("leave", client=client_name(client.client_id))
 
     def _tell(self, state: Any) -> None:
-        _renewed(self._status, status_html(state, self._hand.refused))
+        _renewed(self._status, status_html(state, self._hand.refused, self._hand.waits_for))
         _renewed(self._currents, currents_html(state.current_A, state.current_limit_A, state.temperature_C))
         if state.running:
             self._scene.trail(np.array(state.q_rad))

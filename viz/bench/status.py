@@ -20,7 +20,7 @@ _LARGE = "font-size:1.25em;font-weight:700;font-variant-numeric:tabular-nums"
 _TABLE = "display:grid;grid-template-columns:auto 1fr;column-gap:0.8em;font-variant-numeric:tabular-nums"
 
 
-def status_html(state: Any, refused: str) -> str:
+def status_html(state: Any, refused: str, waits_for: str) -> str:
     """The box on top.
 
     Parameters
@@ -29,6 +29,8 @@ def status_html(state: Any, refused: str) -> str:
         Of the bench.
     refused : str
         What was refused last; may be empty.
+    waits_for : str
+        The command that is being prepared; may be empty.
     """
     wanted = "as fast as possible" if isinf(state.speed) or state.speed > 1e3 else f"{state.speed:g}×"
     rows = [
@@ -44,7 +46,7 @@ def status_html(state: Any, refused: str) -> str:
         f'<div style="{_BOX}" data-bench="status">'
         f'<div style="{_LARGE}">{_badge(state.mode.upper(), _MODES.get(state.mode, _WORKING))}'
         f"{_going(state)}{''.join(_alarms(state))}</div>"
-        f'<div style="{_TABLE}">{table}</div>{_lines(state, refused)}</div>'
+        f'<div style="{_TABLE}">{table}</div>{_lines(state, refused, waits_for)}</div>'
     )
 
 
@@ -114,8 +116,9 @@ def _alarms(state: Any) -> list[str]:
     return alarms
 
 
-def _lines(state: Any, refused: str) -> str:
+def _lines(state: Any, refused: str, waits_for: str) -> str:
     lines = [(BAD, state.reason), (BAD, refused), (WARN, state.note)]
+    lines += [(_WORKING, f"preparing {waits_for} …")] if waits_for else []
     lines += [(WARN, f"at the next reset: {name} = {value}") for name, value in state.pending]
     lines += [(GOOD, f"recording {file}") for file in state.recording]
     return "".join(f'<div style="color:{colour}">{escape(str(text))}</div>' for colour, text in lines if text)

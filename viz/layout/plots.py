@@ -10,11 +10,8 @@ import rerun.blueprint as rrb
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.layout.paths import ENDED, STATES, derived, entity
 from spheretwin.viz.layout.seen import Channel, Seen
-from spheretwin.viz.layout.view import View
+from spheretwin.viz.layout.view import View, shown_until_s
 from spheretwin.viz.quantities.quantity import Quantity
-
-# Of the time until a run failed, what the axis shows behind it.
-AFTER_THE_END = 0.15
 
 Range = tuple[float, float]
 
@@ -52,7 +49,8 @@ class Plots:
 
     def about_zero(
         self,
-        title: str,
+        what: str,
+        unit: str,
         *lines: Line,
         least: float,
         axis: int | None = None,
@@ -62,10 +60,10 @@ class Plots:
 
         Parameters
         ----------
-        title : str
-            Begins the plot's title.
+        what, unit : str
+            What is drawn, in which unit.
         *lines : Line
-            What is drawn.
+            The lines.
         least : float
             Half of the range at least.
         axis : int, optional
@@ -75,27 +73,39 @@ class Plots:
 
         Notes
         -----
-        Plots of the other hinges have the same range, so that what is small looks small.
+        Plots of the other hinges have the same range, so that what is small looks small. The title tells the
+        range: low plots have room for one number at their side.
         """
         if self.seen is None:
-            return self._plot(title + key, lines, axis, None)
+            return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
         limit = self.seen.limit(*(Channel(line.name) for line in lines), least=least)
         told = self.seen.beyond(limit, *(Channel(line.name, axis) for line in lines))
-        return self._plot(title + told + key, lines, axis, (-limit, limit))
+        return self._plot(f"{what} ±{_with_unit(limit, unit)}{told}{key}", lines, axis, (-limit, limit))
 
-    def above_zero(self, title: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
+    def above_zero(self, what: str, unit: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
         """Plot of what is never negative, its range that of the settled run."""
         if self.seen is None:
-            return self._plot(title, (line,), None, None)
+            return self._plot(f"{what} [{unit}]", (line,), None, None)
         limit = self.seen.limit(Channel(line.name), least=least)
         told = self.seen.beyond(limit, Channel(line.name))
-        return self._plot(f"{title}{told}", (line,), None, (-0.02 * limit, limit))
+        title = f"{what}, 0 to {_with_unit(limit, unit)}{told}"
+        return self._plot(title, (line,), None, (-0.02 * limit, limit))
 
-    def whole(self, title: str, *lines: Line, least: float, axis: int | None = None) -> rrb.TimeSeriesView:
-        """Plot of all that some lines have shown."""
-        seen = self.seen
-        band = seen.band(*(Channel(line.name, axis) for line in lines), least=least) if seen else None
-        return self._plot(title, lines, axis, band)
+    def whole(
+        self,
+        what: str,
+        unit: str,
+        *lines: Line,
+        least: float,
+        axis: int | None = None,
+        key: str = "",
+    ) -> rrb.TimeSeriesView:
+        """Plot of all that some lines have shown, over a range of twice `least` at least."""
+        if self.seen is None:
+            return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
+        low, high = self.seen.band(*(Channel(line.name, axis) for line in lines), least=least)
+        told = f"{what}, {low:.3g} to {_with_unit(high, unit)}{key}"
+        return self._plot(told, lines, axis, (low, high))
 
     def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:
         """Plot of a range that is known before the run."""
@@ -129,7 +139,7 @@ class Plots:
         Else none: it is as long as the data, and takes no room in the file.
         """
         if self.seen and self.seen.ended_s is not None:
-            last_s = min(self.view.duration_s, (1 + AFTER_THE_END) * self.seen.ended_s)
+            last_s = shown_until_s(self.view.duration_s, self.seen.ended_s)
         elif self.view.live:
             last_s = self.view.duration_s
         else:
@@ -137,3 +147,7 @@ class Plots:
         boundary = rrb.TimeRangeBoundary
         whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=last_s))
         return rrb.TimeAxis(view_range=whole)
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.3g}{'' if unit == '°' else ' '}{unit}"

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 CLIPPED_FROM = 2.5
 
 # Of the spans of a run, those that are within its range wherever they are.
-USUAL = 0.95
+USUAL = 0.85
 
 # Above and below a curve.
 MARGIN = 1.1
@@ -51,7 +51,7 @@ class Seen:
     def limit(self, *channels: Channel, least: float) -> float:
         """Half of a range about 0 in which the run can be read once it has settled.
 
-        It holds the whole second half and 95 % of all, or everything where that is not much more.
+        It holds the whole second half and 85 % of all, or everything where that is not much more.
 
         Parameters
         ----------

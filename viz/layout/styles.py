@@ -7,13 +7,14 @@ from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import derived, entity
 from spheretwin.viz.quantities.quantity import Quantity
 
-THICK, MIDDLE, THIN = 3.5, 1.5, 1.0
+WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
 
 _ASKED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
 _BELIEVED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
-_BESIDE = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2", "friction_Nm")
+_BESIDE = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
 
-# Under a thin line of what was asked for, which would hide them.
+# Lines are drawn in the order of their names: what the controller believes first, as a rim of what is true,
+# and what was asked for last and thin.
 _ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
 
 
@@ -70,6 +71,7 @@ def _colours(signal: Signal) -> list[palette.Colour]:
 
 
 def _width(name: str) -> float:
-    if name in _ACTUAL:
-        return THICK
-    return THIN if name in (*_ASKED, *_BELIEVED) else MIDDLE
+    for names, width in ((_BELIEVED, WIDEST), (_ACTUAL, THICK), (_ASKED, THIN)):
+        if name in names:
+            return width
+    return MIDDLE

@@ -12,6 +12,9 @@ OVERVIEW = "overview"
 VIEW_NAMES = (OVERVIEW, "control", "coils", "hardware", "compare", "scenario")
 """What a recording has in tabs; kept apart from the views, for Rerun is slow to import."""
 
+# Of the time until a run has ended early, what the time axes show behind it.
+AFTER_THE_END = 0.15
+
 
 class View(NamedTuple):
     """What the layout of a run's recording is made for."""
@@ -35,6 +38,11 @@ class View(NamedTuple):
     def names(self) -> frozenset[str]:
         """Names of all signals."""
         return COMMON_NAMES | {signal.name for signal in self.own}
+
+
+def shown_until_s(duration_s: float, ended_s: float) -> float:
+    """End of the time axes of a run that has ended early: so that one sees that it has, and where."""
+    return min(duration_s, (1 + AFTER_THE_END) * ended_s)
 
 
 def application(view: View) -> str:

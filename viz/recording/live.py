@@ -22,8 +22,9 @@ from spheretwin.viz.recording.viewer.server import ViewerServer
 # More than a plot has pixels for; few enough for a viewer that draws in software.
 LIVE_RATE_Hz = 100.0
 
-# Recorded together: each time costs some kilobytes for each signal, and a picture a viewer draws.
-_TOGETHER_S = 0.05
+# Recorded together: each entity costs some kilobytes each time, and a viewer that draws in software takes no
+# more than a hundred of these a second.
+_TOGETHER_S = 0.25
 
 
 class LiveView(Stream):

@@ -85,9 +85,8 @@ def test_a_variant_is_recorded_with_its_own_groups(variant, tmp_path):
 def test_the_layout_names_the_number_of_groups_and_is_one_of_its_own():
     views = [View(1.0, 8.0, groups, (), False) for groups in (12, 18, 24)]
     for view in views:
-        assert f"currents of groups 0 (lowest) to {view.groups - 1}: blue -8 A, red +8 A" in titles(
-            layout(view)
-        )
+        told = f"currents of groups 0 (lowest) to {view.groups - 1}: blue -8 A, red +8 A"
+        assert told in titles(layout(view))
     assert len({application(view) for view in views}) == 3
 
 

@@ -15,6 +15,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.bench import Bench
+from spheretwin.twin.bench.operators import Operators
 from spheretwin.twin.commands import outputs
 from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.scenario import flags
@@ -26,6 +27,9 @@ PORT = 8080
 EXAMPLE = "hold"
 
 LARGEST_PORT = 65_535
+
+# A page that is closed says so at once; this process may be silent itself while something is compiled.
+SILENCE_S = 10.0
 
 
 def add_to(verbs: Any) -> None:
@@ -72,7 +76,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
 
     with interruptible() as stop_requested, contextlib.ExitStack() as stack:
         stack.enter_context(timers_stopped())
-        bench = stack.enter_context(Bench(scenario))
+        bench = stack.enter_context(Bench(scenario, Operators(SILENCE_S)))
         page = stack.enter_context(Page(bench, choices_of(bench), options.port))
         bench.begin()
         _record(bench, options.record)

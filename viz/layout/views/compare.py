@@ -17,14 +17,14 @@ ANGLE_SIGNALS = ("q_governed_rad", "q_predicted_rad", "q_measured_rad")
 def compare(plots: Plots) -> rrb.Container:
     """Angles of each axis, white as desired; below, how far apart they are in all."""
     angles = _lines(plots, ("q_rad", "q_ref_rad", *ANGLE_SIGNALS))
-    believed = ", amber believed" if len(angles) > 2 else ""
+    key = ", white desired, amber believed" if len(angles) > 2 else ", white desired"
     angles_of_each = [
-        plots.whole(f"{name} [rad]: white desired{believed}", *angles, least=LEAST_rad, axis=axis)
+        plots.whole(name, "rad", *angles, least=LEAST_rad, axis=axis, key=key)
         for axis, name in enumerate(ANGLES)
     ]
     apart = rrb.Horizontal(
-        plots.above_zero("error as one angle [°]", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
-        plots.above_zero("shaft's tip from where it should be [mm]", quantity(TIP_DISTANCE), least=0.01),
+        plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
+        plots.above_zero("shaft's tip from where it should be", "mm", quantity(TIP_DISTANCE), least=0.01),
     )
     return rrb.Vertical(rrb.Horizontal(*angles_of_each), apart, row_shares=[3, 2], name="compare")
 

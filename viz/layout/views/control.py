@@ -21,12 +21,13 @@ def control(plots: Plots) -> rrb.Container:
     """Error and torque of each axis; below, what the law says of itself, and the coupling of the axes."""
     asked = [signal("torque_command_Nm"), quantity(DELIVERED), signal("disturbance_Nm")]
     errors = [
-        plots.about_zero(f"error {name} [mrad]", quantity(ERROR), least=ERROR.floor, axis=axis)
+        plots.about_zero(f"error {name}", "mrad", quantity(ERROR), least=ERROR.floor, axis=axis)
         for axis, name in enumerate(ANGLES)
     ]
     torques = [
         plots.about_zero(
-            f"torque {name} [N·m]",
+            f"torque {name}",
+            "N·m",
             *asked,
             least=DELIVERED.floor,
             axis=axis,
@@ -39,13 +40,12 @@ def control(plots: Plots) -> rrb.Container:
 
 def _of_the_law(plots: Plots) -> rrb.Container:
     own = {each.name: each for each in plots.view.own if _is_of_the_law(each)}
-    coupling = plots.about_zero("coupling torques (6)-(10) [N·m]", quantity(COUPLING), least=COUPLING.floor)
+    coupling = plots.about_zero("coupling torques (6)-(10)", "N·m", quantity(COUPLING), least=COUPLING.floor)
     sliding = []
     if SLIDING in own:
         del own[SLIDING]
-        title = "sliding variables s [rad/s]"
         sliding = [
-            plots.about_zero(title, signal(SLIDING), least=LEAST["rad/s"]),
+            plots.about_zero("sliding variables s", "rad/s", signal(SLIDING), least=LEAST["rad/s"]),
             panels.phase_plane(plots),
         ]
     tabs = [coupling, *(_plot(plots, each) for each in own.values())]
@@ -54,7 +54,7 @@ def _of_the_law(plots: Plots) -> rrb.Container:
 
 def _plot(plots: Plots, of: Signal) -> rrb.TimeSeriesView:
     least = LEAST.get(of.unit, 1e-3)
-    return plots.whole(f"{of.name} [{of.unit}]", signal(of.name), least=least)
+    return plots.whole(of.name, of.unit, signal(of.name), least=least)
 
 
 def _is_of_the_law(of: Signal) -> bool:

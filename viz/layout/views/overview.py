@@ -16,8 +16,8 @@ def overview(plots: Plots) -> rrb.Container:
     """Actuator and currents beside the errors, what is left of the torque, and the states."""
     seen = rrb.Vertical(actuator_view(), panels.current_map(plots), row_shares=[3, 2])
     told = rrb.Vertical(
-        plots.above_zero("error as one angle [°]", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
-        plots.about_zero("error of each axis [mrad]", quantity(ERROR), least=ERROR.floor),
+        plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
+        plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor),
         plots.fixed(
             f"torque margin [times the commanded], 0 is saturated, {MOST:g} or more is {MOST:g}",
             quantity(MARGIN),
@@ -25,6 +25,6 @@ def overview(plots: Plots) -> rrb.Container:
             high=1.05 * MOST,
         ),
         rrb.Horizontal(plots.states(), panels.log(), column_shares=[3, 2]),
-        row_shares=[3, 3, 2, 2],
+        row_shares=[3, 3, 2, 4 if any(each.states for each in plots.view.own) else 2],
     )
     return rrb.Horizontal(seen, told, column_shares=[4, 5], name="overview")

@@ -89,7 +89,7 @@ def test_a_recording_has_a_lane_for_what_fails_and_a_line_in_its_log(tmp_path):
         "group_out/group-7": ["known to be out", "in use"],
         "failsafe_reason": ["no fresh measurement"],
         "limits": ["within limits", "saturated"],
-        "run": ["running", "failsafe"],
+        "run": ["running", "failsafe", "failsafe"],  # at the end, and at that of the time axes
     }
     for text in ("coil.07 open", "group 7 known to be out", "adc dropout", "watchdog: no fresh measurement"):
         assert text in lines

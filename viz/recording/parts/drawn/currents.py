@@ -17,7 +17,7 @@ from spheretwin.viz.recording.parts.part import Part, Subject
 
 Array = NDArray[np.float64]
 
-RATE_Hz = 20.0
+RATE_Hz = 12.5
 
 # Of a row of the map, in points of the screen: rows of 18 groups touch in a panel of some 230 of them.
 ROW_HEIGHT = 12.0
@@ -32,7 +32,7 @@ class Currents(Part):
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
         self._groups = len(subject.actuator.groups)
-        self._bins = Bins(RATE_Hz)
+        self._bins = Bins(RATE_Hz, at_once=subject.live)
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the names of the rows, the limits and the numbers of the bars."""

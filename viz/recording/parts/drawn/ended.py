@@ -10,8 +10,10 @@ from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import ENDED
 from spheretwin.viz.recording.columns import scalars, time_index
 
-# Beyond any range of a plot, so that the line between two points crosses it.
-_FAR = 1e9
+# From beyond any range of a plot to beyond its other end, in steps: a viewer draws with single precision, and
+# would lose a line between two points that are far outside of a narrow range.
+_HALF = np.geomspace(1e5, 1e-3, 9)
+_HEIGHTS = np.concatenate([-_HALF, _HALF[::-1]])
 
 _NEXT_S = 1e-9
 
@@ -26,5 +28,6 @@ def log_end(recording: rr.RecordingStream, t_s: float) -> None:
         aggregation_policy="Off",  # the mean of both ends would be a point
     )
     recording.log(ENDED, style, static=True)
-    ends = np.repeat([[-_FAR], [_FAR]], count, axis=1)
-    recording.send_columns(ENDED, time_index(np.array([t_s, t_s + _NEXT_S])), [scalars(ends, count)])
+    heights = np.repeat(_HEIGHTS[:, None], count, axis=1)
+    times = t_s + _NEXT_S * np.arange(len(heights), dtype=np.float64)
+    recording.send_columns(ENDED, time_index(times), [scalars(heights, count)])

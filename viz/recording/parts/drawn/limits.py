@@ -10,6 +10,7 @@ from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import STATES
+from spheretwin.viz.layout.view import shown_until_s
 from spheretwin.viz.recording.columns import time_index
 from spheretwin.viz.recording.parts.events import QUIET_S
 from spheretwin.viz.recording.parts.part import Part, Subject
@@ -86,9 +87,10 @@ class Limits(Part):
         _log(recording, LIMITS, self._spells.of(rows))
 
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:
-        """Record how the run ended, where that is not as planned."""
+        """Record how the run ended, where that is not as planned, and to the end of the time axes."""
         if status not in (Status.COMPLETED, Status.RUNNING):
-            _log(recording, RUN, [(self._last_s, status.replace("_", " "))])
+            until_s = shown_until_s(self.subject.facts.duration_s, self._last_s)
+            _log(recording, RUN, [(t_s, status.replace("_", " ")) for t_s in (self._last_s, until_s)])
 
 
 def _colour(status: Status) -> palette.Colour:

@@ -13,7 +13,7 @@ from spheretwin.viz.recording.columns import time_index
 from spheretwin.viz.recording.parts.drawn.bins import Binned, Bins
 from spheretwin.viz.recording.parts.part import Part, Subject
 
-RATE_Hz = 30.0
+RATE_Hz = 20.0
 
 SLIDING = "sliding_s"
 
@@ -26,7 +26,7 @@ class PhasePlane(Part):
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
-        self._bins = Bins(RATE_Hz)
+        self._bins = Bins(RATE_Hz, at_once=subject.live)
         self._axes_drawn = False
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:

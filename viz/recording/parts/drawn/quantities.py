@@ -20,8 +20,8 @@ from spheretwin.viz.recording.parts.drawn.summary import Summary
 from spheretwin.viz.recording.parts.drawn.survey import Survey, columns_of, watched
 from spheretwin.viz.recording.parts.part import Part, Subject
 
-# A bin leaves one row or two: no more than 60 a second.
-RATE_Hz = 30.0
+# A bin leaves one row or two: no more than 50 a second.
+RATE_Hz = 25.0
 
 # After these ends there is nothing that was planned and did not come.
 _AS_PLANNED = (Status.COMPLETED, Status.RUNNING)
@@ -39,7 +39,7 @@ class Quantities(Part):
         )
         averaged = [each.kept is Kept.MEAN for each in self._quantities for _ in range(each.size)]
         self._averaged = np.array(averaged + [False] * sum(self._watched.values()))
-        self._bins = Bins(RATE_Hz)
+        self._bins = Bins(RATE_Hz, at_once=subject.live)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
 

@@ -58,7 +58,7 @@ class Summary:
         rms_deg = np.sqrt(self._squares / self._ticks)
         return _told(
             f"{self._what()} — {how}{at}; error largest **{self._largest_deg:.3g}°**, RMS **{rms_deg:.3g}°**;"
-            f" saturated {100 * self._saturated / self._ticks:.2g} % of the time"
+            f" saturated {_percent(self._saturated / self._ticks)} of the time"
         )
 
     def _what(self) -> str:
@@ -82,6 +82,10 @@ class Summary:
 
     def _field(self, section: str, field: str) -> Any:
         return self._facts.sections.get(section, {}).get(field)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if 0 < share < 0.1 else f"{100 * share:.0f} %"
 
 
 def _told(line: str) -> str:

@@ -231,7 +231,7 @@ def test_a_run_that_diverged_is_marked_at_its_last_pose(tmp_path, actuator, lost
 
 
 def size(path, duration_s):
-    """Bytes of a recording of what is drawn in 3D alone."""
+    """Bytes of a recording of the sinusoid."""
     session = Session(scenarios.load("sinusoid", {"plant.engine": "lagrangian", "duration": duration_s}))
     with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
         follow(session, session.scenario.ticks, [recorder])
@@ -243,3 +243,8 @@ def test_what_moves_takes_fifteen_kilobytes_a_second(tmp_path, monkeypatch):
     bytes_each_s = (size(tmp_path / "long.rrd", 45.0) - size(tmp_path / "short.rrd", 15.0)) / 30
     # A fifth of what a thinned recording may take; below half of it, something is missing.
     assert 7_500 < bytes_each_s < 15_000
+
+
+def test_what_a_recording_holds_whatever_its_length_is_less_than_a_megabyte(tmp_path):
+    # Meshes, layout, texts, descriptions of the signals, and a single row.
+    assert size(tmp_path / "tick.rrd", 0.001) < 1_000_000

@@ -1,0 +1,157 @@
+"""What is recorded at a bench replays to the same bytes, whatever was commanded, refused, or looked at."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from spheretwin.models.telemetry.record import RunRecord
+from spheretwin.models.telemetry.table import read_parquet
+from tests.twin.bench.cases import MODES, begun, bench, done, kept_rows, said, same_when_replayed
+
+SETTINGS = [
+    ("controller.law", "pd"),
+    ("controller.law", "afsm"),
+    ("disturbance.load", 0.2),
+    ("plant.payload_kg", 0.02),
+    ("plant.modelling_error", 0.1),
+    ("allocation", "bounded"),
+    ("trajectory.amplitude_rad", [0.1, 0.1, 0.1]),
+    ("controller.stiffness", [80.0, 80.0, 80.0]),  # of some laws; refused under the others
+    ("controller.period_s", 2e-3),  # waits for a reset
+    ("disturbance.load", -1e9),
+]
+OTHERS = [
+    ("add_fault", {"fault": {"target": "coil.07", "mode": "open"}}),
+    ("clear_faults", {}),
+    ("pause", {}),
+    ("start", {}),
+    ("snapshot", {}),
+    ("limits", {"rate_rad_s": 2.0}),
+]
+COMMANDS = [
+    *MODES.items(),
+    *(("set", {"name": name, "value": value}) for name, value in SETTINGS),
+    *OTHERS,
+]
+
+
+@settings(max_examples=12)
+@given(st.lists(st.tuples(st.integers(0, 150), st.sampled_from(COMMANDS)), min_size=1, max_size=12))
+def test_any_sequence_of_commands_replays_to_the_same_bytes(tmp_path_factory, sequence):
+    path = tmp_path_factory.mktemp("run") / "run.parquet"
+    with begun() as made:
+        done(made, "record", telemetry=str(path))
+        for ticks, (name, arguments) in sequence:
+            made.advance(ticks)
+            said(made, name, **arguments)
+        done(made, "start")
+        made.advance(20)
+    assert same_when_replayed(path)
+
+
+@pytest.mark.parametrize(
+    "changes", [{}, {"hardware": "prototype", "plant.engine": "mujoco", "watchdog.on": False}], ids=str
+)
+def test_a_recording_that_begins_on_the_way_replays_to_the_same_bytes(tmp_path, changes):
+    path = tmp_path / "run.parquet"
+    with begun(**changes) as made:
+        made.advance(111)
+        done(made, "set", name="controller.law", value="pd")
+        done(made, "hold")
+        made.advance(89)
+        done(made, "record", telemetry=str(path))
+        for name, arguments in MODES.items():
+            done(made, name, **arguments)
+            made.advance(100)
+        done(made, "keep")
+        made.advance(50)
+    rows, metadata = read_parquet(path)
+    record = RunRecord.from_metadata(metadata)
+    assert (record.first_tick, record.ticks, len(rows)) == (200, 800, 600)
+    np.testing.assert_allclose(rows["t_s"][0], 0.2, rtol=1e-15)
+    assert same_when_replayed(path)
+
+
+def test_a_reset_and_a_way_back_end_a_recording_which_still_replays(tmp_path):
+    first, second = tmp_path / "first.parquet", tmp_path / "second.parquet"
+    with begun() as made:
+        made.advance(50)
+        done(made, "snapshot")
+        done(made, "record", telemetry=str(first))
+        made.advance(70)
+        done(made, "restore")
+        assert made.state().recording == ()
+        assert "time went back" in made.state().note
+        done(made, "record", telemetry=str(second))
+        done(made, "set", name="controller.law", value="pid")
+        made.advance(30)
+        done(made, "reset")
+        assert (made.state().tick, made.state().running) == (0, False)
+    assert [len(kept_rows(path)) for path in (first, second)] == [70, 30]
+    assert same_when_replayed(first)
+    assert same_when_replayed(second)
+
+
+def ran(tmp_path, name, *, chunk, looked=False, refused=False):
+    path = tmp_path / f"{name}.parquet"
+    with begun() as made:
+        done(made, "record", telemetry=str(path))
+        for command in ("hold", "trajectory", "off", "hold"):
+            done(made, command)
+            left = 120
+            while left:
+                left -= made.advance(min(chunk, left))
+                if looked:
+                    made.state(), made.history(), made.fields(), made.command_line(), made.scenario_toml()
+                if refused:
+                    assert said(made, "set", name="disturbance.load", value="heavy")
+                    assert said(made, "set", name="no.such.field", value=1)
+                    assert said(made, "point", pose_rad=[0.0, 9.0, 0.0])
+    return path.read_bytes()
+
+
+def test_neither_chunks_nor_looks_nor_refused_commands_change_a_byte(tmp_path):
+    plain = ran(tmp_path, "plain", chunk=120)
+    assert ran(tmp_path, "chunks", chunk=7) == plain
+    assert ran(tmp_path, "looked", chunk=40, looked=True) == plain
+    assert ran(tmp_path, "refused", chunk=40, refused=True) == plain
+
+
+def test_a_twin_in_a_thread_runs_what_is_commanded_as_one_without(tmp_path):
+    """The clock decides at which tick a command acts, and the journal says at which one it did."""
+    path = tmp_path / "run.parquet"
+    with bench() as made:
+        made.begin()
+        for name, arguments in [
+            ("speed", {"factor": 1e6}),
+            ("record", {"telemetry": str(path)}),
+            ("start", {}),
+            *MODES.items(),
+            ("hold", {}),
+            ("set", {"name": "disturbance.load", "value": 0.01}),
+            ("pause", {}),
+            ("keep", {}),
+        ]:
+            assert made.command(name, **arguments).wait(60) is None
+    assert len(kept_rows(path)) > 0
+    assert same_when_replayed(path)
+
+
+def test_back_at_a_snapshot_the_twin_goes_on_as_it_did():
+    with begun() as made:
+        made.advance(100)
+        done(made, "jog", rates_rad_s=[0.1, 0.0, 0.2])
+        done(made, "snapshot", name="here")
+        done(made, "set", name="controller.law", value="pd")
+        done(made, "off")
+        made.advance(200)
+        went = []
+        for _ in range(2):
+            done(made, "restore", name="here")
+            assert (made.state().mode, made.state().law, made.state().tick) == ("jog", "afsm", 100)
+            made.advance(200)
+            went.append(made.state())
+        assert went[0].q_rad == went[1].q_rad
+        assert went[0].current_A == went[1].current_A
+        assert "here" in said(made, "restore", name="nowhere")

@@ -1,0 +1,273 @@
+"""What a bench makes of commands: what they do, what is refused in which words, and that nothing ends it."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.bench.commands import COMMANDS
+from spheretwin.twin.bench.queue import MOST_WAITING
+from spheretwin.twin.session import Session
+from tests.twin.bench.cases import MODES, begun, bench, done, said
+
+
+@pytest.fixture(scope="module")
+def common():
+    with begun() as made:
+        yield made
+
+
+def test_time_goes_on_when_it_is_told_to():
+    with bench() as made:
+        assert made.advance(10) == 0
+        done(made, "step", ticks=3)
+        assert made.advance(10) == 3
+        assert made.advance(10) == 0
+        done(made, "start")
+        assert "while paused" in said(made, "step")
+        assert made.advance(10) == 10
+        done(made, "pause")
+        assert made.advance(10) == 0
+        assert (made.state().tick, made.state().running) == (13, False)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("controller.law", "magic"),
+        ("disturbance.load", "heavy"),
+        ("plant.payload_kg", -1.0),
+        ("plant.engine", "steam"),
+        ("duration", 0.0),
+        ("nothing", 1.0),
+        ("sensors.adc.bits", 1.5),
+        ("fault", [{"target": "coil.99", "mode": "open"}]),
+        ("trajectory.shape", "spiral"),
+    ],
+)
+def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value):
+    with pytest.raises(InputError) as refusal:
+        Session(scenarios.load("sinusoid", {name: value}))
+    before = common.state()
+    assert said(common, "set", name=name, value=value) == str(refusal.value)
+    assert (common.state().journal, common.state().pending) == (before.journal, before.pending)
+    assert common.state().refused == str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "told"),
+    [
+        ("steer", {}, "bench: expected one of start, "),
+        ("stpo", {}, "did you mean stop?"),
+        (3, {}, "received 3"),
+        ("speed", {"factor": math.nan}, "bench: speed: factor: expected"),
+        ("speed", {"factor": 0.01}, "bench: speed: factor: expected"),
+        ("speed", {}, "factor: expected a value, received none"),
+        ("speed", {"factor": 1.0, "colour": "red"}, "bench: speed: expected factor, received colour"),
+        ("speed", {"factor": "2"}, "bench: speed: factor: expected a valid number, received '2'"),
+        ("off", {"now": True}, "expected no arguments, received now"),
+        ("off", {"now": {1, 2}}, "received now"),
+        ("point", {"pose_rad": [0, 1]}, "pose_rad"),
+        ("point", {"pose_rad": "up"}, "pose_rad"),
+        ("jog", {"rates_rad_s": [math.inf, 0, 0]}, "rates_rad_s"),
+        ("manual", {"group": 18}, "expected a group from 0 to 17"),
+        ("manual", {}, "either currents_A or group"),
+        ("manual", {"currents_A": [1.0] * 17}, "manual.currents_A for 18 groups, received 17"),
+        (
+            "set",
+            {"name": "disturbance.load", "value": math.nan},
+            "disturbance.load: expected a finite number",
+        ),
+        ("set", {"name": "manual.currents_A", "value": None}, "expected a mode instead"),
+        ("set", {"name": "trajectory.approach.start_s", "value": 1.0}, "expected a mode instead"),
+        ("trajectory", {"fields": {"shape": "spiral"}}, "expected one of sinusoid"),
+        ("clear_faults", {"place": 0}, "expected the place of a fault below 0"),
+        ("record", {}, "expected a file to record into"),
+        ("record", {"telemetry": "/no/such/folder/run.parquet"}, "expected a writable path"),
+        ("keep", {}, "expected a recording to keep"),
+        ("replay", {"file": "/no/such/run.parquet"}, "/no/such/run.parquet"),
+        ("load", {"source": "nowhere"}, "expected hold, nutation"),
+        ("save", {"file": "/no/such/folder/s.toml"}, "expected a writable path"),
+    ],
+)
+def test_a_command_that_cannot_be_done_is_refused_in_one_line(common, name, arguments, told):
+    before = common.state()
+    ticket = common.command(name, **arguments)
+    common.advance(0)
+    assert told in ticket.refused
+    assert "\n" not in ticket.refused
+    after = common.state()
+    assert (after.mode, after.journal, after.tick) == (before.mode, before.journal, before.tick)
+    assert after.refused == ticket.refused
+
+
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=6,
+)
+NAMES = st.sampled_from([*COMMANDS, "nonsense"]).filter(lambda name: name not in ("record", "save"))
+ARGUMENTS = sorted({field for kind in COMMANDS.values() for field in kind.arguments.model_fields} - {"name"})
+
+
+@settings(max_examples=150)
+@given(NAMES, st.dictionaries(st.sampled_from(ARGUMENTS), ANYTHING, max_size=2), ANYTHING)
+def test_whatever_is_said_the_bench_lives(common, name, arguments, field):
+    common.command(name, **arguments)
+    if isinstance(field, str):
+        common.command("set", name=field, value=1.0)
+    common.advance(1)
+    assert isinstance(common.state().tick, int)
+
+
+def test_a_flood_of_moves_is_the_last_of_them():
+    with begun() as made:
+        tickets = [made.command("set", name="disturbance.load", value=i * 1e-4) for i in range(10_000)]
+        others = [made.command("jog", rates_rad_s=[0, 0, i * 1e-4]) for i in range(10_000)]
+        assert len({id(ticket) for ticket in tickets}) == 10_000
+        made.advance(1)
+        assert all(ticket.done and ticket.refused is None for ticket in tickets + others)
+        assert made.state().journal == 2
+        fields = {name: value for name, value, _ in made.fields()}
+        assert fields["disturbance.load"] == 0.9999
+        assert fields["trajectory.rate_rad_s"] == (0.0, 0.0, 0.9999)
+
+
+def test_the_queue_is_bounded():
+    with begun() as made:
+        tickets = [made.command("step") for _ in range(MOST_WAITING + 5)]
+        assert [bool(ticket.refused) for ticket in tickets[-6:]] == [False] + 5 * [True]
+        assert made.state().waiting <= MOST_WAITING
+        made.advance(0)
+        assert all(ticket.done for ticket in tickets)
+
+
+def test_what_was_said_last_is_done_last():
+    with begun() as made:
+        for name in ("hold", "off", "hold"):
+            made.command(name)
+        made.advance(1)
+        assert made.state().mode == "hold"
+
+
+def test_a_fixed_field_waits_for_the_reset():
+    with begun() as made:
+        made.advance(5)
+        done(made, "set", name="controller.period_s", value=2e-3)
+        done(made, "set", name="plant.engine", value="mujoco")
+        assert made.state().pending == (("controller.period_s", "0.002"), ("plant.engine", '"mujoco"'))
+        assert made.state().period_s == 1e-3
+        done(made, "reset")
+        assert (made.state().pending, made.state().period_s, made.state().tick) == ((), 2e-3, 0)
+        done(made, "set", name="hardware", value="prototype")
+        done(made, "reset")
+        named = scenarios.load("sinusoid", {"hardware": "prototype"})
+        fields = {name: value for name, value, _ in made.fields()}
+        assert fields["estimator.kind"] == named.estimator.kind
+        assert fields["drive.supply_V"] == named.drive.supply_V
+        done(made, "step")
+        made.advance(1)
+        assert len(made.state().temperature_C) == 18
+        done(made, "set", name="hardware", value="ideal")
+        done(made, "reset")
+        done(made, "step")
+        made.advance(1)
+        assert made.state().temperature_C is None
+
+
+def test_faults_come_and_go():
+    with begun() as made:
+        made.advance(100)
+        done(made, "add_fault", fault={"target": "coil.07", "mode": "open"})
+        done(made, "add_fault", fault={"target": "coil.03", "mode": "open", "start_s": 9.0})
+        made.advance(100)
+        assert made.state().faults == ("coil.07 open from 0.1 s", "coil.03 open from 9 s")
+        assert made.state().current_A[7] == 0.0
+        done(made, "clear_faults", place=0)
+        made.advance(100)
+        assert made.state().faults == ("coil.03 open from 9 s",)
+        assert made.state().current_A[7] != 0.0
+        done(made, "clear_faults")
+        assert made.state().faults == ()
+
+
+def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back():
+    with begun() as made:
+        done(made, "set", name="disturbance.load", value=3.0)
+        done(made, "off")
+        made.advance(4000)
+        state = made.state()
+        assert (state.mode, state.status, state.running) == ("fault", "left_workspace", False)
+        assert "end of its range" in state.reason
+        for name in MODES:
+            assert "expected reset, as the run has ended" in said(made, name, **MODES[name])
+        done(made, "set", name="disturbance.load", value=0.0)
+        assert made.state().pending == (("disturbance.load", "0.0"),)
+        done(made, "reset")
+        done(made, "start")
+        assert made.advance(100) == 100
+        assert (made.state().mode, made.state().reason) == ("trajectory", None)
+
+
+BROKEN = """
+from spheretwin.control.law import Law
+from spheretwin.control.parts.parameters import LawParameters
+
+
+def step(t, reference, measurement, parameters, state, torque):
+    if t > 0.005:
+        raise RuntimeError("out of ideas")
+    torque[:] = 0.0
+
+
+class Broken(LawParameters):
+    def build(self, known):
+        return Law("broken", step, [], [])
+"""
+
+
+def test_a_law_that_raises_is_a_fault_that_says_why(tmp_path):
+    (tmp_path / "law.py").write_text(BROKEN)
+    with begun() as made:
+        done(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Broken")
+        made.advance(200)
+        assert made.state().mode == "fault"
+        assert made.state().reason == "RuntimeError: out of ideas"
+        assert made.state().status == "diverged"
+        done(made, "set", name="controller.law", value="pd")
+        done(made, "reset")
+        done(made, "start")
+        assert made.advance(100) == 100
+
+
+def test_a_user_s_law_file_runs_and_what_is_wrong_with_one_is_told(tmp_path):
+    (tmp_path / "law.py").write_text(BROKEN)
+    with begun() as made:
+        assert "law.py" in said(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Nobody")
+        done(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Broken")
+        assert made.advance(5) == 5
+        assert made.state().law.endswith("law.py:Broken")
+        np.testing.assert_array_equal(made.state().torque_command_Nm, 0.0)
+
+
+def test_another_scenario_is_loaded_with_overrides():
+    with begun() as made:
+        made.advance(10)
+        done(made, "load", source="tilt", overrides={"controller.law": "pd", "plant.engine": "lagrangian"})
+        state = made.state()
+        assert (state.scenario, state.law, state.shape, state.tick) == ("tilt", "pd", "tilt", 0)
+        assert json.loads(json.dumps(state.pending)) == []
+
+
+def test_a_bench_at_work_is_not_advanced_by_hand():
+    with bench() as made:
+        made.begin()
+        with pytest.raises(SpheretwinError, match="received one at work"):
+            made.advance(1)
+    with pytest.raises(SpheretwinError):
+        made.advance(1)

@@ -1,0 +1,145 @@
+"""Files: recordings of a run, its playing back, and the settings written down."""
+
+import shlex
+
+import numpy as np
+import pytest
+
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.bench.keeping import Keeping
+from spheretwin.twin.review import figures
+from spheretwin.twin.review import run as reviewed
+from spheretwin.twin.scenario import flags
+from tests.twin.bench.cases import begun, done, kept_rows, said
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Recording and telemetry of the ticks 200 to 700 of a run."""
+    folder = tmp_path_factory.mktemp("kept")
+    paths = folder / "run.rrd", folder / "run.parquet"
+    with begun() as made:
+        made.advance(200)
+        done(made, "record", recording=str(paths[0]), telemetry=str(paths[1]))
+        assert made.state().recording == tuple(map(str, paths))
+        assert "expected keep before" in said(made, "record", telemetry=str(folder / "other.parquet"))
+        done(made, "jog", rates_rad_s=[0.1, 0.0, 0.2])
+        for _ in range(5):
+            made.advance(100)
+        done(made, "keep")
+        assert made.state().recording == ()
+        made.advance(10)
+    assert made.state().mode == "jog"
+    return paths
+
+
+def test_a_recording_and_a_telemetry_file_hold_the_same_rows_from_then_on(files):
+    recording, telemetry = (reviewed.read(path) for path in files)
+    assert len(telemetry.table) == 500
+    np.testing.assert_allclose(telemetry.table["t_s"][[0, -1]], [0.2, 0.699], rtol=1e-12)
+    for signal in telemetry.table.signals:
+        assert recording.table[signal.name].tobytes() == telemetry.table[signal.name].tobytes()
+    assert any("trajectory set to" in text for _, _, text in recording.log)
+
+
+def test_a_file_that_begins_on_the_way_can_be_reviewed(files):
+    told = figures.figures(reviewed.read(files[1]))
+    assert told["rows"] == 500
+    assert told["status"] == "completed"
+
+
+def test_no_file_is_left_of_a_recording_that_is_refused(tmp_path):
+    with begun() as made:
+        path = tmp_path / "run.parquet"
+        assert "a path of its own" in said(made, "record", recording=str(path), telemetry=str(path))
+        assert "writable" in said(
+            made, "record", recording=str(tmp_path / "no" / "a.rrd"), telemetry=str(path)
+        )
+        made.advance(10)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_goes_wrong_with_a_file_is_told_and_the_run_goes_on(tmp_path, monkeypatch):
+    def fails(self, rows):
+        self.faults.append("the disk is full")
+
+    monkeypatch.setattr(Keeping, "write", fails)
+    with begun() as made:
+        done(made, "record", telemetry=str(tmp_path / "run.parquet"))
+        assert made.advance(50) == 50
+        done(made, "keep")
+        assert made.advance(50) == 50
+    assert made._kept == ()
+    assert made._note == "the disk is full"
+
+
+@pytest.mark.parametrize("place", [0, 1], ids=["recording", "telemetry"])
+def test_a_recorded_run_is_played_back_while_the_twin_stands_still(files, place):
+    rows = kept_rows(files[1])
+    with begun() as made:
+        made.advance(100)
+        q_rad = made.state().q_rad
+        done(made, "replay", file=str(files[place]))
+        state = made.state()
+        assert (state.mode, state.tick, state.t_s) == ("replay", 1, rows["t_s"][0])
+        for shown in (50, 300):
+            made.advance(shown - made.state().tick)
+            state = made.state()
+            for name in ("q_rad", "q_ref_rad", "error_rad", "torque_Nm", "current_A"):
+                assert getattr(state, name) == tuple(rows[name][shown - 1])
+            assert state.t_s == rows["t_s"][shown - 1]
+        np.testing.assert_array_equal(made.history()["q_rad"], rows["q_rad"][:300:20])
+        assert made.advance(1000) == 200
+        assert not made.state().running
+        # Back at the twin, which did not move.
+        done(made, "hold")
+        state = made.state()
+        assert (state.mode, state.tick, state.q_rad) == ("hold", 100, q_rad)
+        done(made, "start")
+        assert made.advance(10) == 10
+
+
+def test_stop_ends_playing_back(files):
+    with begun() as made:
+        done(made, "replay", file=str(files[1]))
+        done(made, "stop")
+        assert (made.state().mode, made.state().stopped) == ("off", True)
+
+
+SETTINGS = [
+    ("controller.law", "pd"),
+    ("controller.stiffness", [60.0, 70.0, 80.0]),
+    ("plant.payload_kg", 0.03),
+    ("disturbance.terms", [{"kind": "constant", "torque_Nm": [0.001, 0.0, 0.0]}]),
+    ("fault", [{"target": "coil.02", "mode": "open", "start_s": 0.5, "detect": True}]),
+    ("trajectory", {"shape": "multisine"}),
+    ("name", "mine"),
+    ("hardware", "prototype"),
+]
+
+
+def test_the_settings_are_written_down_and_read_again_are_the_same(tmp_path):
+    path = tmp_path / "mine.toml"
+    with begun() as made:
+        made.advance(30)
+        for name, value in SETTINGS:
+            done(made, "set", name=name, value=value)
+            done(made, "jog", rates_rad_s=[0.0, 0.1, 0.0])
+            made.advance(3)
+            done(made, "save", file=str(path))
+            loaded = scenarios.load(str(path))
+            assert path.read_text() == made.scenario_toml()
+            words = shlex.split(made.command_line())
+            assert words[:2] == ["spheretwin", "simulate"]
+            assert scenarios.load(words[2], flags.overrides(words[3:])) == loaded
+        # What the jogging made of it is no part of the settings.
+        assert loaded.trajectory.shape == "multisine"
+        assert loaded.trajectory.approach is None
+        assert loaded.manual.currents_A is None
+        done(made, "reset")
+        known = {name: value for name, value, _ in made.fields()}
+        for name, value in SETTINGS[:3]:
+            assert np.all(np.array(known[name]) == np.array(value))
+        done(made, "load", source=str(path))
+        assert {name: value for name, value, _ in made.fields()} == known
+        assert made.state().scenario == "mine"

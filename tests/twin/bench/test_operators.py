@@ -1,0 +1,117 @@
+"""One client operates, others watch; when it is gone, the twin holds."""
+
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.bench import Bench
+from spheretwin.twin.bench.operators import MOST_CLIENTS, GONE_s, Operators
+from tests.twin.bench.cases import QUIET, done
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def shared(clock):
+    with Bench(scenarios.load("sinusoid", QUIET), Operators(clock=clock)) as made:
+        done(made, "start")
+        yield made
+
+
+def say(bench, command, client, **arguments):
+    ticket = bench.command(command, client=client, **arguments)
+    bench.advance(1)
+    return ticket.refused
+
+
+def test_the_first_to_come_operates_and_others_watch(shared):
+    assert say(shared, "hello", "a") is None
+    assert say(shared, "hello", "b") is None
+    state = shared.state()
+    assert (state.operator, state.watching, state.asking) == ("a", ("b",), ())
+    assert (
+        say(shared, "jog", "b", rates_rad_s=[0, 0, 1])
+        == "bench: expected a command of a, received one of 'b'"
+    )
+    assert say(shared, "jog", "a", rates_rad_s=[0, 0, 1]) is None
+    assert shared.state().mode == "jog"
+    assert say(shared, "off", None) is None  # of whoever has the bench in hand
+
+
+def test_anyone_may_stop(shared):
+    say(shared, "hello", "a")
+    assert say(shared, "stop", "b") is None
+    assert shared.state().stopped
+
+
+def test_an_operator_gives_over_to_who_asks(shared):
+    say(shared, "hello", "a")
+    say(shared, "hello", "b")
+    say(shared, "ask", "b")
+    assert shared.state().asking == ("b",)
+    assert "received 'c'" in say(shared, "grant", "a", to="c")
+    assert "expected a command of a" in say(shared, "grant", "b", to="b")
+    assert say(shared, "grant", "a", to="b") is None
+    state = shared.state()
+    assert (state.operator, state.watching, state.asking) == ("b", ("a",), ())
+    assert say(shared, "leave", "b") is None
+    assert shared.state().operator is None
+    assert (
+        say(shared, "hold", "a") == "bench: expected a command of a client that operates, received one of 'a'"
+    )
+    assert say(shared, "ask", "a") is None
+    assert shared.state().operator == "a"
+
+
+def test_the_twin_holds_when_its_operator_is_gone(shared, clock):
+    say(shared, "hello", "a")
+    say(shared, "hello", "b")
+    say(shared, "jog", "a", rates_rad_s=[0, 0, 1])
+    for _ in range(5):
+        clock.now += 0.9 * GONE_s
+        say(shared, "beat", "a")
+        say(shared, "beat", "b")
+    assert (shared.state().mode, shared.state().operator) == ("jog", "a")
+    say(shared, "ask", "b")
+    clock.now += 0.6 * GONE_s
+    say(shared, "beat", "b")
+    clock.now += 0.6 * GONE_s
+    shared.advance(1)
+    state = shared.state()
+    assert (state.mode, state.operator, state.watching) == ("hold", "b", ())
+    assert state.note == "the operator is gone: the twin holds"
+    assert state.journal == 2  # the change is one of the run's: it replays
+
+
+@pytest.mark.parametrize("mode", ["off", "stop"])
+def test_a_twin_without_currents_is_not_given_any_as_its_operator_goes(shared, clock, mode):
+    say(shared, "hello", "a")
+    say(shared, mode, "a")
+    clock.now += 2 * GONE_s
+    shared.advance(1)
+    assert (shared.state().mode, shared.state().operator) == ("off", None)
+
+
+def test_clients_say_who_they_are_and_are_not_without_end(clock):
+    operators = Operators(clock=clock)
+    with pytest.raises(InputError, match="expected hello of a client"):
+        operators.say("hello", None)
+    for i in range(MOST_CLIENTS):
+        operators.say("hello", f"{i}")
+    with pytest.raises(InputError, match="at most"):
+        operators.say("hello", "one more")
+    clock.now = 2 * GONE_s
+    assert operators.look()
+    assert not operators.look()
+    operators.say("hello", "one more")
+    assert operators.operator == "one more"

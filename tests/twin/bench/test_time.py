@@ -1,0 +1,149 @@
+"""The loop's own time: STOP, pace, and what it counts; by a clock of the test's where there is one."""
+
+import numpy as np
+import pytest
+
+from spheretwin.twin.bench.pace import MOST_TICKS, CHUNK_s, LATE_s, Pace
+from tests.twin.bench.cases import MODES, begun, bench, done, kept_rows, said
+from tests.twin.bench.test_operators import Clock
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_stop_takes_the_currents_away_with_the_next_tick_until_reset(tmp_path, mode):
+    path = tmp_path / "run.parquet"
+    with begun() as made:
+        done(made, "record", telemetry=str(path))
+        done(made, mode, **MODES[mode])
+        made.advance(100)
+        made.command("stop")
+        made.advance(20)
+        state = made.state()
+        assert (state.mode, state.stopped) == ("off", True)
+        for other in MODES:
+            assert said(made, other, **MODES[other]) == f"bench: expected reset after STOP, received {other}"
+        made.advance(20)
+        done(made, "reset")
+        assert not made.state().stopped
+    rows = kept_rows(path)
+    assert len(rows) == 140
+    np.testing.assert_array_equal(rows["current_command_A"][100:], 0.0)
+    np.testing.assert_array_equal(rows["torque_command_Nm"][100:], 0.0)
+    if mode != "off":
+        assert np.abs(rows["current_command_A"][99]).max() > 0.0
+        # What is left in the coils fades with their time constant of 0.69 ms: 1e-12 of it after 20 ms.
+        assert np.abs(rows["current_A"][120]).max() < 1e-11
+
+
+def test_stop_does_not_wait_for_what_is_being_prepared():
+    with begun() as made:
+        for _ in range(20):
+            made.command("step")
+            made.command("load", source="nowhere")
+        stop = made.command("stop")
+        made.advance(1)
+        assert stop.done
+        assert made.state().stopped
+
+
+def test_stop_wakes_a_bench_at_work():
+    """In slow motion, where a chunk is 20 ms of the clock's, and while nothing runs at all."""
+    with bench() as made:
+        made.begin()
+        made.command("speed", factor=0.1).wait()
+        for running in (False, True):
+            if running:
+                assert made.command("reset").wait() is None
+                assert made.command("start").wait() is None
+            assert made.command("stop").wait() is None
+            assert made.state().stopped
+            for _ in range(2):  # the second one comes after the chunk that follows the first one
+                assert made.command("limits").wait() is None
+            assert made.state().running == running
+            assert not any(made.state().current_command_A)
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+def run(pace, clock, chunks, took_s=0.001, period_s=1e-3):
+    """Chunks one after the other; returns the times at which they began, and simulated time."""
+    begins, t_s = [], 0.0
+    for _ in range(chunks):
+        clock.now += pace.wait_s()
+        begins.append(clock.now)
+        ticks = pace.ticks(period_s)
+        t_s += ticks * period_s
+        clock.now += took_s
+        pace.ran(ticks, period_s, t_s, took_s)
+    return begins, t_s
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 3.0])
+def test_chunks_keep_the_pace(clock, speed):
+    pace = Pace(clock)
+    pace.speed = speed
+    begins, _ = run(pace, clock, 101)
+    # The first chunks of a faster pace are short, until it is known what a chunk takes.
+    assert np.diff(begins).max() == pytest.approx(CHUNK_s, abs=1e-12)
+    assert (pace.chunks, pace.missed) == (101, 0)
+    assert pace.reached() == pytest.approx(speed, rel=0.02)  # of 50 chunks, the last one's end
+
+
+def test_late_chunks_are_counted_and_made_up_for_but_not_without_end(clock):
+    pace = Pace(clock)
+    run(pace, clock, 11)
+    clock.now += 2.5 * CHUNK_s
+    begins, _ = run(pace, clock, 4)
+    assert pace.missed == 1
+    # Back on the old beat.
+    assert begins[-1] == pytest.approx(14 * CHUNK_s, abs=1e-9)
+    clock.now += 60.0
+    begins, _ = run(pace, clock, 50)
+    made_up_for = int(np.sum(np.diff(begins) < CHUNK_s / 2))
+    assert 0 < made_up_for <= LATE_s / CHUNK_s + 1
+
+
+def test_a_machine_too_slow_for_the_pace_runs_shorter_chunks_so_that_stop_is_heard(clock):
+    pace = Pace(clock)
+    pace.speed = 1000.0
+    for _ in range(100):
+        ticks = pace.ticks(1e-3)
+        took_s = 1e-4 * ticks  # ten times real time is all that it can
+        clock.now += pace.wait_s() + took_s
+        pace.ran(ticks, 1e-3, clock.now * 10, took_s)
+    assert 1e-4 * pace.ticks(1e-3) <= CHUNK_s
+    assert pace.missed_share > 0.9
+    assert pace.reached() == pytest.approx(10, rel=0.1)
+
+
+def test_as_fast_as_possible_waits_for_nothing_and_has_no_deadlines(clock):
+    pace = Pace(clock)
+    pace.speed = 1e6
+    _, t_s = run(pace, clock, 100, took_s=1e-4)
+    assert pace.ticks(1e-3) == MOST_TICKS
+    assert pace.chunks == 0
+    assert clock.now == pytest.approx(0.01)
+    assert pace.reached() == pytest.approx(t_s / 0.01, rel=0.05)
+
+
+def test_the_history_is_thinned_bounded_and_the_same_whatever_the_chunks():
+    found = []
+    for chunk in (1, 7, 600):
+        with begun() as made:
+            for _ in range(600 // chunk):
+                made.advance(chunk)
+            made.advance(600 % chunk)
+            found.append(made.history())
+    np.testing.assert_allclose(found[0]["t_s"], 0.02 * np.arange(30), rtol=1e-12)
+    for other in found[1:]:
+        assert {name: rows.tobytes() for name, rows in other.items()} == {
+            name: rows.tobytes() for name, rows in found[0].items()
+        }
+    with begun() as made:
+        made.advance(15_000)
+        history = made.history()
+        assert history["q_rad"].shape == (500, 3)
+        assert history["current_A"].shape == (500, 18)
+        np.testing.assert_allclose(history["t_s"][[0, -1]], [5.0, 14.98], rtol=1e-12)

@@ -1,0 +1,102 @@
+"""The way to a shape from another motion: it begins with the one, ends with the other, and does not jump."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.simulation import simulate
+from spheretwin.twin.trajectories.approach import FADING, Approach, SOON_s, faded
+from spheretwin.twin.trajectories.shapes.hold import Hold
+from spheretwin.twin.trajectories.shapes.jog import Jog
+from spheretwin.twin.trajectories.shapes.nutation import Nutation
+from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
+
+STEP = 1e-5
+BEGUN = {
+    "angle_rad": (0.1, -0.2, 3.0),
+    "rate_rad_s": (0.5, 0.0, -1.0),
+    "acceleration_rad_s2": (2.0, -3.0, 0.5),
+}
+SHAPES = (Sinusoid, Nutation, Hold, Jog)
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+@pytest.mark.parametrize("rounding", [None, 20.0])
+@pytest.mark.parametrize("shape_s", [0.0, 1.3])
+def test_it_begins_with_the_one_motion_and_ends_with_the_other(kind, rounding, shape_s):
+    way = Approach(start_s=2.0, lasts_s=0.8, shape_s=shape_s, **BEGUN)
+    shape, alone = kind(rounding_rad_s2=rounding, approach=way), kind(approach=Approach())
+    start, earlier = shape.sample(np.array([2.0, 0.5]))
+    np.testing.assert_allclose(start, list(BEGUN.values()), rtol=1e-14, atol=1e-14)
+    np.testing.assert_array_equal(earlier, [BEGUN["angle_rad"], np.zeros(3), np.zeros(3)])
+    after = np.linspace(2.8 + 1e-9, 4.0, 50)
+    if rounding is None:
+        assert shape.sample(after).tobytes() == alone.sharp(after - 2.0 + shape_s).tobytes()
+    else:
+        np.testing.assert_array_equal(shape.sample(after), shape.led_to(shape_s + (after - 2.0)))
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_rates_and_accelerations_are_derivatives_and_nothing_jumps(kind):
+    shape = kind(approach=Approach(start_s=0.5, lasts_s=0.9, **BEGUN))
+    # A step of the difference beside where a polynomial begins or ends would mix the two.
+    t = np.linspace(0.5 + 2 * STEP, 2.0, 400)
+    t = t[np.abs(t - 0.5 - SOON_s) > 2 * STEP]
+    before, now, after = (shape.sample(t + h) for h in (-STEP, 0, STEP))
+    # Central differences: h² times a sixth of third derivatives below 1e5, and rounding of 3 rad over h.
+    np.testing.assert_allclose(now[:, 1], (after - before)[:, 0] / (2 * STEP), atol=2e-6)
+    np.testing.assert_allclose(now[:, 2], (after - before)[:, 1] / (2 * STEP), atol=2e-6)
+    fine = shape.sample(np.arange(0.5, 2.0, 1e-4))
+    # The jerk is at most 9 times the difference of accelerations over a tenth of a second.
+    largest = np.abs(fine[:, 2]).max()
+    assert np.abs(np.diff(fine[:, 2], axis=0)).max() < 1e-4 * 20 * largest / SOON_s
+
+
+def test_the_polynomials_are_those_that_end_at_rest():
+    for order, powers in enumerate(FADING):
+        polynomial = np.polynomial.Polynomial(powers)
+        for derivative in range(3):
+            assert polynomial.deriv(derivative)(0.0) == (derivative == order)
+            assert abs(polynomial.deriv(derivative)(1.0)) < 1e-14
+
+
+@given(st.lists(st.floats(-10, 10), min_size=9, max_size=9), st.floats(0.01, 100), st.floats(0, 200))
+def test_what_is_left_is_bounded_and_vanishes(numbers, lasts_s, since):
+    difference = np.reshape(numbers, (3, 3))
+    left = faded(difference, np.array([since]), lasts_s)[0]
+    bound = np.abs(difference)
+    # Of an angle at most all, of a rate 0.2 s a second, of an acceleration 0.02 s²: the polynomials' largest.
+    most = bound[0] + 0.2 * lasts_s * bound[1] + 0.02 * min(lasts_s, SOON_s) ** 2 * bound[2]
+    assert np.all(np.abs(left[0]) <= most * (1 + 1e-12) + 1e-300)
+    if since >= lasts_s:
+        np.testing.assert_array_equal(left, 0.0)
+
+
+def test_a_scenario_names_it_and_begins_where_it_does():
+    fields = {"start_s": 0.02, "lasts_s": 0.1, "angle_rad": [0.1, 0.0, 0.0]}
+    scenario = scenarios.load("sinusoid", {"trajectory.approach": fields, "duration": 0.05})
+    run = simulate(scenario)
+    np.testing.assert_array_equal(run.scenario.plant.initial_rad, [0.1, 0.0, 0.0])
+    np.testing.assert_array_equal(run.telemetry["q_ref_rad"][:20], np.tile([0.1, 0, 0], (20, 1)))
+    assert scenarios.load("sinusoid", {"trajectory.approach.lasts_s": 0.1}).trajectory.approach.start_s == 0.0
+    with pytest.raises(InputError, match=r"trajectory\.approach\.lasts_s: expected"):
+        scenarios.load("sinusoid", {"trajectory.approach.lasts_s": 0.0})
+    with pytest.raises(InputError, match=r"in trajectory\.approach, received late_s"):
+        scenarios.load("sinusoid", {"trajectory.approach.late_s": 0.1})
+
+
+def test_jogging_turns_until_the_edge():
+    shape = Jog(start_rad=(0.1, -0.2, 0.0), rate_rad_s=(0.5, -0.25, 2.0), farthest_rad=1.0)
+    ends = np.array([0.9 / 0.5, 0.8 / 0.25])
+    samples = shape.sample(np.array([1.0, *ends, 10.0]))
+    np.testing.assert_allclose(samples[0, 0], [0.6, -0.45, 2.0], rtol=1e-15)
+    np.testing.assert_allclose(samples[-1, 0], [1.0, -1.0, 20.0], rtol=1e-15)
+    np.testing.assert_array_equal(samples[-1, 1], [0.0, 0.0, 2.0])
+    np.testing.assert_allclose(shape.corners().t_s, ends, rtol=1e-15)
+    beyond = Jog(start_rad=(1.2, 0.0, 0.0), rate_rad_s=(0.5, 0.0, 0.0), farthest_rad=1.0)
+    np.testing.assert_array_equal(beyond.sample(np.array([0.0, 1.0]))[:, 0, 0], 1.2)
+    back = Jog(start_rad=(1.2, 0.0, 0.0), rate_rad_s=(-0.5, 0.0, 0.0), farthest_rad=1.0)
+    np.testing.assert_allclose(back.sample(np.array([1.0]))[0, 0, 0], 0.7, rtol=1e-15)

@@ -1,0 +1,59 @@
+"""Where things are on a bench's page."""
+
+import numpy as np
+
+STATUS = "document.querySelector('[data-bench=status]')"
+
+_LINE = "[...document.querySelectorAll('label')].find(each => each.innerText == %r)"
+
+
+def opened(browser, page, size=None):
+    """A page of the bench that is served, once it shows its state."""
+    tab = browser.open(page.address, size)
+    tab.wait_for(f"{STATUS} !== null")
+    return tab
+
+
+def errors(tab):
+    """What a page says on its console, but for what viser's own code says of each thing that is dragged."""
+    return [line for line in tab.errors if "preventDefault inside passive event listener" not in line]
+
+
+def on_screen(page, tab, point_m):
+    """Where a point of the picture is on the page, pixels, by the camera that the page tells of itself."""
+    (client,) = page._server.get_clients().values()
+    camera = client.camera
+    w, x, y, z = camera.wxyz
+    R_SC = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    right, down, ahead = R_SC.T @ (np.array(point_m) - camera.position)
+    left, top, width, height = tab.evaluate(
+        "(box => [box.x, box.y, box.width, box.height])"
+        "(document.querySelector('canvas').getBoundingClientRect())"
+    )
+    focal = height / 2 / np.tan(camera.fov / 2)
+    return left + width / 2 + focal * right / ahead, top + height / 2 + focal * down / ahead
+
+
+def write(tab, label, text):
+    """Write into the line of a label in place of what is there."""
+    line = f"{_LINE % label}.parentElement.parentElement.parentElement.querySelector('input')"
+    tab.wait_for(f"{_LINE % label} !== undefined")
+    tab.evaluate(f"{line}.focus(), {line}.select()")
+    if text:
+        tab.write(text)
+    else:
+        tab.key("Backspace")
+
+
+def choose(tab, label, option):
+    """Choose of the list of a label."""
+    line = f"{_LINE % label}.parentElement.parentElement.parentElement.querySelector('input')"
+    tab.wait_for(f"{_LINE % label} !== undefined")
+    tab.evaluate(f"{line}.click()")
+    tab.click(f"text={option}")
