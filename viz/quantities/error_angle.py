@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from spheretwin.viz.quantities.quantity import Array, Quantity, Rows
-from spheretwin.viz.scene.poses import body_quaternions
 
 
 def values(rows: Rows) -> Array:
@@ -13,17 +12,18 @@ def values(rows: Rows) -> Array:
     return np.degrees(angle_between(rows.table["q_rad"], rows.table["q_ref_rad"]))[:, None]
 
 
-def angle_between(q: Array, q_ref: Array) -> Array:
-    """Angle of the one rotation between two orientations, (n,) in rad, of hinge angles (n, 3) in rad."""
-    actual, desired = body_quaternions(q)["rotor"], body_quaternions(q_ref)["rotor"]
-    # The vector part as well as the scalar: near 1 the scalar alone would lose half of the digits.
-    along = np.abs(np.sum(actual * desired, axis=1))
-    across = (
-        desired[:, 3:] * actual[:, :3]
-        - actual[:, 3:] * desired[:, :3]
-        - np.cross(desired[:, :3], actual[:, :3])
-    )
-    return np.asarray(2 * np.arctan2(np.sqrt(np.sum(across**2, axis=1)), along))
+def angle_between(q: Array, desired: Array) -> Array:
+    """Angle of the one rotation between two orientations, (n,) in rad, of hinge angles (n, 3) in rad.
+
+    It is that of ``Ry(-β_ref) Rx(α - α_ref) Ry(β) Rz(γ - γ_ref)``, of which this is the quaternion. Its
+    vector part counts as well as its scalar: near 1 the scalar alone would lose half of the digits.
+    """
+    difference, sum_beta = (q - desired) / 2, (q[:, 1] + desired[:, 1]) / 2
+    (ca, cb, cg), (sa, sb, sg) = np.cos(difference).T, np.sin(difference).T
+    w, z = ca * cb, sa * np.sin(sum_beta)
+    along = w * cg - z * sg
+    across = (sa * np.cos(sum_beta)) ** 2 + (ca * sb) ** 2 + (z * cg + w * sg) ** 2
+    return np.asarray(2 * np.arctan2(np.sqrt(across), np.abs(along)))
 
 
 ERROR_ANGLE = Quantity("error_angle_deg", "°", "angle between the rotor and where it should be", values, 0.01)

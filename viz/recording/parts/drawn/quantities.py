@@ -17,7 +17,7 @@ from spheretwin.viz.recording.columns import scalars, time_index
 from spheretwin.viz.recording.parts.drawn.bins import Binned, Bins
 from spheretwin.viz.recording.parts.drawn.ended import log_end
 from spheretwin.viz.recording.parts.drawn.summary import Summary
-from spheretwin.viz.recording.parts.drawn.survey import Survey, columns_of, watched
+from spheretwin.viz.recording.parts.drawn.survey import Picked, Survey, watched
 from spheretwin.viz.recording.parts.part import Part, Subject
 
 # A bin leaves one row or two: no more than 50 a second.
@@ -34,6 +34,7 @@ class Quantities(Part):
         super().__init__(subject)
         self._quantities = quantities_of({signal.name for signal in subject.signals})
         self._watched = watched(subject.signals)
+        self._picked = Picked(self._watched)
         self._survey = Survey(
             {**{quantity.name: quantity.size for quantity in self._quantities}, **self._watched}
         )
@@ -56,7 +57,7 @@ class Quantities(Part):
         values = {quantity.name: quantity.values(given) for quantity in self._quantities}
         self._before = Table(rows.signals, rows.values[-1:].copy())
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
-        columns = np.concatenate([*values.values(), columns_of(rows, self._watched)], axis=1)
+        columns = np.concatenate([*values.values(), self._picked.of(rows)], axis=1)
         self._record(recording, self._bins.add(rows["t_s"], columns))
 
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:

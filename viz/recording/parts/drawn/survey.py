@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.signals import Signal, offsets
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.seen import Seen
 
@@ -56,18 +56,57 @@ class Survey:
 
 
 def watched(signals: tuple[Signal, ...]) -> dict[str, int]:
-    """Signals of which bounds are kept, with their sizes: all that are plotted in a range of their own."""
-    return {signal.name: signal.size for signal in signals if not signal.states and signal.unit != "A"}
+    """Signals that are plotted in ranges of the run's own, of which bounds are kept; with their sizes."""
+    plotted = (signal for signal in signals if not signal.states)
+    return {signal.name: signal.size for signal in plotted if signal.name not in _OF_FIXED_RANGE}
 
 
-def columns_of(rows: Table, sizes: Mapping[str, int]) -> Array:
-    """Columns of some signals side by side; NaN where the rows have none, after a change of law."""
-    names = {signal.name for signal in rows.signals}
-    missing = np.full(len(rows), np.nan)
-    return np.concatenate(
-        [
-            (rows[name] if name in names else np.tile(missing[:, None], size)).reshape(len(rows), size)
-            for name, size in sizes.items()
-        ],
-        axis=1,
-    )
+_OF_FIXED_RANGE = frozenset(
+    {
+        "t_s",
+        "qdot_rad_s",
+        "qdot_ref_rad_s",
+        "error_rad",
+        "torque_Nm",
+        "current_command_A",
+        "current_A",
+        "allocation_scale",
+        "coil_power_W",
+        "copper_loss_W",
+        "voltage_limited",
+        "current_limited",
+        "time_to_detection_s",
+    }
+)
+"""And those that are not plotted."""
+
+
+class Picked:
+    """Columns of the watched signals side by side.
+
+    Parameters
+    ----------
+    sizes : mapping of name to int
+        The signals.
+    """
+
+    def __init__(self, sizes: Mapping[str, int]) -> None:
+        self._sizes = dict(sizes)
+        self._signals: tuple[Signal, ...] | None = None
+        self._places = self._missing = np.empty(0, dtype=np.int64)
+
+    def of(self, rows: Table) -> Array:
+        """Of the rows of a chunk; NaN where they have none, after a change of law."""
+        if rows.signals is not self._signals:
+            self._signals = rows.signals
+            self._find(rows.signals)
+        columns = rows.values[:, self._places]
+        columns[:, self._missing] = np.nan
+        return columns
+
+    def _find(self, signals: tuple[Signal, ...]) -> None:
+        first, places = offsets(signals), []
+        for name, size in self._sizes.items():
+            places += list(range(first[name], first[name] + size)) if name in first else [-1] * size
+        found = np.array(places, dtype=np.int64)
+        self._places, self._missing = np.maximum(found, 0), np.flatnonzero(found < 0)
