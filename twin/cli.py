@@ -24,6 +24,8 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit code."""
+    # What goes wrong in Rerun is raised, or found where its files end: its own log would only repeat it.
+    os.environ.setdefault("RUST_LOG", "off")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters

@@ -17,7 +17,30 @@ DESIRED_COLOURS: tuple[Colour, ...] = ((150, 78, 78), (62, 112, 80), (70, 96, 15
 
 BACKGROUND: Colour = (20, 22, 26)
 TRACE: Colour = (255, 190, 60)
+NORTH: Colour = (150, 155, 163)
+SOUTH: Colour = (44, 47, 54)
+COIL_TORQUE: Colour = (224, 92, 178)
+LOAD: Colour = (26, 168, 160)
+PAYLOAD: Colour = (26, 168, 160)
+"""Of the weight on the shaft, and of the torque that it has."""
 DESIRED_TRACE: Colour = (130, 136, 146)
+
+ASKED: Colour = (240, 240, 240)
+"""What was asked for, drawn thin over what came of it."""
+
+PLAIN: Colour = (200, 204, 212)
+"""What belongs to no axis and to no current."""
+
+GROUP: Colour = (160, 130, 110)
+"""Each of many coil groups, where only their spread matters."""
+
+BELIEVED: Colour = (255, 190, 60)
+"""What the controller takes for true."""
+
+FINE: Colour = (48, 84, 70)
+WARNING: Colour = (214, 140, 30)
+FAILURE: Colour = (205, 60, 150)
+"""States; red is an axis, and a current."""
 
 LAW_COLOURS: dict[str, str] = {
     "pd": "#0072b2",
@@ -52,7 +75,8 @@ LAW_MARKS: dict[str, tuple[str, Dash]] = {
 
 OTHER_LAW = "#8a5a9e"
 
-_SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
+SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
+"""Where a law's own colour is taken."""
 
 _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
     ("p", (0, (2, 1))),
@@ -65,6 +89,14 @@ _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
 _NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)
 
 
+def mixed(colour: Colour, other: Colour, share: float) -> Colour:
+    """A colour with a share of another."""
+    red, green, blue = (
+        round((1 - share) * own + share * its) for own, its in zip(colour, other, strict=True)
+    )
+    return red, green, blue
+
+
 def law_colour(law: str) -> str:
     """Colour of a law, as a page writes it; one for all that have none of their own."""
     return LAW_COLOURS.get(law, OTHER_LAW)
@@ -75,7 +107,7 @@ def law_colours(laws: Sequence[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for law in laws:
         own = law_colour(law.split(",")[0])
-        others = [each for each in (own, *_SPARE) if each not in found.values()]
+        others = [each for each in (own, *SPARE) if each not in found.values()]
         found[law] = others[0] if others else own
     return found
 

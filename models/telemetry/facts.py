@@ -24,6 +24,8 @@ class RunFacts:
         Largest group current of the amplifiers, A.
     payload_kg : float
         Mass on the shaft's payload mount, kg.
+    gravity_m_s2 : float or None
+        Gravity along -z of the stator, m/s²; None where the model's own acts, which is along another line.
     mjcf : Path
         Model file.
     sections : mapping of mappings
@@ -36,5 +38,6 @@ class RunFacts:
     duration_s: float
     current_limit_A: float
     payload_kg: float
+    gravity_m_s2: float | None
     mjcf: Path
     sections: Mapping[str, Mapping[str, Any]]

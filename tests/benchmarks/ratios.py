@@ -31,6 +31,7 @@ from spheretwin.twin.disturbances.draws import Draws
 from spheretwin.twin.plant.engine import Rotor
 from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.scenario.hardware import HARDWARE
+from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz.recording.recorder import Recorder
@@ -39,6 +40,7 @@ SCENARIO = "nutation"
 PLAIN_TICKS = 500
 FEW_TICKS = 900  # within one block of what comes from outside
 SESSIONS = 8
+THINNED_Hz = 60.0
 
 
 def loop_seconds() -> float:
@@ -171,19 +173,19 @@ def _repeat(calls, q, model, G, scratch):
         fill_torque_matrix(q, model, G, scratch)
 
 
-def run_seconds(folder: Path | None) -> Callable[[], float]:
+def run_seconds(scenario: Scenario, folder: Path | None, rate_Hz: float | None = None) -> Callable[[], float]:
     """Time of one run within this process, s; recorded to a new file in `folder` if there is one."""
     names = itertools.count()
 
     def work() -> None:
-        scenario = scenarios.load(SCENARIO)
         with Session(scenario) as session:
             if folder is None:
                 follow(session, scenario.ticks, [])
                 return
             path, facts = folder / f"run{next(names)}.rrd", facts_of(session.begun_as)
-            with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
+            with Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
                 follow(session, scenario.ticks, [recorder])
+            path.unlink()
 
     return lambda: seconds_of(work)
 
@@ -214,7 +216,18 @@ def ratios() -> list[dict[str, object]]:
     command = [str(Path(sys.executable).with_name("spheretwin")), "simulate", SCENARIO]
     imports = [sys.executable, "-c", "import mujoco, numba, rerun"]
     with tempfile.TemporaryDirectory() as folder:
-        runs = fastest({"recorded": run_seconds(Path(folder)), "silent": run_seconds(None)}, rounds=9)
+        brief, minute = scenarios.load(SCENARIO), scenarios.load("sinusoid", {"duration": 60.0})
+        runs = fastest(
+            {"recorded": run_seconds(brief, Path(folder)), "silent": run_seconds(brief, None)}, rounds=9
+        )
+        minutes = fastest(
+            {
+                "recorded": run_seconds(minute, Path(folder)),
+                "thinned": run_seconds(minute, Path(folder), THINNED_Hz),
+                "silent": run_seconds(minute, None),
+            },
+            rounds=5,
+        )
         processes = fastest(
             {
                 "recorded": process_seconds(*command, "--record", f"{folder}/run.rrd"),
@@ -254,6 +267,8 @@ def ratios() -> list[dict[str, object]]:
         ratio("a run of one second over its loop", inner["brief run"], inner["brief loop"], at_most=1.35),
         ratio("one thread over two, prepared sessions", threads["one"], threads["two"], at_least=1.7),
         ratio("run that records over one that does not", runs["recorded"], runs["silent"], at_most=1.3),
+        ratio("a minute that records every row", minutes["recorded"], minutes["silent"], at_most=1.3),
+        ratio("a minute that records 60 rows a second", minutes["thinned"], minutes["silent"], at_most=1.05),
         ratio("warm command with --record over without", processes["recorded"], processes["silent"]),
         ratio(
             "warm command over importing its libraries", processes["silent"], processes["imports"], at_most=2

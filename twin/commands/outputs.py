@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +16,10 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.records.facts import facts_of, record_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink
+from spheretwin.viz.layout.view import OVERVIEW
 
 if TYPE_CHECKING:
+    from spheretwin.viz.recording.live import LiveView
     from spheretwin.viz.recording.recorder import Recorder
 
 
@@ -33,6 +37,36 @@ def check(paths: list[Path]) -> None:
         raise InputError(f"output: expected a path of its own for each file, received {paths[0]} twice")
 
 
+def rate_Hz(text: str) -> float:
+    """A rate from the command line, Hz."""
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a number of Hz above 0, received {text}")
+    return rate
+
+
+def check_rate(rate: float | None, record: Path | None, period_s: float) -> None:
+    """Refuse a rate of a recording that is not asked for, or one that no run has the rows for.
+
+    Raises
+    ------
+    InputError
+        It is one of these.
+    """
+    if rate is None:
+        return
+    if not record:
+        raise InputError("command line: expected --record FILE.rrd with --record-rate, received none")
+    if rate * period_s > 1 + 1e-9:  # both are rounded
+        raise InputError(
+            f"command line: expected --record-rate of at most {1 / period_s:g} Hz, at which the controller"
+            f" works, received {rate:g}"
+        )
+
+
 class Outputs:
     """What follows a session into files and into a viewer.
 
@@ -44,6 +78,10 @@ class Outputs:
         Files to write.
     live : bool
         Serve a viewer on 127.0.0.1.
+    view : str
+        What of the recording is open at first.
+    record_rate_Hz : float, optional
+        Rows a second that the recording keeps beside those that stand out; every row unless given.
     first_tick : int
         Tick of the first row that the files keep.
 
@@ -56,6 +94,8 @@ class Outputs:
     ------
     InputError
         A file cannot be made, or the model cannot be drawn; nothing is left behind.
+    SpheretwinError
+        There is no viewer to serve; nothing is left behind.
     """
 
     def __init__(
@@ -64,6 +104,8 @@ class Outputs:
         record: Path | None,
         telemetry: Path | None,
         live: bool,
+        view: str = OVERVIEW,
+        record_rate_Hz: float | None = None,
         first_tick: int = 0,
     ) -> None:
         self._session, self._first_tick = session, first_tick
@@ -72,19 +114,30 @@ class Outputs:
         if telemetry:
             self._begun = record_of(session, first_tick=first_tick)
             self._file = TelemetryFile(telemetry, session.signals, self._begun.metadata())
+        self._live = _live_view(session, view) if live else None
         # The recorder last: it alone leaves something where it is made and another is refused.
-        self._recorder = _recorder(session, record, live) if record or live else None
+        try:
+            self._recorder = _recorder(session, record, view, record_rate_Hz) if record else None
+        except SpheretwinError:
+            if self._live:
+                self._live.close()
+            raise
 
     @property
     def sinks(self) -> list[Sink]:
         """To be handed the telemetry."""
-        sinks: list[Sink] = [sink for sink in (self._file, self._recorder) if sink]
+        sinks: list[Sink] = [sink for sink in (self._file, self._recorder, self._live) if sink]
         return [_From(self._first_tick, sink) for sink in sinks] if self._first_tick else sinks
 
     def close(self) -> list[SpheretwinError]:
         """Complete every file; returns what went wrong."""
         faults = []
-        if self._recorder:  # first: its memory is free then
+        if self._live:
+            try:
+                self._live.close()
+            except SpheretwinError as error:
+                faults.append(error)
+        if self._recorder:  # before the telemetry: its memory is free then
             try:
                 self._recorder.close()
             except SpheretwinError as error:
@@ -120,11 +173,16 @@ class _From:
         self._sink.finish(status)
 
 
-def _recorder(session: Session, path: Path | None, live: bool) -> Recorder:
+def _live_view(session: Session, view: str) -> LiveView:
+    from spheretwin.viz.recording.live import LiveView  # Rerun is slow to import
+
+    live = LiveView(session.actuator, session.signals, facts_of(session.begun_as), shown=view)
+    print(f"watch: {live.address}", file=sys.stderr, flush=True)
+    return live
+
+
+def _recorder(session: Session, path: Path, view: str, rate_Hz: float | None) -> Recorder:
     from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
     facts = facts_of(session.begun_as)
-    recorder = Recorder(session.actuator, session.signals, facts, path=path, live=live)
-    if recorder.viewer:
-        print(f"watch: {recorder.viewer.address}", file=sys.stderr, flush=True)
-    return recorder
+    return Recorder(session.actuator, session.signals, facts, path=path, shown=view, rate_Hz=rate_Hz)

@@ -12,6 +12,8 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.twin.commands.reporting import print_json, warn
 from spheretwin.twin.review import columns, tolerances
+from spheretwin.twin.review.beside import merging, picturing
+from spheretwin.twin.review.beside.differences import differences
 from spheretwin.twin.review.figures import figures
 from spheretwin.twin.review.holding import Exceeded, exceeded
 from spheretwin.twin.review.run import Reviewed, read
@@ -43,6 +45,18 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--export", type=Path, metavar="FILE", help="write the columns of the run as .csv or .parquet"
     )
+    parser.add_argument(
+        "--merge",
+        type=Path,
+        metavar="OUT.rrd",
+        help="write all runs side by side as one new recording, with a layout that compares them",
+    )
+    parser.add_argument(
+        "--figures",
+        type=Path,
+        metavar="DIR",
+        help="draw all runs: PNG, SVG and one page with plots to zoom, which needs no viewer and no network",
+    )
     parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
     parser.set_defaults(run=run)
 
@@ -50,7 +64,8 @@ def add_to(verbs: Any) -> None:
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     """Run the verb; True when all runs are within the tolerances, if there are any."""
     if rest:
-        raise InputError(f"command line: expected --tolerance, --export or --json, received {' '.join(rest)}")
+        expected = "--tolerance, --export, --merge, --figures or --json"
+        raise InputError(f"command line: expected {expected}, received {' '.join(rest)}")
     _check(options)
     allowed = tolerances.load(options.tolerance) if options.tolerance else None
     first, *others = runs = [read(path) for path in options.runs]
@@ -58,12 +73,16 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     over = [exceeded(first, other, allowed) for other in others] if allowed else []
     if options.export:
         columns.export(first, options.export)
+    if options.merge:
+        merging.merge(runs, options.merge)
+    page = picturing.write(runs, told, options.figures) if options.figures else None
     if options.json:
         _print_json(told, over, held=allowed is not None)
     else:
         reviews.print_runs(told)
-        tables.print_written([options.export] if options.export else [])
+        tables.print_written([path for path in (options.export, options.merge, page) if path])
     warn(_recovered(each) for each in runs if not each.whole)
+    warn(_thinned(each) for each in runs if each.rate_Hz)
     for places in filter(None, over):
         print(f"spheretwin: review: {_first(places)}", file=sys.stderr)
     return not any(over)
@@ -77,13 +96,25 @@ def _check(options: argparse.Namespace) -> None:
     if options.export:
         columns.check(options.export)
         check_writable(options.export)
+    if options.merge and len(options.runs) < 2:
+        raise InputError("command line: expected two runs or more for --merge, received one")
+    if options.merge:
+        merging.check(options.merge, options.runs)
+        check_writable(options.merge)
+    if options.figures:
+        picturing.check(options.figures)
 
 
 def _print_json(told: list[dict[str, Any]], over: list[list[Exceeded]], *, held: bool) -> None:
-    """Print the runs, and where each of the others first leaves what each signal is allowed."""
+    """Print the runs, their differences, and where each first leaves what each signal is allowed."""
     within = not any(over) if held else None
     print_json(
-        {"runs": told, "within_tolerance": within, "exceeded": [place for each in over for place in each]}
+        {
+            "runs": told,
+            "differences": differences(told),
+            "within_tolerance": within,
+            "exceeded": [place for each in over for place in each],
+        }
     )
 
 
@@ -91,6 +122,14 @@ def _recovered(each: Reviewed) -> str:
     return (
         f"{each.path} was not closed: {len(each.table)} rows, {each.simulated_s:.3f} s of the run,"
         " were recovered"
+    )
+
+
+def _thinned(each: Reviewed) -> str:
+    return (
+        f"{each.path} keeps {each.rate_Hz:g} rows a second and those that stand out: extremes and events are"
+        " those of the run; all other figures are of these rows, each held until the next, and the variation"
+        " of the commands is too low"
     )
 
 

@@ -30,6 +30,7 @@ from spheretwin.twin.scenario import flags
 from spheretwin.twin.scenario.reading import shipped
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink, follow
+from spheretwin.viz.layout.view import OVERVIEW, VIEW_NAMES
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.progress import Progress
 
@@ -49,9 +50,21 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help=f"{names}, or a .toml file")
     parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="write a Rerun recording")
+    parser.add_argument(
+        "--record-rate",
+        type=outputs.rate_Hz,
+        metavar="HZ",
+        help="rows a second that the recording keeps, and besides all that stand out in any 10 s; every one"
+        " unless given",
+    )
     parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
     parser.add_argument(
         "--live", action="store_true", help="run at the pace of the clock, with a viewer on 127.0.0.1"
+    )
+    parser.add_argument(
+        "--view",
+        choices=VIEW_NAMES,
+        help=f"the tab of the recording that is open at first; {OVERVIEW} unless given",
     )
     parser.add_argument(
         "--replay", type=Path, metavar="RUN.parquet", help="run again what a telemetry file says of itself"
@@ -79,13 +92,26 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     if _is_bare(options, rest):
         tables.print_scenarios({name: scenarios.load(name).description for name in shipped()})
     plan = _planned(options, rest)
+    if options.view and not (options.record or options.live):
+        raise InputError(
+            f"command line: expected --view with --record or --live, received {options.view} alone"
+        )
     own = OwnMetrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
+    outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
         figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
-        files = Outputs(session, options.record, options.telemetry, options.live, plan.first_tick)
+        files = Outputs(
+            session,
+            options.record,
+            options.telemetry,
+            options.live,
+            options.view or OVERVIEW,
+            options.record_rate,
+            plan.first_tick,
+        )
         try:
             with progress, timers_stopped(), _code_of_the_user(session, options.json):
                 status = follow(

@@ -33,6 +33,7 @@ def facts_of(scenario: Scenario) -> RunFacts:
         duration_s=scenario.duration,
         current_limit_A=scenario.drive.current_limit_A or 0.0,
         payload_kg=scenario.plant.payload_kg,
+        gravity_m_s2=scenario.plant.gravity_m_s2,
         mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
         sections=_sections(scenario.model_dump(mode="json")),
     )

@@ -13,7 +13,7 @@ from spheretwin.twin.simulation import Run
 from spheretwin.viz.figures.drawing import Drawing
 
 if TYPE_CHECKING:
-    from spheretwin.viz.recording.flights import Flight
+    from spheretwin.viz.merged.flights import Flight
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from spheretwin.viz.page import markdown as pieces
 from spheretwin.viz.page.folder import save_drawings, save_text
 
 if TYPE_CHECKING:
-    from spheretwin.viz.recording.flights import Flight
+    from spheretwin.viz.merged.flights import Flight
 
 TITLE = "What the paper shows, run again"
 MARKDOWN, HTML = "reproduce.md", "reproduce.html"
@@ -126,7 +126,7 @@ def _alone(chapter: Chapter) -> list[str]:
 
 
 def _recorded(folder: Path, chapter: Chapter) -> Path:
-    from spheretwin.viz.recording import flights
+    from spheretwin.viz.merged import flights
 
     name = chapter.experiment.name
     return flights.write(folder / f"{name}.rrd", chapter.flights, actuators.load(), chapter.experiment.title)

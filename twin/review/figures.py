@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
@@ -15,6 +17,7 @@ from spheretwin.twin.review.spectrum import peaks
 from spheretwin.twin.review.work import mechanical_work_J
 from spheretwin.twin.scenario.files import files_of
 from spheretwin.twin.scenario.reading import validated
+from spheretwin.twin.scenario.sections import Scenario
 
 
 def figures(run: Reviewed) -> dict[str, Any]:
@@ -26,7 +29,8 @@ def figures(run: Reviewed) -> dict[str, Any]:
         Its scenario is none of this version's, or its model file is no longer there or has other coil groups.
     """
     try:
-        return _figures(run)
+        with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
+            return _figures(run)
     except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
         raise InputError(f"review {run.path}: expected facts and rows of a run, {error!r}") from None
 
@@ -34,7 +38,7 @@ def figures(run: Reviewed) -> dict[str, Any]:
 def _figures(run: Reviewed) -> dict[str, Any]:
     scenario = run.record.scenario
     metrics = _metrics(run)
-    work_J, copper_J = mechanical_work_J(run.table, run.period_s), metrics["copper_loss_J"]
+    work_J, copper_J = mechanical_work_J(run.every_tick, run.period_s), metrics["copper_loss_J"]
     return {
         "path": str(run.path),
         "scenario": scenario["name"],
@@ -47,6 +51,7 @@ def _figures(run: Reviewed) -> dict[str, Any]:
         "reason": _reason(run.table),
         "whole": run.whole,
         "rows": len(run.table),
+        "record_rate_Hz": run.rate_Hz,
         "simulated_s": run.simulated_s,
         "planned_s": scenario["duration"],
         **metrics,
@@ -62,10 +67,21 @@ def _figures(run: Reviewed) -> dict[str, Any]:
 
 
 def _metrics(run: Reviewed) -> dict[str, Any]:
-    scenario = validated(_what_metrics_take(run), str(run.path))
+    scenario = of_the_actuator(run)
     gathered = Figures(Planned(scenario, files_of(scenario).actuator, scenario.ticks))
-    gathered.write(run.table)
+    gathered.write(run.every_tick)
     return gathered.values()
+
+
+def of_the_actuator(run: Reviewed) -> Scenario:
+    """What a run's scenario says of plant and drive; its law and trajectory, which may be gone, are others.
+
+    Raises
+    ------
+    InputError
+        It is none of this version's.
+    """
+    return validated(_what_metrics_take(run), str(run.path))
 
 
 def _what_metrics_take(run: Reviewed) -> dict[str, Any]:
@@ -79,7 +95,7 @@ def _what_metrics_take(run: Reviewed) -> dict[str, Any]:
 
 
 def _error_peaks(run: Reviewed) -> list[Any]:
-    return [peaks(column, run.period_s) for column in run.table["error_rad"].T]
+    return [peaks(column, run.period_s) for column in run.every_tick["error_rad"].T]
 
 
 def _reason(table: Table) -> str | None:

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.status import Level
 from spheretwin.twin.faults.told import FaultLines
+from spheretwin.twin.review.journal import planned
 from spheretwin.twin.review.run import Reviewed
-from spheretwin.twin.scenario.changing import from_now_on
-from spheretwin.twin.scenario.planned import first_tick
 from spheretwin.twin.simulation import change_told
-from spheretwin.viz.recording.events import Event, Events
+from spheretwin.viz.recording.parts.events import Event, Events
 
 
 def events(run: Reviewed) -> list[Event]:
@@ -21,8 +20,8 @@ def events(run: Reviewed) -> list[Event]:
         found, end = list(run.log[:-1] if ended else run.log), list(run.log[-1:] if ended else ())
     else:
         log = Events()
-        found = log.of(run.table) if len(run.table) else []
-        found += [(t_s, Level.INFO, text) for t_s, text in FaultLines().of(run.table)]
+        found = log.of(run.every_tick) if len(run.table) else []
+        found += [(t_s, Level.INFO, text) for t_s, text in FaultLines().of(run.every_tick)]
         found += [(each.tick * run.period_s, Level.INFO, change_told(each)) for each in _changes(run)]
         end = [log.end(ended)] if ended else []
     return [*sorted(found, key=lambda event: (event[0], event[2])), *end]
@@ -30,7 +29,5 @@ def events(run: Reviewed) -> list[Event]:
 
 def _changes(run: Reviewed) -> Iterator[Change]:
     """Changes that its scenario planned and that it came to, and those that were made by hand."""
-    for event in run.record.scenario.get("event", ()):
-        if (tick := first_tick(event["t_s"] / run.period_s)) < len(run.table):
-            yield Change(tick, event["set"], from_now_on(event["set"], event["value"], event["t_s"]))
+    yield from planned(run.record.scenario, run.period_s, len(run.every_tick))
     yield from run.record.journal

@@ -105,7 +105,9 @@ def _first(
 
 
 def _both(reference: Reviewed, run: Reviewed, name: str) -> tuple[Array, Array]:
-    of_reference, of_run = (each.table[name].reshape(len(each.table), -1) for each in (reference, run))
+    of_reference, of_run = (
+        each.every_tick[name].reshape(len(each.every_tick), -1) for each in (reference, run)
+    )
     return of_reference, of_run
 
 

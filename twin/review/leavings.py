@@ -13,6 +13,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.file import join
 from spheretwin.models.telemetry.parts import read_schema
 from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin.review.held import held
 
 RECORDINGS = (".rrd",)
 
@@ -89,15 +90,15 @@ def recover(path: Path, out: Path) -> Recovered:
         rows = join(parts, out)
         return Recovered(rows, rows * period_s)
     if left.suffix in RECORDINGS or is_recording(left):
-        from spheretwin.viz.recording import messages, reading  # Rerun is slow to import
+        from spheretwin.viz.reading import messages, reading  # Rerun is slow to import
 
         if messages.extent(left).ended:
             raise InputError(
                 f"recover {left}: expected a recording that was not closed, received a whole one"
             )
         recorded = reading.rewrite(left, out)
-        rows = len(recorded.table)
-        return Recovered(rows, rows * recorded.facts["sections"]["controller"]["period_s"])
+        period_s = recorded.facts["sections"]["controller"]["period_s"]
+        return Recovered(len(recorded.table), len(held(recorded.table, period_s)) * period_s)
     read_parquet(left, rows=False)  # what is no telemetry is told as such
     raise InputError(f"recover {left}: expected what a killed process left, received a whole telemetry file")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,12 @@ from spheretwin.models.telemetry.record import RunRecord
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.twin.review import leavings
-from spheretwin.viz.recording.events import Event
+from spheretwin.twin.review.held import held, ticks_of
+from spheretwin.twin.review.journal import logged
+from spheretwin.viz.recording.parts.events import Event
+
+# In the metadata of columns that were exported of a recording that does not keep every row.
+_RATE = "record_rate_Hz"
 
 
 @dataclass(frozen=True)
@@ -27,13 +33,15 @@ class Reviewed:
     record : RunRecord
         Scenario at the start, command journal, versions, and how it ended.
     table : Table
-        Its telemetry.
+        Its telemetry, as the file has it.
     log : tuple of Event
         Lines that were logged; of a telemetry file, which has no log, none.
     whole : bool
         Whether the file was closed.
     metadata : mapping of str
         The record as a telemetry file keeps it.
+    rate_Hz : float or None
+        Rows a second that the file keeps beside those that stand out; None for every row.
     """
 
     path: Path
@@ -42,6 +50,7 @@ class Reviewed:
     log: tuple[Event, ...]
     whole: bool
     metadata: Mapping[str, str]
+    rate_Hz: float | None = None
 
     @property
     def period_s(self) -> float:
@@ -51,7 +60,12 @@ class Reviewed:
     @property
     def simulated_s(self) -> float:
         """Time that its rows cover, s."""
-        return len(self.table) * self.period_s
+        return len(self.every_tick) * self.period_s
+
+    @cached_property
+    def every_tick(self) -> Table:
+        """A row a tick: where the file does not keep every one, each is held until the next."""
+        return held(self.table, self.period_s) if self.rate_Hz else self.table
 
 
 def read(path: Path) -> Reviewed:
@@ -76,19 +90,25 @@ def read(path: Path) -> Reviewed:
 
 
 def _of_telemetry(path: Path, table: Table, metadata: dict[str, str], *, whole: bool) -> Reviewed:
-    return Reviewed(path, RunRecord.from_metadata(metadata), table, (), whole, metadata)
+    rate_Hz = float(metadata[_RATE]) if _RATE in metadata else None
+    return Reviewed(path, RunRecord.from_metadata(metadata), table, (), whole, metadata, rate_Hz)
 
 
 def _of_recording(path: Path) -> Reviewed:
-    from spheretwin.viz.recording import reading  # Rerun is slow to import
+    from spheretwin.viz.reading import reading  # Rerun is slow to import
+    from spheretwin.viz.recording.parts.described import RATE
 
     facts, table, log, whole = reading.read(path)
     statuses = {status.told: status for status in Status}
-    # Without ticks: what was set on the way is text in a recording, and cannot be run again.
-    record = RunRecord(
-        _scenario(facts), (), 0, {}, facts["versions"], statuses.get(log[-1][2] if log else "")
-    )
-    return Reviewed(path, record, table, tuple(log), whole, record.metadata())
+    scenario, status = _scenario(facts), statuses.get(log[-1][2] if log else "")
+    period_s = float(scenario["controller"]["period_s"])
+    ticks = int(ticks_of(table, period_s)[-1]) + 1 if len(table) else 0
+    journal = logged(log, scenario, period_s, ticks)
+    record = RunRecord(scenario, journal, ticks, {}, facts["versions"], status)
+    rate_Hz, metadata = facts.get(RATE), record.metadata()
+    if rate_Hz:
+        metadata = {**metadata, _RATE: repr(rate_Hz)}
+    return Reviewed(path, record, table, tuple(log), whole, metadata, rate_Hz)
 
 
 def _scenario(facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -40,12 +40,35 @@ def peaks(values: Array, period_s: float) -> list[Peak]:
     n = len(values)
     if n < FEWEST_ROWS or not np.all(np.isfinite(values)):
         return []
-    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
-    lines = np.abs(np.fft.rfft((values - values.mean()) * window))
+    lines = _lines(values)
     inner = np.arange(_APART, len(lines) - 1)
     tops = inner[(lines[inner] > lines[inner - 1]) & (lines[inner] >= lines[inner + 1])]
     strongest = tops[np.argsort(-lines[tops], kind="stable")][:PEAKS]
     return [_between(lines, int(top), n, period_s) for top in strongest]
+
+
+def amplitudes(values: Array, period_s: float) -> tuple[Array, Array]:
+    """Frequencies above zero, Hz, and the amplitude at each of the oscillation that it would be alone.
+
+    Parameters
+    ----------
+    values : (n,) array
+        A column; one with gaps, or too short, has no spectrum.
+    period_s : float
+        Time between rows, s.
+    """
+    n = len(values)
+    if n < FEWEST_ROWS or not np.all(np.isfinite(values)):
+        return np.empty(0), np.empty(0)
+    lines = _lines(values)
+    return np.arange(1, len(lines)) / (n * period_s), 4 * lines[1:] / n
+
+
+def _lines(values: Array) -> Array:
+    """Of the column about its mean, under Hann's window."""
+    n = len(values)
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
+    return np.abs(np.fft.rfft((values - values.mean()) * window))
 
 
 def _between(lines: Array, top: int, rows: int, period_s: float) -> Peak:

@@ -11,19 +11,26 @@ from spheretwin.models.base.files import make_folder, whole_file
 from spheretwin.viz.figures.drawing import Drawing
 
 
-def prepare(folder: Path) -> None:
+def prepare(folder: Path, *libraries: str) -> None:
     """Find out before a run whether a page can be drawn and written, and leave an empty folder.
+
+    Parameters
+    ----------
+    folder : Path
+    *libraries : str
+        What draws, beside matplotlib.
 
     Raises
     ------
     InputError
-        matplotlib is not installed, or the folder cannot be made or written to.
+        A library is not installed, or the folder cannot be made or written to.
     """
-    if find_spec("matplotlib") is None:
-        raise InputError(
-            "output: expected the extra `spheretwin[plots]` to draw figures,"
-            " received an installation without matplotlib"
-        )
+    for library in ("matplotlib", *libraries):
+        if find_spec(library) is None:
+            raise InputError(
+                "output: expected the extra `spheretwin[plots]` to draw figures,"
+                f" received an installation without {library}"
+            )
     make_folder(folder)
 
 

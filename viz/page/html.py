@@ -1,4 +1,4 @@
-"""A page of Markdown as HTML that stands alone: no script, no font, no request to any host."""
+"""A page of Markdown as HTML that stands alone: no font, no request to any host, of itself no script."""
 
 from __future__ import annotations
 
@@ -53,13 +53,30 @@ def page(title: str, markdown: str, figures: Path | None = None) -> str:
     figures : Path, optional
         Folder of its figures, which are put into the page; it refers to their files unless given.
     """
+    return whole(title, rendered(markdown, figures))
+
+
+def rendered(markdown: str, figures: Path | None = None) -> str:
+    """What a page shows of Markdown; as in `page`."""
     reader = MarkdownIt("commonmark", {"html": False}).enable("table")
     reader.add_render_rule("table_open", _table_opens)
     reader.add_render_rule("table_close", _table_closes)
     tokens = reader.parse(markdown)
     if figures:
         _put_in(tokens, figures)
-    body = reader.renderer.render(tokens, reader.options, {})
+    return str(reader.renderer.render(tokens, reader.options, {}))
+
+
+def whole(title: str, body: str, head: str = "") -> str:
+    """A page of what it shows.
+
+    Parameters
+    ----------
+    title : str
+        As it is, without markup.
+    body, head : str
+        HTML.
+    """
     return "\n".join(
         [
             "<!doctype html>",
@@ -69,6 +86,7 @@ def page(title: str, markdown: str, figures: Path | None = None) -> str:
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(title)}</title>",
             f"<style>{STYLE}</style>",
+            *([head] if head else []),
             "</head>",
             "<body>",
             "<main>",

@@ -2,64 +2,100 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import subprocess
-import sys
-import urllib.parse
-from pathlib import Path
+from uuid import uuid4
 
 import rerun as rr
-import rerun_cli
 
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.telemetry.facts import RunFacts
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.viz.layout.layout import opening_layout
+from spheretwin.viz.layout.view import OVERVIEW
+from spheretwin.viz.recording.parts.part import Subject
+from spheretwin.viz.recording.stream import Stream
+from spheretwin.viz.recording.thinning import Firsts
+from spheretwin.viz.recording.viewer.broadcast import Broadcast
+from spheretwin.viz.recording.viewer.framing import HEADER_BYTES, messages
+from spheretwin.viz.recording.viewer.server import ViewerServer
 
-HOST = "127.0.0.1"
+# More than a plot has pixels for; few enough for a viewer that draws in software.
+LIVE_RATE_Hz = 100.0
 
-# Kept for viewers that join late; the oldest data make room first.
-SERVER_MEMORY = "500MB"
+# Recorded together: each entity costs some kilobytes each time, and a viewer that draws in software takes no
+# more than a hundred of these a second.
+_TOGETHER_S = 0.25
 
 
-class Viewer:
-    """A server for the data and one for the viewer's page, both on 127.0.0.1.
+class LiveView(Stream):
+    """Takes a run's telemetry chunk by chunk and shows it to any number of viewers.
 
-    The viewer runs as a process of its own with an explicit address: Rerun's calls that start one from
-    Python listen on every interface.
+    None of them is waited for: they read what is kept in memory, which is bounded, and one that is too far
+    behind goes on with the newest. The page answers from the moment this is made.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Drawn; has as many groups as the telemetry has currents.
+    signals : tuple of Signal
+        Columns of the telemetry.
+    facts : RunFacts
+        For the text panel, the axes and the drawing.
+    shown : str
+        The view that is open at first, one of `VIEWS`.
+
+    Raises
+    ------
+    InputError
+        A mesh of the model cannot be read.
+    SpheretwinError
+        Rerun's viewer is not there.
     """
 
-    def __init__(self) -> None:
-        self.sink = rr.GrpcServerSink(HOST, _free_port(), server_memory_limit=SERVER_MEMORY)
-        self._web_port = _free_port()
-        self._process: subprocess.Popen[bytes] | None = None
+    def __init__(
+        self, actuator: Actuator, signals: tuple[Signal, ...], facts: RunFacts, *, shown: str = OVERVIEW
+    ) -> None:
+        subject = Subject(actuator, signals, facts, True, shown, uuid4().hex, LIVE_RATE_Hz)
+        super().__init__(subject, Firsts(LIVE_RATE_Hz))
+        self._together = max(1, round(_TOGETHER_S / facts.sections["controller"]["period_s"]))
+        self._bytes = rr.binary_stream(self.recording)
+        self._broadcast = Broadcast()
+        self._begun = False
+        self._server = ViewerServer(self._broadcast)
+        self.begin()
 
     @property
     def address(self) -> str:
         """Page to open in a browser."""
-        return f"http://{HOST}:{self._web_port}/?url={urllib.parse.quote(self.sink.uri, safe='')}"
+        return self._server.address
 
-    def start(self) -> None:
-        """Serve the page."""
-        program = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
-        options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(self._web_port), self.sink.uri]
-        try:
-            self._process = subprocess.Popen(
-                [program, *options],
-                env={**os.environ, "RERUN_APP_ONLY": "true", "RUST_LOG": "error"},
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            )
-        except OSError as error:
-            raise SpheretwinError(f"viewer: expected Rerun's viewer at {program}, {error}") from None
+    def connect(self) -> None:
+        """Send the layout before all else."""
+        self.recording.send_blueprint(opening_layout(self.view))
 
-    def close(self) -> None:
-        """End the page's server."""
-        if self._process:
-            self._process.terminate()
-            self._process.wait()
+    def due(self) -> int:
+        """Rows that are recorded together."""
+        return self._together
 
+    def send(self) -> None:
+        """Give viewers what was recorded since the last time."""
+        encoded = self._bytes.read() or b""
+        if not self._begun:
+            self._begun = True
+            self._broadcast.begin(encoded[:HEADER_BYTES] + messages(encoded))
+        elif piece := messages(encoded):
+            self._broadcast.send(piece)
 
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
+    def complete(self) -> None:
+        """Serve nobody any more.
+
+        Raises
+        ------
+        SpheretwinError
+            Some of the view could not be made.
+        """
+        self._broadcast.end()
+        self._server.close()
+        self.recording.disconnect()
+        if self.fault:
+            raise SpheretwinError(f"live view: {self.fault}")

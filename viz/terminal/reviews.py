@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -79,23 +79,23 @@ def _peak(peak: dict[str, float]) -> str:
 
 
 def _print_differences(runs: Sequence[dict[str, Any]]) -> None:
-    """A column a run: its figures, and behind each how far it is from that of the first."""
-    table = style.table(
-        f"{len(runs)} runs, differences from the first", "angles in mrad (degrees)", *map(_heading, runs)
-    )
+    title = f"{len(runs)} runs, differences from the first"
+    table = style.table(title, "angles in mrad (degrees)", *(Path(run["path"]).name for run in runs))
+    for label, *cells in differences(runs):
+        table.add_row(label, *map(escape, cells))
+    style.console().print(table)
+
+
+def differences(runs: Sequence[dict[str, Any]]) -> Iterator[list[str]]:
+    """Facts and figures, each with a cell a run: of the others also how far each is from the first's."""
     for name in FACTS:
-        table.add_row(name, *(escape("–" if run[name] is None else f"{run[name]}") for run in runs))
+        yield [name, *("–" if run[name] is None else f"{run[name]}" for run in runs)]
     for row in ROWS:
         for place, axis in enumerate(ANGLES) if row.each_axis else ((None, ""),):
             values = [_entry(run[row.key], place) for run in runs]
             told = [_figure(values[0], row.unit)]
             told += [_beside(values[0], each, row.unit) for each in values[1:]]
-            table.add_row(f"{row.label} {axis}".strip(), *told)
-    style.console().print(table)
-
-
-def _heading(run: dict[str, Any]) -> str:
-    return Path(run["path"]).name
+            yield [f"{row.label} {axis}".strip(), *told]
 
 
 def _entry(value: Any, place: int | None) -> float | None:

@@ -1,5 +1,6 @@
 """The command as its users meet it: a process, its exit code, its two streams."""
 
+import contextlib
 import json
 import os
 import re
@@ -124,19 +125,29 @@ def test_termination_keeps_the_run_too(tmp_path):
     assert len(read_parquet(telemetry)[0]) < 60_000
 
 
-def test_live_serves_on_this_machine_alone():
+def test_live_serves_on_this_machine_alone_and_answers_when_it_tells_where():
     process = started("simulate", "hold", "--live", "--duration", "20")
     try:
         line = process.stderr.readline()
-        page = re.search(r"http://127\.0\.0\.1:(\d+)/", line)
+        page = re.fullmatch(r"watch: http://127\.0\.0\.1:(\d+)/\n", line)
         assert page, line
-        data = re.search(r"127\.0\.0\.1%3A(\d+)", line)
-        for port in (int(page[1]), int(data[1])):
-            _wait_for(lambda port=port: _answers("127.0.0.1", port))
-            assert _listening_hosts(port) == {"127.0.0.1"}
+        assert _answers("127.0.0.1", int(page[1]))
+        assert _listening_hosts(int(page[1])) == {"127.0.0.1"}
+        assert _ports_of(process.pid) == {int(page[1])}
     finally:
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=30)
+
+
+def _ports_of(pid):
+    """Ports on which a process listens, from the kernel's tables."""
+    own = set()
+    for link in Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # it has closed it
+            own.add(os.readlink(link))
+    tables = [Path("/proc/net", name).read_text().splitlines()[1:] for name in ("tcp", "tcp6")]
+    rows = [row.split() for table in tables for row in table]
+    return {int(row[1].split(":")[1], 16) for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in own}
 
 
 def _listening_hosts(port):
@@ -155,13 +166,6 @@ def _answers(host, port):
     with socket.socket() as probe:
         probe.settimeout(1)
         return probe.connect_ex((host, port)) == 0
-
-
-def _wait_for(condition, seconds=60):
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.05)
 
 
 INSTALLED = [str(Path(sys.executable).with_name("spheretwin"))]

@@ -21,6 +21,7 @@ def test_facts_are_the_resolved_scenario_s():
     assert facts.description == session.begun_as.description
     assert facts.current_limit_A == session.actuator.group.current_limit_A
     assert facts.payload_kg == 0.05
+    assert facts.gravity_m_s2 == session.begun_as.plant.gravity_m_s2 == 9.81
     assert facts.mjcf == actuators.MJCF_PATH
     assert facts_of(begun(**{"drive.current_limit_A": 4.0}).begun_as).current_limit_A == 4.0
 

@@ -53,7 +53,7 @@ def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
             np.testing.assert_array_equal(one.kept, other.kept)
     more = planned(made, seeds=5)
     carried_out(more, memory=remembering(more))
-    assert [scenario.seed for scenario in ran[4:]] == [3, 4]
+    assert sorted(scenario.seed for scenario in ran[4:]) == [3, 4]  # threads begin in any order
 
 
 def test_what_was_run_before_an_interruption_is_kept(ran, monkeypatch):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin.review.spectrum import PEAKS, peaks
+from spheretwin.twin.review.spectrum import PEAKS, amplitudes, peaks
 from spheretwin.twin.review.work import angular_velocity, mechanical_work_J
 
 PERIOD_s = 1e-3
@@ -54,3 +54,18 @@ def test_work_is_torque_times_angle():
     # A sum of a thousand terms.
     assert mechanical_work_J(table, PERIOD_s) == pytest.approx(0.3 * 2.0 * 1.0, rel=1e-12)
     assert mechanical_work_J(table.rows(0, 0), PERIOD_s) is None
+
+
+def test_a_spectrum_has_at_a_line_the_amplitude_of_what_oscillates_there():
+    t = np.arange(2000) * PERIOD_s
+    frequency_Hz, amplitude = amplitudes(0.3 * np.sin(2 * np.pi * 50 * t) + 7.0, PERIOD_s)
+    assert len(frequency_Hz) == len(amplitude) == 1000
+    assert frequency_Hz[99] == 50.0  # a whole number of lines
+    # Hann's window keeps an oscillation on a line to rounding, and half of it on both beside.
+    np.testing.assert_allclose(amplitude[98:101], [0.15, 0.3, 0.15], rtol=1e-12)
+    assert amplitude[:90].max() < 1e-12
+
+
+def test_what_is_too_short_or_has_gaps_has_no_spectrum():
+    for values in ([0.0] * 15, [np.nan] * 100):
+        assert [len(each) for each in amplitudes(np.array(values), PERIOD_s)] == [0, 0]

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from spheretwin.models import actuator as actuators
@@ -14,8 +15,11 @@ from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.viz import palette
-from spheretwin.viz.recording import blueprint, scene
+from spheretwin.viz.layout.layout import layout
+from spheretwin.viz.layout.paths import entity
+from spheretwin.viz.layout.view import View, application
 from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.scene import paths as scene
 
 LAYER = 'count="12" euler="0 0 30"'
 ROWS = 40
@@ -62,12 +66,12 @@ def test_a_variant_is_recorded_with_its_own_groups(variant, tmp_path):
         recorder.finish("completed")
     path = tmp_path / "run.rrd"
 
-    currents = one_row_each(path, blueprint.entity("current_A"), "Scalars:scalars")
+    currents = one_row_each(path, entity("current_A"), "Scalars:scalars")
     np.testing.assert_array_equal(currents, table["current_A"])
-    (names,) = one_row_each(path, blueprint.entity("current_A"), "SeriesLines:names")
+    (names,) = one_row_each(path, entity("current_A"), "SeriesLines:names")
     assert names == [f"current group {j} [A]" for j in range(groups)]
-    (colours,) = one_row_each(path, blueprint.entity("current_A"), "SeriesLines:colors")
-    assert len(set(colours)) == groups
+    (colours,) = one_row_each(path, entity("current_A"), "SeriesLines:colors")
+    assert len(colours) == groups
 
     (shape,) = one_row_each(path, scene.COILS, "Mesh3D:albedo_texture_format")
     assert shape[0]["width"] == 2 * groups
@@ -79,8 +83,18 @@ def test_a_variant_is_recorded_with_its_own_groups(variant, tmp_path):
 
 
 def test_the_layout_names_the_number_of_groups_and_is_one_of_its_own():
-    views = [blueprint.View(1.0, 8.0, groups, (), False) for groups in (12, 18, 24)]
+    views = [View(1.0, 8.0, groups, (), False) for groups in (12, 18, 24)]
     for view in views:
-        left, _ = blueprint.layout(view).root_container.contents
-        assert left.contents[1].name == f"currents of the {view.groups} groups [A]"
-    assert len({blueprint.application(view) for view in views}) == 3
+        told = f"currents of groups 0 (lowest) to {view.groups - 1}: blue -8 A, red +8 A"
+        assert told in titles(layout(view))
+    assert len({application(view) for view in views}) == 3
+
+
+def titles(blueprint):
+    """Names of all views."""
+    waiting, found = [blueprint.root_container], []
+    while waiting:
+        part = waiting.pop()
+        waiting += getattr(part, "contents", ()) if isinstance(part, rrb.Container) else ()
+        found.append(part.name)
+    return found

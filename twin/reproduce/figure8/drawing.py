@@ -55,7 +55,7 @@ def errors(runs: Runs) -> Drawing:
 def paths(runs: Runs) -> Drawing:
     """Paths of the shaft tip of the first seed."""
     from spheretwin.viz.figures.tracking import paths as figures
-    from spheretwin.viz.recording.scene import shaft_tip
+    from spheretwin.viz.scene.poses import shaft_tip
 
     actuator, desired = actuators.load(), _longest(runs)
     by_label = {

@@ -13,7 +13,7 @@ from spheretwin.twin.reproduce.laws import Compared
 from spheretwin.twin.simulation import Run
 
 if TYPE_CHECKING:
-    from spheretwin.viz.recording.flights import Flight
+    from spheretwin.viz.merged.flights import Flight
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def keep(run: Run) -> Flown:
 
 def side_by_side(runs: Mapping[Compared, Outcome]) -> dict[str, Flight]:
     """Runs of the first seed for a recording, by the labels of their laws."""
-    from spheretwin.viz.recording.flights import Flight
+    from spheretwin.viz.merged.flights import Flight
 
     return {
         compared.label: Flight(compared.law, *outcome.kept.course)

@@ -1,0 +1,97 @@
+"""Take the pictures that the READMEs show: ``python tests/screenshots/take.py [--out DIR] [NAME ...]``.
+
+Each is a run made anew, recorded, and drawn by Rerun's viewer without a screen.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+from viewer import HeadlessViewer
+
+PICTURES = Path(__file__).parents[2] / "viz" / "pictures"
+WIDTH, HEIGHT = 1280, 800
+
+# A picture of an interface has few colours: these are enough for its shaded coils, in a fifth of the bytes.
+COLOURS = 256
+
+
+class Picture(NamedTuple):
+    """A moment of a run, in one of its views."""
+
+    runs: tuple[str, ...]
+    """Scenario and flags of each; two or more are merged."""
+    view: str
+    t_s: float
+
+
+FAILING = "sinusoid --controller.law pd --disturbance.load 2"
+
+TABLE = {
+    "overview": Picture(("nutation",), "overview", 3.4),
+    "control": Picture(("nutation",), "control", 3.4),
+    "coils": Picture(("sinusoid --plant.payload-kg 0.1 --disturbance.load 2",), "coils", 3.3),
+    "hardware": Picture(
+        ("tilt --hardware prototype --fault.0.target coil.04 --fault.0.mode open --fault.0.start-s 3",),
+        "hardware",
+        4.4,
+    ),
+    "compare": Picture(
+        ("sinusoid --controller.law pd", "sinusoid --controller.law adaptive_fuzzy", "sinusoid"),
+        "compare",
+        3.4,
+    ),
+    "failed": Picture((FAILING,), "overview", 1.2),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(TABLE)}; all unless given")
+    parser.add_argument("--out", type=Path, default=PICTURES, metavar="DIR")
+    parser.add_argument("--size", default=f"{WIDTH}x{HEIGHT}", metavar="WIDTHxHEIGHT")
+    options = parser.parse_args()
+    for name in options.names:
+        if name not in TABLE:
+            parser.error(f"expected one of {', '.join(TABLE)}, received {name}")
+    options.out.mkdir(parents=True, exist_ok=True)
+    width, height = map(int, options.size.split("x"))
+    with tempfile.TemporaryDirectory() as folder:
+        for name in options.names or TABLE:
+            recording = recorded(TABLE[name], Path(folder) / name)
+            with HeadlessViewer(width, height) as viewer:  # each anew: a viewer keeps what it was shown last
+                viewer.open(recording)
+                picture = viewer.at(TABLE[name].t_s)
+                for fault in viewer.faults():
+                    print(f"{name}: {fault}", file=sys.stderr)
+            path = options.out / f"{name}.png"
+            picture.quantize(COLOURS).save(path, optimize=True)
+            print(path)
+
+
+def recorded(picture: Picture, folder: Path) -> Path:
+    """Recording of the picture's run, or of all its runs side by side."""
+    folder.mkdir()
+    paths = [folder / f"{place}.rrd" for place in range(len(picture.runs))]
+    for run, path in zip(picture.runs, paths, strict=True):
+        view = [] if len(paths) > 1 else ["--view", picture.view]
+        spheretwin("simulate", *run.split(), *view, "--record", path)
+    if len(paths) == 1:
+        return paths[0]
+    spheretwin("review", *paths, "--merge", folder / "merged.rrd")
+    return folder / "merged.rrd"
+
+
+def spheretwin(*arguments: str | Path) -> None:
+    """Run the command; a run that ends early is a picture too."""
+    command = [sys.executable, "-m", "spheretwin.twin.cli", *arguments, "--json"]
+    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
+    if done.returncode == 2:
+        raise SystemExit(done.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""Ranges and titles made of what a run has shown."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.viz.layout.seen import CLIPPED_FROM, Channel, Seen, nice
+
+T_s = np.arange(100) * 0.1
+ERROR = Channel("error")
+
+
+def seen(values, ended_s=None):
+    """A run whose only channel is within ± these values."""
+    high = np.asarray(values, dtype=np.float64).reshape(len(T_s), -1)
+    return Seen(T_s, {"error": -high}, {"error": high}, ended_s)
+
+
+def with_transient(peak, settled, spans):
+    return np.where(np.arange(len(T_s)) < spans, peak, settled)
+
+
+def test_a_settled_error_is_legible_beside_its_transient():
+    of = seen(with_transient(31.0, 0.5, 4))
+    limit = of.limit(ERROR, least=0.1)
+    assert 0.5 < limit <= 1.0
+    assert of.beyond(limit, ERROR) == ", to 31 in first 0.4 s"
+
+
+def test_a_transient_that_is_not_much_larger_is_drawn():
+    of = seen(with_transient(0.9 * CLIPPED_FROM * 0.5, 0.5, 4))
+    limit = of.limit(ERROR, least=0.1)
+    assert limit > 0.9 * CLIPPED_FROM * 0.5
+    assert of.beyond(limit, ERROR) == ""
+
+
+def test_a_long_error_is_no_transient():
+    of = seen(with_transient(10.0, 0.1, 30))
+    assert of.limit(ERROR, least=0.1) > 10.0
+
+
+def test_an_error_of_the_second_half_is_always_drawn():
+    values = np.full(len(T_s), 0.1)
+    values[80] = 40.0
+    assert seen(values).limit(ERROR, least=0.1) > 40.0
+
+
+def test_noise_does_not_look_like_something():
+    of = seen(np.full(len(T_s), 1e-6))
+    assert of.limit(ERROR, least=0.1) >= 0.1
+    low, high = of.band(ERROR, least=0.1)
+    assert (low, high) == pytest.approx((-0.1, 0.1))
+
+
+def test_plots_that_are_compared_have_one_range():
+    of = seen(np.stack([np.full(len(T_s), 1.0), np.full(len(T_s), 9.0)], axis=1))
+    assert of.limit(ERROR, least=0.1) > 9.0
+    assert of.limit(Channel("error", 0), least=0.1) < 2.0
+
+
+def test_what_a_run_did_not_have_all_the_time_bounds_nothing():
+    values = np.full(len(T_s), np.nan)
+    values[:50] = 3.0
+    assert seen(values).limit(ERROR, least=0.1) == 4.0
+    assert seen(values * np.nan).limit(ERROR, least=0.1) >= 0.1
+    assert seen(values).band(ERROR, least=0.1) == pytest.approx((-3.3, 3.3))
+
+
+@given(st.floats(1e-9, 1e9))
+def test_a_nice_number_is_just_above(value):
+    # The next one is at most half as large again; a value within 1e-9 of a nice number is that number.
+    assert value * (1 - 2e-9) <= nice(value) <= 1.5 * value * (1 + 1e-9)
+    assert float(f"{nice(value):.1e}") == pytest.approx(nice(value), rel=1e-12)

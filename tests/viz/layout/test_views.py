@@ -1,0 +1,176 @@
+"""Views name only what is there, whatever the hardware, the law and the faults."""
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from spheretwin.models.telemetry.signals import COMMON_NAMES, common_signals
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.records.facts import facts_of
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+from spheretwin.viz.layout.view import AFTER_THE_END, VIEW_NAMES, View, application, shown_until_s
+from spheretwin.viz.layout.views.registry import VIEWS
+from spheretwin.viz.recording.recorder import Recorder
+
+OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detect": True}
+
+RUNS = {
+    "afsm": ("nutation", {}),
+    "pd": ("sinusoid", {"controller.law": "pd"}),
+    "pid": ("sinusoid", {"controller.law": "pid"}),
+    "observer": ("tilt", {"controller.law": "afsm_eso"}),
+    "prototype": ("hold", {"hardware": "prototype", "fault": [OPEN]}),
+    "around": (
+        "tilt",
+        {
+            "hardware": "prototype",
+            "controller.governor.acceleration_rad_s2": [20.0] * 3,
+            "controller.prediction.on": True,
+            "controller.feed_forward.inertia": [1.0] * 3,
+        },
+    ),
+    "failed": (
+        "sinusoid",
+        {
+            "controller.law": "pd",
+            "disturbance.load": 2.0,
+            "plant.modelling_error": 0.2,
+            "duration": 2.0,
+        },
+    ),
+}
+
+
+def recorded(path, name, fields, view="overview"):
+    """Recording of a brief run, and how it ended."""
+    fields = {"duration": 0.3, "plant.engine": "lagrangian", **fields}
+    with Session(scenarios.load(name, fields)) as session:
+        facts = facts_of(session.begun_as)
+        with Recorder(session.actuator, session.signals, facts, path=path, shown=view) as recorder:
+            return path, follow(session, session.begun_as.ticks, [recorder])
+
+
+@pytest.fixture(scope="module", params=RUNS)
+def run(request, tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("views") / f"{request.param}.rrd", *RUNS[request.param])
+
+
+def columns(path, store=None, below=""):
+    """Every value of every component, by entity and component."""
+    found = {}
+    for chunk in RrdReader(path).stream(store=store):
+        if not chunk.entity_path.startswith(below):
+            continue
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if ":" in name:
+                found.setdefault((chunk.entity_path, name), []).extend(batch.column(name).to_pylist())
+    return found
+
+
+def layouts(path):
+    """Both layouts of a recording, the brief one of its beginning first."""
+    found = [columns(path, store) for store in RrdReader(path).blueprints()]
+    return sorted(found, key=len)
+
+
+def contents(layout):
+    """What views show: paths of entities, or of all below an origin."""
+    origins = {
+        path: values[0][0] for (path, name), values in layout.items() if name == "ViewBlueprint:space_origin"
+    }
+    for (path, name), values in layout.items():
+        if name == "ViewContents:query":
+            for line in values[0]:
+                yield line.replace("$origin", origins[path.removesuffix("/ViewContents")]).replace("//", "/")
+
+
+def container_names(layout):
+    return {
+        entity.removeprefix("/"): values[0][0]
+        for (entity, name), values in layout.items()
+        if name == "ContainerBlueprint:display_name" and values[0]
+    }
+
+
+def exists(wanted, entities):
+    below = wanted.removesuffix("/**").removeprefix("+ ")
+    return any(entity == below or entity.startswith(f"{below}/") for entity in entities)
+
+
+def test_views_show_only_what_the_recording_holds(run):
+    path, _ = run
+    entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
+    for layout in layouts(path):
+        shown = list(contents(layout))
+        assert len(shown) > 5
+        assert [each for each in shown if not exists(each, entities)] == []
+
+
+def test_the_whole_layout_has_every_view_in_a_tab(run):
+    path, _ = run
+    _, whole = layouts(path)
+    names = container_names(whole)
+    (found,) = (
+        each
+        for (_, name), values in whole.items()
+        for each in values
+        if name == "ContainerBlueprint:contents" and len(each) == len(VIEW_NAMES)
+    )
+    assert tuple(names[each] for each in found) == VIEW_NAMES
+
+
+def test_the_names_of_views_are_those_of_the_registry():
+    assert tuple(VIEWS) == VIEW_NAMES
+
+
+@pytest.mark.parametrize("view", VIEW_NAMES)
+def test_the_chosen_view_is_open(view, tmp_path):
+    path, _ = recorded(tmp_path / "run.rrd", "hold", {"duration": 0.02}, view)
+    opening, whole = layouts(path)
+    active = [
+        each[0]
+        for (_, name), values in whole.items()
+        for each in values
+        if name == "ContainerBlueprint:active_tab" and each
+    ]
+    names = container_names(whole)
+    assert [names[each] for each in active if names.get(each) in VIEW_NAMES] == [view]
+    assert set(container_names(opening).values()) & set(VIEW_NAMES) == {view}
+
+
+def test_an_early_end_is_marked_in_plots_and_states(tmp_path):
+    path, status = recorded(tmp_path / "run.rrd", *RUNS["failed"])
+    assert status == "left_workspace"
+    found = {**columns(path, below="/ended"), **columns(path, below="/states")}
+    heights = np.array(found["/ended", "Scalars:scalars"])
+    assert np.all(heights[0] < -1e4)
+    assert np.all(heights[-1] > 1e4)
+    _, whole = layouts(path)
+    shown = [each for each in contents(whole) if each == "/ended"]
+    assert len(shown) > 10
+    assert found["/states/run", "StateChange:state"] == [["running"], ["left workspace"], ["left workspace"]]
+    completed, _ = recorded(tmp_path / "whole.rrd", "hold", {})
+    assert columns(completed, below="/ended") == {}
+
+
+def test_time_axes_show_that_a_run_has_ended_early():
+    assert shown_until_s(10.0, 1.0) == 1 + AFTER_THE_END
+    assert shown_until_s(1.01, 1.0) == 1.01
+
+
+def test_layouts_differ_by_application():
+    own = tuple(signal for signal in common_signals(18) if signal.name not in COMMON_NAMES)
+    view = View(1.0, 8.0, 18, own, live=False)
+    others = [
+        view._replace(duration_s=2.0),
+        view._replace(current_limit_A=4.0),
+        view._replace(groups=12),
+        view._replace(own=common_signals(18)[:2]),
+        view._replace(live=True),
+        view._replace(shown="coils"),
+        view._replace(run="another"),
+    ]
+    assert len({application(each) for each in (view, *others)}) == 1 + len(others)
+    assert application(view) == application(view._replace())

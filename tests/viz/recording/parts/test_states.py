@@ -1,0 +1,107 @@
+"""States become lanes of a timeline: whatever the chunks, each change once, at its own time, by its name."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rerun.chunk import RrdReader
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.table import Table, read_parquet
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.records.facts import facts_of
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+from spheretwin.viz.recording.parts.states import StateChanges
+from spheretwin.viz.recording.recorder import Recorder
+
+SIGNALS = (
+    Signal("t_s", "s", 1, "time"),
+    Signal("part", "1", 2, "how a part is", ("first one", "second"), ("works", "open", "short")),
+    Signal("alone", "1", 1, "how it is", states=("on", "off")),
+    Signal("current_A", "A", 1, "no state"),
+)
+ROWS = 30
+
+
+def table(values):
+    made = Table(SIGNALS, np.zeros((len(values), width(SIGNALS))))
+    made["t_s"][:] = 0.1 * np.arange(len(values))
+    made["part"][:], made["alone"][:] = values[:, :2], values[:, 2]
+    made["current_A"][:] = np.arange(len(values))
+    return made
+
+
+def lanes(whole, cuts):
+    changes, found = StateChanges(), {}
+    for first, last in zip([0, *cuts], [*cuts, len(whole)], strict=True):
+        for lane in changes.of(whole.rows(first, last)):
+            found.setdefault(lane.entity, []).extend(zip(lane.t_s.tolist(), lane.states, strict=True))
+    return found
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 2), st.integers(0, 2), st.integers(0, 1)), min_size=ROWS, max_size=ROWS
+    ),
+    st.sets(st.integers(1, ROWS - 1)),
+)
+def test_each_change_is_told_once_whatever_the_chunks(values, cuts):
+    whole = table(np.array(values, dtype=np.float64))
+    expected = {}
+    for column, entity in enumerate(("states/part/first-one", "states/part/second", "states/alone")):
+        names, before = ("on", "off") if column == 2 else SIGNALS[1].states, 0
+        for tick, row in enumerate(values):
+            if row[column] != before:
+                told = (whole["t_s"][tick], names[row[column]])
+                expected.setdefault(entity, []).append(told)
+                before = row[column]
+    assert lanes(whole, sorted(cuts)) == expected
+
+
+def test_a_recording_has_a_lane_for_what_fails_and_a_line_in_its_log(tmp_path):
+    fields = {
+        "duration": 0.2,
+        "plant.engine": "lagrangian",
+        "fault": [
+            {"target": "coil.07", "mode": "open", "start_s": 0.05, "end_s": 0.15, "known": True},
+            {"target": "adc", "mode": "dropout", "start_s": 0.1},
+        ],
+        "watchdog.on": True,
+    }
+    with Session(scenarios.load("hold", fields)) as session:
+        facts, path = facts_of(session.begun_as), tmp_path / "run.rrd"
+        with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
+            assert follow(session, 200, [recorder]) == "failsafe"
+    states, lines = {}, []
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if name.endswith("StateChange:state"):
+                told = [row[0] for row in batch.column(name).to_pylist()]
+                states.setdefault(chunk.entity_path.removeprefix("/states/"), []).extend(told)
+            if name.endswith("TextLog:text"):
+                lines += [row[0] for row in batch.column(name).to_pylist()]
+    assert states == {
+        "fault/coil.07": ["open", "works"],
+        "fault/adc": ["dropout"],
+        "group_out/group-7": ["known to be out", "in use"],
+        "failsafe_reason": ["no fresh measurement"],
+        "limits": ["within limits", "saturated"],
+        "run": ["running", "failsafe", "failsafe"],  # at the end, and at that of the time axes
+    }
+    for text in ("coil.07 open", "group 7 known to be out", "adc dropout", "watchdog: no fresh measurement"):
+        assert text in lines
+
+
+def test_names_of_states_are_kept_in_a_file(tmp_path):
+    table(np.zeros((2, 3))).write_parquet(tmp_path / "run.parquet", {})
+    read, _ = read_parquet(tmp_path / "run.parquet")
+    assert read.signals == SIGNALS
+
+
+@pytest.mark.parametrize("states", ["on", ("on", ""), ("a,b",), (1, 2)])
+def test_states_without_names_are_refused(states):
+    with pytest.raises(InputError, match="expected states as texts without commas"):
+        Signal("part", "1", 1, "how it is", states=states)

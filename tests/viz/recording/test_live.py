@@ -1,0 +1,145 @@
+"""A run that is watched: 100 rows a second at most, the same telemetry whoever watches, nothing outside."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.parse
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.commands.outputs import Outputs
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+from spheretwin.viz.reading.reading import read
+from spheretwin.viz.recording.live import LIVE_RATE_Hz
+from spheretwin.viz.recording.viewer.server import RECORDING
+from tests.browser import Browser, needs_a_browser
+
+CHANGES = {"plant.engine": "lagrangian", "duration": 1.5, "plant.modelling_error": 0.2}
+
+
+def flown(folder, name, live=True, watching=lambda address: None):
+    """A run's telemetry; `watching` is called with the page's address before it, and halfway through."""
+    telemetry = folder / f"{name}.parquet"
+    with Session(scenarios.load("hold", CHANGES)) as session:
+        files = Outputs(session, None, telemetry, live)
+        address = files._live.address if live else None
+        watching(address)
+        half = session.scenario.ticks // 2
+        follow(session, half, files.sinks, live=live)
+        watching(address)
+        follow(session, session.scenario.ticks, files.sinks, live=live)
+        assert files.close() == []
+    return telemetry
+
+
+def asking(address):
+    """A viewer that has asked for the recording."""
+    parts = urllib.parse.urlsplit(address)
+    viewer = socket.socket()
+    viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # full after the first kilobytes
+    viewer.connect((parts.hostname, parts.port))
+    viewer.sendall(f"GET {RECORDING} HTTP/1.0\r\nHost: {parts.netloc}\r\n\r\n".encode())
+    assert viewer.recv(12) == b"HTTP/1.0 200"
+    return viewer
+
+
+@pytest.fixture(scope="module")
+def headless(tmp_path_factory):
+    return read_parquet(flown(tmp_path_factory.mktemp("headless"), "headless", live=False))[0]
+
+
+def same(path, headless):
+    table = read_parquet(path)[0]
+    return table.signals == headless.signals and table.values.tobytes() == headless.values.tobytes()
+
+
+def test_telemetry_is_the_same_whoever_watches(tmp_path, headless):
+    stuck, killed = [], []
+
+    def kill_one(address):
+        for viewer in killed:
+            viewer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+            viewer.close()  # with a reset, as of a process that was killed
+        killed[:] = [] if killed else [asking(address)]
+
+    watchers = {
+        "absent": lambda address: None,
+        "takes nothing": lambda address: stuck.append(asking(address)),
+        "killed": kill_one,
+    }
+    for name, watching in watchers.items():
+        assert same(flown(tmp_path, name, watching=watching), headless), name
+    for viewer in stuck:
+        viewer.close()
+
+
+def test_a_viewer_gets_a_hundred_rows_a_second_and_every_event(tmp_path, headless):
+    (path := tmp_path / "seen.rrd").touch()
+    with Session(scenarios.load("hold", CHANGES)) as session:
+        files = Outputs(session, None, None, live=True)
+        follow(session, session.scenario.ticks, files.sinks)
+        viewer = urllib.request.urlopen(files._live.address.rstrip("/") + RECORDING)
+        assert files.close() == []
+        path.write_bytes(viewer.read())
+    seen = read(path)
+    assert len(seen.table) == LIVE_RATE_Hz * CHANGES["duration"]
+    assert seen.table.values.tobytes() == headless.values[::10].tobytes()
+    assert seen.events[-1][2] == "the run is complete"
+    np.testing.assert_allclose(seen.events[-1][0], headless["t_s"][-1])
+
+
+def test_a_killed_run_leaves_no_server():
+    """Nothing that it started goes on: the kernel closes its ports, and no process has its mark."""
+    mark = f"LIVE_MARK_{os.getpid()}"
+    command = [sys.executable, "-m", "spheretwin.twin.cli", "simulate", "hold", "--live", "--duration", "60"]
+    command += ["--plant.engine", "lagrangian"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, mark: "1"}
+    )
+    parts = urllib.parse.urlsplit(process.stderr.readline().split()[1])
+    asking(parts.geturl()).close()
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    until = time.monotonic() + 30
+    while marked(mark):
+        assert time.monotonic() < until, marked(mark)
+        time.sleep(0.01)
+    with socket.socket() as probe:
+        assert probe.connect_ex((parts.hostname, parts.port)) != 0
+
+
+def marked(mark):
+    """Processes that have a variable in their environment."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark.encode() in (process / "environ").read_bytes() and process.name != str(os.getpid()):
+                found.append((process / "cmdline").read_bytes())
+        except OSError:  # it has ended, or is another's
+            continue
+    return found
+
+
+@needs_a_browser
+def test_the_page_shows_the_run_and_asks_nothing_of_another_machine():
+    """In a browser of which every request is seen, its workers' too."""
+    with Session(scenarios.load("hold", CHANGES)) as session, Browser() as browser:
+        files = Outputs(session, None, None, live=True)
+        follow(session, session.scenario.ticks, files.sinks)
+        page = browser.open(files._live.address)
+        page.wait_for("window._handle !== undefined")
+        time.sleep(3)  # what it asks for some time after it has started
+        assert page.outside == []
+        assert page.errors == []
+        assert any(url.endswith(RECORDING) for url in page.requests)
+        assert page.evaluate("window._handle.has_panicked()") is False
+        assert files.close() == []

@@ -1,0 +1,164 @@
+"""What a thinned recording keeps: whole rows, all that stands out, however the rows come in chunks."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.table import Table
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.commands.outputs import Outputs, check_rate
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+from spheretwin.viz.reading.reading import read
+from spheretwin.viz.recording.parts.events import QUIET_S
+from spheretwin.viz.recording.thinning import WINDOW_S, Firsts, FirstsAndExtremes
+
+SIGNALS = (
+    Signal("t_s", "s", 1, "time"),
+    Signal("x_rad", "rad", 2, "a pair"),
+    Signal("allocation_scale", "1", 1, "share"),
+    Signal("fault", "1", 2, "states", ("a", "b"), ("fine", "open", "short")),
+)
+RATE_Hz = 60.0
+
+
+def made(ticks, signals=SIGNALS, first=0):
+    """Rows at 1 kHz: noise, some saturation that chatters, some changes of state."""
+    generator = np.random.default_rng(first)
+    table = Table(signals, generator.normal(size=(ticks, width(signals))))
+    t_s = (first + np.arange(ticks)) * 1e-3
+    table["t_s"][:] = t_s
+    at_limit = np.sin(2 * np.pi * t_s / 3.1) > 0.9
+    table["allocation_scale"][:] = np.where(at_limit & (generator.random(ticks) < 0.3), 0.7, 1.0)
+    table["fault"][:] = np.floor(t_s[:, None] / [4.1, 7.3]) % 3
+    return table
+
+
+def thinned(thinning, tables):
+    """Rows that are kept of tables that come one after the other."""
+    kept = [each for table in tables for each in thinning.take(table)]
+    return np.concatenate([each.values for each in [*kept, *thinning.rest()]])
+
+
+def slowly(table):
+    """The same rows, one by one."""
+    t_s, fault = table["t_s"], table["fault"]
+    bins, windows = (np.floor(t_s * per_s + 1e-6) for per_s in (RATE_Hz, 1 / WINDOW_S))
+    keep = {0}
+    for i in range(1, len(table)):
+        if bins[i] > bins[i - 1] or (fault[i] != fault[i - 1]).any():
+            keep.add(i)
+        if windows[i] > windows[i - 1]:
+            keep.add(i - 1)
+    keep.add(len(table) - 1)
+    for window in set(windows):
+        inside = [i for i in range(len(table)) if windows[i] == window]
+        for column in table.values.T:
+            keep |= {max(inside, key=lambda i, of=column: of[i]), min(inside, key=lambda i, of=column: of[i])}
+    saturated = [i for i in range(len(table)) if table["allocation_scale"][i] < 1]
+    for before, i, behind in zip([None, *saturated], saturated, [*saturated[1:], None], strict=False):
+        begins = before is None or t_s[i] - t_s[before] > QUIET_S
+        ends = behind is None or windows[behind] > windows[i] or t_s[behind] - t_s[i] > QUIET_S
+        if begins or ends:
+            keep.add(i)
+    return table.values[sorted(keep)]
+
+
+@pytest.fixture(scope="module")
+def long():
+    return made(25_300)
+
+
+@pytest.fixture(scope="module")
+def kept(long):
+    return thinned(FirstsAndExtremes(RATE_Hz), [long])
+
+
+def test_the_first_rows_of_bins_and_those_that_stand_out_are_kept_and_no_others(long, kept):
+    assert kept.tobytes() == slowly(long).tobytes()
+
+
+def test_every_window_has_its_extremes(long, kept):
+    of_all, of_kept = (np.floor(values[:, 0] / WINDOW_S + 1e-6) for values in (long.values, kept))
+    for window in range(3):
+        whole, some = long.values[of_all == window], kept[of_kept == window]
+        np.testing.assert_array_equal(some.max(axis=0), whole.max(axis=0))
+        np.testing.assert_array_equal(some.min(axis=0), whole.min(axis=0))
+
+
+@given(st.lists(st.integers(1, 25_299), max_size=12))
+def test_the_same_rows_however_they_come_in_chunks(long, kept, places):
+    ends = sorted({*places, len(long)})
+    chunks = [long.rows(first, last) for first, last in zip([0, *ends], ends, strict=False)]
+    assert thinned(FirstsAndExtremes(RATE_Hz), chunks).tobytes() == kept.tobytes()
+
+
+def test_a_change_of_columns_ends_a_window():
+    others = (*SIGNALS, Signal("sliding_s", "rad/s", 1, "of another law"))
+    thinning, before = FirstsAndExtremes(RATE_Hz), made(4000)
+    assert thinning.take(before) == []
+    (ended,) = thinning.take(made(2000, others, first=4000))
+    (rest,) = thinning.rest()
+    assert (ended.signals, rest.signals) == (SIGNALS, others)
+    assert ended.values.tobytes() == slowly(before).tobytes()
+
+
+@pytest.mark.parametrize("rate_Hz", [7.3, 60.0, 100.0, 1000.0])
+def test_firsts_are_one_of_each_bin_and_every_row_at_the_rate_of_the_rows(long, rate_Hz):
+    chunks = [long.rows(first, first + 37) for first in range(0, len(long), 37)]
+    t_s = thinned(Firsts(rate_Hz), chunks)[:, 0]
+    bins = np.floor(t_s * rate_Hz + 1e-6)
+    np.testing.assert_array_equal(bins, np.arange(int(np.floor(25.299 * rate_Hz + 1e-6)) + 1))
+    # The first of its bin: the row before it, 1 ms earlier, is of the bin before.
+    assert (np.floor((t_s[1:] - 1e-3) * rate_Hz + 1e-6) < bins[1:]).all()
+
+
+def recorded(path, rate_Hz=None):
+    """A run with faults, saturation, a change of law, and the events of all of these."""
+    changes = {
+        "plant.engine": "lagrangian",
+        "duration": 12.3,
+        "fault": [{"target": "coil.07", "mode": "open", "start_s": 0.3, "detect": True}],
+        "event": [{"t_s": 4.5, "set": "controller.law", "value": "pd"}],
+    }
+    with Session(scenarios.load("hold", changes)) as session:
+        files = Outputs(session, path, None, live=False, record_rate_Hz=rate_Hz)
+        follow(session, session.scenario.ticks, files.sinks)
+        assert files.close() == []
+    return read(path)
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """The same run with all of its rows, and thinned."""
+    folder = tmp_path_factory.mktemp("rates")
+    return recorded(folder / "all.rrd"), recorded(folder / "some.rrd", RATE_Hz)
+
+
+def test_a_thinned_recording_has_whole_rows_of_the_run_and_all_of_its_events(both):
+    every, some = both
+    assert (every.facts["record_rate_Hz"], some.facts["record_rate_Hz"]) == (None, RATE_Hz)
+    assert some.events == every.events
+    assert any("current limit" in text for _, _, text in some.events)
+    assert some.table.signals == every.table.signals
+    places = np.searchsorted(every.table["t_s"], some.table["t_s"])
+    assert some.table.values.tobytes() == every.table.values[places].tobytes()
+    assert len(some.table) < 0.2 * len(every.table)
+
+
+def test_extremes_of_a_thinned_recording_are_those_of_the_run(both):
+    every, some = both
+    for reduce in (np.nanmax, np.nanmin):
+        np.testing.assert_array_equal(reduce(some.table.values, axis=0), reduce(every.table.values, axis=0))
+    np.testing.assert_array_equal(some.table.values[-1], every.table.values[-1])
+
+
+def test_a_rate_that_no_run_has_the_rows_for_is_refused(tmp_path):
+    check_rate(1000.0, tmp_path / "run.rrd", 1e-3)
+    with pytest.raises(InputError, match="at most 1000 Hz"):
+        check_rate(1000.5, tmp_path / "run.rrd", 1e-3)
+    with pytest.raises(InputError, match="--record FILE"):
+        check_rate(60.0, None, 1e-3)

@@ -1,0 +1,58 @@
+"""How a recording is laid out: one view a question about the run, each in a tab."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import rerun.blueprint as rrb
+
+from spheretwin.viz.layout import panels
+from spheretwin.viz.layout.paths import TIMELINE
+from spheretwin.viz.layout.plots import Plots
+from spheretwin.viz.layout.seen import Seen
+from spheretwin.viz.layout.view import View
+from spheretwin.viz.layout.views.registry import VIEWS
+
+# The run in a line takes two lines of text.
+ROW_SHARES = (1, 10)
+
+
+def layout(view: View, seen: Seen | None = None) -> rrb.Blueprint:
+    """Blueprint of a run's recording.
+
+    Parameters
+    ----------
+    view : View
+        What it is made for.
+    seen : Seen, optional
+        What the run has shown; ranges and titles are made of it.
+    """
+    plots = Plots(view, seen)
+    tabs = [made(plots) for made in VIEWS.values()]
+    return _blueprint(rrb.Tabs(*tabs, active_tab=list(VIEWS).index(view.shown), name="views"), view)
+
+
+@lru_cache(maxsize=4)
+def opening_layout(view: View) -> rrb.Blueprint:
+    """Blueprint of a recording that is still written.
+
+    One that is watched has every view. A file has the one that is shown: a layout takes room, and when the
+    run has ended, the whole one with its ranges takes this one's place.
+    """
+    return layout(view) if view.live else _blueprint(VIEWS[view.shown](Plots(view, None)), view)
+
+
+def _blueprint(below: rrb.Container, view: View) -> rrb.Blueprint:
+    return rrb.Blueprint(
+        rrb.Vertical(panels.run_line(), below, row_shares=ROW_SHARES),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            play_state="following" if view.live else "playing",
+            loop_mode="off" if view.live else "all",
+        ),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )

@@ -1,0 +1,153 @@
+"""Plots over time: what stands in one, in which range, and what its title says."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.layout.paths import ENDED, STATES, derived, entity
+from spheretwin.viz.layout.seen import Channel, Seen
+from spheretwin.viz.layout.view import View, shown_until_s
+from spheretwin.viz.quantities.quantity import Quantity
+
+Range = tuple[float, float]
+
+
+class Line(NamedTuple):
+    """What is drawn: an entity, and the name under which its bounds are known."""
+
+    entity: str
+    name: str
+
+
+def signal(name: str) -> Line:
+    """A signal of the telemetry."""
+    return Line(entity(name), name)
+
+
+def quantity(of: Quantity) -> Line:
+    """A derived quantity."""
+    return Line(derived(of.name), of.name)
+
+
+class Plots:
+    """Makes the plots of one layout.
+
+    Parameters
+    ----------
+    view : View
+        What the layout is made for.
+    seen : Seen, optional
+        What the run has shown; without it, ranges follow the data.
+    """
+
+    def __init__(self, view: View, seen: Seen | None) -> None:
+        self.view, self.seen = view, seen
+
+    def about_zero(
+        self,
+        what: str,
+        unit: str,
+        *lines: Line,
+        least: float,
+        axis: int | None = None,
+        key: str = "",
+    ) -> rrb.TimeSeriesView:
+        """Plot whose range is that of the settled run; its title says what lies outside.
+
+        Parameters
+        ----------
+        what, unit : str
+            What is drawn, in which unit.
+        *lines : Line
+            The lines.
+        least : float
+            Half of the range at least.
+        axis : int, optional
+            The hinge whose entries are drawn; all of them unless given.
+        key : str
+            Ends the title: which line is which.
+
+        Notes
+        -----
+        Plots of the other hinges have the same range, so that what is small looks small. The title tells the
+        range: low plots have room for one number at their side.
+        """
+        if self.seen is None:
+            return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
+        limit = self.seen.limit(*(Channel(line.name) for line in lines), least=least)
+        told = self.seen.beyond(limit, *(Channel(line.name, axis) for line in lines))
+        return self._plot(f"{what} ±{_with_unit(limit, unit)}{told}{key}", lines, axis, (-limit, limit))
+
+    def above_zero(self, what: str, unit: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
+        """Plot of what is never negative, its range that of the settled run."""
+        if self.seen is None:
+            return self._plot(f"{what} [{unit}]", (line,), None, None)
+        limit = self.seen.limit(Channel(line.name), least=least)
+        told = self.seen.beyond(limit, Channel(line.name))
+        title = f"{what}, 0 to {_with_unit(limit, unit)}{told}"
+        return self._plot(title, (line,), None, (-0.02 * limit, limit))
+
+    def whole(
+        self,
+        what: str,
+        unit: str,
+        *lines: Line,
+        least: float,
+        axis: int | None = None,
+        key: str = "",
+    ) -> rrb.TimeSeriesView:
+        """Plot of all that some lines have shown, over a range of twice `least` at least."""
+        if self.seen is None:
+            return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
+        low, high = self.seen.band(*(Channel(line.name, axis) for line in lines), least=least)
+        told = f"{what}, {low:.3g} to {_with_unit(high, unit)}{key}"
+        return self._plot(told, lines, axis, (low, high))
+
+    def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:
+        """Plot of a range that is known before the run."""
+        return self._plot(title, lines, None, (low, high))
+
+    def states(self, name: str = "states") -> rrb.StateTimelineView:
+        """Lanes of states."""
+        axis = self._time_axis()
+        return rrb.StateTimelineView(origin=f"/{STATES}", name=name, time_view=axis)
+
+    def _plot(
+        self, title: str, lines: tuple[Line, ...], axis: int | None, band: Range | None
+    ) -> rrb.TimeSeriesView:
+        contents = [f"/{line.entity}" for line in lines]
+        if band and self.seen and self.seen.ended_s is not None:
+            contents.append(f"/{ENDED}")
+        one = [place == axis for place in range(len(ANGLES))]
+        return rrb.TimeSeriesView(
+            origin="/",
+            contents=contents,
+            name=title,
+            axis_x=self._time_axis(),
+            axis_y=rrb.ScalarAxis(range=band) if band else None,
+            plot_legend=rrb.PlotLegend(visible=False),
+            defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
+        )
+
+    def _time_axis(self) -> rrb.TimeAxis | None:
+        """Axis over the time that is planned, while it is watched, or until behind an early end.
+
+        Else none: it is as long as the data, and takes no room in the file.
+        """
+        if self.seen and self.seen.ended_s is not None:
+            last_s = shown_until_s(self.view.duration_s, self.seen.ended_s)
+        elif self.view.live:
+            last_s = self.view.duration_s
+        else:
+            return None
+        boundary = rrb.TimeRangeBoundary
+        whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=last_s))
+        return rrb.TimeAxis(view_range=whole)
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.3g}{'' if unit == '°' else ' '}{unit}"

@@ -1,0 +1,1 @@
+"""Layouts of a recording, each for one question about the run."""

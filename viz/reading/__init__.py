@@ -1,0 +1,1 @@
+"""Recordings read back, whole or as a killed process left them."""

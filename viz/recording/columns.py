@@ -1,0 +1,35 @@
+"""Arrays in the forms in which Rerun takes many rows at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.viz.layout.paths import TIMELINE
+
+Index = list[rr.TimeColumn]
+
+_SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
+
+
+def time_index(t_s: NDArray[np.float64]) -> Index:
+    """Times in whole nanoseconds: Rerun would cut the fraction of seconds off, a nanosecond too early."""
+    nanoseconds = np.round(t_s * 1e9).astype("timedelta64[ns]")
+    return [rr.TimeColumn(TIMELINE, duration=nanoseconds)]
+
+
+def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
+    """What `rr.Scalars.columns` makes of (n, size) values, at half its price."""
+    batch = rr.components.ScalarBatch(values.ravel())
+    return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
+
+
+def strips(segments: NDArray[np.float64]) -> pa.Array:
+    """Arrow form of equally long line strips (n, points, 3); Rerun's own conversion takes them one by one."""
+    kind = rr.components.LineStrip3DBatch([]).as_arrow_array().type
+    flat = pa.array(segments.ravel().astype(np.float32))
+    points = pa.FixedSizeListArray.from_arrays(flat, type=kind.value_type)
+    starts = np.arange(len(segments) + 1, dtype=np.int32) * segments.shape[1]
+    return pa.ListArray.from_arrays(pa.array(starts), points, type=kind)

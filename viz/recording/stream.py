@@ -1,0 +1,197 @@
+"""What follows a run into Rerun: the parts of a recording, made by a thread of its own."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from threading import Semaphore
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.telemetry.status import Level, Status, named
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.layout.view import application
+from spheretwin.viz.recording.parts.log import log_lines
+from spheretwin.viz.recording.parts.part import Rows, Subject
+from spheretwin.viz.recording.parts.registry import PARTS
+from spheretwin.viz.recording.thinning import Thinning
+from spheretwin.viz.scene.meshes import read_meshes
+
+# Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
+# does not gather in memory.
+PENDING_CHUNKS = 3
+
+
+class Stream(ABC):
+    """Takes a run's telemetry chunk by chunk, and makes its recording in a thread beside the simulation.
+
+    The thread leaves the interpreter free while the compiled loop runs. What goes wrong in it ends the
+    recording and is told when the recording closes, so that the run itself goes on.
+
+    Parameters
+    ----------
+    subject : Subject
+        What is recorded.
+    thinning : Thinning
+        Which rows are kept for the parts that do not need all.
+
+    Attributes
+    ----------
+    view : View
+        What the layout is made for.
+    recording : rr.RecordingStream
+        What the parts are recorded into.
+    fault : str or None
+        What went wrong in the thread.
+    rows_handed_over : int
+        To the thread, so far.
+
+    Raises
+    ------
+    InputError
+        A mesh of the model cannot be read.
+    """
+
+    def __init__(self, subject: Subject, thinning: Thinning) -> None:
+        rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
+        read_meshes(
+            subject.facts.mjcf
+        )  # a run needs no mesh, and would find out only now that one is missing
+        self.view = subject.view
+        self.recording = rr.RecordingStream(application(self.view))
+        self.recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
+        self.fault: str | None = None
+        self.rows_handed_over = 0
+        self._parts, self._thinning = [part(subject) for part in PARTS], thinning
+        self._waiting: list[Table] = []
+        self._closed = False
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
+        self._room = Semaphore(PENDING_CHUNKS)
+
+    @abstractmethod
+    def connect(self) -> None:
+        """Say where the recording goes, before anything is in it."""
+
+    @abstractmethod
+    def due(self) -> int:
+        """Rows that are recorded together."""
+
+    @abstractmethod
+    def send(self) -> None:
+        """Send on what was recorded since the last time."""
+
+    @abstractmethod
+    def complete(self) -> None:
+        """End where the recording goes, after all that is in it.
+
+        Raises
+        ------
+        SpheretwinError
+            Some of the recording could not be made or kept.
+        """
+
+    def __enter__(self) -> Stream:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def write(self, rows: Table) -> None:
+        """Record the rows of one chunk, which must not change any more; wait while many are pending."""
+        if not len(rows):
+            return
+        if self._waiting and rows.signals != self._waiting[-1].signals:
+            self._hand_over()
+        self._waiting.append(rows)
+        if sum(map(len, self._waiting)) >= self.due():
+            self._hand_over()
+
+    def note(self, t_s: float, text: str) -> None:
+        """Record what happened before the tick at `t_s`."""
+        self._hand_over()
+        self._submit(log_lines, self.recording, [(t_s, Level.INFO, text)])
+
+    def finish(self, status: Status) -> None:
+        """Record how the run ended."""
+        ending = named(status)  # a name that is none is told here, not in the recorder's thread
+        self._hand_over()
+        self._submit(self._finish, ending)
+
+    def close(self) -> None:
+        """Complete the recording. A second time does nothing.
+
+        Raises
+        ------
+        SpheretwinError
+            Some of it could not be made or kept.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        self._hand_over()
+        self._submit(self._write_rest)
+        self._worker.shutdown()
+        self.complete()
+
+    def begin(self) -> None:
+        """Have the thread record all that stays the same; nothing else is recorded before."""
+        self._submit(self._begin)
+
+    def _hand_over(self) -> None:
+        """Give what is waiting to the worker as one chunk."""
+        if not self._waiting:
+            return
+        waiting, self._waiting = self._waiting, []
+        rows = Table(waiting[0].signals, np.concatenate([table.values for table in waiting]))
+        self.rows_handed_over += len(rows)
+        self._submit(self._write, rows)
+
+    def _submit(self, work: Callable[..., None], *arguments: Any) -> None:
+        self._room.acquire()
+        self._worker.submit(self._perform, work, *arguments)
+
+    def _perform(self, work: Callable[..., None], *arguments: Any) -> None:
+        """Do one piece of work, unless one before it has failed."""
+        try:
+            if not self.fault:
+                work(*arguments)
+        except BaseException as error:  # a panic inside Rerun is no `Exception`
+            self.fault = without_breaks(error) or type(error).__name__
+        finally:
+            self._room.release()
+
+    def _begin(self) -> None:
+        self.connect()
+        for part in self._parts:
+            part.begin(self.recording)
+        self.send()
+
+    def _write(self, rows: Table) -> None:
+        self._write_kept(self._thinning.take(rows))
+        for part in self._parts:
+            if part.rows == Rows.ALL:
+                part.write(self.recording, rows)
+        self.send()
+
+    def _write_rest(self) -> None:
+        self._write_kept(self._thinning.rest())
+        self.send()
+
+    def _write_kept(self, kept: list[Table]) -> None:
+        for rows in kept:
+            for part in self._parts:
+                if part.rows == Rows.KEPT:
+                    part.write(self.recording, rows)
+
+    def _finish(self, ending: Status) -> None:
+        self._write_kept(self._thinning.rest())
+        for part in self._parts:
+            part.finish(self.recording, ending)
+        self.send()

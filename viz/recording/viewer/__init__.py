@@ -1,0 +1,1 @@
+"""Rerun's web viewer, served by this process to this machine alone."""

@@ -1,0 +1,48 @@
+"""What keeps its shape for a whole run."""
+
+from __future__ import annotations
+
+import rerun as rr
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.telemetry.facts import RunFacts
+from spheretwin.viz import palette
+from spheretwin.viz.scene.marks import AXES_LENGTH_m, axes, current_scale, current_scale_labels
+from spheretwin.viz.scene.meshes import read_meshes
+from spheretwin.viz.scene.paths import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROTOR_AXES, WORLD
+
+PAYLOAD_LENGTH_m, PAYLOAD_RADIUS_m = 0.014, 0.011
+
+# The stator's axes stand beside its foot; the rotor's, shorter, around the shaft below a payload.
+AXES_AT_m = (-0.085, -0.105, -0.075)
+ROTOR_AXES_HEIGHT, ROTOR_AXES_LENGTH_m = 0.6, 0.025
+
+
+def log_static(recording: rr.RecordingStream, actuator: Actuator, facts: RunFacts) -> None:
+    """Log everything that keeps its shape: meshes, axes of both frames, the scale of the coils' colours."""
+    recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    meshes = read_meshes(facts.mjcf)
+    if meshes.coils:
+        recording.log(COILS, meshes.coils, static=True)
+    for entity, piece in meshes.others.items():
+        recording.log(entity, *piece.archetypes(), static=True)
+    if facts.payload_kg > 0:
+        recording.log(PAYLOAD, _payload(actuator), static=True)
+    recording.log(AXES, axes(AXES_AT_m, AXES_LENGTH_m, ["x", "y", "z"]), static=True)
+    recording.log(ROTOR_AXES, _rotor_axes(actuator), static=True)
+    recording.log(CURRENT_SCALE, current_scale(), static=True)
+    recording.log(f"{CURRENT_SCALE}/labels", current_scale_labels(facts.current_limit_A), static=True)
+
+
+def _rotor_axes(actuator: Actuator) -> rr.Arrows3D:
+    return axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, ROTOR_AXES_LENGTH_m, ["R"])
+
+
+def _payload(actuator: Actuator) -> rr.Cylinders3D:
+    return rr.Cylinders3D(
+        lengths=[PAYLOAD_LENGTH_m],
+        radii=[PAYLOAD_RADIUS_m],
+        centers=[actuator.payload_mount_m],
+        colors=[palette.PAYLOAD],
+        fill_mode=rr.components.FillMode.Solid,
+    )
