@@ -128,7 +128,7 @@ class Hand:
         on_press(button, lambda event: self.tell(event, name))
         return button
 
-    def on_change(self, line: Any, act: Callable[[Event], None] | None = None) -> None:
+    def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
         """Take what the operator writes or moves; give anybody else's page back what it was.
 
         Parameters
@@ -168,7 +168,7 @@ ANYONES = ("stop", "ask", "hello", "leave", "beat")
 """Commands that the bench takes from pages that watch too."""
 
 
-def on_press(button: Any, act: Callable[[Event], None]) -> None:
+def on_press(button: Any, act: Callable[[Event], object]) -> None:
     """Call a function at each press of a button, on the server's own thread, in order."""
 
     @button.on_click

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from math import degrees, pi, radians
 from typing import Any
 
@@ -78,11 +79,8 @@ class Modes:
                     gui.add_slider(f"{axis}, °", round(degrees(low)), round(degrees(high)), 0.1, 0.0)
                 )
             note = Note(gui, self._angles[-1].order + 0.5)
-            for axis, slider in enumerate(self._angles):
-                self._hand.on_change(
-                    slider,
-                    lambda event, axis=axis: self._turn(event, axis, radians(event.target.value), note),
-                )
+            for place, slider in enumerate(self._angles):
+                self._hand.on_change(slider, partial(self._slid, place, note))
             rate_rad_s, acceleration_rad_s2 = choices.limits
             rate = gui.add_number("rate, rad/s", rate_rad_s, step=0.1, hint="largest, of the way to a pose")
             acceleration = gui.add_number("acceleration, rad/s²", acceleration_rad_s2, step=1.0)
@@ -96,6 +94,9 @@ class Modes:
                     event, "limits", limits, acceleration_rad_s2=event.target.value
                 ),
             )
+
+    def _slid(self, axis: int, note: Note, event: Event) -> None:
+        self._turn(event, axis, radians(event.target.value), note)
 
     def _turn(self, event: Event, axis: int, angle_rad: float, note: Note | None = None) -> None:
         """Go to the pose that was asked for last, but for one angle."""
