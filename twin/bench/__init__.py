@@ -230,6 +230,7 @@ class Bench:
         self._end_keeping(None)
         for keeping in list(self._keepings):
             keeping.join()
+        self._state = self._picture()  # what was kept is known
         self._desk.session.close()
 
     def __enter__(self) -> Bench:
