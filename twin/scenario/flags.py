@@ -49,28 +49,27 @@ def described(scenario: Scenario) -> list[tuple[str, str, str]]:
     return [
         (
             "--" + dotted.replace("_", "-"),
-            written(value),
+            _shown(value),
             (field.description or "") + families.get(_anywhere(dotted), ""),
         )
         for dotted, value, field in fields_of(scenario)
     ]
 
 
-def written(value: Any) -> str:
-    """A value as the command line has it; nothing for one that is not given."""
+def _anywhere(dotted: str) -> str:
+    """Name of a field, whatever its place in a list."""
+    return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)
+
+
+def _shown(value: Any) -> str:
     if isinstance(value, tuple):
         nested = any(isinstance(each, tuple) for each in value)
-        return json.dumps(value) if nested else " ".join(map(written, value))
+        return json.dumps(value) if nested else " ".join(map(_shown, value))
     if isinstance(value, dict | list | bool):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, float):
         return f"{value:g}"
     return "" if value is None else str(value)
-
-
-def _anywhere(dotted: str) -> str:
-    """Name of a field, whatever its place in a list."""
-    return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)
 
 
 def _grouped(tokens: Sequence[str]) -> list[tuple[str, list[str]]]:

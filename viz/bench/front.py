@@ -50,22 +50,40 @@ for (const kind of ["keydown", "keyup"]) addEventListener(kind, (event) => {
 </script>"""
 
 
-def serve(port: int, title: str) -> viser.ViserServer:
-    """Start the server on this machine alone.
+def listen(port: int) -> socket.socket:
+    """Take a port of this machine, for itself alone.
 
     Parameters
     ----------
     port : int
         Where; 0 for any that is free.
-    title : str
-        Of the page.
 
     Raises
     ------
     InputError
         The port is taken, or is none.
     """
-    listening = _bound(port)
+    listening = socket.socket()
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((HOST, port))
+        listening.listen()  # now, not by the server: until then another may take a port that is bound alone
+    except (OSError, OverflowError) as error:
+        listening.close()
+        raise InputError(f"bench: expected a port that is free, received {port}: {error}") from None
+    return listening
+
+
+def serve(listening: socket.socket, title: str) -> viser.ViserServer:
+    """Start the server.
+
+    Parameters
+    ----------
+    listening : socket.socket
+        Where, from `listen`; it is the server's from now on.
+    title : str
+        Of the page.
+    """
     with _as_door(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser tells its address
         server = viser.ViserServer(host=HOST, port=listening.getsockname()[1], verbose=False)
     server.get_event_loop().set_exception_handler(_unheard)
@@ -264,18 +282,6 @@ def _is_a_pages(raw: bytes) -> bool:
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return False
     return True
-
-
-def _bound(port: int) -> socket.socket:
-    listening = socket.socket()
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind((HOST, port))
-        listening.listen()  # now, not by the server: until then another may take a port that is bound alone
-    except (OSError, OverflowError) as error:
-        listening.close()
-        raise InputError(f"bench: expected a port that is free, received {port}: {error}") from None
-    return listening
 
 
 def _refusal(status: http.HTTPStatus) -> Response:

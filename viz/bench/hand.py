@@ -89,14 +89,15 @@ class Hand:
         since_s = time.monotonic() - LONG_S
         return next((each.name for each in self._open if each.since_s < since_s), "")
 
-    def tell(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> None:
-        """Tell the bench one thing in the name of the page that an event comes from."""
+    def tell(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
+        """Tell the bench one thing in the name of an event's page; False where that may not."""
         if name not in ANYONES and not self._operates(event):
             self._warn(event)
-            return
+            return False
         ticket = self._bench.command(name, client=client_name(event.client_id), **arguments)
         with self._lock:
             self._open = [*self._open[-MOST_TICKETS:], Asked(name, ticket, beside, time.monotonic())]
+        return True
 
     def tell_chosen(self, event: Event) -> None:
         """Tell the bench what a group of buttons has as its value."""
@@ -127,7 +128,7 @@ class Hand:
         on_press(button, lambda event: self.tell(event, name))
         return button
 
-    def on_change(self, line: Any, act: Callable[[Event], None] | None = None) -> None:
+    def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
         """Take what the operator writes or moves; give anybody else's page back what it was.
 
         Parameters
@@ -167,7 +168,7 @@ ANYONES = ("stop", "ask", "hello", "leave", "beat")
 """Commands that the bench takes from pages that watch too."""
 
 
-def on_press(button: Any, act: Callable[[Event], None]) -> None:
+def on_press(button: Any, act: Callable[[Event], object]) -> None:
     """Call a function at each press of a button, on the server's own thread, in order."""
 
     @button.on_click

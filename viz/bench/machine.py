@@ -70,6 +70,8 @@ class Choices:
         Value of a text for a field, as the command line reads it.
     scenarios, shapes, laws : sequence of str
         Names.
+    limits : (float, float), rad/s and rad/s²
+        Of the way to a pose, until others are set.
     targets : dict
         Of faults: what can happen to each, by its name.
     """
@@ -80,4 +82,5 @@ class Choices:
     scenarios: Sequence[str]
     shapes: Sequence[str]
     laws: Sequence[str]
+    limits: tuple[float, float]
     targets: dict[str, tuple[str, ...]]

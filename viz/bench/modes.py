@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from math import degrees, pi, radians
 from typing import Any
 
-import numpy as np
 import viser
 
 from spheretwin.models.actuator import Actuator
@@ -49,9 +49,10 @@ class Modes:
     def __init__(self, gui: viser.GuiApi, hand: Hand, bench: Bench, choices: Choices, scene: Scene) -> None:
         self._hand, self._bench, self._scene = hand, bench, scene
         actuator = bench.actuator
+        self._pose_rad, self._asked_s = list(bench.state().q_ref_rad), 0.0
         modes = gui.add_button_group("mode", ("off", "hold", "trajectory"))
         on_press(modes, hand.tell_chosen)
-        self._point(gui, actuator)
+        self._point(gui, actuator, choices)
         self._follow(gui, choices)
         self._jog(gui)
         self._manual(gui, actuator)
@@ -61,14 +62,15 @@ class Modes:
 
     def show(self, state: Any) -> None:
         """Let the sliders follow the twin while it goes elsewhere than they say."""
-        if state.mode != "point":
-            for slider, angle in zip(self._angles, state.q_ref_rad, strict=True):
-                _follow(slider, degrees(angle))
+        if state.mode != "point" and time.monotonic() - self._asked_s > FOLLOWED_S:
+            self._pose_rad = list(state.q_ref_rad)
+        for slider, angle in zip(self._angles, self._pose_rad, strict=True):
+            _follow(slider, degrees(angle))
         if state.mode != "jog":
             for slider in self._rates:
                 _follow(slider, 0.0)
 
-    def _point(self, gui: viser.GuiApi, actuator: Actuator) -> None:
+    def _point(self, gui: viser.GuiApi, actuator: Actuator, choices: Choices) -> None:
         with gui.add_folder("point: or drag the tip, or ← ↑ ↓ →"):
             self._angles = []
             for axis, (low, high) in zip(AXES, actuator.hinge_range_rad.tolist(), strict=True):
@@ -77,10 +79,11 @@ class Modes:
                     gui.add_slider(f"{axis}, °", round(degrees(low)), round(degrees(high)), 0.1, 0.0)
                 )
             note = Note(gui, self._angles[-1].order + 0.5)
-            for slider in self._angles:
-                self._hand.on_change(slider, lambda event: self._go(event, note))
-            rate = gui.add_number("rate, rad/s", 2.0, step=0.1, hint="largest, of the way to a pose")
-            acceleration = gui.add_number("acceleration, rad/s²", 20.0, step=1.0)
+            for place, slider in enumerate(self._angles):
+                self._hand.on_change(slider, partial(self._slid, place, note))
+            rate_rad_s, acceleration_rad_s2 = choices.limits
+            rate = gui.add_number("rate, rad/s", rate_rad_s, step=0.1, hint="largest, of the way to a pose")
+            acceleration = gui.add_number("acceleration, rad/s²", acceleration_rad_s2, step=1.0)
             limits = Note(gui, acceleration.order + 0.5)
             self._hand.on_change(
                 rate, lambda event: self._hand.tell(event, "limits", limits, rate_rad_s=event.target.value)
@@ -92,8 +95,16 @@ class Modes:
                 ),
             )
 
-    def _go(self, event: Event, note: Note) -> None:
-        self._hand.tell(event, "point", note, pose_rad=[radians(slider.value) for slider in self._angles])
+    def _slid(self, axis: int, note: Note, event: Event) -> None:
+        self._turn(event, axis, radians(event.target.value), note)
+
+    def _turn(self, event: Event, axis: int, angle_rad: float, note: Note | None = None) -> None:
+        """Go to the pose that was asked for last, but for one angle."""
+        self._go(event, [angle_rad if each == axis else now for each, now in enumerate(self._pose_rad)], note)
+
+    def _go(self, event: Event, pose_rad: list[float], note: Note | None = None) -> None:
+        if self._hand.tell(event, "point", note, pose_rad=pose_rad):
+            self._pose_rad, self._asked_s = pose_rad, time.monotonic()
 
     def _follow(self, gui: viser.GuiApi, choices: Choices) -> None:
         with gui.add_folder("trajectory", expand_by_default=False):
@@ -168,16 +179,13 @@ class Modes:
 
             @command.on_trigger
             async def _(event: Event, axis: int = axis, sign: float = sign) -> None:
-                pose = np.array(self._bench.state().q_ref_rad)
-                pose[axis] += sign * radians(STEP_DEG)
-                self._hand.tell(event, "point", pose_rad=pose.tolist())
+                self._turn(event, axis, self._pose_rad[axis] + sign * radians(STEP_DEG))
 
     def _picture(self) -> None:
         @self._scene.handle.on_drag
         async def _(event: Event) -> None:
-            gamma = float(self._bench.state().q_ref_rad[2])
-            pose = self._scene.pose_under(event.end_position, event.client.camera.position, gamma)
-            self._hand.tell(event, "point", pose_rad=pose)
+            eye_m = event.client.camera.position
+            self._go(event, self._scene.pose_under(event.end_position, eye_m, self._pose_rad[2]))
 
         @self._scene.coils.on_click
         async def _(event: Event) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import socket
 import time
 from collections.abc import Callable
 from typing import Any
@@ -39,7 +40,7 @@ TITLE = "bench"
 class Page:
     """A page of one bench, on this machine alone.
 
-    ``with Page(bench, choices, port) as page: page.show(until)``
+    ``with Page(bench, choices, front.listen(port)) as page: page.show(until)``
 
     Parameters
     ----------
@@ -47,18 +48,13 @@ class Page:
         What it drives and shows.
     choices : Choices
         What there is to choose from.
-    port : int
-        Where it is served; 0 for any that is free.
-
-    Raises
-    ------
-    InputError
-        The port is taken.
+    listening : socket.socket
+        Where it is served, from `front.listen`.
     """
 
-    def __init__(self, bench: Bench, choices: Choices, port: int) -> None:
+    def __init__(self, bench: Bench, choices: Choices, listening: socket.socket) -> None:
         self._bench, self._choices, self._hand = bench, choices, Hand(bench)
-        self._server = front.serve(port, TITLE)
+        self._server = front.serve(listening, TITLE)
         self._watching: dict[int, Any] = {}
         self._frame = 0
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)

@@ -17,6 +17,7 @@ from spheretwin.twin.bench import Bench
 from spheretwin.twin.bench.operators import Operators
 from spheretwin.twin.commands.benching.choices import choices_of
 from spheretwin.twin.commands.benching.verb import SILENCE_S
+from spheretwin.viz.bench import front
 from spheretwin.viz.bench.page import Page
 from tests.browser import Browser, needs_a_browser
 from tests.viz.bench.on_page import STATUS, choose, errors, on_screen, opened, write
@@ -31,7 +32,10 @@ PATIENCE_S = 120.0
 def driven(scenario):
     """A bench, and a page of it that follows."""
     ended = threading.Event()
-    with Bench(scenario, Operators(SILENCE_S)) as bench, Page(bench, choices_of(bench), 0) as page:
+    with (
+        Bench(scenario, Operators(SILENCE_S)) as bench,
+        Page(bench, choices_of(bench), front.listen(0)) as page,
+    ):
         bench.begin()
         following = threading.Thread(target=page.show, args=(ended.is_set,))
         following.start()

@@ -8,6 +8,7 @@ import numpy as np
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
+from spheretwin.viz.bench import front
 from spheretwin.viz.bench.machine import Choices, Setting
 from spheretwin.viz.bench.page import Page
 
@@ -105,15 +106,16 @@ CHOICES = Choices(
     scenarios=("hold", "nutation"),
     shapes=("hold", "sinusoid"),
     laws=("pd", "afsm"),
+    limits=(2.0, 20.0),
     targets={"coil.00": ("open", "short"), "supply": ("off",)},
 )
 
 
 @contextlib.contextmanager
-def shown(bench, port=0):
+def shown(bench):
     """A page that follows a bench, in a thread of its own."""
     ended = threading.Event()
-    with Page(bench, CHOICES, port) as page:
+    with Page(bench, CHOICES, front.listen(0)) as page:
         following = threading.Thread(target=page.show, args=(ended.is_set,))
         following.start()
         try:

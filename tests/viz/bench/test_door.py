@@ -123,7 +123,7 @@ def test_a_path_gives_the_page_or_nothing(page, path):
 
 def test_a_port_in_use_is_refused(page):
     with pytest.raises(InputError, match=f"expected a port that is free, received {port(page)}"):
-        front.serve(port(page), "another")
+        front.listen(port(page))
 
 
 def test_two_benches_stand_side_by_side(page):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -15,6 +16,7 @@ from pydantic_core import PydanticUndefined
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.bench import Bench
+from spheretwin.twin.bench.modes import Limits
 from spheretwin.twin.faults.targets.registry import TARGETS
 from spheretwin.twin.scenario import flags
 from spheretwin.twin.scenario.fields import every_field, kind_of
@@ -39,6 +41,7 @@ def choices_of(bench: Bench) -> Choices:
         scenarios=shipped(),
         shapes=tuple(SHAPES),
         laws=tuple(LAWS),
+        limits=Limits(),
         targets={name: tuple(target.modes) for target in TARGETS.values() for name in target.names(groups)},
     )
 
@@ -63,14 +66,26 @@ def shape_settings(name: str, bench: Bench) -> list[Setting]:
     return [
         Setting(
             field,
-            flags.written(known.get(field, _default(info))),
-            flags.written(_default(info)),
+            written(known.get(field, _default(info))),
+            written(_default(info)),
             _meaning(info.description or "", info),
             _literals(info.annotation),
         )
         for field, info in kind.model_fields.items()
         if field not in NO_SHAPE
     ]
+
+
+def written(value: Any) -> str:
+    """A value as the command line takes it, to its last digit; nothing for one that is not given."""
+    if isinstance(value, tuple) and not any(isinstance(each, tuple) for each in value):
+        return " ".join(map(written, value))
+    if isinstance(value, tuple | dict | list | bool):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return "" if value is None else str(value)
 
 
 def read(name: str, text: str) -> Any:
@@ -112,7 +127,7 @@ def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> 
     info = _field_of(name, values)
     default = _default(info) if info else None
     choices = _families().get(_anywhere(name)) or (_literals(info.annotation) if info else ())
-    return Setting(name, flags.written(value), flags.written(default), _meaning(meaning, info), choices)
+    return Setting(name, written(value), written(default), _meaning(meaning, info), choices)
 
 
 @cache

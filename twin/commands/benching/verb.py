@@ -72,12 +72,14 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     outputs.check([options.record] if options.record else [])
     # Slow to import, and only a bench needs it.
     from spheretwin.twin.commands.benching.choices import choices_of
+    from spheretwin.viz.bench import front
     from spheretwin.viz.bench.page import Page
 
-    with interruptible() as stop_requested, contextlib.ExitStack() as stack:
+    listening = front.listen(options.port)  # before anything is compiled
+    with listening, interruptible() as stop_requested, contextlib.ExitStack() as stack:
         stack.enter_context(timers_stopped())
         bench = stack.enter_context(Bench(scenario, Operators(SILENCE_S)))
-        page = stack.enter_context(Page(bench, choices_of(bench), options.port))
+        page = stack.enter_context(Page(bench, choices_of(bench), listening))
         bench.begin()
         _record(bench, options.record)
         print(f"bench: {page.address} (Ctrl-C ends it)", flush=True)

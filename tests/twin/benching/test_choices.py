@@ -1,0 +1,108 @@
+"""What a bench's page offers: each field as the command line has it, and what it may be."""
+
+import json
+
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.bench import Bench
+from spheretwin.twin.commands.benching.choices import choices_of, read, settings_of, shape_settings
+from spheretwin.twin.scenario.fields import fields_of
+from spheretwin.twin.scenario.reading import shipped
+from spheretwin.twin.trajectories.registry import SHAPES
+
+
+def fields(scenario):
+    return [(name, value, field.description or "") for name, value, field in fields_of(scenario)]
+
+
+def setting(name, scenario):
+    return next(each for each in settings_of(fields(scenario)) if each.name == name)
+
+
+@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("hardware", ["ideal", "prototype"])
+def test_what_is_shown_of_a_field_is_read_as_what_it_is(name, hardware):
+    scenario = scenarios.load(name, {"hardware": hardware})
+    known = {dotted: value for dotted, value, _ in fields(scenario)}
+    for each in settings_of(fields(scenario)):
+        if each.name in ("name", "description"):  # words, which no form has
+            continue
+        value = json.loads(json.dumps(known[each.name]))
+        if value not in ("", []):
+            assert read(each.name, each.text) == value, each.name
+        assert not each.choices or each.text in ("", *each.choices)
+
+
+def test_families_and_names_can_be_chosen_from():
+    scenario = scenarios.load("hold")
+    assert {"pd", "afsm", "adrc"} < set(setting("controller.law", scenario).choices)
+    assert setting("plant.integrator", scenario).choices == ("RK4", "Euler", "implicitfast")
+    assert {"bounded", "least_norm"} <= set(setting("allocation", scenario).choices)
+    assert setting("estimator.kind", scenario).choices
+
+
+def test_bounds_are_told_beside_the_meaning():
+    found = setting("plant.step_s", scenarios.load("hold"))
+    assert found.meaning == "physics step, s, ≥ 1e-07, ≤ 1"
+    assert found.default == "0.0005"
+
+
+def test_the_gains_are_those_of_the_law_that_is_in_force():
+    scenario = scenarios.load("hold", {"controller.law": "pid", "controller.integral": 3.0})
+    gains = {each.name for each in settings_of(fields(scenario)) if each.name.startswith("controller.")}
+    assert "controller.surface_slope" not in gains
+    assert setting("controller.integral", scenario).text == "3 3 3"
+    assert setting("controller.integral", scenario).default != "3 3 3"
+
+
+def test_text_is_read_as_by_the_command_line():
+    assert read("controller.stiffness", "1 2.5 -3") == [1, 2.5, -3]
+    assert read("fault.0.known", "true") is True
+    assert read("plant.mjcf", "'a file.xml'") == "a file.xml"
+    assert read("trajectory.points", "[[0, 1], [2, 3]]") == [[0, 1], [2, 3]]
+    assert read("plant.mjcf", "  ") is None
+
+
+@pytest.mark.parametrize("text", ["'open", "--plant.step-s 1", "1 --x 2"])
+def test_what_is_no_value_is_refused(text):
+    with pytest.raises(InputError, match=r"^plant\.step_s: expected a value, received "):
+        read("plant.step_s", text)
+
+
+def test_every_shape_is_offered_as_it_comes_and_the_present_one_as_it_is():
+    scenario = scenarios.load(
+        "sinusoid", {"trajectory.amplitude_rad": [0.1, 0.1, 0.1 / 3], "plant.engine": "lagrangian"}
+    )
+    with Bench(scenario) as bench:
+        assert choices_of(bench).targets["coil.17"] == ("open", "short", "gain", "intermittent")
+        for shape in SHAPES:
+            offered = {each.name: each for each in shape_settings(shape, bench)}
+            assert "approach" not in offered
+            expected = {name for name in SHAPES[shape].model_fields if name not in ("shape", "approach")}
+            assert set(offered) == expected
+        present = {each.name: each for each in shape_settings("sinusoid", bench)}
+        assert present["amplitude_rad"].text == f"0.1 0.1 {0.1 / 3!r}"
+        assert present["amplitude_rad"].default == "0.2 0.2 0.2"
+        assert shape_settings("no such shape", bench) == []
+
+
+def test_a_shape_with_a_list_of_tables_is_offered_as_it_is():
+    rows = [
+        {"amplitude_rad": [0.1, 0.1, 0.1], "frequency_Hz": [0.5, 0.5, 0.5]},
+        {"amplitude_rad": [0.05, 0.0, 0.0], "frequency_Hz": [1.5, 1.5, 1.5]},
+    ]
+    given = {"trajectory": {"shape": "multisine", "components": rows}, "plant.engine": "lagrangian"}
+    with Bench(scenarios.load("sinusoid", given)) as bench:
+        (components,) = [each for each in shape_settings("multisine", bench) if each.name == "components"]
+        before = bench.fields()
+        assert bench.command(
+            "trajectory", fields={"shape": "multisine", "components": read("x", components.text)}
+        )
+        bench.advance(0)
+        assert bench.state().refused is None
+        at = "trajectory.components."
+        assert [each for each in bench.fields() if each[0].startswith(at)] == [
+            each for each in before if each[0].startswith(at)
+        ]

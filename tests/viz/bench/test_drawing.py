@@ -1,0 +1,141 @@
+"""The actuator in few triangles: closed solids of the right size, and poses that are the rotor's."""
+
+import numpy as np
+import pytest
+
+from spheretwin.models.kinematics import rotation
+from spheretwin.viz.bench import front
+from spheretwin.viz.bench.drawing import solids
+from spheretwin.viz.bench.drawing.parts import parts_of, quaternions_along
+from spheretwin.viz.bench.drawing.scene import Scene
+
+# Coordinates are single precision: 1e-7 of a length, and of a volume three times that.
+SINGLE = 1e-6
+
+# A browser without a GPU draws them 10 times a second and more.
+MOST_TRIANGLES = 10_000
+
+
+def volume(solid):
+    """Enclosed volume, by the divergence theorem; positive where the faces look outward."""
+    a, b, c = np.moveaxis(solid.vertices[solid.faces].astype(float), 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
+def is_closed(solid):
+    """Whether each edge, by the places of its ends, is walked once in each direction."""
+    _, place = np.unique(np.round(solid.vertices, 7), axis=0, return_inverse=True)
+    corners = place.reshape(-1)[solid.faces]
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    edges = edges[edges[:, 0] != edges[:, 1]]  # at the axis
+    found = {}
+    for start, end in edges.tolist():
+        found[start, end] = found.get((start, end), 0) + 1
+    return all(found.get((end, start)) == count for (start, end), count in found.items())
+
+
+def polygon(sections):
+    """Area of a regular polygon within the unit circle."""
+    return sections / 2 * np.sin(2 * np.pi / sections)
+
+
+def test_solids_have_the_volume_of_their_prisms():
+    assert volume(solids.bar((1.0, 2.0, 3.0))) == pytest.approx(6.0, rel=SINGLE)
+    assert volume(solids.cylinder(0.5, -1.0, 2.0, 7)) == pytest.approx(0.25 * 3 * polygon(7), rel=SINGLE)
+    assert volume(solids.tube(1.0, 2.0, 0.0, 1.5, 16)) == pytest.approx(4.5 * polygon(16), rel=SINGLE)
+
+
+def test_a_zone_lies_on_its_sphere_between_its_heights():
+    zone = solids.zone(2.0, -0.5, 1.0, 6, 12)
+    assert np.linalg.norm(zone.vertices, axis=1) == pytest.approx(2.0, rel=SINGLE)
+    assert zone.vertices[:, 2].min() == pytest.approx(-0.5, rel=SINGLE)
+    assert zone.vertices[:, 2].max() == pytest.approx(1.0, rel=SINGLE)
+
+
+@pytest.mark.parametrize("name", ["stator", "outer_ring", "inner_ring", "rotor", "shaft", "coil"])
+def test_every_part_is_closed_and_looks_outward(actuator, name):
+    part = getattr(parts_of(actuator), name)
+    assert is_closed(part)
+    assert volume(part) > 0
+
+
+def test_coils_and_poles_have_the_actuators_own_size(actuator):
+    parts, coil, magnet = parts_of(actuator), actuator.coil, actuator.magnet
+    across = np.linalg.norm(parts.coil.vertices[:, :2], axis=1)
+    assert (across.min(), across.max()) == pytest.approx(
+        (coil.inner_radius_m, coil.outer_radius_m), rel=SINGLE
+    )
+    assert np.ptp(parts.coil.vertices[:, 2]) == pytest.approx(coil.length_m, rel=SINGLE)
+    # A tenth of a millimetre proud, so as not to flicker.
+    assert parts.pole.vertices[:, 2].max() == pytest.approx(magnet.front_m + 1e-4, rel=SINGLE)
+    assert np.linalg.norm(parts.pole.vertices[:, :2], axis=1).max() == pytest.approx(
+        magnet.radius_m, rel=SINGLE
+    )
+    assert parts.shaft.vertices[:, 2].max() == pytest.approx(actuator.shaft_tip_m[2], rel=SINGLE)
+
+
+def test_all_of_it_is_few_triangles(actuator):
+    assert parts_of(actuator).triangles(actuator) < MOST_TRIANGLES
+
+
+def test_quaternions_turn_z_to_each_axis(actuator):
+    axes = np.concatenate([actuator.coil_axes, np.eye(3), -np.eye(3)])
+    w, x, y, z = quaternions_along(axes).T
+    turned = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
+    assert turned == pytest.approx(axes, abs=1e-12)  # rounding
+
+
+@pytest.fixture
+def scene(actuator):
+    server = front.serve(front.listen(0), "scene")
+    yield Scene(server.scene, actuator)
+    front.stop(server)
+
+
+def test_the_tip_that_is_drawn_is_the_rotors(scene, actuator):
+    for q in ([0.3, -0.2, 1.0], [-1.2, 0.9, -3.0]):
+        scene.move(np.zeros(3), np.array(q), np.zeros(len(actuator.groups)), 8.0)
+        tip = rotation(np.array(q)) @ actuator.shaft_tip_m
+        assert scene.handle.position == pytest.approx(tip, abs=1e-12)  # rounding
+
+
+def test_each_hinge_turns_about_its_own_axis(scene, actuator):
+    """Frames within frames: the product of their turns is the rotor's orientation."""
+    q = np.array([0.3, -0.2, 1.0])
+    scene.move(q, None, np.zeros(len(actuator.groups)), 8.0)
+    R = np.eye(3)
+    for hinge in scene._hinges:
+        w, *v = hinge.wxyz
+        v = np.array(v)
+        cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+        R = R @ (np.eye(3) + 2 * w * cross + 2 * cross @ cross)
+    assert pytest.approx(rotation(q), abs=1e-12) == R
+    assert not scene.handle.visible
+
+
+def test_what_is_under_the_pointer_is_where_the_tip_goes(scene, actuator):
+    """The inverse of the tip's place, from any eye that sees it."""
+    for q in ([0.3, 0.2, 0.5], [-0.4, 0.6, -1.0], [0.0, 0.0, 0.0]):
+        tip = rotation(np.array(q)) @ actuator.shaft_tip_m
+        eye = 2.5 * tip + [0.02, -0.05, 0.01]
+        for depth in (0.5, 1.0, 3.0):
+            pose = scene.pose_under(tuple(eye + depth * (tip - eye)), eye, q[2])
+            assert pose == pytest.approx(q, abs=1e-9)  # of a square root that cancels
+
+
+def test_a_pointer_beside_the_sphere_gives_a_pose_all_the_same(scene):
+    eye = np.array([0.0, -0.4, 0.1])
+    for point in ((0.4, 0.0, 0.1), (0.0, -0.4, 0.1), (0.0, 0.0, 5.0)):
+        assert np.isfinite(scene.pose_under(point, eye, 0.0)).all()
+
+
+def test_both_coils_of_a_group_have_its_colour(scene, actuator):
+    current = np.zeros(len(actuator.groups))
+    current[5] = 8.0
+    scene.move(np.zeros(3), None, current, 8.0)
+    colours = np.array(scene.coils.batched_colors)
+    (red,) = np.unique(colours[actuator.groups[5]], axis=0)
+    assert (colours == red).all(axis=1).sum() == 2
+    assert [scene.group_of(coil) for coil in actuator.groups[5].tolist()] == [5, 5]
+    assert scene.group_of(None) is None
+    assert scene.group_of(99) is None
