@@ -48,7 +48,8 @@ class Quantities(Part):
         self._bins = Bins(RATE_Hz, at_once=subject.live)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
-        self._begun_s, self._opened = monotonic(), False
+        self._begun_s: float | None = None  # of the clock, when the first rows came: all is compiled then
+        self._opened = False
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log how the quantities look, and for whoever watches what is known of the run from its start."""
@@ -81,6 +82,7 @@ class Quantities(Part):
 
     def _open(self, recording: rr.RecordingStream) -> None:
         """Lay a file out for whoever finds it without its end; most runs end before it could be killed."""
+        self._begun_s = self._begun_s or monotonic()
         if self._opened or self.subject.live or monotonic() - self._begun_s < OPENED_AFTER_s:
             return
         self._opened = True
