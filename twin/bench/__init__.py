@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -39,6 +40,9 @@ from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.scenario.writing import as_command, as_toml
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import change_told
+
+# What lets time go on, or STOP go: not where STOP came after it.
+UNDONE_BY_STOP = ("reset", "load", "start", "step")
 
 CLIENTS = ("hello", "beat", "ask", "leave", "grant")
 
@@ -111,6 +115,7 @@ class Bench:
         self._running, self._steps, self._noted = False, 0, (0, 0)
         self._warm: set[tuple[str, object]] = set()
         self._stops: list[Ticket] = []
+        self._stopped_s = -math.inf
         self._outcomes: list[tuple[Ticket, str | None]] = []
         self._preparing: tuple[Waiting, Future[Any]] | None = None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="bench")
@@ -180,8 +185,12 @@ class Bench:
         return as_command(self._desk.settings)
 
     def fields(self) -> list[tuple[str, Any, str]]:
-        """Every field of the scenario in force: dotted name, value, meaning."""
-        found = fields_of(self._desk.session.scenario)
+        """Every field of the scenario in force: dotted name, value, meaning.
+
+        The trajectory is the one that is set, whatever the mode makes of it meanwhile.
+        """
+        in_force, own = self._desk.session.scenario, self._desk.settings.trajectory
+        found = fields_of(in_force.model_copy(update={"trajectory": own}))
         return [(name, value, field.description or "") for name, value, field in found]
 
     def advance(self, ticks: int) -> int:
@@ -235,6 +244,7 @@ class Bench:
     def _stop_asked(self) -> Ticket:
         """STOP waits for nothing but the chunk that is at work."""
         ticket = Ticket()
+        self._stopped_s = ticket.begun_s
         self._stops.append(ticket)
         self._wake.set()
         return ticket
@@ -317,6 +327,8 @@ class Bench:
     def _act(self, command: Waiting, prepared: Callable[[], Any]) -> None:
         """Do what is commanded, or say why not."""
         try:
+            if command.name in UNDONE_BY_STOP and command.ticket.begun_s <= self._stopped_s:
+                raise InputError(f"bench: expected {command.name} after STOP, received it before")
             self._do(command.name, command.arguments, prepared())
         except Exception as error:  # files and laws of the user's may raise whatever they will
             told = f"{error}" if isinstance(error, SpheretwinError) else _told(error)

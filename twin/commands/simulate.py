@@ -54,7 +54,7 @@ def add_to(verbs: Any) -> None:
         "--record-rate",
         type=outputs.rate_Hz,
         metavar="HZ",
-        help="rows a second that the recording keeps, and besides all that stand out in any 10 s; every one"
+        help="rows a second that the recording keeps, and besides all that stand out in any 20 s; every one"
         " unless given",
     )
     parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")

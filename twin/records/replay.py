@@ -57,9 +57,10 @@ def _plan(record: RunRecord, source: str) -> Plan:
                 f"replay {source}: expected changes to {', '.join(LAWS)}, received one to {change.value}"
                 f" at tick {change.tick}, a law that the file does not hold"
             )
-    if record.ticks < 1:
+    if record.ticks <= record.first_tick:
         raise InputError(
-            f"replay {source}: expected a run of at least one tick, received {record.ticks};"
+            f"replay {source}: expected a run of at least one tick, received"
+            f" {record.ticks - record.first_tick};"
             " the parts of a run that was killed do not say how far it went"
         )
     named = facts.files_of(scenario.model_dump(mode="json"), record.journal)

@@ -9,6 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.record import RunRecord
 from spheretwin.models.telemetry.status import Status
@@ -90,6 +92,7 @@ def read(path: Path) -> Reviewed:
 
 
 def _of_telemetry(path: Path, table: Table, metadata: dict[str, str], *, whole: bool) -> Reviewed:
+    _check_times(path, table)
     rate_Hz = float(metadata[_RATE]) if _RATE in metadata else None
     return Reviewed(path, RunRecord.from_metadata(metadata), table, (), whole, metadata, rate_Hz)
 
@@ -99,6 +102,7 @@ def _of_recording(path: Path) -> Reviewed:
     from spheretwin.viz.recording.parts.described import RATE
 
     facts, table, log, whole = reading.read(path)
+    _check_times(path, table)
     statuses = {status.told: status for status in Status}
     scenario, status = _scenario(facts), statuses.get(log[-1][2] if log else "")
     period_s = float(scenario["controller"]["period_s"])
@@ -109,6 +113,13 @@ def _of_recording(path: Path) -> Reviewed:
     if rate_Hz:
         metadata = {**metadata, _RATE: repr(rate_Hz)}
     return Reviewed(path, record, table, tuple(log), whole, metadata, rate_Hz)
+
+
+def _check_times(path: Path, table: Table) -> None:
+    """Refuse rows out of their order: only damage makes them so."""
+    t_s = table["t_s"]
+    if not (np.all(np.isfinite(t_s)) and np.all(t_s[1:] > t_s[:-1])):
+        raise InputError(f"review {path}: expected rows whose times rise, received others: it is damaged")
 
 
 def _scenario(facts: Mapping[str, Any]) -> dict[str, Any]:

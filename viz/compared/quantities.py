@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.quantities.delivered import on_the_hinges
+from spheretwin.viz.quantities.error_angle import angle_between
 
 Array = NDArray[np.float64]
 
@@ -45,41 +47,6 @@ def drawn(tables: Sequence[Table]) -> list[Quantity]:
     return [each for each in QUANTITIES if all(set(each.needs) <= having for having in names)]
 
 
-def whole_error_rad(q: Array, q_ref: Array) -> Array:
-    """Angle of the one rotation between two orientations, (n,) in rad from 0 to π.
-
-    Of the chord between their quaternions, which loses no digits where they are close.
-
-    Parameters
-    ----------
-    q, q_ref : (n, 3) array, rad
-        Hinge angles.
-    """
-    a, b = _quaternion(q), _quaternion(q_ref)
-    chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
-    return 4 * np.arcsin(np.minimum(chord / 2, 1.0))
-
-
-def hinge_torque_Nm(q: Array, torque_S: Array) -> Array:
-    """Effect of torques of the stator frame on the hinges, ``E^T torque_S``, (n, 3) in N·m.
-
-    Parameters
-    ----------
-    q : (n, 3) array, rad
-        Hinge angles.
-    torque_S : (n, 3) array, N·m
-    """
-    (sa, sb, _), (ca, cb, _), (x, y, z) = np.sin(q).T, np.cos(q).T, torque_S.T
-    return np.stack([x, ca * y + sa * z, sb * x + cb * (ca * z - sa * y)], axis=1)
-
-
-def _quaternion(q: Array) -> Array:
-    """Of rotations about x, y, z, one after the other: (n, 4) w, x, y, z."""
-    (ca, cb, cg), (sa, sb, sg) = np.cos(q / 2).T, np.sin(q / 2).T
-    w, x = ca * cb * cg - sa * sb * sg, sa * cb * cg + ca * sb * sg
-    return np.stack([w, x, ca * sb * cg - sa * cb * sg, ca * cb * sg + sa * sb * cg], axis=1)
-
-
 def _entry(signal: str, axis: int, factor: float = 1.0) -> Callable[[Table], Array]:
     return lambda table: factor * table[signal][:, axis]
 
@@ -89,7 +56,7 @@ def _largest(signal: str) -> Callable[[Table], Array]:
 
 
 def _whole_error_deg(table: Table) -> Array:
-    return np.degrees(whole_error_rad(table["q_rad"], table["q_ref_rad"]))
+    return np.degrees(angle_between(table["q_rad"], table["q_ref_rad"]))
 
 
 def _asked_Nm(table: Table) -> Array:
@@ -97,7 +64,7 @@ def _asked_Nm(table: Table) -> Array:
 
 
 def _delivered_Nm(table: Table) -> Array:
-    return np.linalg.norm(hinge_torque_Nm(table["q_rad"], table["torque_Nm"]), axis=1)
+    return np.linalg.norm(on_the_hinges(table["q_rad"], table["torque_Nm"]), axis=1)
 
 
 QUANTITIES = (

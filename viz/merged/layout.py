@@ -18,7 +18,7 @@ COMPARE, RUNS, TIP = "compare", "runs", "tip"
 """Parts of the paths of entities, behind the name of a run but for `RUNS`."""
 
 ASKED = "asked"
-"""Part of a path before the name of a run: a viewer draws lines in the order of their paths, this below all."""
+"""Before the name of a run: a viewer draws lines in the order of their paths, these below all others."""
 
 # Plots that share a row are too narrow for names; the one that has a row of its own tells them.
 NAMED, BESIDE_TEXTS = "whole", "more"

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 # Rows of so long a time are looked at together for what stands out in them.
-WINDOW_S = 10.0
+WINDOW_S = 20.0
 
 # Of a bin or a window: times are products of whole numbers, right to some 1e-16 of themselves.
 _ROUNDING = 1e-6
@@ -59,7 +59,7 @@ class Firsts(Thinning):
 class FirstsAndExtremes(Thinning):
     """Keeps whole rows, bit for bit: the first of each bin of time, and all that stand out.
 
-    Those are, of every window of 10 s, the rows in which an entry of a signal is at its largest or smallest;
+    Those are, of every window of 20 s, the rows in which an entry of a signal is at its largest or smallest;
     where a state changes; where the current limit begins and ceases to cut the torque; and the last row.
     Windows go by time, and end besides where the columns change: how the rows come in chunks does not show.
 

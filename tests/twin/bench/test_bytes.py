@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.record import RunRecord
 from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.twin.records import replay
 from tests.twin.bench.cases import MODES, begun, bench, done, kept_rows, said, same_when_replayed
 
 SETTINGS = [
@@ -71,6 +73,18 @@ def test_a_recording_that_begins_on_the_way_replays_to_the_same_bytes(tmp_path, 
     assert (record.first_tick, record.ticks, len(rows)) == (200, 800, 600)
     np.testing.assert_allclose(rows["t_s"][0], 0.2, rtol=1e-15)
     assert same_when_replayed(path)
+
+
+def test_what_is_left_of_a_recording_that_was_killed_is_not_replayed_as_a_whole_one(tmp_path):
+    path = tmp_path / "run.parquet"
+    with begun() as made:
+        made.advance(30)
+        done(made, "record", telemetry=str(path))
+        made.advance(5)
+    rows, metadata = read_parquet(path)
+    rows.write_parquet(path, metadata | {"ticks": metadata["first_tick"]})  # as it was at its beginning
+    with pytest.raises(InputError, match="at least one tick, received 0"):
+        replay.read(path)
 
 
 def test_a_reset_and_a_way_back_end_a_recording_which_still_replays(tmp_path):

@@ -135,7 +135,9 @@ def test_a_flood_of_moves_is_the_last_of_them():
         assert made.state().journal == 2
         fields = {name: value for name, value, _ in made.fields()}
         assert fields["disturbance.load"] == 0.9999
-        assert fields["trajectory.rate_rad_s"] == (0.0, 0.0, 0.9999)
+        assert fields["trajectory.shape"] == "sinusoid"
+        made.advance(2000)
+        assert made.state().qdot_ref_rad_s == (0.0, 0.0, 0.9999)
 
 
 def test_the_queue_is_bounded():
@@ -212,6 +214,32 @@ def test_a_run_that_ends_leaves_a_bench_that_a_reset_brings_back():
         done(made, "start")
         assert made.advance(100) == 100
         assert (made.state().mode, made.state().reason) == ("trajectory", None)
+
+
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_snapshot_brings_back_a_run_that_has_ended_and_one_before_a_reset(reset):
+    with begun() as made:
+        made.advance(50)
+        done(made, "point", **MODES["point"])
+        made.advance(50)
+        done(made, "snapshot")
+        made.advance(100)
+        there = made.state()
+        done(made, "set", name="disturbance.load", value=5.0)
+        done(made, "off")
+        made.advance(4000)
+        assert made.state().mode == "fault"
+        if reset:
+            done(made, "set", name="controller.law", value="pd")
+            done(made, "reset")
+        done(made, "restore")
+        done(made, "start")
+        assert made.advance(100) == 100
+        state = made.state()
+        assert (state.mode, state.law, state.pending) == ("point", "afsm", ())
+        assert (state.tick, state.q_rad, state.current_A) == (there.tick, there.q_rad, there.current_A)
+        done(made, "stop")
+        assert "after STOP" in said(made, "restore")
 
 
 BROKEN = """

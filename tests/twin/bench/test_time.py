@@ -45,6 +45,17 @@ def test_stop_does_not_wait_for_what_is_being_prepared():
         assert made.state().stopped
 
 
+def test_what_was_asked_before_stop_does_not_undo_it():
+    with begun() as made:
+        before = [made.command(name) for name in ("pause", "reset", "start")]
+        made.command("stop")
+        made.advance(1)
+        assert [bool(ticket.refused) for ticket in before] == [False, True, True]
+        assert made.state().stopped
+        done(made, "reset")
+        assert not made.state().stopped
+
+
 def test_stop_wakes_a_bench_at_work():
     """In slow motion, where a chunk is 20 ms of the clock's, and while nothing runs at all."""
     with bench() as made:

@@ -258,3 +258,12 @@ def test_what_several_processes_left_is_not_guessed(tmp_path):
         (tmp_path / f".run.rrd.{number}.part").touch()
     with pytest.raises(InputError, match="what 2 processes left"):
         read(tmp_path / "run.rrd")
+
+
+@pytest.mark.parametrize("time_s", [np.nan, np.inf, 0.0])
+def test_rows_out_of_order_are_damage(files, tmp_path, time_s):
+    table, metadata = read_parquet(files[0])
+    table.values[500, 0] = time_s
+    table.write_parquet(path := tmp_path / "run.parquet", metadata)
+    with pytest.raises(InputError, match="expected rows whose times rise"):
+        read(path)
