@@ -297,6 +297,15 @@ def test_fifty_pages_come_and_go(page):
         visitor.close()
 
 
+def test_one_page_more_than_there_is_room_for_is_refused(page, monkeypatch):
+    monkeypatch.setattr(front, "MOST_PAGES", 2)
+    with socket_to(page), socket_to(page):
+        with pytest.raises(InvalidStatus) as refusal:
+            socket_to(page)
+        assert refusal.value.response.status_code == 503
+    wait_for(lambda: is_alive(page))
+
+
 def test_a_flood_waits_in_its_own_socket(page, bench):
     """Thousands of moves of a slider hold up neither the server nor another page."""
     before = len(bench.commands())
@@ -312,6 +321,9 @@ def test_a_flood_waits_in_its_own_socket(page, bench):
         waited_s = time.monotonic() - begun
         # Of what is steered, the bench is told ten times a second; of who is there, now and then.
         assert len(bench.commands()) - before <= 2 + (waited_s + sending_s) / STEERED_S
+        # Of messages, a second's worth is taken at once and the rest at its rate: the moves count themselves.
+        moves = page._server.gui._gui_input_handle_from_uuid[name].value / 0.01
+        assert 0 < moves <= 1 + front.MOST_MESSAGES_PER_S * (1 + time.monotonic() - begun + sending_s)
         flooding.socket.shutdown(socket.SHUT_RDWR)
 
 
