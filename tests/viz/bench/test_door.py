@@ -303,7 +303,6 @@ def test_one_page_more_than_there_is_room_for_is_refused(page, monkeypatch):
         with pytest.raises(InvalidStatus) as refusal:
             socket_to(page)
         assert refusal.value.response.status_code == 503
-    wait_for(lambda: is_alive(page))
 
 
 def test_a_flood_waits_in_its_own_socket(page, bench):
