@@ -148,7 +148,7 @@ def test_leaving_the_workspace_is_an_event(tmp_path):
 def test_recording_carries_its_blueprint_and_name(run):
     path, *_ = run
     reader = RrdReader(path)
-    assert len(reader.blueprints()) == 2  # of the run as it goes on, and with its ranges once it has ended
+    assert len(reader.blueprints()) == 1
     assert reader.recordings()[0].application_id.startswith("spheretwin-")
 
 

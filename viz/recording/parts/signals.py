@@ -7,7 +7,7 @@ import rerun as rr
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.paths import entity
-from spheretwin.viz.layout.styles import log_styles
+from spheretwin.viz.layout.styles import signal_style
 from spheretwin.viz.recording.columns import scalars, time_index
 from spheretwin.viz.recording.parts.described import COMPLETE, signal_as_json
 from spheretwin.viz.recording.parts.part import Part, Rows, Subject
@@ -24,7 +24,6 @@ class Signals(Part):
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Say what the signals are."""
-        log_styles(recording, self.subject.signals)
         self._describe(recording, self.subject.signals)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
@@ -40,7 +39,9 @@ class Signals(Part):
         new = [signal for signal in signals if signal.name not in self._described]
         for signal in new:
             described = signal_as_json(len(self._described), signal)
-            recording.log(entity(signal.name), described, static=True)
+            # Time is an axis, and no line over itself.
+            drawn = [] if signal.name == COMPLETE else [signal_style(signal)]
+            recording.log(entity(signal.name), described, *drawn, static=True)
             self._described.add(signal.name)
         if new:
             recording.flush()  # before their rows: what a killed process leaves says what they are
