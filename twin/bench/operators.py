@@ -10,6 +10,9 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
 
 GONE_s = 2.0
+"""How long a twin may be without its operator until it holds."""
+
+SILENCE_s = 2.0
 """Silence after which a client is taken to be gone."""
 
 MOST_CLIENTS = 64
@@ -21,7 +24,9 @@ class Operators:
     Parameters
     ----------
     gone_s : float, s
-        Silence after which a client is gone.
+        How long after its operator left the twin is on its own, unless somebody takes over.
+    silence_s : float, s
+        Silence after which a client is gone, as if it had left.
     clock : callable
         Seconds that never go back.
 
@@ -31,11 +36,17 @@ class Operators:
     who have asked does so when the operator leaves, is gone, or gives over to it.
     """
 
-    def __init__(self, gone_s: float = GONE_s, clock: Callable[[], float] = time.monotonic) -> None:
-        self._gone_s, self._clock = gone_s, clock
+    def __init__(
+        self,
+        gone_s: float = GONE_s,
+        silence_s: float = SILENCE_s,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._gone_s, self._silence_s, self._clock = gone_s, silence_s, clock
         self._lock = threading.RLock()
         self._seen: dict[str, float] = {}
         self._asking: list[str] = []
+        self._left_s: float | None = None
         self.operator: str | None = None
 
     @property
@@ -85,14 +96,18 @@ class Operators:
             )
 
     def look(self) -> bool:
-        """Drop clients that are gone; True where the operator was one of them."""
+        """Drop clients that are gone; True, once, where the twin is on its own from now on."""
         now = self._clock()
         with self._lock:
-            gone = [client for client, seen_s in self._seen.items() if now - seen_s > self._gone_s]
-            lost = self.operator in gone
+            gone = [client for client, seen_s in self._seen.items() if now - seen_s > self._silence_s]
+            fell_silent = self.operator in gone
             for client in gone:
                 self._drop(client)
-        return lost
+            waited = self._left_s is not None and now - self._left_s > self._gone_s
+            if not fell_silent and not waited:
+                return False
+            self._left_s = None
+            return True
 
     def _note(self, client: str) -> None:
         if client not in self._seen and len(self._seen) >= MOST_CLIENTS:
@@ -100,11 +115,11 @@ class Operators:
         first = not self._seen
         self._seen[client] = self._clock()
         if first:
-            self.operator = client
+            self._operate(client)
 
     def _ask(self, client: str) -> None:
         if self.operator is None:
-            self.operator = client
+            self._operate(client)
         elif client != self.operator and client not in self._asking:
             self._asking.append(client)
 
@@ -112,11 +127,16 @@ class Operators:
         self.check(client)
         if to not in self._seen:
             raise InputError(f"bench: expected one of {', '.join(self._seen)}, received {shown(to)}")
-        self.operator = to
+        self._operate(to)
         self._asking = [asking for asking in self._asking if asking != to]
 
     def _drop(self, client: str) -> None:
         self._seen.pop(client, None)
         self._asking = [asking for asking in self._asking if asking != client]
         if client == self.operator:
-            self.operator = self._asking.pop(0) if self._asking else None
+            self.operator, self._left_s = None, self._clock()
+            if self._asking:
+                self._operate(self._asking.pop(0))
+
+    def _operate(self, client: str) -> None:
+        self.operator, self._left_s = client, None

@@ -115,3 +115,24 @@ def test_clients_say_who_they_are_and_are_not_without_end(clock):
     assert not operators.look()
     operators.say("hello", "one more")
     assert operators.operator == "one more"
+
+
+def test_the_twin_holds_some_time_after_its_operator_has_left_unless_somebody_takes_over(shared, clock):
+    say(shared, "hello", "a")
+    say(shared, "hello", "b")
+    say(shared, "jog", "a", rates_rad_s=[0, 0, 1])
+    say(shared, "leave", "a")
+    for still, mode in ((0.9 * GONE_s, "jog"), (0.2 * GONE_s, "hold")):
+        clock.now += still
+        say(shared, "beat", "b")
+        assert shared.state().mode == mode
+    say(shared, "ask", "b")
+    say(shared, "jog", "b", rates_rad_s=[0, 0, 1])
+    say(shared, "hello", "c")
+    say(shared, "ask", "c")
+    say(shared, "leave", "b")
+    assert shared.state().operator == "c"
+    for _ in range(4):
+        clock.now += 0.5 * GONE_s
+        say(shared, "beat", "c")
+    assert shared.state().mode == "jog"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import sys
 import warnings
 import webbrowser
@@ -16,7 +17,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.bench import Bench
-from spheretwin.twin.bench.operators import Operators
+from spheretwin.twin.bench.operators import GONE_s, Operators
 from spheretwin.twin.commands import outputs
 from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.scenario import flags
@@ -57,6 +58,13 @@ def add_to(verbs: Any) -> None:
         help=f"of the page, on 127.0.0.1; {PORT} unless given, 0 for any that is free",
     )
     parser.add_argument("--no-browser", action="store_true", help="only say where the page is")
+    parser.add_argument(
+        "--hold-after",
+        type=float,
+        default=GONE_s,
+        metavar="S",
+        help=f"how long the twin goes on after the page that operates it is gone; {GONE_s:g} s unless given",
+    )
     parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="record from the start")
     parser.set_defaults(run=run)
 
@@ -69,6 +77,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         )
     if not 0 <= options.port <= LARGEST_PORT:
         raise InputError(f"command line: expected a port from 0 to {LARGEST_PORT}, received {options.port}")
+    if not 0 <= options.hold_after < math.inf:
+        raise InputError(f"command line: expected --hold-after from 0 s on, received {options.hold_after:g}")
     scenario = scenarios.load(options.scenario, flags.overrides(rest))
     outputs.check([options.record] if options.record else [])
     # Slow to import, and only a bench needs it.
@@ -79,9 +89,10 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     # It warns of what it has to say to pages that are gone.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"viser\b")
     listening = front.listen(options.port)  # before anything is compiled
+    print(f"bench: preparing {scenario.name}", file=sys.stderr, flush=True)  # it may have to be compiled
     with listening, interruptible() as stop_requested, contextlib.ExitStack() as stack:
         stack.enter_context(timers_stopped())
-        bench = stack.enter_context(Bench(scenario, Operators(SILENCE_S)))
+        bench = stack.enter_context(Bench(scenario, Operators(options.hold_after, SILENCE_S)))
         page = stack.enter_context(Page(bench, choices_of(bench), listening))
         bench.begin()
         _record(bench, options.record)
