@@ -42,10 +42,16 @@ class Plots:
         What the layout is made for.
     seen : Seen, optional
         What the run has shown; without it, ranges follow the data.
+
+    Attributes
+    ----------
+    drawn : set of str
+        Entities that some plot has drawn so far.
     """
 
     def __init__(self, view: View, seen: Seen | None) -> None:
         self.view, self.seen = view, seen
+        self.drawn: set[str] = set()
 
     def about_zero(
         self,
@@ -119,12 +125,12 @@ class Plots:
     def _plot(
         self, title: str, lines: tuple[Line, ...], axis: int | None, band: Range | None
     ) -> rrb.TimeSeriesView:
+        self.drawn.update(line.entity for line in lines)
         contents = [f"/{line.entity}" for line in lines]
         if band and self.seen and self.seen.ended_s is not None:
             contents.append(f"/{ENDED}")
         one = [place == axis for place in range(len(ANGLES))]
-        return rrb.TimeSeriesView(
-            origin="/",
+        plot = rrb.TimeSeriesView(
             contents=contents,
             name=title,
             axis_x=self._time_axis(),
@@ -132,6 +138,8 @@ class Plots:
             plot_legend=rrb.PlotLegend(visible=False),
             defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
         )
+        plot.origin = None  # type: ignore[assignment]  # the root, which a file need not say
+        return plot
 
     def _time_axis(self) -> rrb.TimeAxis | None:
         """Axis over the time that is planned, while it is watched, or until behind an early end.

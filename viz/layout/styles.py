@@ -18,11 +18,11 @@ _BESIDE = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_gov
 _ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
 
 
-def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
-    """Log names with units, colours and widths of every signal."""
+def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...], drawn: frozenset[str]) -> None:
+    """Log names with units, colours and widths of the signals whose entities are drawn."""
     for signal in signals:
-        if signal.name == "t_s":
-            continue  # time is an axis, and no line over itself
+        if entity(signal.name) not in drawn:
+            continue
         names = _names(_short(signal.name), signal.labels or ("",), signal.unit)
         colours = _colours(signal)
         _log(recording, entity(signal.name), names, colours, _width(signal.name))

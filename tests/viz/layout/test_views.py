@@ -83,7 +83,8 @@ def contents(layout):
     for (path, name), values in layout.items():
         if name == "ViewContents:query":
             for line in values[0]:
-                yield line.replace("$origin", origins[path.removesuffix("/ViewContents")]).replace("//", "/")
+                origin = origins.get(path.removesuffix("/ViewContents"), "/")  # without one it is the root
+                yield line.replace("$origin", origin).replace("//", "/")
 
 
 def container_names(layout):
@@ -102,10 +103,20 @@ def exists(wanted, entities):
 def test_views_show_only_what_the_recording_holds(run):
     path, _ = run
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
-    for layout in layouts(path):
-        shown = list(contents(layout))
-        assert len(shown) > 5
-        assert [each for each in shown if not exists(each, entities)] == []
+    opening, whole = (list(contents(layout)) for layout in layouts(path))
+    assert [each for each in (*opening, *whole) if not exists(each, entities)] == []
+    # What is watched before a run has ended, and more than two plots a view.
+    assert set(opening) == {"/summary/**", "/world/**", "/derived/error_angle_deg", "/derived/error_mrad"}
+    assert len(whole) > 2 * len(VIEW_NAMES)
+
+
+def test_what_a_plot_draws_has_a_name_and_colours(run):
+    path, _ = run
+    _, whole = layouts(path)
+    styled = {entity for entity, name in columns(path) if name == "SeriesLines:names"}
+    drawn = {each for each in contents(whole) if each.startswith(("/telemetry/", "/derived/"))}
+    assert len(drawn) > 8
+    assert drawn <= styled
 
 
 def test_the_whole_layout_has_every_view_in_a_tab(run):

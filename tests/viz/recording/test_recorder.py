@@ -120,8 +120,8 @@ def test_resolved_scenario_is_in_the_recording(run):
 
 def test_series_have_names_with_units(run):
     path, *_ = run
-    names = static_text(path, entity("error_rad"), "SeriesLines:names")
-    assert names == ["error α [rad]", "error β [rad]", "error γ [rad]"]
+    names = static_text(path, entity("q_rad"), "SeriesLines:names")
+    assert names == ["q α [rad]", "q β [rad]", "q γ [rad]"]
 
 
 def texts(path):

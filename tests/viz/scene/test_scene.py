@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import palette
+from spheretwin.viz.scene.coils import SECTIONS
 from spheretwin.viz.scene.marks import ALONG, current_scale, current_scale_labels
 from spheretwin.viz.scene.meshes import read_meshes
 from spheretwin.viz.scene.paths import WORLD
@@ -146,10 +147,10 @@ def test_faces_and_normals_of_a_coil_point_outward(actuator):
     normals = np.array(mesh.vertex_normals.as_arrow_array().to_pylist())
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     ahead = normals[np.array(mesh.triangle_indices.as_arrow_array().to_pylist())]
-    # A facet of a circle of twenty is nine degrees off the normals at its corners.
+    # Of a circle of so many facets one is half of its angle off the normals at its corners.
     cosines = np.einsum("ti,tki->tk", facing, ahead) / np.linalg.norm(facing, axis=1, keepdims=True)
-    assert cosines.min() > np.cos(np.radians(9.1))
-    # A closed surface that faces outward holds its volume; a circle of twenty lacks 1.6 % of its area.
+    assert cosines.min() > np.cos(np.pi / SECTIONS + np.radians(0.1))
+    # A closed surface that faces outward holds its volume; a circle of fourteen lacks 3.3 % of its area.
     volume = np.einsum("ti,ti->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6 / 36
     coil = actuator.coil
     hull = np.pi * (coil.outer_radius_m**2 - coil.inner_radius_m**2) * coil.length_m
