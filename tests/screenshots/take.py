@@ -22,29 +22,30 @@ COLOURS = 256
 class Picture(NamedTuple):
     """A moment of a run, in one of its views."""
 
-    runs: tuple[str, ...]
-    """Scenario and flags of each; two or more are merged."""
+    runs: dict[str, str]
+    """Scenario and flags of each by the name of its file; two or more are merged."""
     view: str
     t_s: float
 
 
+OPEN = "--fault.0.target coil.04 --fault.0.mode open --fault.0.start-s 3"
 FAILING = "sinusoid --controller.law pd --disturbance.load 2"
 
 TABLE = {
-    "overview": Picture(("nutation",), "overview", 3.4),
-    "control": Picture(("nutation",), "control", 3.4),
-    "coils": Picture(("sinusoid --plant.payload-kg 0.1 --disturbance.load 2",), "coils", 3.3),
+    "overview": Picture({"nutation": "nutation"}, "overview", 3.4),
+    "control": Picture({"nutation": "nutation"}, "control", 3.4),
+    "coils": Picture({"loaded": "sinusoid --plant.payload-kg 0.1 --disturbance.load 2"}, "coils", 3.3),
     "hardware": Picture(
-        ("tilt --hardware prototype --fault.0.target coil.04 --fault.0.mode open --fault.0.start-s 3",),
+        {"open": f"tilt --hardware prototype {OPEN}"},
         "hardware",
         4.4,
     ),
     "compare": Picture(
-        ("sinusoid --controller.law pd", "sinusoid --controller.law adaptive_fuzzy", "sinusoid"),
+        {law: f"sinusoid --controller.law {law}" for law in ("afsm", "adaptive_fuzzy", "pd")},
         "compare",
         3.4,
     ),
-    "failed": Picture((FAILING,), "overview", 1.2),
+    "failed": Picture({"failing": FAILING}, "overview", 1.2),
 }
 
 
@@ -75,10 +76,10 @@ def main() -> None:
 def recorded(picture: Picture, folder: Path) -> Path:
     """Recording of the picture's run, or of all its runs side by side."""
     folder.mkdir()
-    paths = [folder / f"{place}.rrd" for place in range(len(picture.runs))]
-    for run, path in zip(picture.runs, paths, strict=True):
+    paths = [folder / f"{name}.rrd" for name in picture.runs]
+    for flags, path in zip(picture.runs.values(), paths, strict=True):
         view = [] if len(paths) > 1 else ["--view", picture.view]
-        spheretwin("simulate", *run.split(), *view, "--record", path)
+        spheretwin("simulate", *flags.split(), *view, "--record", path)
     if len(paths) == 1:
         return paths[0]
     spheretwin("review", *paths, "--merge", folder / "merged.rrd")

@@ -56,7 +56,7 @@ class Page:
         self._bench, self._choices, self._hand = bench, choices, Hand(bench)
         self._server = front.serve(listening, TITLE)
         self._watching: dict[int, Any] = {}
-        self._frame = 0
+        self._frame, self._shown_s = 0, -1.0
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._server.gui.set_panel_label(TITLE)
         _look(self._server)
@@ -182,9 +182,13 @@ class Page:
     def _tell(self, state: Any) -> None:
         _renewed(self._status, status_html(state, self._hand.refused, self._hand.waits_for))
         _renewed(self._currents, currents_html(state.current_A, state.current_limit_A, state.temperature_C))
-        if state.running:
+        if state.t_s < self._shown_s:  # another run
+            self._scene.forget()
+        if state.t_s != self._shown_s:
+            self._shown_s = state.t_s
             self._scene.trail(np.array(state.q_rad))
             self._plots.show(self._bench.history())
+            self._plots.warm(state.t_s, state.temperature_C)
         self._modes.show(state)
         self._faults.show(state)
 

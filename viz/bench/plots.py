@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,21 @@ class Plots:
     def __init__(self, gui: viser.GuiApi) -> None:
         self._error = _plot(gui, "error, mrad", ("α", "β", "γ"))
         self._torque = _plot(gui, "torque asked for, N·m", ("α", "β", "γ"))
+        self._temperature = _plot(gui, "warmest winding, °C", ("T",))
+        self._temperature.visible = False
+        self._warmest: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)
+
+    def warm(self, t_s: float, temperature_C: tuple[float, ...] | None) -> None:
+        """Draw the warmest winding, where the hardware has any that warm."""
+        if temperature_C is None:
+            self._temperature.visible = False
+            return
+        if self._warmest and t_s <= self._warmest[-1][0]:  # another run
+            self._warmest.clear()
+        self._warmest.append((t_s, max(temperature_C)))
+        if len(self._warmest) > 1:
+            self._temperature.data = tuple(np.array(self._warmest).T.copy())
+            self._temperature.visible = True
 
     def show(self, rows: dict[str, NDArray[np.float64]]) -> None:
         """Draw rows, as a bench's history has them."""
@@ -46,7 +62,7 @@ class Plots:
 
 def _plot(gui: viser.GuiApi, title: str, names: tuple[str, ...]) -> viser.GuiUplotHandle:
     nothing = np.array([0.0, 1.0])
-    colours = ["rgb({},{},{})".format(*colour) for colour in palette.AXIS_COLOURS]
+    colours = ["rgb({},{},{})".format(*colour) for colour in palette.AXIS_COLOURS[: len(names)]]
     curves: Any = tuple(
         {"label": name, "stroke": colour, "width": 1.5, "points": {"show": False}}
         for name, colour in zip(names, colours, strict=True)

@@ -157,7 +157,10 @@ class Settings:
             self._laws.value = law.text
         self._gains.show([each for each in settings if _section(each.name) == "controller" and each != law])
         self._often.show([each for each in settings if each.name in OFTEN])
-        self._fields.show([each for each in settings if _section(each.name) == self._sections.value])
+        section = self._sections.value
+        self._fields.show(
+            [each for each in settings if _section(each.name) == section and each.name not in OFTEN]
+        )
 
     def _law(self, gui: viser.GuiApi) -> None:
         self._laws = gui.add_dropdown("law", self._choices.laws)

@@ -72,7 +72,7 @@ def currents_html(
         _upright(current / limit, "rgb({},{},{})".format(*colour))
         for current, colour in zip(current_A, colours, strict=True)
     )
-    warmest = f", warmest {max(temperature_C):.1f} °C" if temperature_C else ""
+    warmest = f", {max(temperature_C):.1f} °C" if temperature_C else ""
     peak = max(map(abs, current_A))
     return (
         f'<div style="padding:0.2em 0.8em;font-size:0.78em;color:{QUIET}">'

@@ -9,19 +9,12 @@ from spheretwin.viz.scene import paths as scene
 from spheretwin.viz.scene.torques import SCALE
 from spheretwin.viz.scene.traces import TRACES, Trace
 
-NAME = f"actuator; {SCALE}"
-
-
-def actuator_alone() -> rrb.Spatial3DView:
-    """View of all that moves, as the viewer has it."""
-    return rrb.Spatial3DView(origin=f"/{scene.WORLD}", name=NAME)
-
 
 def actuator_view() -> rrb.Spatial3DView:
     """View of all that moves, and of the traces of the last seconds, on the ground of the viewer's theme."""
     return rrb.Spatial3DView(
         origin=f"/{scene.WORLD}",
-        name=NAME,
+        name=f"actuator; {SCALE}",
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital,

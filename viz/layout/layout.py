@@ -8,25 +8,14 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spheretwin.viz.layout import panels
-from spheretwin.viz.layout.actuator_view import actuator_alone
 from spheretwin.viz.layout.paths import TIMELINE
-from spheretwin.viz.layout.plots import Plots, quantity
+from spheretwin.viz.layout.plots import Plots
 from spheretwin.viz.layout.seen import Seen
 from spheretwin.viz.layout.view import View
 from spheretwin.viz.layout.views.registry import VIEWS
-from spheretwin.viz.quantities.error import ERROR
-from spheretwin.viz.quantities.error_angle import ERROR_ANGLE
 
 # The run in a line takes two lines of text.
 ROW_SHARES = (1, 10)
-
-
-class Brief(rrb.Blueprint):
-    """Blueprint without the wall clock, of which a file would keep some bytes for every piece of it."""
-
-    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
-        stream.set_log_time_enabled(False)
-        super()._log_to_stream(stream)
 
 
 def layout(view: View, seen: Seen | None = None) -> rrb.Blueprint:
@@ -48,29 +37,22 @@ def layout(view: View, seen: Seen | None = None) -> rrb.Blueprint:
 def opening_layout(view: View) -> rrb.Blueprint:
     """Blueprint of a recording that is still written.
 
-    One that is watched has every view. A file has the actuator and its errors alone: a layout takes room,
-    and when the run has ended, the whole one with its ranges takes this one's place.
+    One that is watched has every view. A file has the one that is shown: a layout takes room, and when the
+    run has ended, the whole one with its ranges takes this one's place.
     """
-    return layout(view) if view.live else _blueprint(_least(view), view)
+    return layout(view) if view.live else _blueprint(VIEWS[view.shown](Plots(view, None)), view)
 
 
-def _least(view: View) -> rrb.Container:
-    """What tells a run that is not whole from others, under the name of the view that is shown."""
-    errors = [f"/{quantity(each).entity}" for each in (ERROR_ANGLE, ERROR)]
-    plot = rrb.TimeSeriesView(contents=errors, name="error as one angle [°], of each axis [mrad]")
-    return rrb.Horizontal(actuator_alone(), plot, name=view.shown)
+class _Small(rrb.Blueprint):
+    """Blueprint without the clock's time in each of its rows, which is a quarter of its bytes."""
+
+    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
+        stream.set_log_time_enabled(False)
+        super()._log_to_stream(stream)
 
 
-def plotted(view: View) -> frozenset[str]:
-    """Entities that some plot of the layout draws."""
-    plots = Plots(view, None)
-    for made in VIEWS.values():
-        made(plots)
-    return frozenset(plots.drawn)
-
-
-def _blueprint(below: rrb.Container, view: View) -> rrb.Blueprint:
-    return Brief(
+def _blueprint(below: rrb.Container | rrb.View, view: View) -> rrb.Blueprint:
+    return _Small(
         rrb.Vertical(panels.run_line(), below, row_shares=ROW_SHARES),
         rrb.TimePanel(
             state="collapsed",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from spheretwin.viz import palette
 from spheretwin.viz.layout.paths import CURRENT_BARS, CURRENT_MAP, EVENTS, PHASE_PLANE, SUMMARY, TIMELINE
 from spheretwin.viz.layout.plots import Line, Plots
 from spheretwin.viz.layout.seen import Channel
@@ -29,7 +28,6 @@ def current_bars(plots: Plots) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         origin=f"/{CURRENT_BARS}",
         name="currents at the cursor, by group, between the limits",
-        background=list(palette.BACKGROUND),
         visual_bounds=rrb.VisualBounds2D(x_range=[-0.1, 2.1], y_range=[-0.6, 0.7]),
     )
 
@@ -49,7 +47,6 @@ def phase_plane(plots: Plots) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         origin=f"/{PHASE_PLANE}",
         name="phase plane: ė up, s - ė right; line s = 0",
-        background=list(palette.BACKGROUND),
         visual_bounds=bounds,
         time_ranges=trail,
     )
@@ -57,5 +54,4 @@ def phase_plane(plots: Plots) -> rrb.Spatial2DView:
 
 def log() -> rrb.TextLogView:
     """What is worth a line."""
-    shown = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
-    return rrb.TextLogView(origin=f"/{EVENTS}", name="events", columns=shown)
+    return rrb.TextLogView(origin=f"/{EVENTS}", name="events")

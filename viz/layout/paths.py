@@ -13,7 +13,6 @@ CURRENT_MAP = "currents/map"
 CURRENT_BARS = "currents/bars"
 CURRENT_BARS_STILL = f"{CURRENT_BARS}/still"
 PHASE_PLANE = "phase_plane"
-PHASE_PLANE_POINTS = f"{PHASE_PLANE}/now"
 ENDED = "ended"
 
 

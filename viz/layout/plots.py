@@ -8,12 +8,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.layout.paths import ENDED, STATES, derived, entity
+from spheretwin.viz.layout.paths import CURRENT_MAP, ENDED, STATES, derived, entity
 from spheretwin.viz.layout.seen import Channel, Seen
 from spheretwin.viz.layout.view import View, shown_until_s
 from spheretwin.viz.quantities.quantity import Quantity
 
 Range = tuple[float, float]
+
+_NO_LEGEND = rrb.PlotLegend(visible=False)
+"""Where it would name lines that are not drawn, or too many; else it stands over the oldest data."""
 
 
 class Line(NamedTuple):
@@ -42,16 +45,10 @@ class Plots:
         What the layout is made for.
     seen : Seen, optional
         What the run has shown; without it, ranges follow the data.
-
-    Attributes
-    ----------
-    drawn : set of str
-        Entities that some plot has drawn so far.
     """
 
     def __init__(self, view: View, seen: Seen | None) -> None:
         self.view, self.seen = view, seen
-        self.drawn: set[str] = set()
 
     def about_zero(
         self,
@@ -111,7 +108,9 @@ class Plots:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
         low, high = self.seen.band(*(Channel(line.name, axis) for line in lines), least=least)
         told = f"{what}, {low:.3g} to {_with_unit(high, unit)}{key}"
-        return self._plot(told, lines, axis, (low, high))
+        # What follows the data needs no range of its own, which takes room in the file.
+        follows = high - low > 2 * least and self.seen.ended_s is None
+        return self._plot(told, lines, axis, None if follows else (low, high))
 
     def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:
         """Plot of a range that is known before the run."""
@@ -123,23 +122,26 @@ class Plots:
         return rrb.StateTimelineView(origin=f"/{STATES}", name=name, time_view=axis)
 
     def _plot(
-        self, title: str, lines: tuple[Line, ...], axis: int | None, band: Range | None
+        self,
+        title: str,
+        lines: tuple[Line, ...],
+        axis: int | None,
+        band: Range | None,
     ) -> rrb.TimeSeriesView:
-        self.drawn.update(line.entity for line in lines)
         contents = [f"/{line.entity}" for line in lines]
         if band and self.seen and self.seen.ended_s is not None:
             contents.append(f"/{ENDED}")
+        short = axis is None and CURRENT_MAP not in contents[0] and len(lines) == 1
         one = [place == axis for place in range(len(ANGLES))]
-        plot = rrb.TimeSeriesView(
+        return rrb.TimeSeriesView(
+            origin="/",
             contents=contents,
             name=title,
             axis_x=self._time_axis(),
             axis_y=rrb.ScalarAxis(range=band) if band else None,
-            plot_legend=rrb.PlotLegend(visible=False),
+            plot_legend=None if short else _NO_LEGEND,
             defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
         )
-        plot.origin = None  # type: ignore[assignment]  # the root, which a file need not say
-        return plot
 
     def _time_axis(self) -> rrb.TimeAxis | None:
         """Axis over the time that is planned, while it is watched, or until behind an early end.

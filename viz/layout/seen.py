@@ -83,8 +83,9 @@ class Seen:
         return f", to {np.max(size):.3g} in first {until:.2g} s"
 
     def _largest(self, *channels: Channel) -> Array:
-        """Largest magnitude among some channels in each span; 0 where there was no value."""
-        return np.nan_to_num(np.max(np.concatenate([self._size(each) for each in channels], axis=1), axis=1))
+        """Largest magnitude among some channels in each span; 0 where there was no number."""
+        sizes = np.concatenate([self._size(each) for each in channels], axis=1)
+        return np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=1)
 
     def _size(self, channel: Channel) -> Array:
         return np.maximum(np.abs(self._bounds(self._low, channel)), np.abs(self._bounds(self._high, channel)))

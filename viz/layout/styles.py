@@ -4,7 +4,6 @@ import rerun as rr
 
 from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
 from spheretwin.viz import palette
-from spheretwin.viz.layout.paths import derived, entity
 from spheretwin.viz.quantities.quantity import Quantity
 
 WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
@@ -18,31 +17,24 @@ _BESIDE = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_gov
 _ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
 
 
-def log_styles(recording: rr.RecordingStream, signals: tuple[Signal, ...], drawn: frozenset[str]) -> None:
-    """Log names with units, colours and widths of the signals whose entities are drawn."""
-    for signal in signals:
-        if entity(signal.name) not in drawn:
-            continue
-        names = _names(_short(signal.name), signal.labels or ("",), signal.unit)
-        colours = _colours(signal)
-        _log(recording, entity(signal.name), names, colours, _width(signal.name))
+def signal_style(signal: Signal) -> rr.SeriesLines:
+    """Names with units, colours and widths of a signal's lines."""
+    names = _names(_short(signal.name), signal.labels or ("",), signal.unit)
+    return _style(names, _colours(signal), _width(signal.name))
 
 
-def log_quantity_style(recording: rr.RecordingStream, quantity: Quantity) -> None:
-    """Log names with units, colours and width of a derived quantity."""
+def quantity_style(quantity: Quantity) -> rr.SeriesLines:
+    """Names with units, colours and width of a derived quantity's lines."""
     names = _names(_short(quantity.name), quantity.labels, quantity.unit)
-    _log(recording, derived(quantity.name), names, list(quantity.colours), _width(quantity.name))
+    return _style(names, list(quantity.colours), _width(quantity.name))
 
 
-def _log(
-    recording: rr.RecordingStream, path: str, names: list[str], colours: list[palette.Colour], width: float
-) -> None:
+def _style(names: list[str], colours: list[palette.Colour], width: float) -> rr.SeriesLines:
     # A command that swings from tick to tick is its mean where ticks share a pixel: this moves the rotor.
     aggregation = rr.components.AggregationPolicy.Average if width == THIN else None
-    style = rr.SeriesLines(
+    return rr.SeriesLines(
         names=names, colors=colours, widths=[width] * len(names), aggregation_policy=aggregation
     )
-    recording.log(path, style, static=True)
 
 
 def _names(short: str, labels: tuple[str, ...], unit: str) -> list[str]:

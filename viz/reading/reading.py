@@ -26,7 +26,7 @@ from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY, TIMELINE
 from spheretwin.viz.layout.view import View, application
 from spheretwin.viz.reading.messages import whole_messages
 from spheretwin.viz.reading.survival import check_readable
-from spheretwin.viz.recording.parts.described import COMPLETE, FACTS, SIGNALS, signals_of
+from spheretwin.viz.recording.parts.described import COMPLETE, FACTS, SIGNAL, signal_of
 from spheretwin.viz.recording.parts.events import Event
 
 VALUES = "Scalars:scalars"
@@ -61,7 +61,7 @@ class _Found:
 
     def __init__(self) -> None:
         self.facts: dict[str, Any] | None = None
-        self.signals: tuple[Signal, ...] = ()
+        self.signals: dict[str, tuple[int, Signal]] = {}
         self.columns: list[_Column] = []
         self.log: list[tuple[int, str, str]] = []
 
@@ -75,9 +75,9 @@ class _Found:
         names = batch.schema.names
         if path == SCENARIO and FACTS in names:
             self.facts = json.loads(_text(batch, FACTS))
-        elif path == TELEMETRY and SIGNALS in names:
-            told = signals_of(_text(batch, SIGNALS))
-            self.signals = max(self.signals, told, key=len)  # the last that was told has all
+        elif root == TELEMETRY and SIGNAL in names:
+            place, signal = signal_of(_text(batch, SIGNAL))
+            self.signals[name] = place, signal
         elif root == TELEMETRY and VALUES in names:
             values = np.asarray(batch.column(VALUES).flatten())
             self.columns.append(_Column(name, _times(batch), values.reshape(len(batch), -1)))
@@ -170,7 +170,8 @@ def _exact(t_ns: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
 
 def _table(found: _Found) -> Table:
     """All columns by tick; NaN where a run had no such column."""
-    signals, columns = found.signals, _complete(found)
+    signals = tuple(signal for _, signal in sorted(found.signals.values(), key=lambda each: each[0]))
+    columns = _complete(found)
     ticks = np.unique(np.concatenate([column.t_ns for column in columns] or [np.empty(0, np.int64)]))
     values = allocated(len(ticks), width(signals))
     values[:] = np.nan

@@ -12,7 +12,6 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.layout.layout import opening_layout
 from spheretwin.viz.layout.view import OVERVIEW
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.parts.part import Subject
@@ -73,7 +72,7 @@ class Recorder(Stream):
     def connect(self) -> None:
         """Open the file."""
         sink = rr.FileSink((self._pipe or self._output).path)
-        self.recording.set_sinks(sink, default_blueprint=opening_layout(self.view))
+        self.recording.set_sinks(sink)
 
     def due(self) -> int:
         """Rows that are recorded together: more as the recording grows."""

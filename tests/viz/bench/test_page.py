@@ -159,3 +159,15 @@ def test_a_page_comes_back_by_itself(browser):
         bench.now.t_s = 77.0
         tab.wait_for(f"{STATUS}?.innerText.includes('77.000 s')")
         tab.close()
+
+
+def test_the_way_of_the_tip_begins_anew_with_another_run():
+    bench = fake.Bench()
+    with fake.shown(bench) as page:
+        for t_s in (1.3, 1.4, 1.5):
+            bench.now.t_s = t_s
+            time.sleep(0.5)
+        assert len(page._scene._trail) >= 3
+        bench.now.t_s = 0.0
+        time.sleep(0.5)
+        assert len(page._scene._trail) == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+import warnings
 import webbrowser
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -75,6 +76,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     from spheretwin.viz.bench import front
     from spheretwin.viz.bench.page import Page
 
+    # It warns of what it has to say to pages that are gone.
+    warnings.filterwarnings("ignore", category=UserWarning, module=r"viser\b")
     listening = front.listen(options.port)  # before anything is compiled
     with listening, interruptible() as stop_requested, contextlib.ExitStack() as stack:
         stack.enter_context(timers_stopped())

@@ -9,7 +9,6 @@ from spheretwin.viz.layout import panels
 from spheretwin.viz.layout.plots import Plots, quantity, signal
 from spheretwin.viz.quantities.coupling import COUPLING
 from spheretwin.viz.quantities.delivered import DELIVERED
-from spheretwin.viz.quantities.error import ERROR
 
 SLIDING = "sliding_s"
 
@@ -18,12 +17,8 @@ LEAST = {"N·m": 0.01, "rad/s": 0.05, "rad": 0.02, "rad/s²": 0.5}
 
 
 def control(plots: Plots) -> rrb.Container:
-    """Error and torque of each axis; below, what the law says of itself, and the coupling of the axes."""
+    """Torques of each axis; below, what the law says of itself, and the coupling of the axes."""
     asked = [signal("torque_command_Nm"), quantity(DELIVERED), signal("disturbance_Nm")]
-    errors = [
-        plots.about_zero(f"error {name}", "mrad", quantity(ERROR), least=ERROR.floor, axis=axis)
-        for axis, name in enumerate(ANGLES)
-    ]
     torques = [
         plots.about_zero(
             f"torque {name}",
@@ -35,10 +30,10 @@ def control(plots: Plots) -> rrb.Container:
         )
         for axis, name in enumerate(ANGLES)
     ]
-    return rrb.Vertical(rrb.Horizontal(*errors), rrb.Horizontal(*torques), _of_the_law(plots), name="control")
+    return rrb.Grid(*torques, *_of_the_law(plots), grid_columns=3, name="control")
 
 
-def _of_the_law(plots: Plots) -> rrb.Container:
+def _of_the_law(plots: Plots) -> list[rrb.Container | rrb.View]:
     own = {each.name: each for each in plots.view.own if _is_of_the_law(each)}
     coupling = plots.about_zero("coupling torques (6)-(10)", "N·m", quantity(COUPLING), least=COUPLING.floor)
     sliding = []
@@ -48,13 +43,15 @@ def _of_the_law(plots: Plots) -> rrb.Container:
             plots.about_zero("sliding variables s", "rad/s", signal(SLIDING), least=LEAST["rad/s"]),
             panels.phase_plane(plots),
         ]
-    tabs = [coupling, *(_plot(plots, each) for each in own.values())]
-    return rrb.Horizontal(*sliding, rrb.Tabs(*tabs, active_tab=0))
+    units = dict.fromkeys(each.unit for each in own.values())
+    tabs = [coupling, *(_plot(plots, unit, own) for unit in units)]
+    return [*sliding, rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else coupling]
 
 
-def _plot(plots: Plots, of: Signal) -> rrb.TimeSeriesView:
-    least = LEAST.get(of.unit, 1e-3)
-    return plots.whole(of.name, of.unit, signal(of.name), least=least)
+def _plot(plots: Plots, unit: str, own: dict[str, Signal]) -> rrb.TimeSeriesView:
+    """Plot of all signals of one unit."""
+    names = [name for name, each in own.items() if each.unit == unit]
+    return plots.whole(", ".join(names), unit, *map(signal, names), least=LEAST.get(unit, 1e-3))
 
 
 def _is_of_the_law(of: Signal) -> bool:

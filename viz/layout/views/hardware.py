@@ -6,7 +6,6 @@ import rerun.blueprint as rrb
 
 from spheretwin.viz.layout import panels
 from spheretwin.viz.layout.plots import Plots, quantity, signal
-from spheretwin.viz.quantities.copper_loss import COPPER_LOSS
 from spheretwin.viz.quantities.estimated_rate import ESTIMATED_RATE
 from spheretwin.viz.quantities.measured_angle import MEASURED_ANGLE
 
@@ -20,7 +19,7 @@ LEAST_W = 1.0
 def hardware(plots: Plots) -> rrb.Container:
     """States and events beside what the chain of sensors, amplifiers and coils shows of itself."""
     names = plots.view.names
-    shown = [plots.whole("heat of all coils", "W", quantity(COPPER_LOSS), least=COPPER_LOSS.floor)]
+    shown = []
     if "coil_temperature_degC" in names:
         line = signal("coil_temperature_degC")
         shown.append(plots.whole("temperature of the coils", "°C", line, least=LEAST_degC))
@@ -37,7 +36,10 @@ def hardware(plots: Plots) -> rrb.Container:
         shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
     if "friction_Nm" in names:
         shown.append(plots.whole("friction", "N·m", signal("friction_Nm"), least=0.002))
-    columns = 2 if len(shown) > 1 else 1
-    left = rrb.Vertical(plots.states("states of what can fail"), panels.log(), row_shares=[3, 2])
-    right = rrb.Grid(*shown, grid_columns=columns)
-    return rrb.Horizontal(left, right, column_shares=[2, 3], name="hardware")
+    told = [plots.states("states of what can fail"), panels.log()]
+    if not shown:
+        return rrb.Vertical(*told, name="hardware")
+    chain = rrb.Grid(*shown, grid_columns=2)
+    return rrb.Horizontal(
+        rrb.Vertical(*told, row_shares=[3, 2]), chain, column_shares=[2, 3], name="hardware"
+    )

@@ -24,7 +24,7 @@ def overview(plots: Plots) -> rrb.Container:
             low=-0.05 * MOST,
             high=1.05 * MOST,
         ),
-        rrb.Horizontal(plots.states(), panels.log(), column_shares=[3, 2]),
+        plots.states(),
         row_shares=[3, 3, 2, 4 if any(each.states for each in plots.view.own) else 2],
     )
     return rrb.Horizontal(seen, told, column_shares=[4, 5], name="overview")

@@ -14,7 +14,7 @@ from spheretwin.viz.layout.views.hardware import hardware
 from spheretwin.viz.layout.views.overview import overview
 from spheretwin.viz.layout.views.scenario import scenario
 
-VIEWS: dict[str, Callable[[Plots], rrb.Container]] = {
+VIEWS: dict[str, Callable[[Plots], rrb.Container | rrb.View]] = {
     "overview": overview,
     "control": control,
     "coils": coils,

@@ -8,7 +8,6 @@ from spheretwin.viz.layout.paths import SCENARIO
 from spheretwin.viz.layout.plots import Plots
 
 
-def scenario(plots: Plots) -> rrb.Container:
+def scenario(plots: Plots) -> rrb.View:
     """The resolved scenario as text."""
-    text = rrb.TextDocumentView(origin=f"/{SCENARIO}", name="resolved scenario")
-    return rrb.Vertical(text, name="scenario")
+    return rrb.TextDocumentView(origin=f"/{SCENARIO}", name="scenario")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import Any
 
 import rerun as rr
 
@@ -12,7 +11,7 @@ from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.versions import versions
 
-FACTS, SIGNALS = "facts", "signals"
+FACTS, SIGNAL = "facts", "signal"
 """Names of the components below."""
 
 RATE = "record_rate_Hz"
@@ -28,15 +27,13 @@ def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
     return rr.AnyValues(facts=json.dumps(described, default=str))
 
 
-def signals_as_json(signals: tuple[Signal, ...]) -> rr.AnyValues:
-    """All signals that a run has had so far, in the order of their columns."""
-    return rr.AnyValues(signals=json.dumps([asdict(signal) for signal in signals]))
+def signal_as_json(place: int, signal: Signal) -> rr.AnyValues:
+    """A signal, and its place among the columns."""
+    return rr.AnyValues(signal=json.dumps({"place": place, **asdict(signal)}))
 
 
-def signals_of(text: str) -> tuple[Signal, ...]:
-    """Signals as they were written."""
-    return tuple(_signal(fields) for fields in json.loads(text))
-
-
-def _signal(fields: dict[str, Any]) -> Signal:
-    return Signal(**{**fields, **{name: tuple(fields[name]) for name in ("labels", "states")}})
+def signal_of(text: str) -> tuple[int, Signal]:
+    """Place and signal as they were written."""
+    fields = json.loads(text)
+    labels, states = (tuple(fields.pop(name)) for name in ("labels", "states"))
+    return fields.pop("place"), Signal(**fields, labels=labels, states=states)

@@ -6,11 +6,10 @@ import rerun as rr
 
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.layout import plotted
-from spheretwin.viz.layout.paths import TELEMETRY, entity
-from spheretwin.viz.layout.styles import log_styles
+from spheretwin.viz.layout.paths import entity
+from spheretwin.viz.layout.styles import signal_style
 from spheretwin.viz.recording.columns import scalars, time_index
-from spheretwin.viz.recording.parts.described import COMPLETE, signals_as_json
+from spheretwin.viz.recording.parts.described import COMPLETE, signal_as_json
 from spheretwin.viz.recording.parts.part import Part, Rows, Subject
 
 
@@ -21,11 +20,10 @@ class Signals(Part):
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
-        self._described: dict[str, Signal] = {}
+        self._described: set[str] = set()
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Say what the signals are."""
-        log_styles(recording, self.subject.signals, plotted(self.subject.view))
         self._describe(recording, self.subject.signals)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
@@ -37,9 +35,13 @@ class Signals(Part):
             recording.send_columns(entity(signal.name), index, [scalars(rows[signal.name], signal.size)])
 
     def _describe(self, recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
-        """Say what all signals are once some come for the first time; a change of law may bring some."""
-        if all(signal.name in self._described for signal in signals):
-            return
-        self._described |= {signal.name: signal for signal in signals}
-        recording.log(TELEMETRY, signals_as_json(tuple(self._described.values())), static=True)
-        recording.flush()  # before their rows: what a killed process leaves says what they are
+        """Say of signals that come for the first time what they are; a change of law may bring some."""
+        new = [signal for signal in signals if signal.name not in self._described]
+        for signal in new:
+            described = signal_as_json(len(self._described), signal)
+            # Time is an axis, and no line over itself.
+            drawn = [] if signal.name == COMPLETE else [signal_style(signal)]
+            recording.log(entity(signal.name), described, *drawn, static=True)
+            self._described.add(signal.name)
+        if new:
+            recording.flush()  # before their rows: what a killed process leaves says what they are

@@ -42,11 +42,10 @@ class Currents(Part):
         limit_A = self.subject.facts.current_limit_A
         ends = [[[0.0, y], [WIDTH, y]] for y in (-0.5, 0.0, 0.5)]
         lines = rr.LineStrips2D(ends, colors=[palette.DESIRED_TRACE] * 3, radii=rr.Radius.ui_points(0.5))
-        recording.log(CURRENT_BARS_STILL, lines, static=True)
         places = [[-0.05, -0.5], [-0.05, 0.5], *([x, 0.56] for x in self._places())]
         labels = [f"+{limit_A:g} A", f"-{limit_A:g} A", *map(str, range(self._groups))]
         told = rr.Points2D(places, labels=labels, show_labels=True, radii=0.0, colors=[palette.PLAIN])
-        recording.log(f"{CURRENT_BARS_STILL}/names", told, static=True)
+        recording.log(CURRENT_BARS_STILL, lines, told, static=True)
         bars = rr.LineStrips2D.from_fields(radii=0.3 * WIDTH / self._groups)
         recording.log(CURRENT_BARS, bars, static=True)
 

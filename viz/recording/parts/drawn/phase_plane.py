@@ -8,7 +8,7 @@ import rerun as rr
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import palette
-from spheretwin.viz.layout.paths import PHASE_PLANE, PHASE_PLANE_POINTS
+from spheretwin.viz.layout.paths import PHASE_PLANE
 from spheretwin.viz.recording.columns import time_index
 from spheretwin.viz.recording.parts.drawn.bins import Binned, Bins
 from spheretwin.viz.recording.parts.part import Part, Subject
@@ -51,13 +51,12 @@ class PhasePlane(Part):
         x, y = binned.first[:, :3], -binned.first[:, 3:]  # a 2D view's y points down
         positions = np.stack([x, y], axis=2).reshape(-1, 2)
         columns = rr.Points2D.columns(positions=positions).partition([3] * len(x))
-        recording.send_columns(PHASE_PLANE_POINTS, time_index(binned.t_s), columns)
+        recording.send_columns(PHASE_PLANE, time_index(binned.t_s), columns)
 
 
 def _log_axes(recording: rr.RecordingStream) -> None:
     ends = [[[-_FAR, 0], [_FAR, 0]], [[0, -_FAR], [0, _FAR]], [[-_FAR, -_FAR], [_FAR, _FAR]]]
     colours = [palette.DESIRED_TRACE, palette.DESIRED_TRACE, palette.ASKED]
     axes = rr.LineStrips2D(ends, colors=colours, radii=rr.Radius.ui_points(0.5))
-    recording.log(f"{PHASE_PLANE}/axes", axes, static=True)
     points = rr.Points2D.from_fields(colors=palette.AXIS_COLOURS, radii=rr.Radius.ui_points(2.5))
-    recording.log(PHASE_PLANE_POINTS, points, static=True)
+    recording.log(PHASE_PLANE, axes, points, static=True)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from time import monotonic
+
 import numpy as np
 import rerun as rr
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.layout import layout
+from spheretwin.viz.layout.layout import layout, opening_layout
 from spheretwin.viz.layout.paths import SUMMARY, derived
-from spheretwin.viz.layout.styles import log_quantity_style
+from spheretwin.viz.layout.styles import quantity_style
 from spheretwin.viz.quantities.error_angle import ERROR_ANGLE
 from spheretwin.viz.quantities.quantity import Kept, Rows
 from spheretwin.viz.quantities.registry import quantities_of
@@ -22,6 +24,9 @@ from spheretwin.viz.recording.parts.part import Part, Subject
 
 # A bin leaves one row or two: no more than 50 a second.
 RATE_Hz = 25.0
+
+# A file has a layout before the one of its end from then on, in s of the clock: it takes some 100 kB.
+OPENED_AFTER_s = 2.0
 
 # After these ends there is nothing that was planned and did not come.
 _AS_PLANNED = (Status.COMPLETED, Status.RUNNING)
@@ -43,18 +48,22 @@ class Quantities(Part):
         self._bins = Bins(RATE_Hz, at_once=subject.live)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
+        self._begun_s: float | None = None  # of the clock, when the first rows came: all is compiled then
+        self._opened = False
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log how the quantities look, and what is known of the run from its start."""
+        """Log how the quantities look, and for whoever watches what is known of the run from its start."""
         for quantity in self._quantities:
-            log_quantity_style(recording, quantity)
-        _log_summary(recording, self._summary.running())
+            recording.log(derived(quantity.name), quantity_style(quantity), static=True)
+        if self.subject.live:
+            _log_summary(recording, self._summary.running())
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record what bins the rows of a chunk have completed."""
+        self._open(recording)
         facts = self.subject.facts
         given = Rows(rows, self._before or rows.rows(0, 1), self.subject.actuator, facts.current_limit_A)
-        with np.errstate(over="ignore", invalid="ignore"):  # a run that diverged ends in what is no number
+        with np.errstate(all="ignore"):  # of a run that diverged, the last rows may hold no numbers
             values = {quantity.name: quantity.values(given) for quantity in self._quantities}
         self._before = Table(rows.signals, rows.values[-1:].copy())
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
@@ -70,6 +79,15 @@ class Quantities(Part):
         if ended_s is not None:
             log_end(recording, ended_s)
         recording.send_blueprint(layout(self.subject.view, self._survey.seen(ended_s)))
+
+    def _open(self, recording: rr.RecordingStream) -> None:
+        """Lay a file out for whoever finds it without its end; most runs end before it could be killed."""
+        self._begun_s = self._begun_s or monotonic()
+        if self._opened or self.subject.live or monotonic() - self._begun_s < OPENED_AFTER_s:
+            return
+        self._opened = True
+        _log_summary(recording, self._summary.running())
+        recording.send_blueprint(opening_layout(self.subject.view))
 
     def _record(self, recording: rr.RecordingStream, binned: Binned | None) -> None:
         if binned is None:

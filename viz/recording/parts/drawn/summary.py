@@ -42,8 +42,9 @@ class Summary:
         self.last_s = float(rows["t_s"][-1])
         self._ticks += len(rows)
         self._saturated += int(np.count_nonzero(rows["allocation_scale"] < 1))
-        self._largest_deg = max(self._largest_deg, float(np.max(error_deg)))
-        self._squares += float(np.sum(error_deg**2))
+        told = error_deg[np.isfinite(error_deg)]  # the last rows of a run that diverged may hold no numbers
+        self._largest_deg = max(self._largest_deg, float(np.max(told, initial=0.0)))
+        self._squares += float(np.sum(told**2))
 
     def running(self) -> str:
         """The line while the run goes on."""
