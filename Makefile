@@ -15,7 +15,7 @@ demo: .venv/demo ## run the nutation under AFSM and leave a recording and its te
 
 # Tests of one file stay together: they share what they have computed.
 test: setup ## pass the tests, side by side
-	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadfile
+	$(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile
 
 check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/ruff format --check .

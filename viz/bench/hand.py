@@ -18,6 +18,9 @@ SHOWN_S = 8.0
 # What waits for so long is said to: the first time, a law or a fault may have to be compiled.
 LONG_S = 0.5
 
+# A way to a pose takes the loop a fifth of a chunk to make: a slider that slides makes ten a second.
+STEERED_S = 0.1
+
 # Somebody who floods the bench sees no more than this of what becomes of it.
 MOST_TICKETS = 200
 
@@ -77,6 +80,8 @@ class Hand:
         self._open: list[Asked] = []
         self._refused, self._until_s = "", 0.0
         self._warned_s: dict[int, float] = {}
+        self._steered: dict[str, tuple[Event, Note | None, dict[str, Any]]] = {}
+        self._steered_s: dict[str, float] = {}
 
     @property
     def refused(self) -> str:
@@ -94,10 +99,33 @@ class Hand:
         if name not in ANYONES and not self._operates(event):
             self._warn(event)
             return False
+        self.flush(0.0)  # what was steered before it comes before it
+        self._send(event, name, beside, arguments)
+        return True
+
+    def steer(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
+        """Tell the bench something of which only the latest matters, as often as it can be of use."""
+        if not self._operates(event):
+            self._warn(event)
+            return False
+        with self._lock:
+            self._steered[name] = (event, beside, arguments)
+        return True
+
+    def flush(self, apart_s: float = STEERED_S) -> None:
+        """Tell the latest of what is steered, where the last one is long enough ago."""
+        now = time.monotonic()
+        with self._lock:
+            due = [name for name in self._steered if now - self._steered_s.get(name, 0.0) >= apart_s]
+            steered = {name: self._steered.pop(name) for name in due}
+            self._steered_s |= dict.fromkeys(due, now)
+        for name, (event, beside, arguments) in steered.items():
+            self._send(event, name, beside, arguments)
+
+    def _send(self, event: Event, name: str, beside: Note | None, arguments: dict[str, Any]) -> None:
         ticket = self._bench.command(name, client=client_name(event.client_id), **arguments)
         with self._lock:
             self._open = [*self._open[-MOST_TICKETS:], Asked(name, ticket, beside, time.monotonic())]
-        return True
 
     def tell_chosen(self, event: Event) -> None:
         """Tell the bench what a group of buttons has as its value."""

@@ -50,7 +50,8 @@ class Setting:
     """Dotted."""
     text: str
     """Its value."""
-    default: str
+    default: str | None
+    """None where it is not known, as of a law of a person's own."""
     meaning: str
     choices: tuple[str, ...] = ()
     """Where it can only be one of these."""

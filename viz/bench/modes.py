@@ -103,7 +103,7 @@ class Modes:
         self._go(event, [angle_rad if each == axis else now for each, now in enumerate(self._pose_rad)], note)
 
     def _go(self, event: Event, pose_rad: list[float], note: Note | None = None) -> None:
-        if self._hand.tell(event, "point", note, pose_rad=pose_rad):
+        if self._hand.steer(event, "point", note, pose_rad=pose_rad):
             self._pose_rad, self._asked_s = pose_rad, time.monotonic()
 
     def _follow(self, gui: viser.GuiApi, choices: Choices) -> None:
@@ -133,7 +133,7 @@ class Modes:
             for slider in self._rates:
                 self._hand.on_change(
                     slider,
-                    lambda event: self._hand.tell(
+                    lambda event: self._hand.steer(
                         event, "jog", note, rates_rad_s=[radians(each.value) for each in self._rates]
                     ),
                 )
@@ -160,7 +160,7 @@ class Modes:
             for slider in sliders:
                 self._hand.on_change(
                     slider,
-                    lambda event: self._hand.tell(
+                    lambda event: self._hand.steer(
                         event, "manual", note, currents_A=[float(each.value) for each in sliders]
                     ),
                 )

@@ -83,6 +83,7 @@ class Page:
             self._server.gui.reset()
             self._build()
         state = self._bench.state()
+        self._hand.flush()
         self._hand.settle()
         with self._server.atomic():
             self._scene.move(

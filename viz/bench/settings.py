@@ -101,7 +101,9 @@ class Form:
 
     def _line(self, setting: Setting) -> Any:
         label = setting.name.partition(".")[2] or setting.name
-        hint = f"{setting.meaning}; {setting.default or 'none'} unless set"
+        hint = setting.meaning
+        if setting.default is not None:
+            hint += f"; {setting.default or 'none'} unless set"
         if setting.choices:
             options = list(dict.fromkeys([*setting.choices, setting.text]))
             return self._gui.add_dropdown(label, options, initial_value=setting.text, hint=hint)
@@ -196,7 +198,9 @@ class Settings:
 
     def _reset_gains(self, event: Event) -> None:
         for each in self._choices.settings():
-            if _section(each.name) == "controller" and each.name != LAW and each.text != each.default:
+            if _section(each.name) != "controller" or each.name == LAW:
+                continue
+            if each.default is not None and each.text != each.default:
                 self._set(event, each.name, each.default, self._gains.note_of(each.name))
 
     def _set(self, event: Event, name: str, text: str, note: Note) -> None:

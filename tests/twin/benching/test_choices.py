@@ -106,3 +106,30 @@ def test_a_shape_with_a_list_of_tables_is_offered_as_it_is():
         assert [each for each in bench.fields() if each[0].startswith(at)] == [
             each for each in before if each[0].startswith(at)
         ]
+
+
+def test_a_law_of_a_persons_own_is_offered_as_it_is_and_nothing_is_made_up(tmp_path):
+    """A gain of the same name as a shipped law's has neither its bounds nor its default."""
+    (tmp_path / "mine.py").write_text(OWN)
+    law = f"{tmp_path / 'mine.py'}:Mine"
+    with Bench(scenarios.load("hold", {"plant.engine": "lagrangian", "controller.law": law})) as bench:
+        found = {each.name: each for each in settings_of(bench.fields())}
+    assert found["controller.law"].text == law
+    assert (found["controller.stiffness"].text, found["controller.stiffness"].default) == ("3 3 3", None)
+    assert found["controller.stiffness"].meaning == "my own"
+
+
+OWN = """
+from pydantic import Field
+from spheretwin.control.law import Law
+from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each
+
+def step(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+
+class Mine(LawParameters):
+    stiffness: PositiveEach = Field(each(3.0), description="my own")
+
+    def build(self, known):
+        return Law("mine", step, [*self.stiffness], [])
+"""

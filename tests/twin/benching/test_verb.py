@@ -64,3 +64,9 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
     assert (process.returncode, err) == (0, "")
     assert out.split() == ["written", str(recording)]
     assert recording.stat().st_size > 0
+
+
+def test_without_viser_it_says_what_brings_it(monkeypatch, capsys):
+    monkeypatch.setattr("spheretwin.twin.commands.benching.verb.find_spec", lambda name: None)
+    assert cli.main(["bench", "hold", "--no-browser"]) == 2
+    assert "spheretwin[bench]" in capsys.readouterr().err

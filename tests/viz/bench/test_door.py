@@ -15,6 +15,7 @@ from websockets.sync.client import connect
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import front
+from spheretwin.viz.bench.hand import STEERED_S
 from tests.viz.bench import fake
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -296,17 +297,46 @@ def test_fifty_pages_come_and_go(page):
         visitor.close()
 
 
+def test_one_page_more_than_there_is_room_for_is_refused(page, monkeypatch):
+    monkeypatch.setattr(front, "MOST_PAGES", 2)
+    with socket_to(page), socket_to(page):
+        with pytest.raises(InvalidStatus) as refusal:
+            socket_to(page)
+        assert refusal.value.response.status_code == 503
+
+
 def test_a_flood_waits_in_its_own_socket(page, bench):
     """Thousands of moves of a slider hold up neither the server nor another page."""
-    before = len(bench.told)
+    before = len(bench.commands())
     name = handle_of(page, "α, °")
     with socket_to(page) as flooding:
         flooding.send(msgspec.msgpack.encode(CAMERA))
+        begun = time.monotonic()
         for i in range(5000):
             flooding.send(changed(name, value=0.01 * i))
+        sending_s = time.monotonic() - begun
         begun = time.monotonic()
         assert is_alive(page)
         waited_s = time.monotonic() - begun
-        # One token a message, and a second's worth at once: what came through in this time is counted.
-        assert len(bench.told) - before <= 2 * front.MOST_MESSAGES_PER_S * (1 + waited_s)
+        # Of what is steered, the bench is told ten times a second; of who is there, now and then.
+        assert len(bench.commands()) - before <= 2 + (waited_s + sending_s) / STEERED_S
+        # Of messages, a second's worth is taken at once and the rest at its rate: the moves count themselves.
+        moves = page._server.gui._gui_input_handle_from_uuid[name].value / 0.01
+        assert 0 < moves <= 1 + front.MOST_MESSAGES_PER_S * (1 + time.monotonic() - begun + sending_s)
         flooding.socket.shutdown(socket.SHUT_RDWR)
+
+
+def test_a_press_comes_after_what_was_moved_before_it(page, bench):
+    """The slider's last place is told before the button, however short a time ago another was."""
+    with socket_to(page) as visitor:
+        visitor.send(msgspec.msgpack.encode(CAMERA))
+        for angle in (10.0, 20.0, 30.0):
+            visitor.send(changed(handle_of(page, "α, °"), value=angle))
+        visitor.send(changed(handle_of(page, "mode"), value="hold"))
+        wait_for(lambda: ("hold", {}) in bench.commands())
+        (*_, (before, given), last) = bench.commands()
+        assert last == ("hold", {})
+        assert before == "point"
+        assert given["pose_rad"][0] == pytest.approx(np.radians(30.0), rel=1e-12)
+        time.sleep(2 * STEERED_S)
+        assert bench.commands()[-1] == last

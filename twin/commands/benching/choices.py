@@ -125,9 +125,9 @@ def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> Setting:
     info = _field_of(name, values)
-    default = _default(info) if info else None
+    default = written(_default(info)) if info else None
     choices = _families().get(_anywhere(name)) or (_literals(info.annotation) if info else ())
-    return Setting(name, written(value), written(default), _meaning(meaning, info), choices)
+    return Setting(name, written(value), default, _meaning(meaning, info), choices)
 
 
 @cache
@@ -156,7 +156,10 @@ def _field_of(name: str, values: Mapping[str, Any]) -> FieldInfo | None:
         if kind is None:
             return None
         tag = kind.told_apart_by
-        members = kind.chosen({tag: values.get(f"{prefix}{tag}")} if tag else {})
+        which = values.get(f"{prefix}{tag}", "") if tag else ""
+        if tag and which and which not in kind.members:
+            return None
+        members = kind.chosen({tag: which} if tag else {})
     return next((each.model_fields[last] for each in members if last in each.model_fields), None)
 
 

@@ -1,0 +1,98 @@
+"""Every button is one command with what its fields say, and nothing that is shared moves by itself."""
+
+import msgspec
+import pytest
+
+from tests.viz.bench import fake
+from tests.viz.bench.test_door import CAMERA, changed, handle_of, socket_to, wait_for
+
+BUTTONS = {
+    "STOP (space)": ("stop", {}),
+    "Stand": ("hold", {}),
+    "Only this one, at 1 A": ("manual", {"group": 0, "current_A": 1.0}),
+    "Show it": ("replay", {"file": ""}),
+    "Follow this": ("trajectory", {"fields": {"shape": "hold"}}),
+    "Add from now on": ("add_fault", {"fault": {"target": "coil.00", "mode": "open"}}),
+    "Clear all": ("clear_faults", {}),
+    "Clear the one at this place": ("clear_faults", {"place": 0}),
+    "Record from now on": ("record", {"recording": "bench.rrd", "telemetry": "bench.parquet"}),
+    "End it, and complete the files": ("keep", {}),
+    "Load it": ("load", {"source": "hold"}),
+    "Save the present settings": ("save", {"file": "bench.toml"}),
+    "Take one": ("snapshot", {"name": "last"}),
+    "Back to it": ("restore", {"name": "last"}),
+}
+
+CHANGES = {
+    "jog": ("β, °/s", 30.0, ("jog", {"rates_rad_s": pytest.approx([0.0, 0.5235988, 0.0], abs=1e-6)})),
+    "manual": ("03, A", 0.5, ("manual", {"currents_A": [0.0] * 3 + [0.5] + [0.0] * 14})),
+    "speed": ("speed", "0.5×", ("speed", {"factor": 0.5})),
+    "as fast as possible": ("speed", "as fast as possible", ("speed", {"factor": 1e6})),
+    "rate": ("rate, rad/s", 0.7, ("limits", {"rate_rad_s": 0.7})),
+    "law": ("law", "pd", ("set", {"name": "controller.law", "value": "pd"})),
+    "step": ("run", "step", ("step", {})),
+    "off": ("mode", "off", ("off", {})),
+}
+
+
+@pytest.fixture
+def bench():
+    return fake.Bench()
+
+
+@pytest.fixture
+def page(bench):
+    with fake.shown(bench) as found:
+        yield found
+
+
+def test_each_button_is_one_command(page, bench):
+    with socket_to(page) as visitor:
+        visitor.send(msgspec.msgpack.encode(CAMERA))
+        for number, (label, expected) in enumerate(BUTTONS.items()):
+            visitor.send(changed(handle_of(page, label), value=True))
+            wait_for(lambda number=number: len(bench.commands()) > number)
+            assert bench.commands()[number:] == [expected]
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_each_change_is_one_command(page, bench, change):
+    label, value, expected = CHANGES[change]
+    with socket_to(page) as visitor:
+        visitor.send(msgspec.msgpack.encode(CAMERA))
+        visitor.send(changed(handle_of(page, label), value=value))
+        wait_for(lambda: bench.commands() == [expected])
+
+
+def test_gains_as_they_come_are_those_that_differ(page, bench):
+    with socket_to(page) as visitor:
+        visitor.send(msgspec.msgpack.encode(CAMERA))
+        visitor.send(changed(handle_of(page, "Gains as they come"), value=True))
+        wait_for(lambda: len(bench.commands()) == 2)
+        assert bench.commands() == [
+            ("set", {"name": "controller.stiffness", "value": "1 1 1"}),
+            ("set", {"name": "controller.known", "value": "false"}),
+        ]
+
+
+def test_what_a_page_that_watches_writes_is_taken_back(page, bench):
+    bench.now.operator = "another"
+    name = handle_of(page, "save as")
+    with socket_to(page) as visitor:
+        visitor.send(msgspec.msgpack.encode(CAMERA))
+        visitor.send(changed(name, value="/etc/passwd"))
+        visitor.send(changed(handle_of(page, "Save the present settings"), value=True))
+        visitor.send(changed(handle_of(page, "STOP (space)"), value=True))  # which is anybody's
+        wait_for(lambda: bench.commands() == [("stop", {})])
+    assert page._server.gui._gui_input_handle_from_uuid[name].value == "bench.toml"
+
+
+def test_the_page_of_itself_commands_nothing(page, bench):
+    """Sliders follow the twin, forms what is in force: none of it is a person's."""
+    with socket_to(page) as visitor:
+        visitor.send(msgspec.msgpack.encode(CAMERA))
+        wait_for(lambda: ("hello", "page 0", {}) in bench.told)
+        bench.now.mode, bench.now.q_ref_rad = "trajectory", (0.5, 0.6, -0.7)
+        slider = page._server.gui._gui_input_handle_from_uuid[handle_of(page, "γ, °")]
+        wait_for(lambda: slider.value == pytest.approx(-40.1))
+    assert bench.commands() == []
