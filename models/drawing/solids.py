@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 MM = 1e-3
 
 # How finely circles are drawn, by the size of what they bound.
-SECTIONS = 60
-SMALL_SECTIONS = 40
+SECTIONS = 48
+SMALL_SECTIONS = 32
 PIN_SECTIONS = 24
-HOLE_SECTIONS = 24
-ARC_STEP_DEG = 6.0
+HOLE_SECTIONS = 16
+ARC_STEP_DEG = 7.5
 
 RING_CHAMFER_M = 0.5 * MM
 

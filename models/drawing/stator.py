@@ -110,7 +110,7 @@ def _housing(actuator: Actuator) -> Manifold:
         actuator.coil.outer_radius_m + COIL_CLEARANCE_M,
         SHELL_INNER_RADIUS_M / 2,
         2 * SHELL_OUTER_RADIUS_M,
-        36,
+        COIL_SECTIONS,  # as the coil in it: the gap between them is the same all around
     )
     return shell - along(hole, actuator.coil_axes)
 

@@ -10,7 +10,7 @@ from spheretwin.models.actuator import Coil
 from spheretwin.viz.scene.solids import joined, turned
 
 # What a coil looks like beside its numbers: a winding between two flanges.
-SECTIONS = 20
+SECTIONS = 14
 FLANGE_SHARE = 0.07  # of the length
 RECESS_SHARE = 0.12  # of the winding's depth
 

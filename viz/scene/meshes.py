@@ -33,6 +33,10 @@ DECIMALS = 7
 """Of vertices in m: what a mesh file holds, and equal where they were equal there, which compresses."""
 
 
+ROUNDING = 1e-12
+"""Of a pose that the engine has turned to a mesh's own axes and back."""
+
+
 class Piece(NamedTuple):
     """What is drawn under one name: copies of one mesh."""
 
@@ -42,13 +46,17 @@ class Piece(NamedTuple):
     rotations: Array  # (copies, 3, 3), into the frame of the body that carries them
     translations: Array  # (copies, 3) m
 
-    def archetypes(self) -> tuple[rr.Asset3D, rr.InstancePoses3D]:
-        """In the form in which a recording takes it."""
+    def archetypes(self) -> list[rr.Asset3D | rr.InstancePoses3D]:
+        """In the form in which a recording takes it: without poses where its body carries one as it is."""
         contents = gltf.binary(self.positions, self.triangles)
-        return (
-            rr.Asset3D(contents=contents, media_type=gltf.MEDIA_TYPE, albedo_factor=self.colour),
-            rr.InstancePoses3D(translations=self.translations, mat3x3=self.rotations),
-        )
+        asset = rr.Asset3D(contents=contents, media_type=gltf.MEDIA_TYPE, albedo_factor=self.colour)
+        if self._lies_as_in_its_file():
+            return [asset]
+        return [asset, rr.InstancePoses3D(translations=self.translations, mat3x3=self.rotations)]
+
+    def _lies_as_in_its_file(self) -> bool:
+        one = len(self.rotations) == 1 and np.allclose(self.rotations[0], np.eye(3), rtol=0, atol=ROUNDING)
+        return one and np.allclose(self.translations, 0.0, rtol=0, atol=ROUNDING)
 
 
 class Meshes(NamedTuple):

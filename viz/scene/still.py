@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import rerun as rr
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.viz import palette
-from spheretwin.viz.scene.marks import AXES_LENGTH_m, axes, current_scale, current_scale_labels
+from spheretwin.viz.scene.marks import AXES_LENGTH_m, axes, current_scale, current_scale_labels, size_of
 from spheretwin.viz.scene.meshes import read_meshes
 from spheretwin.viz.scene.paths import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROTOR_AXES, WORLD
 
@@ -28,14 +29,18 @@ def log_static(recording: rr.RecordingStream, actuator: Actuator, facts: RunFact
         recording.log(entity, *piece.archetypes(), static=True)
     if facts.payload_kg > 0:
         recording.log(PAYLOAD, _payload(actuator), static=True)
-    recording.log(AXES, axes(AXES_AT_m, AXES_LENGTH_m, ["x", "y", "z"]), static=True)
+    size = size_of(actuator)
+    at = size * np.array(AXES_AT_m)
+    recording.log(AXES, axes(at, size * AXES_LENGTH_m, ["x", "y", "z"]), static=True)
     recording.log(ROTOR_AXES, _rotor_axes(actuator), static=True)
-    recording.log(CURRENT_SCALE, current_scale(), static=True)
-    recording.log(f"{CURRENT_SCALE}/labels", current_scale_labels(facts.current_limit_A), static=True)
+    recording.log(CURRENT_SCALE, current_scale(size), static=True)
+    labels = current_scale_labels(facts.current_limit_A, size)
+    recording.log(f"{CURRENT_SCALE}/labels", labels, static=True)
 
 
 def _rotor_axes(actuator: Actuator) -> rr.Arrows3D:
-    return axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, ROTOR_AXES_LENGTH_m, ["R"])
+    length_m = size_of(actuator) * ROTOR_AXES_LENGTH_m
+    return axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, length_m, ["R"])
 
 
 def _payload(actuator: Actuator) -> rr.Cylinders3D:

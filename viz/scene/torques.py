@@ -28,7 +28,9 @@ SHOWN = {
 }
 """By name."""
 
-METRES_PER_Nm = 0.25
+METRES_PER_Nm = 0.1
+"""Beside an actuator as large as the shipped one; like the axes, longer beside a larger one."""
+
 SCALE = f"torque arrows: the length of x, y, z is {AXES_LENGTH_m / METRES_PER_Nm:g} N·m"
 """What the arrows' lengths mean, for people."""
 

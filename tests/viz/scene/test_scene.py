@@ -1,6 +1,7 @@
 """Poses of the drawn bodies against the kinematics; meshes as the model file places them."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -13,7 +14,8 @@ from scipy.spatial.transform import Rotation
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import palette
-from spheretwin.viz.scene.marks import ALONG, current_scale, current_scale_labels
+from spheretwin.viz.scene.coils import SECTIONS
+from spheretwin.viz.scene.marks import ALONG, current_scale, current_scale_labels, size_of
 from spheretwin.viz.scene.meshes import read_meshes
 from spheretwin.viz.scene.paths import WORLD
 from spheretwin.viz.scene.poses import body_quaternions, shaft_tip
@@ -146,10 +148,10 @@ def test_faces_and_normals_of_a_coil_point_outward(actuator):
     normals = np.array(mesh.vertex_normals.as_arrow_array().to_pylist())
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     ahead = normals[np.array(mesh.triangle_indices.as_arrow_array().to_pylist())]
-    # A facet of a circle of twenty is nine degrees off the normals at its corners.
+    # Of a circle of so many facets one is half of its angle off the normals at its corners.
     cosines = np.einsum("ti,tki->tk", facing, ahead) / np.linalg.norm(facing, axis=1, keepdims=True)
-    assert cosines.min() > np.cos(np.radians(9.1))
-    # A closed surface that faces outward holds its volume; a circle of twenty lacks 1.6 % of its area.
+    assert cosines.min() > np.cos(np.pi / SECTIONS + np.radians(0.1))
+    # A closed surface that faces outward holds its volume; a circle of fourteen lacks 3.3 % of its area.
     volume = np.einsum("ti,ti->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6 / 36
     coil = actuator.coil
     hull = np.pi * (coil.outer_radius_m**2 - coil.inner_radius_m**2) * coil.length_m
@@ -237,7 +239,7 @@ def test_current_colours_tell_sign_and_size():
 
 
 def test_the_scale_has_the_colours_that_coils_have_at_its_currents():
-    scale, labels = current_scale(), current_scale_labels(6.0)
+    scale, labels = current_scale(1.0), current_scale_labels(6.0, 1.0)
     colours = np.array(scale.vertex_colors.as_arrow_array().to_pylist())
     shown = np.stack([colours >> 24, colours >> 16 & 255, colours >> 8 & 255], axis=1)
     along = positions(scale) @ ALONG
@@ -248,6 +250,16 @@ def test_the_scale_has_the_colours_that_coils_have_at_its_currents():
     at = 2 * (positions(labels) @ ALONG - along.min()) / np.ptp(along) - 1
     np.testing.assert_allclose([float(text.removesuffix("A")) for text in texts], 6.0 * at, atol=1e-5)
     assert (texts[0], texts[-1]) == ("-6 A", "+6 A")
+
+
+def test_marks_grow_with_the_actuator_that_they_stand_beside(actuator):
+    assert size_of(actuator) == pytest.approx(1.0, rel=1e-15)  # the lengths are those for the shipped one
+    larger = replace(actuator, shaft_tip_m=3 * actuator.shaft_tip_m)
+    assert size_of(larger) == pytest.approx(3.0, rel=1e-15)
+    stub = replace(actuator, shaft_tip_m=0 * actuator.shaft_tip_m)  # the coils reach farther than its shaft
+    assert size_of(stub) == pytest.approx((0.063 + 0.025 / 2) / 0.12, rel=1e-12)
+    # Single precision.
+    np.testing.assert_allclose(positions(current_scale(3.0)), 3 * positions(current_scale(1.0)), atol=1e-7)
 
 
 def height(mjcf):

@@ -12,6 +12,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.recording.columns import time_index
 from spheretwin.viz.recording.parts.moving.frames import Frames
 from spheretwin.viz.recording.parts.part import Part, Subject
+from spheretwin.viz.scene.marks import size_of
 from spheretwin.viz.scene.paths import TORQUES
 from spheretwin.viz.scene.poses import shaft_tip
 from spheretwin.viz.scene.torques import SHOWN, LONGEST_m, METRES_PER_Nm, gravity_torque, load_torque
@@ -48,7 +49,8 @@ class Torques(Part):
             actuator, facts = self.subject.actuator, self.subject.facts
             torques.append(gravity_torque(q, facts.payload_kg, actuator.payload_mount_m, self._gravity_m_s2))
         torques.append(load_torque(q, load_Nm))
-        vectors = np.clip(METRES_PER_Nm * np.stack(torques, axis=1), -LONGEST_m, LONGEST_m)
+        metres = size_of(self.subject.actuator) * METRES_PER_Nm
+        vectors = np.clip(metres * np.stack(torques, axis=1), -LONGEST_m, LONGEST_m)
         drawn = np.ones(vectors.shape[:2], dtype=bool)
         drawn[:, -1] = np.any(load_Nm != 0, axis=1)
         columns = [

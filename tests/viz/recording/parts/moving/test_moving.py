@@ -172,8 +172,8 @@ def test_without_load_and_payload_there_is_one_arrow(tmp_path):
 
 
 def test_the_scale_of_the_arrows_is_told_by_the_axes(loaded):
-    assert SCALE.endswith("the length of x, y, z is 0.2 N·m")
-    np.testing.assert_allclose(0.2 * METRES_PER_Nm, AXES_LENGTH_m, rtol=1e-15)
+    assert SCALE.endswith("the length of x, y, z is 0.5 N·m")
+    np.testing.assert_allclose(0.5 * METRES_PER_Nm, AXES_LENGTH_m, rtol=1e-15)
 
 
 def test_a_payload_is_a_solid_in_the_colour_of_its_torque(loaded):
