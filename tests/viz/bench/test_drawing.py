@@ -41,7 +41,7 @@ def polygon(sections):
 
 
 def as_the_page_shows(albedo):
-    """Numbers on the screen, 0 to 255, of what a surface gives back: the curve forward, written for the test."""
+    """Numbers on the screen, 0 to 255, of what a surface gives back: the curve, forward."""
     into = [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]]
     out_of = [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]]
     light = np.array(into) @ albedo * colours.LIGHT / 0.6

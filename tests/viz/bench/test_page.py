@@ -12,8 +12,8 @@ from tests.browser import Browser, needs_a_browser
 from tests.viz.bench import fake
 from tests.viz.bench.on_page import STATUS, errors, on_screen, opened, write
 
-# Of two colours, as directions: light and shade change their length. Colours that are told as they are come out
-# pale: copper 0.982, blue 0.91, red 0.87.
+# Of two colours, as directions: light and shade change their length. Told as they are, they come out pale:
+# copper 0.982, blue 0.91, red 0.87.
 ALIKE = 0.985
 
 pytestmark = needs_a_browser
