@@ -29,7 +29,7 @@ FRAMES_A_STATUS = 2
 FRAMES_A_SETTING = 20
 
 LEFT_WIDTH, RIGHT_WIDTH = 255, 290
-STATUS_HEIGHT = 370
+STATUS_HEIGHT = 430
 
 SPEEDS = {"0.1×": 0.1, "0.2×": 0.2, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "10×": 10.0}
 SPEEDS["as fast as possible"] = 1e6
@@ -37,6 +37,9 @@ SPEEDS["as fast as possible"] = 1e6
 TITLE = "bench"
 
 ASK = "Ask to operate"
+
+# A page that is loaded anew may come before it is said that it went: it operates again. Who only watched does not.
+FRESH_S = 5.0
 
 
 class Page:
@@ -175,7 +178,7 @@ class Page:
                     self._hand.tell(event, "grant", to=name)
 
             on_press(give, grant)
-            self._watching[client.client_id] = (ask, give)
+            self._watching[client.client_id] = (time.monotonic(), ask, give)
 
         @self._server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
@@ -198,10 +201,11 @@ class Page:
 
     def _renew(self, state: Any) -> None:
         self._settings.show()
-        for number, (ask, give) in list(self._watching.items()):
+        for number, (came_s, ask, give) in list(self._watching.items()):
             name = client_name(number)
             self._bench.command("beat", client=name)
-            if state.operator is None and len(self._watching) == 1:  # it came back before it was gone
+            fresh = time.monotonic() - came_s < FRESH_S
+            if state.operator is None and fresh and len(self._watching) == 1:
                 self._bench.command("ask", client=name)
             with contextlib.suppress(RuntimeError):  # the page has gone meanwhile
                 ask.visible = state.operator != name and name not in state.asking

@@ -18,7 +18,7 @@ TAKE_OVER = "Take over"
 _MODES = {"off": QUIET, "hold": GOOD, "fault": BAD, "replay": "#4dabf7"}
 _WORKING = "#4dabf7"
 
-_BOX = "padding:0.45em 0.8em;font-size:0.86em;line-height:1.5;color:#e9ecef;overflow-wrap:anywhere"
+_BOX = "padding:0.45em 0.8em;font-size:0.86em;line-height:1.35;color:#e9ecef;overflow-wrap:anywhere"
 _LARGE = "font-size:1.25em;font-weight:700;font-variant-numeric:tabular-nums"
 _TABLE = "display:grid;grid-template-columns:auto 1fr;column-gap:0.8em;font-variant-numeric:tabular-nums"
 

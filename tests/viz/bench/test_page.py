@@ -193,6 +193,19 @@ def test_a_page_that_is_alone_operates_though_it_came_back_before_it_was_gone(br
         tab.close()
 
 
+def test_who_only_watched_does_not_operate_though_alone(browser, monkeypatch):
+    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", 0.5)
+    bench = fake.Bench(operator="page 7", watching=("page 0",))
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        time.sleep(1.0)
+        bench.now.operator = None
+        tab.wait_for("document.body.innerText.includes('Take over')")
+        time.sleep(1.5)  # longer than from one look at the pages to the next
+        assert bench.commands() == []
+        tab.close()
+
+
 def test_a_coil_has_the_colour_of_its_current(browser, tmp_path):
     bench = fake.Bench(q_ref_rad=(0.0, 0.0, 0.0))
     actuator = bench.actuator
