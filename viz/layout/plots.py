@@ -6,10 +6,12 @@ from typing import NamedTuple
 
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.layout.paths import ENDED, STATES, derived, entity
+from spheretwin.viz.layout.paths import ENDED, STATES, STYLES, TELEMETRY, VALUES, component, derived
 from spheretwin.viz.layout.seen import ROOM, Channel, Seen
+from spheretwin.viz.layout.styles import LOOKS
 from spheretwin.viz.layout.view import View, shown_until_s
 from spheretwin.viz.quantities.quantity import Quantity
 
@@ -20,7 +22,7 @@ _NO_LEGEND = rrb.PlotLegend(visible=False)
 
 
 class Line(NamedTuple):
-    """What is drawn: an entity, and the name under which its bounds are known."""
+    """What is drawn: an entity, or a signal of the telemetry; its bounds are known under the name."""
 
     entity: str
     name: str
@@ -28,7 +30,7 @@ class Line(NamedTuple):
 
 def signal(name: str) -> Line:
     """A signal of the telemetry."""
-    return Line(entity(name), name)
+    return Line(TELEMETRY, name)
 
 
 def quantity(of: Quantity) -> Line:
@@ -126,9 +128,12 @@ class Plots:
         axis: int | None,
         band: Range | None,
     ) -> rrb.TimeSeriesView:
-        contents = [f"/{line.entity}" for line in lines]
+        contents = list(dict.fromkeys(f"/{line.entity}" for line in lines))
         if band and self.seen and self.seen.ended_s is not None:
             contents.append(f"/{ENDED}")
+        # Drawn in this order, as entities are in that of their names.
+        names = sorted(line.name for line in lines if line.entity == TELEMETRY)
+        signals = [rr.SeriesLines().visualizer(mappings=_mappings(name)) for name in names]
         one = [place == axis for place in range(len(ANGLES))]
         return rrb.TimeSeriesView(
             origin="/",
@@ -138,6 +143,7 @@ class Plots:
             axis_y=rrb.ScalarAxis(range=band) if band else None,
             plot_legend=_NO_LEGEND,
             defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
+            overrides={f"/{TELEMETRY}": signals} if signals else None,
         )
 
     def _time_axis(self) -> rrb.TimeAxis | None:
@@ -154,3 +160,19 @@ class Plots:
         boundary = rrb.TimeRangeBoundary
         whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=last_s))
         return rrb.TimeAxis(view_range=whole)
+
+
+def _mappings(name: str) -> list[VisualizerComponentMapping]:
+    """What the lines of a signal are drawn from: fields of the telemetry's components."""
+    looks = [f"SeriesLines:{look}" for look in LOOKS]
+    mappings = [_taken(VALUES, name, "", "Scalars:scalars")]
+    mappings += [_taken(STYLES, name, f".{look}", target) for look, target in zip(LOOKS, looks, strict=True)]
+    return mappings
+
+
+def _taken(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:
+    """Where a visualizer takes something from; plotted signals are there from the start."""
+    source, selector = component(kind, 0), f".{name}{of}[]"
+    return VisualizerComponentMapping(
+        target, ComponentSourceKind.SourceComponent, source_component=source, selector=selector
+    )
