@@ -9,17 +9,8 @@ import rerun.blueprint as rrb
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.layout.paths import (
-    CURRENT_MAP,
-    ENDED,
-    STATES,
-    STYLES,
-    TELEMETRY,
-    VALUES,
-    component,
-    derived,
-)
-from spheretwin.viz.layout.seen import Channel, Seen
+from spheretwin.viz.layout.paths import ENDED, STATES, STYLES, TELEMETRY, VALUES, component, derived
+from spheretwin.viz.layout.seen import ROOM, Channel, Seen
 from spheretwin.viz.layout.styles import LOOKS
 from spheretwin.viz.layout.view import View, shown_until_s
 from spheretwin.viz.quantities.quantity import Quantity
@@ -27,7 +18,7 @@ from spheretwin.viz.quantities.quantity import Quantity
 Range = tuple[float, float]
 
 _NO_LEGEND = rrb.PlotLegend(visible=False)
-"""Where it would name lines that are not drawn, or too many; else it stands over the oldest data."""
+"""It would lie over data, and titles and the colours of the axes tell what it says."""
 
 
 class Line(NamedTuple):
@@ -87,23 +78,22 @@ class Plots:
 
         Notes
         -----
-        Plots of the other hinges have the same range, so that what is small looks small. The title tells the
-        range: low plots have room for one number at their side.
+        Plots of the other hinges have the same range, so that what is small looks small.
         """
         if self.seen is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
         limit = self.seen.limit(*(Channel(line.name) for line in lines), least=least)
-        told = self.seen.beyond(limit, *(Channel(line.name, axis) for line in lines))
-        return self._plot(f"{what} ±{_with_unit(limit, unit)}{told}{key}", lines, axis, (-limit, limit))
+        told = self.seen.largest(limit, *(Channel(line.name, axis) for line in lines))
+        reach = (1 + ROOM) * limit
+        return self._plot(f"{what} [{unit}]{told}{key}", lines, axis, (-reach, reach))
 
     def above_zero(self, what: str, unit: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
         """Plot of what is never negative, its range that of the settled run."""
         if self.seen is None:
             return self._plot(f"{what} [{unit}]", (line,), None, None)
-        limit = self.seen.limit(Channel(line.name), least=least)
-        told = self.seen.beyond(limit, Channel(line.name))
-        title = f"{what}, 0 to {_with_unit(limit, unit)}{told}"
-        return self._plot(title, (line,), None, (-0.02 * limit, limit))
+        limit = self.seen.limit(Channel(line.name), least=least, above_zero=True)
+        told = self.seen.largest(limit, Channel(line.name))
+        return self._plot(f"{what} [{unit}]{told}", (line,), None, (-ROOM * limit, (1 + ROOM) * limit))
 
     def whole(
         self,
@@ -117,11 +107,10 @@ class Plots:
         """Plot of all that some lines have shown, over a range of twice `least` at least."""
         if self.seen is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        low, high = self.seen.band(*(Channel(line.name, axis) for line in lines), least=least)
-        told = f"{what}, {low:.3g} to {_with_unit(high, unit)}{key}"
-        # What follows the data needs no range of its own, which takes room in the file.
-        follows = high - low > 2 * least and self.seen.ended_s is None
-        return self._plot(told, lines, axis, None if follows else (low, high))
+        channels = [Channel(line.name, axis) for line in lines]
+        low, high = self.seen.bounds(*channels)
+        told = f"{what} [{unit}], {low:.3g} to {high:.3g}{key}"
+        return self._plot(told, lines, axis, self.seen.band(*channels, least=least))
 
     def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:
         """Plot of a range that is known before the run."""
@@ -142,7 +131,6 @@ class Plots:
         contents = list(dict.fromkeys(f"/{line.entity}" for line in lines))
         if band and self.seen and self.seen.ended_s is not None:
             contents.append(f"/{ENDED}")
-        short = axis is None and CURRENT_MAP not in contents[0] and len(lines) == 1
         # Drawn in this order, as entities are in that of their names.
         names = sorted(line.name for line in lines if line.entity == TELEMETRY)
         signals = [rr.SeriesLines().visualizer(mappings=_mappings(name)) for name in names]
@@ -153,7 +141,7 @@ class Plots:
             name=title,
             axis_x=self._time_axis(),
             axis_y=rrb.ScalarAxis(range=band) if band else None,
-            plot_legend=None if short else _NO_LEGEND,
+            plot_legend=_NO_LEGEND,
             defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
             overrides={f"/{TELEMETRY}": signals} if signals else None,
         )
@@ -188,7 +176,3 @@ def _taken(kind: str, name: str, of: str, target: str) -> VisualizerComponentMap
     return VisualizerComponentMapping(
         target, ComponentSourceKind.SourceComponent, source_component=source, selector=selector
     )
-
-
-def _with_unit(value: float, unit: str) -> str:
-    return f"{value:.3g}{'' if unit == '°' else ' '}{unit}"

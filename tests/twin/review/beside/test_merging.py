@@ -99,15 +99,15 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
     # Rounding of angles below 1 rad, in mrad.
     np.testing.assert_allclose(apart["error_α_mrad"], APART_mrad, rtol=0, atol=1e-12)
     np.testing.assert_allclose(apart["angle_α_rad"], 1e-3 * APART_mrad, rtol=0, atol=1e-15)
-    for name in ("error_β_mrad", "error_γ_mrad", "torque_asked_Nm", "largest_current_A", "torque_share_1"):
+    for name in ("error_β_mrad", "error_γ_mrad", "torque_asked_Nm", "largest_current_A", "torque_margin"):
         assert not apart[name].any()
-    assert apart["whole_error_deg"].any()
+    assert apart["error_angle_deg"].any()
 
 
 def test_what_was_asked_for_is_there_once(merged):
-    leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/asked/")}
+    leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/what_was_asked/")}
     assert leading == {"run_3_slow"}  # the longest of runs that were asked for the same
-    wanted = merged.values("/asked/run_3_slow/angle_α_rad")
+    wanted = merged.values("/what_was_asked/run_3_slow/angle_α_rad")
     assert np.array_equal(wanted, merged.values("/run_3_slow/telemetry:q_ref_rad")[:, :1])
 
 
