@@ -10,7 +10,7 @@ from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMa
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.layout.paths import ENDED, STATES, STYLES, TELEMETRY, VALUES, component, derived
-from spheretwin.viz.layout.seen import ROOM, Channel, Seen
+from spheretwin.viz.layout.seen import ROOM, Channel, Seen, number
 from spheretwin.viz.layout.styles import LOOKS
 from spheretwin.viz.layout.view import View, shown_until_s
 from spheretwin.viz.quantities.quantity import Quantity
@@ -109,7 +109,7 @@ class Plots:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
         channels = [Channel(line.name, axis) for line in lines]
         low, high = self.seen.bounds(*channels)
-        told = f"{what} [{unit}], {low:.3g} to {high:.3g}{key}"
+        told = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
         return self._plot(told, lines, axis, self.seen.band(*channels, least=least))
 
     def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:

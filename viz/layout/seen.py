@@ -91,7 +91,7 @@ class Seen:
         """What the title of a plot says of its largest magnitude, and when it lies outside of the range."""
         size = self._largest(*channels)
         outside = np.flatnonzero(size > limit)
-        told = f", largest {np.max(size):.3g}"
+        told = f", largest {number(float(np.max(size)))}"
         if not len(outside):
             return told
         until = self.t_s[min(outside[-1] + 1, len(self.t_s) - 1)]
@@ -116,6 +116,11 @@ def nice(value: float, among: Sequence[float] = _NICE) -> float:
     return next(each for each in among if each * decade >= value * (1 - 1e-9)) * decade
 
 
+def number(value: float) -> str:
+    """Three digits, and thousands without a power of ten."""
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
+
+
 def labelled(low: float, high: float, least: float, most: int = LABELLED) -> tuple[float, float]:
     """Range around two numbers in which a viewer labels two ticks or more.
 
@@ -136,9 +141,8 @@ def labelled(low: float, high: float, least: float, most: int = LABELLED) -> tup
         return low, high
     if last < first:  # none lies within
         return step * last - room, step * first + room
-    if first * step - low < high - first * step:
-        return step * (first - 1) - room, high
-    return low, step * (last + 1) + room
+    below, above = step * (first - 1), step * (last + 1)
+    return (below - room, high) if low - below < above - high else (low, above + room)
 
 
 def _least(values: Array) -> float:

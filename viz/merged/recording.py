@@ -32,7 +32,7 @@ from spheretwin.viz.scene.marks import size_of
 from spheretwin.viz.scene.meshes import read_meshes
 
 # Of a range of what hardly differs from zero; and steps for which the lowest of the plots is high enough.
-LEAST, STEPS = 1e-3, 5
+LEAST, STEPS = 1e-3, 6
 
 
 def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: str) -> Path:

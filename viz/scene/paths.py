@@ -5,6 +5,7 @@ COILS = f"{WORLD}/coils"
 MOVING = ("outer_ring", "inner_ring", "rotor")
 TORQUES = f"{WORLD}/torques"
 FAILURE = f"{WORLD}/failure"
+FAILURE_TEXT = f"{FAILURE}/text"
 AXES = f"{WORLD}/axes"
 ROTOR_AXES = f"{WORLD}/rotor/axes"
 PAYLOAD = f"{WORLD}/rotor/payload"

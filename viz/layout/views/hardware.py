@@ -30,9 +30,9 @@ def hardware(plots: Plots) -> rrb.Container:
         line = signal("supply_power_W")
         shown.append(plots.whole("power of the supply", "W", line, least=LEAST_W))
     if "q_measured_rad" in names:
-        title = "measured minus true angles"
+        title = "measured - true"
         shown.append(plots.about_zero(title, "mrad", quantity(MEASURED_ANGLE), least=MEASURED_ANGLE.floor))
-        title = "estimated minus true rates"
+        title = "estimated - true"
         shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
     if "friction_Nm" in names:
         shown.append(plots.whole("friction", "N·m", signal("friction_Nm"), least=0.002))

@@ -11,10 +11,11 @@ from spheretwin.viz import palette
 from spheretwin.viz.recording.columns import time_index
 from spheretwin.viz.recording.parts.moving.frames import posed
 from spheretwin.viz.recording.parts.part import Part, Subject
-from spheretwin.viz.scene.paths import FAILURE
+from spheretwin.viz.scene.marks import size_of
+from spheretwin.viz.scene.paths import FAILURE, FAILURE_TEXT
 from spheretwin.viz.scene.poses import shaft_tip
 
-# A ball around the tip, and its text on a pole, clear of the texts of the torques.
+# A ball around the tip, and its text on top of a pole, clear of the texts of the torques.
 MARK_RADIUS_m, POLE_m = 0.006, 0.1
 
 
@@ -38,14 +39,19 @@ class Ending(Part):
         if status.level != Level.ERROR:
             return
         tip = shaft_tip(self._q_rad, self.subject.actuator)
-        pole = np.stack([tip, tip + np.array([0.0, 0.0, POLE_m])], axis=1)
+        top = tip + size_of(self.subject.actuator) * np.array([0.0, 0.0, POLE_m])
         mark = [
             *rr.Points3D.columns(positions=tip, colors=[palette.FAILURE], radii=[MARK_RADIUS_m]),
             *rr.LineStrips3D.columns(
-                strips=pole,
+                strips=np.stack([tip, top], axis=1),
                 colors=[palette.FAILURE],
                 radii=rr.Radius.ui_points(1.5),
-                labels=[f"{status} at {self._t_s:.3f} s"],
             ),
         ]
-        recording.send_columns(FAILURE, time_index(np.array([self._t_s])), mark)
+        text = f"{status.replace('_', ' ')} at {self._t_s:.3f} s"
+        told = rr.Points3D.columns(
+            positions=top, colors=[palette.FAILURE], radii=rr.Radius.ui_points(0.0), labels=[text]
+        )
+        index = time_index(np.array([self._t_s]))
+        recording.send_columns(FAILURE, index, mark)
+        recording.send_columns(FAILURE_TEXT, index, told)

@@ -24,7 +24,7 @@ from spheretwin.viz.recording.parts.moving.torques import Torques
 from spheretwin.viz.recording.parts.moving.traces import Traces
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.scene.marks import AXES_LENGTH_m
-from spheretwin.viz.scene.paths import FAILURE, PAYLOAD, TORQUES
+from spheretwin.viz.scene.paths import FAILURE, FAILURE_TEXT, PAYLOAD, TORQUES
 from spheretwin.viz.scene.torques import SCALE, METRES_PER_Nm
 from spheretwin.viz.scene.traces import TRACES, TRAIL_S
 
@@ -187,9 +187,8 @@ def test_a_payload_is_a_solid_in_the_colour_of_its_torque(loaded):
 
 def mark(path):
     """Time in ms, position and text of each mark of a failure."""
-    positions, texts = (
-        rows_of(path, FAILURE, name) for name in ("Points3D:positions", "LineStrips3D:labels")
-    )
+    positions = rows_of(path, FAILURE, "Points3D:positions")
+    texts = rows_of(path, FAILURE_TEXT, "Points3D:labels")
     return [(t_ms, *at, *text) for (t_ms, at), (_, text) in zip(positions, texts, strict=True)]
 
 
@@ -200,7 +199,7 @@ def test_a_failure_is_marked_where_it_happens(tmp_path, actuator):
     ((t_ms, position, text),) = mark(path)
     assert t_ms == len(telemetry) - 1
     np.testing.assert_allclose(position, rotation(telemetry["q_rad"][-1]) @ actuator.shaft_tip_m, atol=1e-8)
-    assert text == f"left_workspace at {telemetry['t_s'][-1]:.3f} s"
+    assert text == f"left workspace at {telemetry['t_s'][-1]:.3f} s"
 
 
 def test_a_run_that_is_complete_or_interrupted_has_no_mark(tmp_path, loaded):
@@ -249,10 +248,15 @@ def test_what_moves_takes_fifteen_kilobytes_a_second(tmp_path, monkeypatch):
 FAULT = {"target": "coil.04", "mode": "open", "start_s": 0.0}
 
 
-@pytest.mark.parametrize("changes", [{}, {"hardware": "prototype", "fault": [FAULT]}], ids=["ideal", "fault"])
-def test_what_a_recording_holds_whatever_its_length_is_less_than_a_megabyte(tmp_path, changes):
-    # Meshes, layout, texts, descriptions of the signals, and a single row.
-    assert size(tmp_path / "tick.rrd", 0.001, **changes) < 1_000_000
+# Meshes, layout, texts, descriptions of the signals, and a single row. The prototype has 13 more signals,
+# and plots of them, of which each is told in some ten kilobytes.
+@pytest.mark.parametrize(
+    ("changes", "most"),
+    [({}, 1_000_000), ({"hardware": "prototype", "fault": [FAULT]}, 1_150_000)],
+    ids=["ideal", "prototype"],
+)
+def test_what_a_recording_holds_whatever_its_length_is_bounded(tmp_path, changes, most):
+    assert size(tmp_path / "tick.rrd", 0.001, **changes) < most
 
 
 def test_labels_stand_at_the_heads_of_their_arrows(loaded):
