@@ -61,25 +61,52 @@ class Operators:
         with self._lock:
             return tuple(self._asking)
 
-    def say(self, name: str, client: str | None, to: str | None = None) -> None:
-        """Take note of what a client says: ``hello``, ``beat``, ``ask``, ``leave`` or ``grant``.
+    def see(self, client: str) -> None:
+        """Take note that a client is there.
 
         Raises
         ------
         InputError
-            It does not say who it is, there are too many, or it gives over what it has not, or to nobody.
+            There are too many.
         """
-        if client is None:
-            raise InputError(f"bench: expected {name} of a client, received none")
         with self._lock:
-            if name == "leave":
-                self._drop(client)
-                return
             self._note(client)
-            if name == "ask":
-                self._ask(client)
-            elif name == "grant":
-                self._grant(client, to)
+
+    def ask(self, client: str) -> None:
+        """Let a client operate, or wait for it.
+
+        Raises
+        ------
+        InputError
+            There are too many.
+        """
+        with self._lock:
+            self._note(client)
+            if self.operator is None:
+                self._operate(client)
+            elif client != self.operator and client not in self._asking:
+                self._asking.append(client)
+
+    def grant(self, client: str, to: str) -> None:
+        """Let another client operate.
+
+        Raises
+        ------
+        InputError
+            A client gives over what it has not, or to nobody, or there are too many.
+        """
+        with self._lock:
+            self._note(client)
+            self.check(client)
+            if to not in self._seen:
+                raise InputError(f"bench: expected one of {', '.join(self._seen)}, received {shown(to)}")
+            self._operate(to)
+            self._asking = [asking for asking in self._asking if asking != to]
+
+    def leave(self, client: str) -> None:
+        """Take note that a client goes."""
+        with self._lock:
+            self._drop(client)
 
     def check(self, client: str | None) -> None:
         """Find out whether a client may command; whoever does not say who it is has the bench in hand.
@@ -116,19 +143,6 @@ class Operators:
         self._seen[client] = self._clock()
         if first:
             self._operate(client)
-
-    def _ask(self, client: str) -> None:
-        if self.operator is None:
-            self._operate(client)
-        elif client != self.operator and client not in self._asking:
-            self._asking.append(client)
-
-    def _grant(self, client: str, to: str | None) -> None:
-        self.check(client)
-        if to not in self._seen:
-            raise InputError(f"bench: expected one of {', '.join(self._seen)}, received {shown(to)}")
-        self._operate(to)
-        self._asking = [asking for asking in self._asking if asking != to]
 
     def _drop(self, client: str) -> None:
         self._seen.pop(client, None)

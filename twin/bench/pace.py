@@ -6,7 +6,11 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from spheretwin.twin.bench.commands import FASTEST
+SLOWEST = 0.1
+"""Slow motion, as a share of the clock's pace."""
+
+FASTEST = 1e6
+"""No machine reaches it: as fast as possible."""
 
 CHUNK_s = 0.02
 """Wall time from one chunk to the next."""

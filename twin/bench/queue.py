@@ -8,7 +8,7 @@ from collections import OrderedDict
 from typing import Any
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.bench.commands import COMMANDS
+from spheretwin.twin.bench.command import Command
 
 MOST_WAITING = 256
 
@@ -48,19 +48,26 @@ class Ticket:
         self._done.set()
 
 
+def settled() -> Ticket:
+    """Ticket of what was done at once."""
+    ticket = Ticket()
+    ticket.settle()
+    return ticket
+
+
 class Waiting:
     """A command in the queue.
 
     Attributes
     ----------
-    name : str
+    command : Command
     arguments : dict
         Checked.
     ticket : Ticket
     """
 
-    def __init__(self, name: str, arguments: dict[str, Any]) -> None:
-        self.name, self.arguments, self.ticket = name, arguments, Ticket()
+    def __init__(self, command: Command, arguments: dict[str, Any]) -> None:
+        self.command, self.arguments, self.ticket = command, arguments, Ticket()
 
 
 class Queue:
@@ -76,7 +83,7 @@ class Queue:
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def put(self, command: Waiting) -> None:
+    def put(self, waiting: Waiting) -> None:
         """Let a command wait for its turn.
 
         Raises
@@ -84,14 +91,15 @@ class Queue:
         InputError
             Too many do.
         """
-        key = _key(command)
+        key = _key(waiting)
         with self._lock:
             replaced = self._waiting.pop(key, None)
             if len(self._waiting) >= MOST_WAITING:
+                name = waiting.command.name
                 raise InputError(
-                    f"bench: expected at most {MOST_WAITING} commands at a time, received {command.name} too"
+                    f"bench: expected at most {MOST_WAITING} commands at a time, received {name} too"
                 )
-            self._waiting[key] = command
+            self._waiting[key] = waiting
         if replaced:
             replaced.ticket.settle()
 
@@ -101,9 +109,9 @@ class Queue:
             return self._waiting.popitem(last=False)[1] if self._waiting else None
 
 
-def _key(command: Waiting) -> object:
+def _key(waiting: Waiting) -> object:
     """Equal for two commands of which only the last one matters."""
-    only_last = COMMANDS[command.name].only_last
+    only_last = waiting.command.only_last
     if only_last is None:
-        return command
-    return command.name, *(command.arguments[name] for name in only_last)
+        return waiting
+    return waiting.command.name, *(waiting.arguments[name] for name in only_last)

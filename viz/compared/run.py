@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.quantities.quantity import Rows
 
 Event = tuple[float, Level, str]
 """Simulated time in s, level, text."""
@@ -22,8 +23,13 @@ class Run(NamedTuple):
     law: str
     period_s: float
     """Between two rows."""
-    table: Table
-    """Its telemetry, with a row at least."""
+    rows: Rows
+    """Its telemetry, with a row at least, and what is derived from it needs beside it."""
     record: Mapping[str, str]
     """What its telemetry file says of it beside the rows."""
     events: Sequence[Event]
+
+    @property
+    def table(self) -> Table:
+        """Its telemetry."""
+        return self.rows.table

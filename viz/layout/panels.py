@@ -54,4 +54,5 @@ def phase_plane(plots: Plots) -> rrb.Spatial2DView:
 
 def log() -> rrb.TextLogView:
     """What is worth a line."""
-    return rrb.TextLogView(origin=f"/{EVENTS}", name="events")
+    columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])  # all have one path
+    return rrb.TextLogView(origin=f"/{EVENTS}", name="events", columns=columns)

@@ -16,9 +16,18 @@ PHASE_PLANE = "phase_plane"
 ENDED = "ended"
 
 
-def entity(signal: str) -> str:
-    """Entity that holds a signal, at the full rate of the control ticks."""
-    return f"{TELEMETRY}/{rr.escape_entity_path_part(signal)}"
+VALUES, STYLES, DESCRIBED = "values", "styles", "described"
+"""Components of `TELEMETRY`: what all signals are in each row, how their lines look, what they are.
+
+The first two are structs with a field a signal: each component would cost some bytes more in every row."""
+
+
+def component(kind: str, arrival: int) -> str:
+    """Component of the signals that came together: 0 for those of the start; a change of law brings others.
+
+    They have components of their own: of one whose fields change, viewers draw nothing.
+    """
+    return f"{kind}_{arrival}"
 
 
 def derived(quantity: str) -> str:

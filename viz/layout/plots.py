@@ -6,21 +6,23 @@ from typing import NamedTuple
 
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.layout.paths import CURRENT_MAP, ENDED, STATES, derived, entity
-from spheretwin.viz.layout.seen import Channel, Seen
+from spheretwin.viz.layout.paths import ENDED, STATES, STYLES, TELEMETRY, VALUES, component, derived
+from spheretwin.viz.layout.seen import ROOM, Channel, Seen
+from spheretwin.viz.layout.styles import LOOKS
 from spheretwin.viz.layout.view import View, shown_until_s
 from spheretwin.viz.quantities.quantity import Quantity
 
 Range = tuple[float, float]
 
 _NO_LEGEND = rrb.PlotLegend(visible=False)
-"""Where it would name lines that are not drawn, or too many; else it stands over the oldest data."""
+"""It would lie over data, and titles and the colours of the axes tell what it says."""
 
 
 class Line(NamedTuple):
-    """What is drawn: an entity, and the name under which its bounds are known."""
+    """What is drawn: an entity, or a signal of the telemetry; its bounds are known under the name."""
 
     entity: str
     name: str
@@ -28,7 +30,7 @@ class Line(NamedTuple):
 
 def signal(name: str) -> Line:
     """A signal of the telemetry."""
-    return Line(entity(name), name)
+    return Line(TELEMETRY, name)
 
 
 def quantity(of: Quantity) -> Line:
@@ -76,23 +78,22 @@ class Plots:
 
         Notes
         -----
-        Plots of the other hinges have the same range, so that what is small looks small. The title tells the
-        range: low plots have room for one number at their side.
+        Plots of the other hinges have the same range, so that what is small looks small.
         """
         if self.seen is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
         limit = self.seen.limit(*(Channel(line.name) for line in lines), least=least)
-        told = self.seen.beyond(limit, *(Channel(line.name, axis) for line in lines))
-        return self._plot(f"{what} ±{_with_unit(limit, unit)}{told}{key}", lines, axis, (-limit, limit))
+        told = self.seen.largest(limit, *(Channel(line.name, axis) for line in lines))
+        reach = (1 + ROOM) * limit
+        return self._plot(f"{what} [{unit}]{told}{key}", lines, axis, (-reach, reach))
 
     def above_zero(self, what: str, unit: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
         """Plot of what is never negative, its range that of the settled run."""
         if self.seen is None:
             return self._plot(f"{what} [{unit}]", (line,), None, None)
-        limit = self.seen.limit(Channel(line.name), least=least)
-        told = self.seen.beyond(limit, Channel(line.name))
-        title = f"{what}, 0 to {_with_unit(limit, unit)}{told}"
-        return self._plot(title, (line,), None, (-0.02 * limit, limit))
+        limit = self.seen.limit(Channel(line.name), least=least, above_zero=True)
+        told = self.seen.largest(limit, Channel(line.name))
+        return self._plot(f"{what} [{unit}]{told}", (line,), None, (-ROOM * limit, (1 + ROOM) * limit))
 
     def whole(
         self,
@@ -106,11 +107,10 @@ class Plots:
         """Plot of all that some lines have shown, over a range of twice `least` at least."""
         if self.seen is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        low, high = self.seen.band(*(Channel(line.name, axis) for line in lines), least=least)
-        told = f"{what}, {low:.3g} to {_with_unit(high, unit)}{key}"
-        # What follows the data needs no range of its own, which takes room in the file.
-        follows = high - low > 2 * least and self.seen.ended_s is None
-        return self._plot(told, lines, axis, None if follows else (low, high))
+        channels = [Channel(line.name, axis) for line in lines]
+        low, high = self.seen.bounds(*channels)
+        told = f"{what} [{unit}], {low:.3g} to {high:.3g}{key}"
+        return self._plot(told, lines, axis, self.seen.band(*channels, least=least))
 
     def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:
         """Plot of a range that is known before the run."""
@@ -128,10 +128,12 @@ class Plots:
         axis: int | None,
         band: Range | None,
     ) -> rrb.TimeSeriesView:
-        contents = [f"/{line.entity}" for line in lines]
+        contents = list(dict.fromkeys(f"/{line.entity}" for line in lines))
         if band and self.seen and self.seen.ended_s is not None:
             contents.append(f"/{ENDED}")
-        short = axis is None and CURRENT_MAP not in contents[0] and len(lines) == 1
+        # Drawn in this order, as entities are in that of their names.
+        names = sorted(line.name for line in lines if line.entity == TELEMETRY)
+        signals = [rr.SeriesLines().visualizer(mappings=_mappings(name)) for name in names]
         one = [place == axis for place in range(len(ANGLES))]
         return rrb.TimeSeriesView(
             origin="/",
@@ -139,8 +141,9 @@ class Plots:
             name=title,
             axis_x=self._time_axis(),
             axis_y=rrb.ScalarAxis(range=band) if band else None,
-            plot_legend=None if short else _NO_LEGEND,
+            plot_legend=_NO_LEGEND,
             defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
+            overrides={f"/{TELEMETRY}": signals} if signals else None,
         )
 
     def _time_axis(self) -> rrb.TimeAxis | None:
@@ -159,5 +162,17 @@ class Plots:
         return rrb.TimeAxis(view_range=whole)
 
 
-def _with_unit(value: float, unit: str) -> str:
-    return f"{value:.3g}{'' if unit == '°' else ' '}{unit}"
+def _mappings(name: str) -> list[VisualizerComponentMapping]:
+    """What the lines of a signal are drawn from: fields of the telemetry's components."""
+    looks = [f"SeriesLines:{look}" for look in LOOKS]
+    mappings = [_taken(VALUES, name, "", "Scalars:scalars")]
+    mappings += [_taken(STYLES, name, f".{look}", target) for look, target in zip(LOOKS, looks, strict=True)]
+    return mappings
+
+
+def _taken(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:
+    """Where a visualizer takes something from; plotted signals are there from the start."""
+    source, selector = component(kind, 0), f".{name}{of}[]"
+    return VisualizerComponentMapping(
+        target, ComponentSourceKind.SourceComponent, source_component=source, selector=selector
+    )

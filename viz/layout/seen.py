@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import floor, log10
+from collections.abc import Mapping, Sequence
+from math import ceil, floor, log10
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,15 @@ USUAL = 0.85
 # Above and below a curve.
 MARGIN = 1.1
 
-_NICE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+# A viewer labels steps of a power of ten, each some 22 pixels high: in a plot of a small window so many.
+LABELLED = 8
+
+# Halves and ends of ranges in which there are such steps.
+_NICE = (1.0, 1.5, 2.0, 3.0, 10.0)
+_NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
+
+# Of a range, beyond the greatest number that is labelled: half of its height would be cut.
+ROOM = 0.06
 
 
 class Channel(NamedTuple):
@@ -48,8 +56,8 @@ class Seen:
     ) -> None:
         self.t_s, self._low, self._high, self.ended_s = t_s, low, high, ended_s
 
-    def limit(self, *channels: Channel, least: float) -> float:
-        """Half of a range about 0 in which the run can be read once it has settled.
+    def limit(self, *channels: Channel, least: float, above_zero: bool = False) -> float:
+        """Half of a range about 0, or its end, in which the run can be read once it has settled.
 
         It holds the whole second half and 85 % of all, or everything where that is not much more.
 
@@ -59,28 +67,35 @@ class Seen:
             Drawn in one plot, or in plots that are compared.
         least : float
             What the range never falls below.
+        above_zero : bool
+            Whether the range begins at 0.
         """
         size = self._largest(*channels)
         second_half = size[self.t_s >= self.t_s[-1] / 2]
         usual = max(least, float(np.max(second_half)), float(np.quantile(size, USUAL)))
         whole = float(np.max(size))
-        return nice(MARGIN * (whole if least < whole <= CLIPPED_FROM * usual else usual))
+        drawn = whole if least < whole <= CLIPPED_FROM * usual else usual
+        return nice(MARGIN * drawn, _NICE_ABOVE_ZERO if above_zero else _NICE)
 
-    def band(self, *channels: Channel, least: float) -> tuple[float, float]:
-        """Range of all that some channels have shown, at least twice `least` wide."""
+    def bounds(self, *channels: Channel) -> tuple[float, float]:
+        """Least and greatest of all that some channels have shown."""
         low = min(_least(self._bounds(self._low, channel)) for channel in channels)
         high = max(-_least(-self._bounds(self._high, channel)) for channel in channels)
-        middle, half = (low + high) / 2, max(least, MARGIN * (high - low) / 2)
-        return middle - half, middle + half
+        return low, high
 
-    def beyond(self, limit: float, *channels: Channel) -> str:
-        """What the title of a plot says of what lies outside of its range; nothing if all lies within."""
+    def band(self, *channels: Channel, least: float) -> tuple[float, float]:
+        """Range of all that some channels have shown, at least twice `least` wide, with two labels."""
+        return labelled(*self.bounds(*channels), least)
+
+    def largest(self, limit: float, *channels: Channel) -> str:
+        """What the title of a plot says of its largest magnitude, and when it lies outside of the range."""
         size = self._largest(*channels)
         outside = np.flatnonzero(size > limit)
+        told = f", largest {np.max(size):.3g}"
         if not len(outside):
-            return ""
+            return told
         until = self.t_s[min(outside[-1] + 1, len(self.t_s) - 1)]
-        return f", to {np.max(size):.3g} in first {until:.2g} s"
+        return f"{told} in first {until:.2g} s"
 
     def _largest(self, *channels: Channel) -> Array:
         """Largest magnitude among some channels in each span; 0 where there was no number."""
@@ -95,10 +110,35 @@ class Seen:
         return values if channel.place is None else values[:, channel.place : channel.place + 1]
 
 
-def nice(value: float) -> float:
-    """The least short number that is not below a positive one."""
+def nice(value: float, among: Sequence[float] = _NICE) -> float:
+    """The least of some numbers of a decade, up to 10 of it, that is not below a positive value."""
     decade = 10.0 ** floor(log10(value))
-    return next(each for each in _NICE if each * decade >= value * (1 - 1e-9)) * decade
+    return next(each for each in among if each * decade >= value * (1 - 1e-9)) * decade
+
+
+def labelled(low: float, high: float, least: float, most: int = LABELLED) -> tuple[float, float]:
+    """Range around two numbers in which a viewer labels two ticks or more.
+
+    Parameters
+    ----------
+    low, high : float
+    least : float
+        Half of the range at least, above zero.
+    most : int
+        Steps for which the plot is high enough.
+    """
+    middle, half = (low + high) / 2, max(least, MARGIN * (high - low) / 2)
+    low, high = middle - half, middle + half
+    step = 10.0 ** ceil(log10((high - low) / most))
+    first, last = ceil(low / step), floor(high / step)
+    room = ROOM * (high - low)
+    if last > first:
+        return low, high
+    if last < first:  # none lies within
+        return step * last - room, step * first + room
+    if first * step - low < high - first * step:
+        return step * (first - 1) - room, high
+    return low, step * (last + 1) + room
 
 
 def _least(values: Array) -> float:

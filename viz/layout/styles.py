@@ -6,6 +6,9 @@ from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
 from spheretwin.viz import palette
 from spheretwin.viz.quantities.quantity import Quantity
 
+LOOKS = ("names", "colors", "widths", "aggregation_policy")
+"""What of `rr.SeriesLines` a style says."""
+
 WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
 
 _ASKED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")

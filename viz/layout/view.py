@@ -31,6 +31,8 @@ class View(NamedTuple):
     """Follow the run instead of playing from its start."""
     shown: str = OVERVIEW
     """The view that is open at first."""
+    size: float = 1.0
+    """Of the actuator, beside the shipped one; the eye stands as many times as far."""
     run: str = ""
     """What tells the recording from others, for figures of its run stand in the layout."""
 

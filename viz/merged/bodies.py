@@ -41,12 +41,12 @@ class Ghost(Part):
         """Log the rotor's meshes."""
         for entity, piece in read_meshes(self.subject.facts.mjcf).others.items():
             if entity.startswith(f"{ROTOR}/"):
-                asset, places = piece.archetypes()
+                asset, *places = piece.archetypes()
                 tint = rr.Asset3D.from_fields(albedo_factor=[*self._colour, GHOST_ALPHA])
                 shape = [
                     each for each in asset.as_component_batches() if each.component_descriptor() != _TINT
                 ]
-                recording.log(entity, [*shape, *tint.as_component_batches()], places, static=True)
+                recording.log(entity, [*shape, *tint.as_component_batches()], *places, static=True)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""

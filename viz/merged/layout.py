@@ -9,6 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spheretwin.viz import palette
+from spheretwin.viz.layout.actuator_view import eye
 from spheretwin.viz.layout.paths import EVENTS, STATES, TIMELINE
 from spheretwin.viz.merged.bodies import ROTOR
 from spheretwin.viz.scene.paths import WORLD
@@ -17,8 +18,8 @@ from spheretwin.viz.scene.traces import TRAIL_S
 COMPARE, RUNS, TIP = "compare", "runs", "tip"
 """Parts of the paths of entities, behind the name of a run but for `RUNS`."""
 
-ASKED = "asked"
-"""Before the name of a run: a viewer draws lines in the order of their paths, these below all others."""
+ASKED = "what_was_asked"
+"""Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
 
 # Plots that share a row are too narrow for names; the one that has a row of its own tells them.
 NAMED, BESIDE_TEXTS = "whole", "more"
@@ -32,7 +33,7 @@ class Plot(NamedTuple):
     group: str
     desired: bool
     """Whether what was asked for is drawn with it."""
-    limits: tuple[float, float] | None
+    limits: tuple[float, float]
 
 
 class View(NamedTuple):
@@ -48,6 +49,8 @@ class View(NamedTuple):
     """Names of those that have parts whose states change."""
     logs: tuple[str, ...]
     """Names of those in which something happens."""
+    size: float
+    """Of the actuator of the first, which is drawn whole."""
 
 
 def application(view: View) -> str:
@@ -105,8 +108,8 @@ def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
         contents=[*wanted, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
         name=plot.title,
         axis_x=time_axis(view.duration_s),
-        axis_y=rrb.ScalarAxis(range=plot.limits) if plot.limits else None,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
+        axis_y=rrb.ScalarAxis(range=plot.limits),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
         interaction=rrb.PlotInteraction(tooltip_mode="All"),
     )
 
@@ -121,12 +124,7 @@ def _bodies(view: View) -> rrb.Spatial3DView:
         name="run 1 in the actuator, the others as ghosts",
         background=list(palette.BACKGROUND),
         line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=[0.16, -0.16, 0.22],
-            look_target=[0, 0, 0.02],
-            eye_up=[0, 0, 1],
-        ),
+        eye_controls=eye(view.size),
         overrides={f"{tip}/path": trail_behind() for tip in tips},
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import cast
 
+import numpy as np
 import rerun as rr
 
 from spheretwin.models.telemetry.table import Table
@@ -16,6 +17,8 @@ from spheretwin.viz.compared.desired import leaders
 from spheretwin.viz.compared.quantities import Quantity, drawn
 from spheretwin.viz.compared.run import Run
 from spheretwin.viz.layout.paths import SCENARIO
+from spheretwin.viz.layout.seen import labelled
+from spheretwin.viz.layout.styles import THIN
 from spheretwin.viz.merged.bodies import Tip, body
 from spheretwin.viz.merged.layout import ASKED, COMPARE, RUNS, TIP, Plot, View, application, layout
 from spheretwin.viz.merged.series import send_line
@@ -25,7 +28,11 @@ from spheretwin.viz.recording.parts.part import Part, Subject
 from spheretwin.viz.recording.parts.signals import Signals
 from spheretwin.viz.recording.parts.states import StateChanges, States
 from spheretwin.viz.recording.recorder import MOST_ROWS
+from spheretwin.viz.scene.marks import size_of
 from spheretwin.viz.scene.meshes import read_meshes
+
+# Of a range of what hardly differs from zero; and steps for which the lowest of the plots is high enough.
+LEAST, STEPS = 1e-3, 5
 
 
 def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: str) -> Path:
@@ -58,12 +65,13 @@ def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: st
         tuple(run.name for run in runs),
         tuple(runs[place].name for place in leading),
         tuple(
-            Plot(each.name, each.heading, each.group, each.desired is not None, each.limits)
+            Plot(each.name, each.heading, each.group, each.desired is not None, _limits(each, runs))
             for each in quantities
         ),
         max(float(table["t_s"][-1]) for table in tables),
         tuple(run.name for run in runs if StateChanges().of(run.table)),
         tuple(run.name for run in runs if run.events),
+        size_of(subjects[0].actuator),
     )
     colours = [on_dark(colour) for colour in run_colours([run.law for run in runs])]
     with recorded(path, application(view), layout(view)) as recording:
@@ -79,7 +87,7 @@ def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: st
             ]
             _write_run(below, run, parts)
             for each in quantities:
-                entity, t_s, values = f"{COMPARE}/{each.name}", run.table["t_s"], each.of(run.table)
+                entity, t_s, values = f"{COMPARE}/{each.name}", run.table["t_s"], each.of(run.rows)
                 send_line(below, entity, run.label, t_s, values, colour)
         for place in leading:
             run, asked = runs[place], Below(recording, f"{ASKED}/{runs[place].name}")
@@ -111,8 +119,17 @@ def _write_asked(
     for each in quantities:
         if each.desired:
             send_line(
-                recording, each.name, label, run.table["t_s"], each.desired(run.table), colour, width=3.0
+                recording, each.name, label, run.table["t_s"], each.desired(run.rows), palette.ASKED, THIN
             )
+
+
+def _limits(quantity: Quantity, runs: Sequence[Run]) -> tuple[float, float]:
+    """Range of all values of all runs, in which numbers can be read."""
+    if quantity.limits:
+        return quantity.limits
+    values = np.concatenate([quantity.of(run.rows) for run in runs])
+    told = values[np.isfinite(values)]
+    return labelled(float(np.min(told, initial=0.0)), float(np.max(told, initial=0.0)), LEAST, STEPS)
 
 
 def _write_part(recording: rr.RecordingStream, run: Run, part: Part) -> None:

@@ -22,14 +22,12 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, offsets, w
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.viz.layout.layout import layout
-from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY, TIMELINE
+from spheretwin.viz.layout.paths import DESCRIBED, EVENTS, SCENARIO, TELEMETRY, TIMELINE, VALUES
 from spheretwin.viz.layout.view import View, application
 from spheretwin.viz.reading.messages import whole_messages
 from spheretwin.viz.reading.survival import check_readable
-from spheretwin.viz.recording.parts.described import COMPLETE, FACTS, SIGNAL, signal_of
+from spheretwin.viz.recording.parts.described import FACTS, signals_of
 from spheretwin.viz.recording.parts.events import Event
-
-VALUES = "Scalars:scalars"
 
 # A recording has its times in whole nanoseconds.
 _NS = 1e-9
@@ -61,26 +59,26 @@ class _Found:
 
     def __init__(self) -> None:
         self.facts: dict[str, Any] | None = None
-        self.signals: dict[str, tuple[int, Signal]] = {}
+        self.arrived: dict[int, list[Signal]] = {}
         self.columns: list[_Column] = []
         self.log: list[tuple[int, str, str]] = []
 
     def take(self, chunk: Chunk) -> None:
         """Take what a chunk holds of the run; poses and colours are made of it."""
         path = chunk.entity_path.removeprefix("/")
-        root, _, name = path.partition("/")
-        batch = chunk.to_record_batch() if root in (SCENARIO, TELEMETRY, EVENTS) else None
+        batch = chunk.to_record_batch() if path in (SCENARIO, TELEMETRY, EVENTS) else None
         if batch is None:
             return
         names = batch.schema.names
         if path == SCENARIO and FACTS in names:
             self.facts = json.loads(_text(batch, FACTS))
-        elif root == TELEMETRY and SIGNAL in names:
-            place, signal = signal_of(_text(batch, SIGNAL))
-            self.signals[name] = place, signal
-        elif root == TELEMETRY and VALUES in names:
-            values = np.asarray(batch.column(VALUES).flatten())
-            self.columns.append(_Column(name, _times(batch), values.reshape(len(batch), -1)))
+        elif path == TELEMETRY:
+            for name in names:
+                kind, _, arrival = name.rpartition("_")
+                if kind == DESCRIBED:
+                    self.arrived[int(arrival)] = signals_of(_text(batch, name))
+                elif kind == VALUES:
+                    self.columns += _columns(_times(batch), batch.column(name).flatten())
         elif path == EVENTS and TIMELINE in names:
             levels, texts = (batch.column(f"TextLog:{each}").to_pylist() for each in ("level", "text"))
             self.log += [
@@ -124,21 +122,14 @@ def rewrite(path: Path, target: Path) -> Recorded:
     own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
     groups = next(signal.size for signal in signals if signal.name == "current_A")
     view = View(facts["duration_s"], facts["current_limit_A"], groups, own, live=False)
-    last_ns = round(recorded.table["t_s"][-1] / _NS)
     with _chunks(path) as (chunks, _), whole_file(target) as temporary:
         recording = rr.RecordingStream(application(view))
         recording.set_log_time_enabled(False)
         recording.set_sinks(rr.FileSink(temporary), default_blueprint=layout(view))
-        recording.send_chunks(chunk for chunk in chunks if not _is_of_rows_after(chunk, last_ns))
+        recording.send_chunks(chunks)
         recording.flush()
         recording.disconnect()
     return recorded
-
-
-def _is_of_rows_after(chunk: Chunk, t_ns: int) -> bool:
-    """Whether a chunk holds a signal at ticks that are not whole."""
-    of_rows = chunk.entity_path.startswith(f"/{TELEMETRY}/") and not chunk.is_static
-    return of_rows and int(_times(chunk.to_record_batch())[0]) > t_ns
 
 
 @contextmanager
@@ -159,6 +150,13 @@ def _text(batch: pa.RecordBatch, component: str) -> str:
     return str(batch.column(component).to_pylist()[0][0])
 
 
+def _columns(t_ns: NDArray[np.int64], values: pa.StructArray) -> Iterator[_Column]:
+    """Signals of a struct that are in its rows at all."""
+    for field, column in zip(values.type, values.flatten(), strict=True):
+        if column.null_count < len(column):
+            yield _Column(field.name, t_ns, np.asarray(column.flatten()).reshape(len(column), -1))
+
+
 def _times(batch: pa.RecordBatch) -> NDArray[np.int64]:
     return np.asarray(batch.column(TIMELINE).cast(pa.int64()))
 
@@ -170,19 +168,12 @@ def _exact(t_ns: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
 
 def _table(found: _Found) -> Table:
     """All columns by tick; NaN where a run had no such column."""
-    signals = tuple(signal for _, signal in sorted(found.signals.values(), key=lambda each: each[0]))
-    columns = _complete(found)
-    ticks = np.unique(np.concatenate([column.t_ns for column in columns] or [np.empty(0, np.int64)]))
+    signals = tuple(signal for _, arrived in sorted(found.arrived.items()) for signal in arrived)
+    ticks = np.unique(np.concatenate([column.t_ns for column in found.columns] or [np.empty(0, np.int64)]))
     values = allocated(len(ticks), width(signals))
     values[:] = np.nan
     first = offsets(signals)
-    for column in columns:
+    for column in found.columns:
         rows, place = np.searchsorted(ticks, column.t_ns), first[column.signal]
         values[rows, place : place + column.values.shape[1]] = column.values
     return Table(signals, values)
-
-
-def _complete(found: _Found) -> list[_Column]:
-    """Columns of the rows that are whole; of the last ones some may be missing."""
-    whole = {column.t_ns[0] for column in found.columns if column.signal == COMPLETE}
-    return [column for column in found.columns if column.t_ns[0] in whole]

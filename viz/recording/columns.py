@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pyarrow as pa
 import rerun as rr
@@ -24,6 +26,31 @@ def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
     """What `rr.Scalars.columns` makes of (n, size) values, at half its price."""
     batch = rr.components.ScalarBatch(values.ravel())
     return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
+
+
+class Struct:
+    """Values with named fields, as a component.
+
+    Rerun's own form for types that it does not know wants each name to have one type in a whole process,
+    and runs differ in their signals.
+    """
+
+    def __init__(self, fields: Mapping[str, pa.Array]) -> None:
+        self._array = pa.StructArray.from_arrays(list(fields.values()), list(fields))
+
+    def as_arrow_array(self) -> pa.Array:
+        """What Rerun asks for."""
+        return self._array
+
+
+def vectors(values: NDArray[np.float64], size: int) -> pa.Array:
+    """Arrow form of (n, size) values: `size` numbers a row, whose places need no room."""
+    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), size)
+
+
+def no_vectors(rows: int, size: int) -> pa.Array:
+    """What stands for (n, size) values where there are none."""
+    return pa.nulls(rows, pa.list_(pa.float64(), size))
 
 
 def strips(segments: NDArray[np.float64]) -> pa.Array:

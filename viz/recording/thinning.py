@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,10 @@ Places = NDArray[np.intp]
 
 # Rows of so long a time are looked at together for what stands out in them.
 WINDOW_S = 20.0
+
+# Rows whose bounds are found before the place of the bound is looked for in one such block: a bound takes a
+# fourth of the time of its place.
+_BLOCK = 64
 
 # Of a bin or a window: times are products of whole numbers, right to some 1e-16 of themselves.
 _ROUNDING = 1e-6
@@ -100,8 +106,8 @@ class FirstsAndExtremes(Thinning):
         places = np.concatenate(
             [
                 self._firsts.firsts(rows["t_s"]),
-                rows.values.argmax(axis=0),
-                rows.values.argmin(axis=0),
+                _places_of(np.max, np.argmax, rows.values),
+                _places_of(np.min, np.argmin, rows.values),
                 self._changes_of_state(rows),
                 self._saturation(rows),
                 [len(rows) - 1],
@@ -132,3 +138,14 @@ class FirstsAndExtremes(Thinning):
         ends = np.diff(t_s, append=np.inf) > QUIET_S
         self._last_saturated_s = t_s[-1]
         return places[begins | ends]
+
+
+def _places_of(bound: Callable[..., Array], place: Callable[..., Places], values: Array) -> Places:
+    """Place of the first bound of each column, as ``place(values, axis=0)`` finds it."""
+    ends = len(values) // _BLOCK * _BLOCK
+    bounds = bound(values[:ends].reshape(-1, _BLOCK, values.shape[1]), axis=1)
+    if ends < len(values):
+        bounds = np.concatenate([bounds, bound(values[ends:], axis=0, keepdims=True)])
+    starts = _BLOCK * place(bounds, axis=0)
+    within = [place(values[start : start + _BLOCK, column]) for column, start in enumerate(starts)]
+    return np.asarray(starts + within)

@@ -34,16 +34,20 @@ def size_of(actuator: Actuator) -> float:
     return max(float(np.linalg.norm(actuator.shaft_tip_m)), coils_m) / REACH_m
 
 
-def axes(origin_m: Sequence[float] | Array, length_m: float, labels: Sequence[str]) -> rr.Arrows3D:
-    """Axes of a frame in the colours of the plots, each with its label, or all with one."""
+def axes(origin_m: Sequence[float] | Array, length_m: float) -> rr.Arrows3D:
+    """Axes of a frame in the colours of the plots."""
     return rr.Arrows3D(
         origins=[origin_m] * 3,
         vectors=length_m * np.eye(3),
         colors=palette.AXIS_COLOURS,
-        labels=labels,
         radii=rr.Radius.ui_points(1.5),
-        show_labels=True,
     )
+
+
+def labels(texts: Sequence[str], colours: Sequence[palette.Colour]) -> rr.Points3D:
+    """Texts for the heads of arrows, as points without a size: an arrow's own text stands in its middle."""
+    size = rr.Radius.ui_points(0.0)
+    return rr.Points3D.from_fields(labels=texts, colors=colours, radii=size, show_labels=True)
 
 
 def current_scale(size: float) -> rr.Mesh3D:

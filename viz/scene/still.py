@@ -8,7 +8,14 @@ import rerun as rr
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.viz import palette
-from spheretwin.viz.scene.marks import AXES_LENGTH_m, axes, current_scale, current_scale_labels, size_of
+from spheretwin.viz.scene.marks import (
+    AXES_LENGTH_m,
+    axes,
+    current_scale,
+    current_scale_labels,
+    labels,
+    size_of,
+)
 from spheretwin.viz.scene.meshes import read_meshes
 from spheretwin.viz.scene.paths import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROTOR_AXES, WORLD
 
@@ -16,6 +23,7 @@ PAYLOAD_LENGTH_m, PAYLOAD_RADIUS_m = 0.014, 0.011
 
 # The stator's axes stand beside its foot; the rotor's, shorter, around the shaft below a payload.
 AXES_AT_m = (-0.085, -0.105, -0.075)
+NAMED_AT = 1.15  # of the length: beyond the head
 ROTOR_AXES_HEIGHT, ROTOR_AXES_LENGTH_m = 0.6, 0.025
 
 
@@ -30,17 +38,15 @@ def log_static(recording: rr.RecordingStream, actuator: Actuator, facts: RunFact
     if facts.payload_kg > 0:
         recording.log(PAYLOAD, _payload(actuator), static=True)
     size = size_of(actuator)
-    at = size * np.array(AXES_AT_m)
-    recording.log(AXES, axes(at, size * AXES_LENGTH_m, ["x", "y", "z"]), static=True)
-    recording.log(ROTOR_AXES, _rotor_axes(actuator), static=True)
+    at, length_m = size * np.array(AXES_AT_m), size * AXES_LENGTH_m
+    names = labels(["x", "y", "z"], palette.AXIS_COLOURS)
+    ends = rr.Points3D.from_fields(positions=at + NAMED_AT * length_m * np.eye(3))
+    recording.log(AXES, axes(at, length_m), names, ends, static=True)
+    rotor_axes = axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, size * ROTOR_AXES_LENGTH_m)
+    recording.log(ROTOR_AXES, rotor_axes, static=True)
     recording.log(CURRENT_SCALE, current_scale(size), static=True)
-    labels = current_scale_labels(facts.current_limit_A, size)
-    recording.log(f"{CURRENT_SCALE}/labels", labels, static=True)
-
-
-def _rotor_axes(actuator: Actuator) -> rr.Arrows3D:
-    length_m = size_of(actuator) * ROTOR_AXES_LENGTH_m
-    return axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, length_m, ["R"])
+    currents = current_scale_labels(facts.current_limit_A, size)
+    recording.log(f"{CURRENT_SCALE}/labels", currents, static=True)
 
 
 def _payload(actuator: Actuator) -> rr.Cylinders3D:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.bench.commands import COMMANDS
+from spheretwin.twin.bench import Bench
+from spheretwin.twin.bench.commands.registry import COMMANDS
 from spheretwin.twin.bench.queue import MOST_WAITING
 from spheretwin.twin.session import Session
 from tests.twin.bench.cases import MODES, begun, bench, done, said
@@ -104,6 +105,13 @@ def test_a_command_that_cannot_be_done_is_refused_in_one_line(common, name, argu
     after = common.state()
     assert (after.mode, after.journal, after.tick) == (before.mode, before.journal, before.tick)
     assert after.refused == ticket.refused
+
+
+@pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
+def test_what_is_said_of_the_bench_names_every_command_and_its_arguments(command):
+    said_of_it = Bench.__doc__
+    assert f"``{command.name}``" in said_of_it
+    assert all(argument in said_of_it for argument in command.arguments.model_fields)
 
 
 ANYTHING = st.recursive(

@@ -69,8 +69,8 @@ def test_what_goes_wrong_with_a_file_is_told_and_the_run_goes_on(tmp_path, monke
         assert made.advance(50) == 50
         done(made, "keep")
         assert made.advance(50) == 50
-    assert made._kept == ()
-    assert made._note == "the disk is full"
+    assert made.state().kept == ()
+    assert made.state().note == "the disk is full"
 
 
 @pytest.mark.parametrize("place", [0, 1], ids=["recording", "telemetry"])

@@ -102,18 +102,20 @@ def test_a_twin_without_currents_is_not_given_any_as_its_operator_goes(shared, c
     assert (shared.state().mode, shared.state().operator) == ("off", None)
 
 
-def test_clients_say_who_they_are_and_are_not_without_end(clock):
+def test_clients_say_who_they_are(shared):
+    assert "expected hello of a client" in shared.command("hello").refused
+
+
+def test_clients_are_not_without_end(clock):
     operators = Operators(clock=clock)
-    with pytest.raises(InputError, match="expected hello of a client"):
-        operators.say("hello", None)
     for i in range(MOST_CLIENTS):
-        operators.say("hello", f"{i}")
+        operators.see(f"{i}")
     with pytest.raises(InputError, match="at most"):
-        operators.say("hello", "one more")
+        operators.see("one more")
     clock.now = 2 * GONE_s
     assert operators.look()
     assert not operators.look()
-    operators.say("hello", "one more")
+    operators.see("one more")
     assert operators.operator == "one more"
 
 

@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from spheretwin.models.kinematics import generalised_torque, rotation
-from spheretwin.models.telemetry.signals import Signal, common_signals, width
+from spheretwin.models.telemetry.signals import ANGLES, Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.compared.quantities import QUANTITIES, drawn
 from spheretwin.viz.quantities.delivered import on_the_hinges
-from spheretwin.viz.quantities.error_angle import angle_between
+from spheretwin.viz.quantities.error import ERROR
+from spheretwin.viz.quantities.error_angle import ERROR_ANGLE, angle_between
+from spheretwin.viz.quantities.margin import MARGIN
+from spheretwin.viz.quantities.quantity import Rows
 
 RANDOM = np.random.default_rng(0)
 
@@ -49,6 +52,10 @@ def table(*more):
     return Table(signals, RANDOM.uniform(-1, 1, size=(7, width(signals))))
 
 
+def rows(of, actuator):
+    return Rows(of, of.rows(0, 1), actuator, 8.0)
+
+
 def test_only_what_all_runs_have_is_drawn():
     slides = table(Signal("sliding_s", "rad/s", 3, "s", ("α", "β", "γ")))
     assert drawn([slides, slides]) == list(QUANTITIES)
@@ -56,10 +63,19 @@ def test_only_what_all_runs_have_is_drawn():
     assert {each.group for each in QUANTITIES} - {each.group for each in common} == {"sliding"}
 
 
-def test_every_quantity_has_a_number_a_row_and_a_name_of_its_own():
-    of = table(Signal("sliding_s", "rad/s", 3, "s", ("α", "β", "γ")))
+def test_every_quantity_has_a_number_a_row_and_a_name_of_its_own(actuator):
+    of = rows(table(Signal("sliding_s", "rad/s", 3, "s", ("α", "β", "γ"))), actuator)
     for each in QUANTITIES:
         assert each.of(of).shape == (7,)
         assert each.desired is None or each.desired(of).shape == (7,)
         assert each.heading == f"{each.title} [{each.unit}]"
     assert len({each.name for each in QUANTITIES}) == len({each.heading for each in QUANTITIES}) == 14
+
+
+def test_what_one_run_s_recording_has_too_is_the_same_number(actuator):
+    of = rows(table(), actuator)
+    beside = {each.name: each.of(of) for each in QUANTITIES if "sliding" not in each.name}
+    for alone in (ERROR_ANGLE, MARGIN):
+        np.testing.assert_array_equal(beside[alone.name], alone.values(of)[:, 0])
+    errors = np.stack([beside[f"error_{angle}_mrad"] for angle in ANGLES], axis=1)
+    np.testing.assert_array_equal(errors, ERROR.values(of))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.viz.layout.seen import CLIPPED_FROM, Channel, Seen, nice
+from spheretwin.viz.layout.seen import CLIPPED_FROM, LABELLED, MARGIN, Channel, Seen, labelled, nice
 
 T_s = np.arange(100) * 0.1
 ERROR = Channel("error")
@@ -25,14 +25,14 @@ def test_a_settled_error_is_legible_beside_its_transient():
     of = seen(with_transient(31.0, 0.5, 4))
     limit = of.limit(ERROR, least=0.1)
     assert 0.5 < limit <= 1.0
-    assert of.beyond(limit, ERROR) == ", to 31 in first 0.4 s"
+    assert of.largest(limit, ERROR) == ", largest 31 in first 0.4 s"
 
 
 def test_a_transient_that_is_not_much_larger_is_drawn():
     of = seen(with_transient(0.9 * CLIPPED_FROM * 0.5, 0.5, 4))
     limit = of.limit(ERROR, least=0.1)
     assert limit > 0.9 * CLIPPED_FROM * 0.5
-    assert of.beyond(limit, ERROR) == ""
+    assert of.largest(limit, ERROR) == ", largest 1.12"
 
 
 def test_a_long_error_is_no_transient():
@@ -62,13 +62,40 @@ def test_plots_that_are_compared_have_one_range():
 def test_what_a_run_did_not_have_all_the_time_bounds_nothing():
     values = np.full(len(T_s), np.nan)
     values[:50] = 3.0
-    assert seen(values).limit(ERROR, least=0.1) == 4.0
+    assert seen(values).limit(ERROR, least=0.1) == 10.0
+    assert seen(values).limit(ERROR, least=0.1, above_zero=True) == 4.0
     assert seen(values * np.nan).limit(ERROR, least=0.1) >= 0.1
     assert seen(values).band(ERROR, least=0.1) == pytest.approx((-3.3, 3.3))
 
 
 @given(st.floats(1e-9, 1e9))
 def test_a_nice_number_is_just_above(value):
-    # The next one is at most half as large again; a value within 1e-9 of a nice number is that number.
-    assert value * (1 - 2e-9) <= nice(value) <= 1.5 * value * (1 + 1e-9)
+    # The next number of a decade is at most 10/3 as large; a value within 1e-9 of one is that one.
+    assert value * (1 - 2e-9) <= nice(value) <= 10 / 3 * value * (1 + 1e-9)
     assert float(f"{nice(value):.1e}") == pytest.approx(nice(value), rel=1e-12)
+
+
+def ticks(low, high):
+    """What a viewer labels: multiples of the least power of ten of which few enough are in the range."""
+    step = 1e-12
+    while (high - low) / step > 1.2 * LABELLED:  # what is extended has a little more
+        step *= 10
+    return np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step
+
+
+@given(st.floats(-1e3, 1e3), st.floats(0, 1e3), st.floats(1e-3, 10))
+def test_a_range_around_anything_has_two_labels(low, width, least):
+    first, last = labelled(low, low + width, least)
+    reach = max(least, MARGIN * width / 2)
+    # Sums of numbers up to 1e3.
+    assert first <= low + width / 2 - reach + 1e-9
+    assert last >= low + width / 2 + reach - 1e-9
+    found = ticks(first, last)
+    assert len(found) >= 2
+    # A step is up to ten times the eighth part of the range, and one or two are added with their room.
+    assert last - first <= (2 * 10 / LABELLED + 1.2) * 2 * reach * 1.1
+
+
+@given(st.floats(1e-6, 1e6))
+def test_a_range_about_zero_has_a_label_beside_zero(value):
+    assert len(ticks(-nice(value), nice(value))) >= 3

@@ -9,6 +9,7 @@ from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow
+from spheretwin.viz.layout.paths import STYLES, TELEMETRY, VALUES
 from spheretwin.viz.layout.view import AFTER_THE_END, VIEW_NAMES, View, application, shown_until_s
 from spheretwin.viz.layout.views.registry import VIEWS
 from spheretwin.viz.recording.parts.drawn import quantities
@@ -107,6 +108,34 @@ def test_views_show_only_what_the_recording_holds(run):
         shown = list(contents(layout))
         assert len(shown) > 5
         assert [each for each in shown if not exists(each, entities)] == []
+
+
+def fields(path):
+    """Fields of the telemetry's structs, nested ones with a dot before them, by component."""
+    found = {}
+    for chunk in RrdReader(path).stream():
+        if chunk.entity_path == f"/{TELEMETRY}":
+            batch = chunk.to_record_batch()
+            for name in batch.schema.names:
+                if name.startswith((VALUES, STYLES)):
+                    for field in batch.schema.field(name).type.value_type:
+                        looks = field.type if name.startswith(STYLES) else []
+                        found.setdefault(name, set()).add(f".{field.name}[]")
+                        found[name] |= {f".{field.name}.{look.name}[]" for look in looks}
+    return found
+
+
+def test_what_draws_a_signal_finds_its_values_and_its_looks(run):
+    path, _ = run
+    there = fields(path)
+    taken = [
+        each
+        for (_, name), values in layouts(path)[-1].items()
+        for mappings in values
+        for each in (mappings if name == "VisualizerInstruction:component_map" else [])
+    ]
+    assert len(taken) > 30
+    assert [each for each in taken if each["selector"] not in there[each["source_component"]]] == []
 
 
 def test_the_whole_layout_has_every_view_in_a_tab(run):

@@ -25,7 +25,8 @@ from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import follow, simulate
 from spheretwin.viz import palette
-from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TIMELINE, entity
+from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY, TIMELINE
+from spheretwin.viz.reading.reading import read
 from spheretwin.viz.recording import recorder as recording
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
@@ -49,8 +50,8 @@ def run(tmp_path_factory):
     return path, session, finished
 
 
-def rows_of(path, entity, component):
-    """Times in ns and values of one component, in order."""
+def rows_of(path, entity, component, field=None):
+    """Times in ns and values of one component, or of one field of it, in order."""
     times, values = [], []
     chunks = (
         RrdReader(path).stream().filter(content=f"/{entity}", components=component, has_timeline=TIMELINE)
@@ -58,6 +59,8 @@ def rows_of(path, entity, component):
     for chunk in chunks:
         batch = chunk.to_record_batch()
         column = batch.column(component)
+        if field:
+            column = column.flatten().field(field)
         while pa.types.is_nested(column.type):
             column = column.flatten()
         times.append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
@@ -72,9 +75,29 @@ def test_every_signal_is_recorded_bit_for_bit(run):
     table = finished.telemetry
     ticks_ns = np.arange(len(table)) * 1_000_000
     for signal in table.signals:
-        times, values = rows_of(path, entity(signal.name), "Scalars:scalars")
+        times, values = rows_of(path, TELEMETRY, "values_0", signal.name)
         np.testing.assert_array_equal(times, ticks_ns)
         assert values.tobytes() == np.ascontiguousarray(table[signal.name]).tobytes()
+
+
+def test_signals_that_a_law_brings_on_the_way_change_no_component(tmp_path):
+    """A viewer draws nothing of a component that changes its type; NaN stands for what a law does not log."""
+    changes = [{"t_s": at, "set": "controller.law", "value": law} for at, law in ((0.1, "afsm"), (0.2, "pd"))]
+    fields = {"controller.law": "pd", "duration": 0.3, "plant.engine": "lagrangian", "event": changes}
+    with Session(scenarios.load("sinusoid", fields)) as session:
+        facts, ticks, begun = facts_of(session.begun_as), session.begun_as.ticks, session.signals
+        with Recorder(session.actuator, begun, facts, path=tmp_path / "run.rrd") as recorder:
+            follow(session, ticks, [recorder])
+    types = {}
+    for chunk in RrdReader(tmp_path / "run.rrd").stream().filter(content=f"/{TELEMETRY}", is_static=False):
+        for field in chunk.to_record_batch().schema:
+            types.setdefault(field.name, set()).add(field.type)
+    assert {"values_0", "values_1"} <= set(types)
+    assert all(len(of_one) == 1 for of_one in types.values())
+    table = read(tmp_path / "run.rrd").table
+    assert "sliding_s" not in {signal.name for signal in begun}
+    logged = np.isfinite(table["sliding_s"]).all(axis=1)
+    np.testing.assert_array_equal(logged, np.arange(300) // 100 == 1)
 
 
 def test_rotor_turns_as_the_telemetry_says(run):
@@ -120,8 +143,8 @@ def test_resolved_scenario_is_in_the_recording(run):
 
 def test_series_have_names_with_units(run):
     path, *_ = run
-    names = static_text(path, entity("error_rad"), "SeriesLines:names")
-    assert names == ["error α [rad]", "error β [rad]", "error γ [rad]"]
+    (styles,) = static_text(path, TELEMETRY, "styles_0")
+    assert styles["error_rad"]["names"] == ["error α [rad]", "error β [rad]", "error γ [rad]"]
 
 
 def texts(path):
@@ -172,7 +195,7 @@ def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    times, _ = rows_of(path, entity("q_rad"), "Scalars:scalars")
+    times, _ = rows_of(path, TELEMETRY, "values_0", "q_rad")
     assert len(times) == 100
 
 
@@ -209,7 +232,7 @@ def test_a_folder_in_the_place_of_a_recording_is_told_with_where_the_recording_i
         recorder.close()
     (kept,) = tmp_path.glob(".run.rrd.*.part")
     assert f"{raised.value}".endswith(f"; the recording is in {kept}")
-    assert len(rows_of(kept, entity("q_rad"), "Scalars:scalars")[0]) == 100
+    assert len(rows_of(kept, TELEMETRY, "values_0", "q_rad")[0]) == 100
 
 
 def test_closing_twice_is_closing_once(tmp_path):
@@ -223,7 +246,7 @@ def test_closing_twice_is_closing_once(tmp_path):
 def test_where_a_pipe_has_no_path_rerun_writes_the_file(tmp_path, monkeypatch):
     monkeypatch.setattr(recording, "PIPE_PATHS", tmp_path / "none")
     recorded(path := tmp_path / "run.rrd", "hold", duration=0.1)
-    assert len(rows_of(path, entity("q_rad"), "Scalars:scalars")[0]) == 100
+    assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 100
     assert os.listdir(tmp_path) == ["run.rrd"]
 
 
@@ -247,9 +270,9 @@ def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
         with Recorder(session.actuator, session.signals, longer, path=path) as second:
             simulate(scenarios.load("hold", {"duration": 0.2}), sinks=[second])
             assert not path.exists()
-        assert len(rows_of(path, entity("q_rad"), "Scalars:scalars")[0]) == 200
+        assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 200
         follow(session, session.scenario.ticks, [first])
-    assert len(rows_of(path, entity("q_rad"), "Scalars:scalars")[0]) == 100
+    assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 100
     assert sorted(os.listdir(tmp_path)) == ["run.rrd", "run.rrd.part"]
     assert mine.read_text() == "mine"
 
@@ -263,7 +286,7 @@ def test_recording_at_a_link_replaces_the_file_behind_it(tmp_path, there):
     recorded(link, "hold", duration=0.1)
     assert link.is_symlink()
     assert os.listdir(folder) == ["real.rrd"]
-    assert len(rows_of(folder / "real.rrd", entity("q_rad"), "Scalars:scalars")[0]) == 100
+    assert len(rows_of(folder / "real.rrd", TELEMETRY, "values_0", "q_rad")[0]) == 100
 
 
 def broken_model(folder, content):
@@ -345,7 +368,7 @@ def test_run_waits_for_a_recorder_that_is_behind(tmp_path):
         finally:
             done.set()
             writer.join()
-    assert len(rows_of(tmp_path / "run.rrd", entity("q_rad"), "Scalars:scalars")[0]) == len(written)
+    assert len(rows_of(tmp_path / "run.rrd", TELEMETRY, "values_0", "q_rad")[0]) == len(written)
 
 
 def test_recorder_that_has_failed_keeps_no_run_waiting(tmp_path):

@@ -16,7 +16,7 @@ from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
 from spheretwin.viz import palette
 from spheretwin.viz.layout.layout import layout
-from spheretwin.viz.layout.paths import entity
+from spheretwin.viz.layout.paths import TELEMETRY
 from spheretwin.viz.layout.view import View, application
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.scene import paths as scene
@@ -66,12 +66,11 @@ def test_a_variant_is_recorded_with_its_own_groups(variant, tmp_path):
         recorder.finish("completed")
     path = tmp_path / "run.rrd"
 
-    currents = one_row_each(path, entity("current_A"), "Scalars:scalars")
+    currents = [row["current_A"] for (row,) in one_row_each(path, TELEMETRY, "values_0")]
     np.testing.assert_array_equal(currents, table["current_A"])
-    (names,) = one_row_each(path, entity("current_A"), "SeriesLines:names")
-    assert names == [f"current group {j} [A]" for j in range(groups)]
-    (colours,) = one_row_each(path, entity("current_A"), "SeriesLines:colors")
-    assert len(colours) == groups
+    ((styles,),) = one_row_each(path, TELEMETRY, "styles_0")
+    assert styles["current_A"]["names"] == [f"current group {j} [A]" for j in range(groups)]
+    assert len(styles["current_A"]["colors"]) == groups
 
     (shape,) = one_row_each(path, scene.COILS, "Mesh3D:albedo_texture_format")
     assert shape[0]["width"] == 2 * groups

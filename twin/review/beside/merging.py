@@ -11,6 +11,7 @@ from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.facts import RunFacts
+from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.review.beside import naming
 from spheretwin.twin.review.figures import of_the_actuator
 from spheretwin.twin.review.happened import events
@@ -18,6 +19,7 @@ from spheretwin.twin.review.run import Reviewed
 from spheretwin.twin.scenario.files import files_of
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.viz.compared.run import Run
+from spheretwin.viz.quantities.quantity import Rows
 
 SUFFIX = ".rrd"
 
@@ -92,12 +94,17 @@ def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
             label,
             _law(run),
             run.period_s,
-            run.every_tick if every_tick else run.table,
+            _rows(run, run.every_tick if every_tick else run.table),
             run.metadata,
             tuple(events(run)),
         )
         for run, name, label in told
     ]
+
+
+def _rows(run: Reviewed, table: Table) -> Rows:
+    scenario = of_the_actuator(run)
+    return Rows(table, table.rows(0, 1), files_of(scenario).actuator, scenario.drive.current_limit_A or 0.0)
 
 
 def _facts(scenario: Scenario, law: str) -> RunFacts:
@@ -122,4 +129,4 @@ def _told(runs: Sequence[Reviewed]) -> str:
     """What each run is, in Markdown; one that is named here is named so in every plot."""
     status = (f"{run.record.status or 'not closed'} at {run.simulated_s:.3f} s" for run in runs)
     lines = [f"- **{label}**, {ended}" for label, ended in zip(naming.labels(runs), status, strict=True)]
-    return "\n".join([*lines, "", "What was asked for is the wide grey line."])
+    return "\n".join([*lines, "", "What was asked for is the thin white line."])

@@ -36,6 +36,8 @@ GOES_WITH = {
 def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
     """What is said of each run: its number, file and law, and in what they differ, as far as there is room.
 
+    A file that has the name of its law is told once.
+
     Parameters
     ----------
     runs : sequence of Reviewed
@@ -45,7 +47,8 @@ def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
     told = differing([run.record.scenario for run in runs])
     found = []
     for place, (run, parts) in enumerate(zip(runs, told, strict=True), start=1):
-        label = f"{place} {shortened(run.path.stem, LONGEST)}: {_law(run)}"
+        stem, law = shortened(run.path.stem, LONGEST), _law(run)
+        label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
         for part in parts:
             if len(label) + len(part) + 2 > longest:
                 label += ", …"

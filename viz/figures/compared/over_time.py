@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from spheretwin.viz.compared.quantities import Array, Quantity
+from spheretwin.viz.compared.quantities import Quantity
 from spheretwin.viz.compared.run import Run
 from spheretwin.viz.compared.thinning import thinned
 from spheretwin.viz.figures.compared.style import MOST_POINTS, looks, name_runs, plain
 from spheretwin.viz.figures.plots import INK, WIDTH_in
+from spheretwin.viz.quantities.quantity import Array
 
 
 def over_time(
@@ -33,12 +34,12 @@ def over_time(
     panels = figure.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0]
     for panel, quantity in zip(panels, quantities, strict=True):
         for run, of_run in zip(runs, looks(runs), strict=True):
-            _draw(panel, run, quantity.of(run.table), label=run.label, **of_run.line())
+            _draw(panel, run, quantity.of(run.rows), label=run.label, **of_run.line())
         for place in leading:
             if quantity.desired:
                 name = "asked for" if len(leading) == 1 else f"asked for in {runs[place].label}"
                 look = {"label": name, "color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
-                _draw(panel, runs[place], quantity.desired(runs[place].table), **look)
+                _draw(panel, runs[place], quantity.desired(runs[place].rows), **look)
         if quantity.limits:
             panel.set_ylim(*quantity.limits)
         plain(panel, quantity.heading.replace(" [", ",\n").removesuffix("]"))

@@ -9,6 +9,7 @@ from spheretwin.viz.layout import panels
 from spheretwin.viz.layout.plots import Plots, quantity, signal
 from spheretwin.viz.quantities.coupling import COUPLING
 from spheretwin.viz.quantities.delivered import DELIVERED
+from spheretwin.viz.quantities.error import ERROR
 
 SLIDING = "sliding_s"
 
@@ -17,7 +18,11 @@ LEAST = {"N·m": 0.01, "rad/s": 0.05, "rad": 0.02, "rad/s²": 0.5}
 
 
 def control(plots: Plots) -> rrb.Container:
-    """Torques of each axis; below, what the law says of itself, and the coupling of the axes."""
+    """Errors and torques of each axis; below, what the law says of itself, and the coupling of the axes."""
+    errors = [
+        plots.about_zero(f"error {name}", "mrad", quantity(ERROR), least=ERROR.floor, axis=axis)
+        for axis, name in enumerate(ANGLES)
+    ]
     asked = [signal("torque_command_Nm"), quantity(DELIVERED), signal("disturbance_Nm")]
     torques = [
         plots.about_zero(
@@ -26,16 +31,16 @@ def control(plots: Plots) -> rrb.Container:
             *asked,
             least=DELIVERED.floor,
             axis=axis,
-            key=", white asked, grey load",
+            key=", grey load",
         )
         for axis, name in enumerate(ANGLES)
     ]
-    return rrb.Grid(*torques, *_of_the_law(plots), grid_columns=3, name="control")
+    return rrb.Grid(*errors, *torques, *_of_the_law(plots), grid_columns=3, name="control")
 
 
 def _of_the_law(plots: Plots) -> list[rrb.Container | rrb.View]:
     own = {each.name: each for each in plots.view.own if _is_of_the_law(each)}
-    coupling = plots.about_zero("coupling torques (6)-(10)", "N·m", quantity(COUPLING), least=COUPLING.floor)
+    coupling = plots.about_zero("coupling", "N·m", quantity(COUPLING), least=COUPLING.floor)
     sliding = []
     if SLIDING in own:
         del own[SLIDING]

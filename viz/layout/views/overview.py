@@ -13,8 +13,8 @@ from spheretwin.viz.quantities.margin import MARGIN, MOST
 
 
 def overview(plots: Plots) -> rrb.Container:
-    """Actuator and currents beside the errors, what is left of the torque, and the states."""
-    seen = rrb.Vertical(actuator_view(), panels.current_map(plots), row_shares=[3, 2])
+    """Actuator and currents beside the errors, what is left of the torque, states and events."""
+    seen = rrb.Vertical(actuator_view(plots.view.size), panels.current_map(plots), row_shares=[3, 2])
     told = rrb.Vertical(
         plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
         plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor),
@@ -24,7 +24,7 @@ def overview(plots: Plots) -> rrb.Container:
             low=-0.05 * MOST,
             high=1.05 * MOST,
         ),
-        plots.states(),
-        row_shares=[3, 3, 2, 4 if any(each.states for each in plots.view.own) else 2],
+        rrb.Horizontal(plots.states(), panels.log(), column_shares=[1, 1]),
+        row_shares=[3, 3, 2, 4 if any(each.states for each in plots.view.own) else 3],
     )
     return rrb.Horizontal(seen, told, column_shares=[4, 5], name="overview")

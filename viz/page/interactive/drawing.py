@@ -10,11 +10,12 @@ import plotly.graph_objects as plotly
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz.compared.colours import run_colours
-from spheretwin.viz.compared.quantities import Array, Quantity
+from spheretwin.viz.compared.quantities import Quantity
 from spheretwin.viz.compared.run import Run
 from spheretwin.viz.compared.spectrum import Spectrum
 from spheretwin.viz.compared.thinning import highest_by_octave, strongest, thinned
 from spheretwin.viz.page.interactive.panels import ASKED, Panel, stacked
+from spheretwin.viz.quantities.quantity import Array
 
 MOST_NUMBERS = 130_000
 """In all lines; each takes five to six bytes of the page, beside the library's 4.8 MB."""
@@ -42,12 +43,12 @@ def over_time(runs: Sequence[Run], leading: Sequence[int], quantities: Sequence[
     panels = []
     for quantity in quantities:
         asked = [
-            _line(runs[place], place, quantity.desired(runs[place].table), most, ASKED, 4.0)
+            _line(runs[place], place, quantity.desired(runs[place].rows), most, ASKED, 4.0)
             for place in leading
             if quantity.desired
         ]
         lines = [
-            _line(run, place, quantity.of(run.table), most, colour, 1.3)
+            _line(run, place, quantity.of(run.rows), most, colour, 1.3)
             for place, (run, colour) in enumerate(zip(runs, colours, strict=True))
         ]
         for trace in asked:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 
 import rerun as rr
@@ -10,15 +11,13 @@ import rerun as rr
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.versions import versions
+from spheretwin.viz.layout.paths import DESCRIBED, component
 
-FACTS, SIGNAL = "facts", "signal"
-"""Names of the components below."""
+FACTS = "facts"
+"""Name of the component below."""
 
 RATE = "record_rate_Hz"
 """Among the facts: rows a second that are kept beside those that stand out; null for every row."""
-
-COMPLETE = "t_s"
-"""Signal that is recorded behind all others of its rows."""
 
 
 def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
@@ -27,13 +26,16 @@ def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
     return rr.AnyValues(facts=json.dumps(described, default=str))
 
 
-def signal_as_json(place: int, signal: Signal) -> rr.AnyValues:
-    """A signal, and its place among the columns."""
-    return rr.AnyValues(signal=json.dumps({"place": place, **asdict(signal)}))
+def signals_as_json(arrival: int, signals: Sequence[Signal]) -> rr.DescribedComponentBatch:
+    """Signals that come together, in the order of their columns."""
+    text = json.dumps([asdict(signal) for signal in signals])
+    descriptor = rr.ComponentDescriptor(component(DESCRIBED, arrival))
+    return rr.DescribedComponentBatch(rr.components.TextBatch(text), descriptor)
 
 
-def signal_of(text: str) -> tuple[int, Signal]:
-    """Place and signal as they were written."""
-    fields = json.loads(text)
-    labels, states = (tuple(fields.pop(name)) for name in ("labels", "states"))
-    return fields.pop("place"), Signal(**fields, labels=labels, states=states)
+def signals_of(text: str) -> list[Signal]:
+    """Signals as they were written."""
+    return [
+        Signal(**{**fields, **{name: tuple(fields[name]) for name in ("labels", "states")}})
+        for fields in json.loads(text)
+    ]

@@ -13,6 +13,7 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.view import OVERVIEW, View
+from spheretwin.viz.scene.marks import size_of
 
 
 class Rows(Enum):
@@ -51,6 +52,7 @@ class Subject(NamedTuple):
             tuple(signal for signal in self.signals if signal.name not in COMMON_NAMES),
             self.live,
             self.shown,
+            size_of(self.actuator),
             self.run,
         )
 

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import pyarrow as pa
 import rerun as rr
 
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.paths import entity
-from spheretwin.viz.layout.styles import signal_style
-from spheretwin.viz.recording.columns import scalars, time_index
-from spheretwin.viz.recording.parts.described import COMPLETE, signal_as_json
+from spheretwin.viz.layout.paths import STYLES, TELEMETRY, VALUES, component
+from spheretwin.viz.layout.styles import LOOKS, signal_style
+from spheretwin.viz.recording.columns import Struct, no_vectors, time_index, vectors
+from spheretwin.viz.recording.parts.described import signals_as_json
 from spheretwin.viz.recording.parts.part import Part, Rows, Subject
+
+# An axis, and no line over itself.
+TIME = "t_s"
 
 
 class Signals(Part):
-    """Every column of the telemetry."""
+    """Every column of the telemetry, all of a row together: a killed process leaves whole rows."""
 
     rows = Rows.KEPT
 
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
-        self._described: set[str] = set()
+        self._arrived: list[list[Signal]] = []
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Say what the signals are."""
@@ -28,20 +32,50 @@ class Signals(Part):
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the values of a chunk."""
-        index = time_index(rows["t_s"])
         self._describe(recording, rows.signals)
-        # The times last: rows that have them are whole, wherever a killed process left off.
-        for signal in sorted(rows.signals, key=lambda signal: signal.name == COMPLETE):
-            recording.send_columns(entity(signal.name), index, [scalars(rows[signal.name], signal.size)])
+        names = {signal.name for signal in rows.signals}
+        columns = [
+            rr.ComponentColumn(component(VALUES, arrival), _values(rows, signals, names))
+            for arrival, signals in enumerate(self._arrived)
+            if any(signal.name in names for signal in signals)
+        ]
+        recording.send_columns(TELEMETRY, time_index(rows["t_s"]), columns)
 
     def _describe(self, recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
         """Say of signals that come for the first time what they are; a change of law may bring some."""
-        new = [signal for signal in signals if signal.name not in self._described]
-        for signal in new:
-            described = signal_as_json(len(self._described), signal)
-            # Time is an axis, and no line over itself.
-            drawn = [] if signal.name == COMPLETE else [signal_style(signal)]
-            recording.log(entity(signal.name), described, *drawn, static=True)
-            self._described.add(signal.name)
-        if new:
-            recording.flush()  # before their rows: what a killed process leaves says what they are
+        known = {signal.name for arrived in self._arrived for signal in arrived}
+        new = [signal for signal in signals if signal.name not in known]
+        if not new:
+            return
+        arrival = len(self._arrived)
+        self._arrived.append(new)
+        styles = Struct({signal.name: _style(signal) for signal in new if signal.name != TIME})
+        drawn = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
+        recording.log(TELEMETRY, [signals_as_json(arrival, new), drawn], static=True)
+        recording.flush()  # before their rows: what a killed process leaves says what they are
+
+
+def _values(rows: Table, signals: list[Signal], names: set[str]) -> Struct:
+    """Values of signals that came together; none of those that the rows do not have any more."""
+    return Struct(
+        {
+            signal.name: vectors(rows[signal.name], signal.size)
+            if signal.name in names
+            else no_vectors(len(rows), signal.size)
+            for signal in signals
+        }
+    )
+
+
+def _style(signal: Signal) -> pa.Array:
+    """How a signal's lines look: what `rr.SeriesLines` has of it, as lists in a struct."""
+    style = signal_style(signal)
+    return pa.StructArray.from_arrays([_look(getattr(style, look)) for look in LOOKS], list(LOOKS))
+
+
+def _look(batch: rr.ComponentBatchLike | None) -> pa.Array:
+    """One list; none where the viewer may choose."""
+    if batch is None:
+        return pa.nulls(1, pa.list_(pa.uint8(), 1))
+    values = batch.as_arrow_array()
+    return pa.FixedSizeListArray.from_arrays(values, len(values))

@@ -15,6 +15,7 @@ import pytest
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import cli
 from spheretwin.twin.review.beside import picturing
+from spheretwin.twin.review.beside.merging import beside
 from spheretwin.twin.review.run import read
 from spheretwin.viz.compared.quantities import drawn
 
@@ -115,11 +116,11 @@ def test_the_page_asks_no_host_for_anything(page, drawn_into):
 
 
 def test_every_series_of_every_run_is_on_the_page_to_seven_digits(files, page):
-    runs = [read(path) for path in files]
+    runs = beside([read(path) for path in files])
     traces = figures_of(page)["over-time"]["data"]
     for quantity in drawn([run.table for run in runs]):
         for place, run in enumerate(runs):
-            wanted = quantity.of(run.table)
+            wanted = quantity.of(run.rows)
             found = [
                 trace for trace in traces
                 if trace["meta"] == f"{place}" and trace["type"] == "scatter" and trace["mode"] == "lines"
@@ -136,7 +137,7 @@ def test_the_axes_have_units_and_the_buttons_name_the_runs(page):
     figures = figures_of(page)
     titles = [each["text"] for each in figures["over-time"]["layout"]["annotations"]]
     for heading in (
-        "error |e| as one angle [degrees]",
+        "error as one angle [°]",
         "error of β [mrad]",
         "angle γ [rad]",
         "top current [A]",
@@ -173,7 +174,7 @@ def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypat
     traces = [each for each in figures_of(Sources(text))["over-time"]["data"] if each["type"] == "scatter"]
     (largest,) = {float(decoded(each["y"]).max()) for each in traces[:1]}
     quantity = drawn([read(files[0]).table])[0]
-    assert largest == np.float32(quantity.of(read(files[0]).table).max())
+    assert largest == np.float32(quantity.of(beside([read(files[0])])[0].rows).max())
 
 
 @pytest.mark.parametrize("library", ["matplotlib", "plotly"])

@@ -64,8 +64,6 @@ def watched(signals: tuple[Signal, ...]) -> dict[str, int]:
 _OF_FIXED_RANGE = frozenset(
     {
         "t_s",
-        "qdot_rad_s",
-        "qdot_ref_rad_s",
         "error_rad",
         "torque_Nm",
         "current_command_A",

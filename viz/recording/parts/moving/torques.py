@@ -12,7 +12,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.recording.columns import time_index
 from spheretwin.viz.recording.parts.moving.frames import Frames
 from spheretwin.viz.recording.parts.part import Part, Subject
-from spheretwin.viz.scene.marks import size_of
+from spheretwin.viz.scene.marks import labels, size_of
 from spheretwin.viz.scene.paths import TORQUES
 from spheretwin.viz.scene.poses import shaft_tip
 from spheretwin.viz.scene.torques import SHOWN, LONGEST_m, METRES_PER_Nm, gravity_torque, load_torque
@@ -31,12 +31,9 @@ class Torques(Part):
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log names and colours; the load is the last, so that it can be left out."""
         shown = [SHOWN[name] for name in ("coils", *self._weight(), "load")]
-        style = rr.Arrows3D.from_fields(
-            colors=[torque.colour for torque in shown],
-            labels=[torque.label for torque in shown],
-            radii=rr.Radius.ui_points(2.5),
-        )
-        recording.log(TORQUES, style, static=True)
+        colours = [torque.colour for torque in shown]
+        style = rr.Arrows3D.from_fields(colors=colours, radii=rr.Radius.ui_points(2.5))
+        recording.log(TORQUES, style, labels([torque.label for torque in shown], colours), static=True)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
@@ -53,9 +50,12 @@ class Torques(Part):
         vectors = np.clip(metres * np.stack(torques, axis=1), -LONGEST_m, LONGEST_m)
         drawn = np.ones(vectors.shape[:2], dtype=bool)
         drawn[:, -1] = np.any(load_Nm != 0, axis=1)
+        count = drawn.sum(axis=1)
         columns = [
-            *rr.Arrows3D.columns(vectors=vectors[drawn]).partition(drawn.sum(axis=1)),
-            *rr.Arrows3D.columns(origins=shaft_tip(q, self.subject.actuator)),
+            *rr.Arrows3D.columns(vectors=vectors[drawn]).partition(count),
+            # Labels at the heads: the same numbers once more, which takes no bytes.
+            *rr.Points3D.columns(positions=vectors[drawn]).partition(count),
+            *rr.Transform3D.columns(translation=shaft_tip(q, self.subject.actuator)),
         ]
         recording.send_columns(TORQUES, time_index(rows["t_s"][new]), columns)
 

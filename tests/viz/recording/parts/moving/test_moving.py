@@ -99,9 +99,9 @@ def test_the_ages_of_what_is_shown_of_the_way_meet(actuator):
 
 def arrows(path):
     """Ticks, torques in N·m by name, and origins in m of the arrows."""
-    names = static(path, TORQUES, "Arrows3D:labels")
+    names = static(path, TORQUES, "Points3D:labels")
     ticks, vectors = zip(*rows_of(path, TORQUES, "Arrows3D:vectors"), strict=True)
-    _, origins = zip(*rows_of(path, TORQUES, "Arrows3D:origins"), strict=True)
+    _, origins = zip(*rows_of(path, TORQUES, "Transform3D:translation"), strict=True)
     torques = {name: [] for name in names}
     for row in vectors:
         for name, vector in zip(names, row, strict=False):  # what has no arrow is last
@@ -230,9 +230,10 @@ def test_a_run_that_diverged_is_marked_at_its_last_pose(tmp_path, actuator, lost
     np.testing.assert_allclose(position, rotation(last) @ actuator.shaft_tip_m, atol=1e-8)
 
 
-def size(path, duration_s):
+def size(path, duration_s, **changes):
     """Bytes of a recording of the sinusoid."""
-    session = Session(scenarios.load("sinusoid", {"plant.engine": "lagrangian", "duration": duration_s}))
+    fields = {"plant.engine": "lagrangian", "duration": duration_s, **changes}
+    session = Session(scenarios.load("sinusoid", fields))
     with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
         follow(session, session.scenario.ticks, [recorder])
     return path.stat().st_size
@@ -245,6 +246,17 @@ def test_what_moves_takes_fifteen_kilobytes_a_second(tmp_path, monkeypatch):
     assert 7_500 < bytes_each_s < 15_000
 
 
-def test_what_a_recording_holds_whatever_its_length_is_less_than_a_megabyte(tmp_path):
+FAULT = {"target": "coil.04", "mode": "open", "start_s": 0.0}
+
+
+@pytest.mark.parametrize("changes", [{}, {"hardware": "prototype", "fault": [FAULT]}], ids=["ideal", "fault"])
+def test_what_a_recording_holds_whatever_its_length_is_less_than_a_megabyte(tmp_path, changes):
     # Meshes, layout, texts, descriptions of the signals, and a single row.
-    assert size(tmp_path / "tick.rrd", 0.001) < 1_000_000
+    assert size(tmp_path / "tick.rrd", 0.001, **changes) < 1_000_000
+
+
+def test_labels_stand_at_the_heads_of_their_arrows(loaded):
+    path, _ = loaded
+    heads, labels = (rows_of(path, TORQUES, name) for name in ("Arrows3D:vectors", "Points3D:positions"))
+    assert labels == heads
+    assert static(path, TORQUES, "Points3D:labels") == ["coils", "gravity", "load"]
