@@ -38,7 +38,7 @@ TITLE = "bench"
 
 ASK = "Ask to operate"
 
-# A page that is loaded anew may come before it is said that it went: it operates again, unlike who only watched.
+# A page that is loaded anew may come before it is said that it went. It operates again; who watched does not.
 FRESH_S = 5.0
 
 
