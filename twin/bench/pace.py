@@ -92,6 +92,8 @@ class Pace:
     def ran(self, ticks: int, period_s: float, t_s: float, took_s: float) -> None:
         """Take note of a chunk: its ticks, the time it reached, and the wall time that it took."""
         now = self._clock()
+        if self._done and t_s < self._done[-1][1]:  # time went back
+            self._done.clear()
         self._done.append((now, t_s))
         while now - self._done[0][0] > WINDOW_s:
             self._done.popleft()

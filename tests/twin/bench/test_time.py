@@ -158,3 +158,15 @@ def test_the_history_is_thinned_bounded_and_the_same_whatever_the_chunks():
         assert history["q_rad"].shape == (500, 3)
         assert history["current_A"].shape == (500, 18)
         np.testing.assert_allclose(history["t_s"][[0, -1]], [5.0, 14.98], rtol=1e-12)
+
+
+def test_what_was_reached_is_counted_anew_when_time_goes_back():
+    clock = Clock()
+    pace = Pace(clock)
+    for first_s in (5.0, 1.0):
+        for chunk in range(1, 11):
+            pace.wait_s()
+            clock.now += 0.02
+            pace.ran(20, 1e-3, first_s + 0.02 * chunk, 1e-3)
+            assert pace.reached() >= 0.0
+    assert pace.reached() == pytest.approx(1.0, rel=1e-9)
