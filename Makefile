@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test check format benchmark peers reproduce setup clean
+.PHONY: demo test check format benchmark peers reproduce screenshots setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -34,6 +34,9 @@ peers: .venv-peers/installed ## hold JAX, MJX, Drake and plain NumPy against our
 reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a page in reproduced/
 	$(BIN)/spheretwin reproduce all --out reproduced
 	@echo "here:      reproduced/reproduce.html"
+
+screenshots: setup ## take the READMEs' pictures
+	$(BIN)/python tests/screenshots/take.py
 
 format: .venv-wheel/installed
 	$(WHEEL)/ruff format .

@@ -1,6 +1,7 @@
 """Take the pictures that the READMEs show: ``python tests/screenshots/take.py [--out DIR] [NAME ...]``.
 
-Each is a run made anew, recorded, and drawn by Rerun's viewer without a screen.
+Each is a run made anew, recorded, and drawn by Rerun's viewer without a screen; or a bench that is driven in
+Chromium, where the machine has it.
 """
 
 import argparse
@@ -10,16 +11,24 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
+from PIL import Image
 from viewer import HeadlessViewer
 
-PICTURES = Path(__file__).parents[2] / "viz" / "pictures"
+ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT))  # the browser is the tests'
+
+from bench import drawn  # noqa: E402
+
+from tests.browser import CHROMIUM  # noqa: E402
+
+PICTURES = ROOT / "viz" / "pictures"
 WIDTH, HEIGHT = 1280, 800
 
 # A picture of an interface has few colours: these are enough for its shaded coils, in a fifth of the bytes.
 COLOURS = 256
 
 
-class Picture(NamedTuple):
+class Recorded(NamedTuple):
     """A moment of a run, in one of its views."""
 
     runs: dict[str, str]
@@ -28,24 +37,34 @@ class Picture(NamedTuple):
     t_s: float
 
 
+class Driven(NamedTuple):
+    """A bench, its tip dragged from place to place."""
+
+    run: str
+    """Scenario and flags."""
+    poses_deg: tuple[tuple[float, float], ...]
+    """Angles α and β that the tip is dragged to."""
+
+
 OPEN = "--fault.0.target coil.04 --fault.0.mode open --fault.0.start-s 3"
 FAILING = "sinusoid --controller.law pd --disturbance.load 2"
 
-TABLE = {
-    "overview": Picture({"nutation": "nutation"}, "overview", 3.4),
-    "control": Picture({"nutation": "nutation"}, "control", 3.4),
-    "coils": Picture({"loaded": "sinusoid --plant.payload-kg 0.1 --disturbance.load 2"}, "coils", 3.3),
-    "hardware": Picture(
+TABLE: dict[str, Recorded | Driven] = {
+    "overview": Recorded({"nutation": "nutation"}, "overview", 3.4),
+    "control": Recorded({"nutation": "nutation"}, "control", 3.4),
+    "coils": Recorded({"loaded": "sinusoid --plant.payload-kg 0.1 --disturbance.load 2"}, "coils", 3.3),
+    "hardware": Recorded(
         {"open": f"tilt --hardware prototype {OPEN}"},
         "hardware",
         4.4,
     ),
-    "compare": Picture(
+    "compare": Recorded(
         {law: f"sinusoid --controller.law {law}" for law in ("afsm", "adaptive_fuzzy", "pd")},
         "compare",
         3.4,
     ),
-    "failed": Picture({"failing": FAILING}, "overview", 1.222),
+    "failed": Recorded({"failing": FAILING}, "overview", 1.222),
+    "bench": Driven("hold --plant.payload-kg 0.1", ((10.0, -20.0), (-20.0, -5.0), (5.0, 25.0))),
 }
 
 
@@ -62,18 +81,31 @@ def main() -> None:
     width, height = map(int, options.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
         for name in options.names or TABLE:
-            recording = recorded(TABLE[name], Path(folder) / name)
-            with HeadlessViewer(width, height) as viewer:  # each anew: a viewer keeps what it was shown last
-                viewer.open(recording)
-                picture = viewer.at(TABLE[name].t_s)
-                for fault in viewer.faults():
-                    print(f"{name}: {fault}", file=sys.stderr)
+            row = TABLE[name]
+            if isinstance(row, Recorded):
+                picture = seen(name, row, Path(folder) / name, (width, height))
+            elif CHROMIUM:
+                picture = drawn(row.run.split(), row.poses_deg, (width, height), Path(folder))
+            else:
+                print(f"{name}: not taken: no Chromium on this machine", file=sys.stderr)
+                continue
             path = options.out / f"{name}.png"
             picture.quantize(COLOURS).save(path, optimize=True)
             print(path)
 
 
-def recorded(picture: Picture, folder: Path) -> Path:
+def seen(name: str, picture: Recorded, folder: Path, size: tuple[int, int]) -> Image.Image:
+    """The picture's moment, as a viewer draws it; what the viewer cannot draw is said."""
+    recording = recorded(picture, folder)
+    with HeadlessViewer(*size) as viewer:  # each anew: a viewer keeps what it was shown last
+        viewer.open(recording)
+        image = viewer.at(picture.t_s)
+        for fault in viewer.faults():
+            print(f"{name}: {fault}", file=sys.stderr)
+    return image
+
+
+def recorded(picture: Recorded, folder: Path) -> Path:
     """Recording of the picture's run, or of all its runs side by side."""
     folder.mkdir()
     paths = [folder / f"{name}.rrd" for name in picture.runs]

@@ -136,7 +136,7 @@ class Keeping:
 
 
 def warm() -> None:
-    """Import what a recording needs: slow, and no chunk must wait for it."""
+    """Import what a recording needs: slow, and it holds the interpreter."""
     import pyarrow.parquet  # noqa: F401
 
     from spheretwin.viz.recording import recorder  # noqa: F401

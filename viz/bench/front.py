@@ -41,12 +41,16 @@ POLICY = (
 )
 
 # A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
+# viser's camera listens to keys too, at the document, after its commands: an arrow steers the twin alone.
 # Notices stand below, where they hide nothing.
 HEAD = """<style>.mantine-Notifications-root { top: auto !important; bottom: 8px !important; }</style>
 <script>
 for (const kind of ["keydown", "keyup"]) addEventListener(kind, (event) => {
   if (event.code == "Space" && !/INPUT|TEXTAREA/.test(event.target.tagName)) event.preventDefault();
 }, true);
+document.documentElement.addEventListener("keydown", (event) => {
+  if (/^(Arrow|Key[WASDQE]$)/.test(event.code)) event.stopPropagation();
+});
 </script>"""
 
 

@@ -180,16 +180,19 @@ class Hand:
                 act(event)
 
     def _operates(self, event: Event) -> bool:
-        return self._bench.state().operator in (None, client_name(event.client_id))
+        state, name = self._bench.state(), client_name(event.client_id)
+        # The picture may be older than the page: who is in none of it is let through, and the bench decides.
+        return state.operator == name or (state.operator is None and name not in state.watching)
 
     def _warn(self, event: Event) -> None:
         """Tell a page that only watches, and no other, why nothing happens; not at every key."""
         now = time.monotonic()
         if now - self._warned_s.get(event.client_id, -SHOWN_S) >= SHOWN_S:
             self._warned_s[event.client_id] = now
-            event.client.add_notification(
-                "This page watches", "Another one operates; ask it, above.", auto_close_seconds=SHOWN_S
-            )
+            told = "Nobody operates; take over, above."
+            if self._bench.state().operator is not None:
+                told = "Another one operates; ask it, above."
+            event.client.add_notification("This page watches", told, auto_close_seconds=SHOWN_S)
 
 
 ANYONES = ("stop", "ask", "hello", "leave", "beat")

@@ -60,7 +60,24 @@ class Keeping:
         with gui.add_folder("snapshot"):
             name = gui.add_text("name", "last")
             hand.on_change(name)
-            keep, back = gui.add_button("Take one"), gui.add_button("Back to it")
-            note = Note(gui, back.order + 0.5)
+            keep = gui.add_button("Take one")
+            self._kept: Any = gui.add_button_group("back to", NONE_YET, visible=False)
+            note = Note(gui, self._kept.order + 0.5)
             on_press(keep, lambda event: hand.tell(event, "snapshot", note, name=name.value))
-            on_press(back, lambda event: hand.tell(event, "restore", note, name=name.value))
+
+            def go_back(event: Event) -> None:
+                if event.target.value in event.target.options:
+                    hand.tell(event, "restore", note, name=event.target.value)
+
+            on_press(self._kept, go_back)
+
+    def show(self, state: Any) -> None:
+        """List the snapshots."""
+        if state.snapshots and tuple(self._kept.options) != state.snapshots:
+            self._kept.options = state.snapshots
+        if self._kept.visible != bool(state.snapshots):
+            self._kept.visible = bool(state.snapshots)
+
+
+# A group of buttons has to have one.
+NONE_YET = ("",)

@@ -20,21 +20,26 @@ from spheretwin.viz.bench.machine import Bench, Choices
 from spheretwin.viz.bench.modes import Modes
 from spheretwin.viz.bench.plots import Plots
 from spheretwin.viz.bench.settings import Settings
-from spheretwin.viz.bench.status import currents_html, scale_html, status_html
+from spheretwin.viz.bench.status import TAKE_OVER, currents_html, scale_html, status_html
 
-FRAME_S = 1 / 25
+FRAME_S = 1 / 20
 """The picture moves this often; words and curves every so many frames, the fields' values rarely."""
 
-FRAMES_A_STATUS = 3
-FRAMES_A_SETTING = 25
+FRAMES_A_STATUS = 2
+FRAMES_A_SETTING = 20
 
 LEFT_WIDTH, RIGHT_WIDTH = 255, 290
-STATUS_HEIGHT = 370
+STATUS_HEIGHT = 430
 
 SPEEDS = {"0.1×": 0.1, "0.2×": 0.2, "0.5×": 0.5, "1×": 1.0, "2×": 2.0, "5×": 5.0, "10×": 10.0}
 SPEEDS["as fast as possible"] = 1e6
 
 TITLE = "bench"
+
+ASK = "Ask to operate"
+
+# A page that is loaded anew may come before it is said that it went. It operates again; who watched does not.
+FRESH_S = 5.0
 
 
 class Page:
@@ -154,7 +159,7 @@ class Page:
         with tabs.add_tab("faults"):
             self._faults = Faults(gui, self._hand, choices)
         with tabs.add_tab("keep"):
-            Keeping(gui, self._hand, self._bench, choices)
+            self._keeping = Keeping(gui, self._hand, self._bench, choices)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(RIGHT_WIDTH)
 
@@ -164,7 +169,7 @@ class Page:
         @self._server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
             self._bench.command("hello", client=client_name(client.client_id))
-            ask = client.gui.add_button("Ask to operate", visible=False, order=-1e6)
+            ask = client.gui.add_button(ASK, visible=False, order=-1e6)
             on_press(ask, lambda event: self._hand.tell(event, "ask"))
             give = client.gui.add_button("", visible=False, order=-1e6, color="orange")
 
@@ -173,7 +178,7 @@ class Page:
                     self._hand.tell(event, "grant", to=name)
 
             on_press(give, grant)
-            self._watching[client.client_id] = (ask, give)
+            self._watching[client.client_id] = (time.monotonic(), ask, give)
 
         @self._server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
@@ -192,14 +197,19 @@ class Page:
             self._plots.warm(state.t_s, state.temperature_C)
         self._modes.show(state)
         self._faults.show(state)
+        self._keeping.show(state)
 
     def _renew(self, state: Any) -> None:
         self._settings.show()
-        for number, (ask, give) in list(self._watching.items()):
+        for number, (came_s, ask, give) in list(self._watching.items()):
             name = client_name(number)
             self._bench.command("beat", client=name)
+            fresh = time.monotonic() - came_s < FRESH_S
+            if state.operator is None and fresh and len(self._watching) == 1:
+                self._bench.command("ask", client=name)
             with contextlib.suppress(RuntimeError):  # the page has gone meanwhile
                 ask.visible = state.operator != name and name not in state.asking
+                ask.label = ASK if state.operator else TAKE_OVER
                 give.visible = state.operator == name and bool(state.asking)
                 if give.visible:
                     give.label = f"Let {state.asking[0]} operate"

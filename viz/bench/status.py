@@ -12,10 +12,13 @@ from spheretwin.viz import palette
 
 GOOD, WARN, BAD, QUIET = "#40c057", "#fab005", "#fa5252", "#868e96"
 
+TAKE_OVER = "Take over"
+"""What a page that watches presses where nobody operates."""
+
 _MODES = {"off": QUIET, "hold": GOOD, "fault": BAD, "replay": "#4dabf7"}
 _WORKING = "#4dabf7"
 
-_BOX = "padding:0.45em 0.8em;font-size:0.86em;line-height:1.5;color:#e9ecef;overflow-wrap:anywhere"
+_BOX = "padding:0.45em 0.8em;font-size:0.86em;line-height:1.35;color:#e9ecef;overflow-wrap:anywhere"
 _LARGE = "font-size:1.25em;font-weight:700;font-variant-numeric:tabular-nums"
 _TABLE = "display:grid;grid-template-columns:auto 1fr;column-gap:0.8em;font-variant-numeric:tabular-nums"
 
@@ -45,7 +48,7 @@ def status_html(state: Any, refused: str, waits_for: str) -> str:
     return (
         f'<div style="{_BOX}" data-bench="status">'
         f'<div style="{_LARGE}">{_badge(state.mode.upper(), _MODES.get(state.mode, _WORKING))}'
-        f"{_going(state)}{''.join(_alarms(state))}</div>"
+        f"{_going(state)}{''.join(_alarms(state))}</div>{_nobody(state)}"
         f'<div style="{_TABLE}">{table}</div>{_lines(state, refused, waits_for)}</div>'
     )
 
@@ -101,6 +104,12 @@ def _badge(text: str, colour: str) -> str:
 
 def _going(state: Any) -> str:
     return _badge("RUNS", GOOD) if state.running else _badge("PAUSED", QUIET)
+
+
+def _nobody(state: Any) -> str:
+    if state.operator is not None or not state.watching:
+        return ""
+    return f'<div style="color:{WARN}">Nobody operates: press “{TAKE_OVER}”.</div>'
 
 
 def _alarms(state: Any) -> list[str]:

@@ -61,7 +61,7 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
             assert answer.status == 200
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (0, "")
+    assert (process.returncode, err) == (0, "bench: preparing hold\n")
     assert out.split() == ["written", str(recording)]
     assert recording.stat().st_size > 0
 

@@ -39,6 +39,7 @@ STATE = {
     "reason": None,
     "faults": (),
     "pending": (),
+    "snapshots": (),
     "recording": (),
     "kept": (),
     "note": None,
@@ -63,6 +64,8 @@ class Bench:
             if name != "beat":
                 self.told.append((name, client, arguments))
             if name == "hello" and self.now.operator is None:
+                self.now.operator = client
+            if name == "ask" and self.now.operator is None:
                 self.now.operator = client
             if name == "leave" and self.now.operator == client:
                 self.now.operator = None

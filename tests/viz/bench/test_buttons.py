@@ -20,7 +20,6 @@ BUTTONS = {
     "Load it": ("load", {"source": "hold"}),
     "Save the present settings": ("save", {"file": "bench.toml"}),
     "Take one": ("snapshot", {"name": "last"}),
-    "Back to it": ("restore", {"name": "last"}),
 }
 
 CHANGES = {
@@ -31,6 +30,7 @@ CHANGES = {
     "rate": ("rate, rad/s", 0.7, ("limits", {"rate_rad_s": 0.7})),
     "law": ("law", "pd", ("set", {"name": "controller.law", "value": "pd"})),
     "step": ("run", "step", ("step", {})),
+    "back to": ("back to", "before", ("restore", {"name": "before"})),
     "off": ("mode", "off", ("off", {})),
 }
 
@@ -58,6 +58,7 @@ def test_each_button_is_one_command(page, bench):
 @pytest.mark.parametrize("change", CHANGES)
 def test_each_change_is_one_command(page, bench, change):
     label, value, expected = CHANGES[change]
+    bench.now.snapshots = ("last", "before")
     with socket_to(page) as visitor:
         visitor.send(msgspec.msgpack.encode(CAMERA))
         visitor.send(changed(handle_of(page, label), value=value))

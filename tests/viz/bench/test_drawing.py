@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from spheretwin.models.kinematics import rotation
+from spheretwin.viz import palette
 from spheretwin.viz.bench import front
-from spheretwin.viz.bench.drawing import solids
+from spheretwin.viz.bench.drawing import colours, solids
 from spheretwin.viz.bench.drawing.parts import parts_of, quaternions_along
 from spheretwin.viz.bench.drawing.scene import Scene
 
@@ -37,6 +38,31 @@ def is_closed(solid):
 def polygon(sections):
     """Area of a regular polygon within the unit circle."""
     return sections / 2 * np.sin(2 * np.pi / sections)
+
+
+def as_the_page_shows(albedo):
+    """Numbers on the screen, 0 to 255, of what a surface gives back: the curve, forward."""
+    into = [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]]
+    out_of = [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]]
+    light = np.array(into) @ albedo * colours.LIGHT / 0.6
+    pressed = (light * (light + 0.0245786) - 0.000090537) / (light * (0.983729 * light + 0.432951) + 0.238081)
+    linear = np.clip(out_of @ pressed, 0.0, 1.0)
+    return 255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+@pytest.mark.parametrize("current", np.linspace(-1.0, 1.0, 9))
+def test_a_current_is_shown_in_its_own_colour(current):
+    meant = palette.current_colours(np.array(current), 1.0)
+    seen = as_the_page_shows(colours.of_instances(meant) / 255)
+    # No colour of a surface makes the curve's blue as deep as the screen's: 14.3 of 255; the others, to 4.
+    assert seen == pytest.approx(meant, abs=15 if current == -1.0 else 4)
+
+
+def test_one_solid_is_shown_in_its_own_colour():
+    for meant in (palette.TRACE, (150, 156, 166), (70, 76, 86)):
+        encoded = np.array(colours.of_one(meant)) / 255
+        albedo = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+        assert as_the_page_shows(albedo) == pytest.approx(meant, abs=11)  # the trace is nearly all light
 
 
 def test_solids_have_the_volume_of_their_prisms():

@@ -4,11 +4,17 @@ import time
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from spheretwin.models.kinematics import rotation
+from spheretwin.viz import palette
 from tests.browser import Browser, needs_a_browser
 from tests.viz.bench import fake
 from tests.viz.bench.on_page import STATUS, errors, on_screen, opened, write
+
+# Of two colours, as directions: light and shade change their length. Told as they are, they come out pale:
+# copper 0.982, blue 0.91, red 0.87.
+ALIKE = 0.985
 
 pytestmark = needs_a_browser
 
@@ -35,6 +41,7 @@ def test_a_touch_is_a_command(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:
         tab = opened(browser, page)
+        (client,) = page._server.get_clients().values()
         tab.click("text=start")
         assert told(bench, 1) == [("start", {})]
         tab.key(" ")  # the button that was clicked has the focus: the space bar is STOP all the same
@@ -43,6 +50,8 @@ def test_a_touch_is_a_command(browser):
         ((name, given),) = told(bench, 3)[2:]
         assert name == "point"
         assert given["pose_rad"] == pytest.approx([0.1 - np.radians(1.0), -0.1, 0.3], abs=1e-12)
+        time.sleep(0.5)
+        assert client.camera.position == pytest.approx([0.15, -0.22, 0.15])  # an arrow steers the twin alone
         assert errors(tab) == []
         assert tab.outside == []
         assert len(tab.requests) == 2  # the page and its socket
@@ -149,6 +158,76 @@ def test_one_page_operates_and_gives_over(browser):
         assert told(bench, 3)[2:] == [("grant", {"to": "page 1"})]
         first.close()
         second.close()
+
+
+def test_where_nobody_operates_it_is_said_how_to_take_over(browser):
+    bench = fake.Bench()
+    with fake.shown(bench) as page:
+        first, second = opened(browser, page), opened(browser, page)
+        third = opened(browser, page)
+        bench.now.watching = ("page 1", "page 2")
+        first.close()
+        third.wait_for(f"{STATUS}.innerText.includes('Nobody operates: press “Take over”.')")
+        third.click("text=start")
+        third.wait_for("document.body.innerText.includes('Nobody operates; take over, above.')")
+        assert bench.commands() == []
+        third.click("text=Take over")
+        assert told(bench, 1) == [("ask", {})]
+        bench.now.watching = ("page 1",)
+        third.wait_for(f"!{STATUS}.innerText.includes('Nobody operates')")
+        third.click("text=start")
+        assert told(bench, 2)[1:] == [("start", {})]
+        second.close()
+        third.close()
+
+
+def test_a_page_that_is_alone_operates_though_it_came_back_before_it_was_gone(browser):
+    bench = fake.Bench(operator="page 7", watching=("page 0",))
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        time.sleep(1.5)
+        assert bench.commands() == []
+        bench.now.operator = None
+        assert told(bench, 1) == [("ask", {})]
+        assert bench.now.operator == "page 0"
+        tab.close()
+
+
+def test_who_only_watched_does_not_operate_though_alone(browser, monkeypatch):
+    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", 0.5)
+    bench = fake.Bench(operator="page 7", watching=("page 0",))
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        time.sleep(1.0)
+        bench.now.operator = None
+        tab.wait_for("document.body.innerText.includes('Take over')")
+        time.sleep(1.5)  # longer than from one look at the pages to the next
+        assert bench.commands() == []
+        tab.close()
+
+
+def test_a_coil_has_the_colour_of_its_current(browser, tmp_path):
+    bench = fake.Bench(q_ref_rad=(0.0, 0.0, 0.0))
+    actuator = bench.actuator
+    with fake.shown(bench) as page:
+        tab = opened(browser, page)
+        time.sleep(1.0)
+        (client,) = page._server.get_clients().values()
+        nearest = int(np.argmax(actuator.coil_axes @ client.camera.position))
+        (group,) = np.flatnonzero((actuator.groups == nearest).any(axis=1))
+        axis, coil = actuator.coil_axes[nearest], actuator.coil
+        end = (coil.distance_m + coil.length_m / 2) * axis
+        above = np.array([0.0, 0.0, 1.0]) - axis[2] * axis  # a hoop goes across the middle
+        middle = (coil.inner_radius_m + coil.outer_radius_m) / 2
+        at = tuple(map(int, on_screen(page, tab, end + middle * above / np.linalg.norm(above))))
+        for current in (-8.0, 0.0, 8.0):
+            bench.now.current_A = (0.0,) * group + (current,) + (0.0,) * (fake.GROUPS - 1 - group)
+            time.sleep(1.5)
+            seen = np.array(Image.open(tab.screenshot(tmp_path / "page.png")).convert("RGB").getpixel(at))
+            meant = palette.current_colours(np.array(current), 8.0).astype(float)
+            cosine = seen @ meant / np.linalg.norm(seen) / np.linalg.norm(meant)
+            assert cosine > ALIKE, current
+        tab.close()
 
 
 def test_a_page_comes_back_by_itself(browser):

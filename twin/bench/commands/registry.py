@@ -1,4 +1,4 @@
-"""All commands of a bench, in the order in which complaints name them: a new one is a file and a row."""
+"""All commands of a bench, as complaints name them: a new one is said in the file of its kind, and a row."""
 
 from __future__ import annotations
 

@@ -38,9 +38,9 @@ class Thread:
 
     def begin(self) -> None:
         """Be at work from now on; until `end`, the interpreter goes from thread to thread more often."""
+        warm()  # here: beside the loop it makes its first chunks late
         self._switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_s)
-        self._taking.prepare(warm)
         self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)
         self._thread.start()
 

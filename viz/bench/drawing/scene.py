@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from math import pi
 
 import numpy as np
 import viser
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import palette
+from spheretwin.viz.bench.drawing import colours
 from spheretwin.viz.bench.drawing.parts import parts_of, quaternions_along
 from spheretwin.viz.bench.drawing.solids import Solid
 
@@ -65,7 +67,7 @@ class Scene:
             parts.pole.faces,
             batched_wxyzs=quaternions_along(actuator.pole_axes),
             batched_positions=np.zeros((len(actuator.pole_axes), 3)),
-            batched_colors=np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH).astype(np.uint8),
+            batched_colors=colours.of_instances(np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH)),
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
@@ -87,7 +89,7 @@ class Scene:
             "/tip",
             radius=TIP_RADIUS * actuator.magnet.front_m,
             subdivisions=2,
-            color=palette.TRACE,
+            color=colours.of_one(palette.TRACE),
             cast_shadow=False,
             receive_shadow=False,
         )
@@ -122,9 +124,9 @@ class Scene:
         """
         for axis, hinge in enumerate(self._hinges):
             hinge.wxyz = _about(axis, q_rad[axis])
-        colours = self._coil_colours(current_A, limit_A)
-        if not np.array_equal(colours, self.coils.batched_colors):
-            self.coils.batched_colors = colours
+        coloured = self._coil_colours(current_A, limit_A)
+        if not np.array_equal(coloured, self.coils.batched_colors):
+            self.coils.batched_colors = coloured
         self._ghost.visible = self.handle.visible = desired_rad is not None
         if desired_rad is not None:
             w = _pose(desired_rad)
@@ -173,10 +175,10 @@ class Scene:
         self._line.points = np.zeros((1, 2, 3), dtype=np.float32)
 
     def _coil_colours(self, current_A: NDArray[np.float64], limit_A: float) -> NDArray[np.uint8]:
-        of_group = palette.current_colours(current_A, limit_A)
-        colours = np.empty((len(self._actuator.coil_axes), 3), dtype=np.uint8)
-        colours[self._actuator.groups] = of_group[:, None, :]
-        return colours
+        of_group = colours.of_instances(palette.current_colours(current_A, limit_A))
+        coloured = np.empty((len(self._actuator.coil_axes), 3), dtype=np.uint8)
+        coloured[self._actuator.groups] = of_group[:, None, :]
+        return coloured
 
 
 _HINGES = ("/alpha", "/alpha/beta", "/alpha/beta/gamma")
@@ -186,12 +188,16 @@ def _light(api: viser.SceneApi) -> None:
     """Few lights, no shadows and no mirrored surroundings: these cost half the frames without a GPU."""
     api.configure_default_lights(enabled=False)
     api.configure_environment_map(None)
-    api.add_light_ambient("/light/all", intensity=0.5)
+    api.add_light_ambient("/light/all", intensity=AMBIENT * pi * colours.LIGHT)
     for name, intensity, position in _LAMPS:
-        api.add_light_directional(f"/light/{name}", intensity=intensity, position=position, cast_shadow=False)
+        api.add_light_directional(
+            f"/light/{name}", intensity=intensity * pi * colours.LIGHT, position=position, cast_shadow=False
+        )
 
 
-_LAMPS = (("key", 2.6, (0.6, -0.8, 1.0)), ("fill", 0.8, (-1.0, 0.3, 0.4)))
+# Shares of the light in which a surface has its own colour; a matt one gives a π-th of light back each way.
+AMBIENT = 0.45
+_LAMPS = (("key", 0.75, (0.6, -0.8, 1.0)), ("fill", 0.3, (-1.0, 0.3, 0.4)))
 
 
 def _mesh(
@@ -206,7 +212,7 @@ def _mesh(
         name,
         solid.vertices,
         solid.faces,
-        color=colour,
+        color=colours.of_one(colour),
         wxyz=wxyz,
         opacity=opacity,
         cast_shadow=False,
