@@ -78,14 +78,15 @@ class Plots:
 
         Notes
         -----
-        Plots of the other hinges have the same range, so that what is small looks small.
+        Plots of the other hinges have the same range, so that what is small looks small. The title
+        tells the range too: a low plot may have room for one number at its side.
         """
         if self.seen is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
         limit = self.seen.limit(*(Channel(line.name) for line in lines), least=least)
         told = self.seen.largest(limit, *(Channel(line.name, axis) for line in lines))
         reach = (1 + ROOM) * limit
-        return self._plot(f"{what} [{unit}]{told}{key}", lines, axis, (-reach, reach))
+        return self._plot(f"{what} ±{number(limit)} {unit}{told}{key}", lines, axis, (-reach, reach))
 
     def above_zero(self, what: str, unit: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
         """Plot of what is never negative, its range that of the settled run."""

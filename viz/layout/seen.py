@@ -24,7 +24,7 @@ MARGIN = 1.1
 LABELLED = 8
 
 # Halves and ends of ranges in which there are such steps.
-_NICE = (1.0, 1.5, 2.0, 3.0, 10.0)
+_NICE = (1.0, 1.5, 2.0, 3.0, 4.0, 10.0)
 _NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
 
 # Of a range, beyond the greatest number that is labelled: half of its height would be cut.

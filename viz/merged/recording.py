@@ -18,7 +18,7 @@ from spheretwin.viz.compared.quantities import Quantity, drawn
 from spheretwin.viz.compared.run import Run
 from spheretwin.viz.layout.paths import SCENARIO
 from spheretwin.viz.layout.seen import labelled
-from spheretwin.viz.layout.styles import THIN
+from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.merged.bodies import Tip, body
 from spheretwin.viz.merged.layout import ASKED, COMPARE, RUNS, TIP, Plot, View, application, layout
 from spheretwin.viz.merged.series import send_line
@@ -88,7 +88,8 @@ def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: st
             _write_run(below, run, parts)
             for each in quantities:
                 entity, t_s, values = f"{COMPARE}/{each.name}", run.table["t_s"], each.of(run.rows)
-                send_line(below, entity, run.label, t_s, values, colour)
+                width = THICK if each.desired else MIDDLE  # what was asked for lies over it
+                send_line(below, entity, run.label, t_s, values, colour, width)
         for place in leading:
             run, asked = runs[place], Below(recording, f"{ASKED}/{runs[place].name}")
             _write_asked(
