@@ -27,6 +27,7 @@ benchmark: setup ## print the speed ratios and the bars of studies, hold the all
 	$(BIN)/python tests/benchmarks/ratios.py
 	$(BIN)/python tests/benchmarks/studies.py
 	$(BIN)/python tests/benchmarks/allocation.py
+	$(BIN)/python tests/benchmarks/deadlines.py
 
 peers: .venv-peers/installed ## hold JAX, MJX, Drake and plain NumPy against ours, and print the times of all
 	.venv-peers/bin/python tests/benchmarks/peers/compare.py
