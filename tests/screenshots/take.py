@@ -63,6 +63,7 @@ TABLE: dict[str, Recorded | Driven] = {
         "compare",
         3.4,
     ),
+    "desired": Recorded({"nutation": "nutation"}, "compare", 3.4),
     "failed": Recorded({"failing": FAILING}, "overview", 1.222),
     "bench": Driven("hold --plant.payload-kg 0.1", ((10.0, -20.0), (-20.0, -5.0), (5.0, 25.0))),
 }

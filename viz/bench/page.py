@@ -22,11 +22,11 @@ from spheretwin.viz.bench.plots import Plots
 from spheretwin.viz.bench.settings import Settings
 from spheretwin.viz.bench.status import TAKE_OVER, currents_html, scale_html, status_html
 
-FRAME_S = 1 / 20
+FRAME_S = 1 / 30
 """The picture moves this often; words and curves every so many frames, the fields' values rarely."""
 
-FRAMES_A_STATUS = 2
-FRAMES_A_SETTING = 20
+FRAMES_A_STATUS = 3
+FRAMES_A_SETTING = 30
 
 LEFT_WIDTH, RIGHT_WIDTH = 255, 290
 STATUS_HEIGHT = 430

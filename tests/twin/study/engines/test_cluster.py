@@ -1,5 +1,6 @@
 """Sweeps on a Ray cluster of two nodes: the same table, whatever happens to it on the way."""
 
+import contextlib
 import os
 import shutil
 import signal
@@ -91,14 +92,37 @@ def test_the_table_is_that_of_the_local_engine(study, machines, wanted, tmp_path
     assert kept.name == next((wanted / "telemetry").iterdir()).name
 
 
-def slowly(job, numbers):
-    """As a node runs a batch, but longer than it takes to kill it."""
-    import time
+SLOWLY_s = 1.0
 
-    from spheretwin.twin.study.engines import worker
 
-    time.sleep(0.5)  # in the process of a node
-    return worker.carried_out(job, numbers)
+def slowly_in(folder):
+    """As a node runs a batch, but longer than it takes to kill it; a file says that one is at work."""
+
+    def slowly(job, numbers):
+        import time
+
+        import ray
+
+        from spheretwin.twin.study.engines import worker
+
+        at_work = folder / ray.get_runtime_context().get_node_id()
+        at_work.touch()
+        time.sleep(SLOWLY_s)  # in the process of a node
+        at_work.unlink()
+        return worker.carried_out(job, numbers)
+
+    return slowly
+
+
+def has_just_begun(at_work):
+    """Whether a node is in the first half of what takes it so long, now or soon."""
+    until = time.monotonic() + 2 * SLOWLY_s
+    while time.monotonic() < until:
+        with contextlib.suppress(FileNotFoundError):
+            if time.time() - at_work.stat().st_mtime < SLOWLY_s / 2:
+                return True
+        time.sleep(0.02)
+    return False
 
 
 def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, tmp_path, monkeypatch):
@@ -107,25 +131,27 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
     monkeypatch.setattr(
         batches.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
     )
-    monkeypatch.setattr(worker, "carried_out", slowly)
+    (folder := tmp_path / "at_work").mkdir()
+    monkeypatch.setattr(worker, "carried_out", slowly_in(folder))
     killed = []
 
     def kill(done, of):
-        if done >= of // 4 and not killed:
+        node = next(iter(machines.worker_nodes), None)
+        if done >= of // 4 and not killed and has_just_begun(folder / node.node_id):
             killed.append(done)
-            machines.remove_node(next(iter(machines.worker_nodes)), allow_graceful=False)
+            machines.remove_node(node, allow_graceful=False)
 
     try:
-        found = run(study, tmp_path, machines, done=kill)
+        found = run(study, tmp_path / "study", machines, done=kill)
     finally:
         machines.add_node(num_cpus=1)
     assert killed
     assert killed[0] < ROWS
     assert lost
     assert found.rows == ROWS
-    lines = (tmp_path / journal.NAME).read_text().splitlines()
+    lines = (tmp_path / "study" / journal.NAME).read_text().splitlines()
     assert len(lines) == 1 + ROWS  # its head, and each row once
-    assert same_table(tmp_path, wanted)
+    assert same_table(tmp_path / "study", wanted)
 
 
 def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
