@@ -59,6 +59,8 @@ def test_each_button_is_one_command(page, bench):
 def test_each_change_is_one_command(page, bench, change):
     label, value, expected = CHANGES[change]
     bench.now.snapshots = ("last", "before")
+    touched = page._server.gui._gui_input_handle_from_uuid[handle_of(page, label)]
+    wait_for(lambda: value in getattr(touched, "options", [value]))  # what is not offered yet is refused
     with socket_to(page) as visitor:
         visitor.send(msgspec.msgpack.encode(CAMERA))
         visitor.send(changed(handle_of(page, label), value=value))
