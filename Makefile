@@ -37,7 +37,7 @@ reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a pag
 	@echo "here:      reproduced/reproduce.html"
 
 screenshots: setup ## take the READMEs' pictures
-	$(BIN)/python tests/screenshots/take.py
+	$(BIN)/python -m tests.screenshots.take
 
 format: .venv-wheel/installed
 	$(WHEEL)/ruff format .

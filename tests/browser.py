@@ -29,6 +29,7 @@ from websockets.sync.client import connect
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
+# A browser is no Python package: what sets the tests up cannot bring it, and most tests need none.
 needs_a_browser = pytest.mark.skipif(
     not CHROMIUM, reason="no Chromium on this machine: its page is not tried"
 )

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
-from spheretwin.control.laws.registry import LAWS
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
@@ -22,7 +21,7 @@ from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.telemetry.status import BY_CODE, Status
-from spheretwin.models.telemetry.table import Table, allocated
+from spheretwin.models.telemetry.table import Table, allocated, check_rows
 from spheretwin.twin import loop as loops
 from spheretwin.twin import resolving
 from spheretwin.twin.exogenous import Exogenous
@@ -34,7 +33,7 @@ from spheretwin.twin.scenario.files import Files
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain, is_dotted
 from spheretwin.twin.scenario.sections import OwnPath, Scenario
-from spheretwin.twin.snapshot import Snapshot
+from spheretwin.twin.snapshot import OwnLaws, Snapshot
 from spheretwin.twin.trajectories.trajectory import Sampled
 
 
@@ -87,7 +86,7 @@ class Session:
     ) -> None:
         self._busy = threading.Lock()
         self._closed = False
-        self._own_laws = {law.name: law} if law else {}
+        self._own_laws = OwnLaws().with_law(law)
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
         self.events: tuple[Change, ...] = ()
@@ -177,7 +176,7 @@ class Session:
         """
         with self._alone():
             self._make_planned()
-            _check_rows(log, self._machine.columns)
+            check_rows(log, self._machine.columns)
             return self._advance(log)
 
     def check_horizon(self, ticks: int) -> None:
@@ -231,7 +230,7 @@ class Session:
             return Snapshot(
                 self.scenario,
                 self.begun_as,
-                self._key_of(self._in_force.own_law),
+                self._own_laws.key_of(self._in_force.own_law),
                 scenario_files.digest(self._in_force.files),
                 self.scenario.controller.source,
                 self.tick,
@@ -251,18 +250,13 @@ class Session:
             It was taken under a law of the user's that this session does not have, or on another model.
         """
         with self._alone(), self._all_or_nothing():
-            if snapshot.own_law is not None and snapshot.own_law not in self._own_laws:
-                known = ", ".join([*LAWS, *self._own_laws])
-                raise InputError(
-                    f"session: expected a snapshot under one of the laws {known},"
-                    f" received one under {snapshot.own_law}"
-                )
+            own_law = self._own_laws.under(snapshot.own_law)
             if isinstance(snapshot.scenario.trajectory, OwnPath) != bool(self._in_force.own_trajectory):
                 raise InputError(
                     "session: expected a snapshot along the trajectory that it follows itself,"
                     f" received one along {snapshot.scenario.trajectory.shape}"
                 )
-            self._restore(snapshot)
+            self._restore(snapshot, own_law)
 
     def close(self) -> None:
         """End the session: to advance, set, keep or restore it is refused from then on."""
@@ -367,8 +361,7 @@ class Session:
         if built != self._in_force or own_law not in (None, self.law):
             self._machine = self._machine.changed(scenario, self._in_force.files, own_law)
             self._seen = with_more(self._seen, self.signals)
-        if own_law and self._key_of(own_law) is None:
-            self._own_laws = {**self._own_laws, self._key_for(own_law): own_law}
+        self._own_laws = self._own_laws.with_law(own_law)
         self._exogenous.scenario = scenario  # last: it is altered, and what fails must have changed nothing
 
     def _check_plan(self) -> None:
@@ -387,18 +380,9 @@ class Session:
             at_s = self._planned[made].tick * self.scenario.controller.period_s
             raise InputError(f"{error}, as the event at {at_s:g} s sets it") from None
 
-    def _key_for(self, law: Law) -> str:
-        """Key under which a snapshot knows a law of the user's: its name, told apart from others' of it."""
-        taken = [key for key, other in self._own_laws.items() if other.name == law.name]
-        return law.name if not taken else f"{law.name} #{len(taken) + 1}"
-
-    def _key_of(self, law: Law | None) -> str | None:
-        return next((key for key, other in self._own_laws.items() if other is law), None)
-
-    def _restore(self, snapshot: Snapshot) -> None:
+    def _restore(self, snapshot: Snapshot, own_law: Law | None) -> None:
         files = scenario_files.files_again(self._in_force.files, self.scenario, snapshot.scenario)
         snapshot.check_fits(files)
-        own_law = self._own_laws[snapshot.own_law] if snapshot.own_law is not None else None
         self._in_force = self._in_force._replace(scenario=snapshot.scenario, files=files, own_law=own_law)
         self._machine = Machine(self.scenario, files, self._in_force.law)
         self._machine.restore(snapshot.machine)
@@ -415,14 +399,3 @@ def _recorded(value: Any) -> Any:
     if isinstance(value, Law):
         return resolving.name_of_own(value.name)
     return json.loads(json.dumps(value, default=as_plain))
-
-
-def _check_rows(log: NDArray[np.float64], columns: int) -> None:
-    if isinstance(log, np.ndarray):
-        fits = log.shape[1:] == (columns,) and log.dtype == np.float64
-        if fits and log.flags.c_contiguous and log.flags.writeable:
-            return
-    raise InputError(
-        f"session: expected contiguous, writeable rows of {columns} float64, received"
-        f" {getattr(log, 'dtype', type(log).__name__)} of shape {np.shape(log)}"
-    )

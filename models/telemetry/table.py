@@ -167,3 +167,21 @@ def _named(described: Mapping[str, str]) -> tuple[str, str]:
 def _flat(column, size: int) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
     chunk = column.combine_chunks()
     return np.asarray(chunk.flatten() if size > 1 else chunk, dtype=np.float64).reshape(-1, size)
+
+
+def check_rows(log: NDArray[np.float64], columns: int) -> None:
+    """Find out whether compiled code may write into the rows of an array of a caller's.
+
+    Raises
+    ------
+    InputError
+        They are of another kind or width: it would write beside them.
+    """
+    if isinstance(log, np.ndarray):
+        fits = log.shape[1:] == (columns,) and log.dtype == np.float64
+        if fits and log.flags.c_contiguous and log.flags.writeable:
+            return
+    raise InputError(
+        f"session: expected contiguous, writeable rows of {columns} float64, received"
+        f" {getattr(log, 'dtype', type(log).__name__)} of shape {np.shape(log)}"
+    )

@@ -1,4 +1,4 @@
-"""Take the pictures that the READMEs show: ``python tests/screenshots/take.py [--out DIR] [NAME ...]``.
+"""Take the pictures that the READMEs show: ``python -m tests.screenshots.take [--out DIR] [NAME ...]``.
 
 Each is a run made anew, recorded, and drawn by Rerun's viewer without a screen; or a bench that is driven in
 Chromium, where the machine has it.
@@ -12,16 +12,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from PIL import Image
-from viewer import HeadlessViewer
 
-ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT))  # the browser is the tests'
+from tests.browser import CHROMIUM
+from tests.screenshots.bench import drawn
+from tests.screenshots.viewer import HeadlessViewer
 
-from bench import drawn  # noqa: E402
-
-from tests.browser import CHROMIUM  # noqa: E402
-
-PICTURES = ROOT / "viz" / "pictures"
+PICTURES = Path(__file__).parents[2] / "viz" / "pictures"
 WIDTH, HEIGHT = 1280, 800
 
 # A picture of an interface has few colours: these are enough for its shaded coils, in a fifth of the bytes.

@@ -86,7 +86,7 @@ class HeadlessViewer:
         try:
             self._client = rerun.experimental.ViewerClient.connect(self._address)
             self._client.get_state()
-        except Exception:  # of whatever kind: it is not up yet
+        except ConnectionError:  # it is not up yet
             return False
         return True
 

@@ -85,7 +85,7 @@ class Desk:
             return None
         try:
             rows = self.session.advance(ticks)
-        except Exception as error:  # of a law of the user's, or a trajectory that is no number
+        except Exception as error:  # a law of the user's may raise anything: the run ends
             self.fail(error)
             return None
         if self.session.status != Status.RUNNING:

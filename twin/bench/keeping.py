@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from threading import Semaphore
 from typing import TYPE_CHECKING
@@ -129,7 +130,7 @@ class Keeping:
     def _perform(self, work: Callable[[], object]) -> None:
         try:
             work()
-        except Exception as error:  # the run goes on without
+        except Exception as error:  # of the disk, Arrow or Rerun: the run goes on, and its faults are told
             self.faults.append(without_breaks(error) or type(error).__name__)
         finally:
             self._room.release()
@@ -137,9 +138,8 @@ class Keeping:
 
 def warm() -> None:
     """Import what a recording needs: slow, and it holds the interpreter."""
-    import pyarrow.parquet  # noqa: F401
-
-    from spheretwin.viz.recording import recorder  # noqa: F401
+    for module in ("pyarrow.parquet", "spheretwin.viz.recording.recorder"):
+        import_module(module)
 
 
 def _recorder(session: Session, path: Path) -> Recorder:

@@ -3,7 +3,6 @@
 import msgspec
 import pytest
 
-from tests.viz.bench import fake
 from tests.viz.bench.test_door import CAMERA, changed, handle_of, socket_to, wait_for
 
 BUTTONS = {
@@ -33,17 +32,6 @@ CHANGES = {
     "back to": ("back to", "before", ("restore", {"name": "before"})),
     "off": ("mode", "off", ("off", {})),
 }
-
-
-@pytest.fixture
-def bench():
-    return fake.Bench()
-
-
-@pytest.fixture
-def page(bench):
-    with fake.shown(bench) as found:
-        yield found
 
 
 def test_each_button_is_one_command(page, bench):

@@ -34,17 +34,6 @@ CAMERA = {
 }
 
 
-@pytest.fixture
-def bench():
-    return fake.Bench()
-
-
-@pytest.fixture
-def page(bench):
-    with fake.shown(bench) as found:
-        yield found
-
-
 def port(page):
     return int(page.address.rpartition(":")[2])
 

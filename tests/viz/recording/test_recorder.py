@@ -1,46 +1,31 @@
 """Recordings read back: the telemetry bit for bit, poses, colours, texts and events."""
 
-import json
-import os
-import shutil
-import subprocess
-import sys
 import threading
 import time
 
 import numpy as np
-import pyarrow as pa
 import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
-from spheretwin.models import actuator as actuators
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.records.facts import facts_of
 from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow, simulate
+from spheretwin.twin.simulation import follow
 from spheretwin.viz import palette
-from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY, TIMELINE
+from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY
 from spheretwin.viz.reading.reading import read
-from spheretwin.viz.recording import recorder as recording
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
 from spheretwin.viz.scene import paths as scene
+from tests.viz.recording.recordings import hold_facts, recorded, rows_of
 
 SIGNALS = common_signals(18)
-
-
-def recorded(path, name="nutation", **changes):
-    scenario = scenarios.load(name, {"duration": 2.3, **changes})
-    session = Session(scenario)
-    facts = facts_of(session.scenario)
-    with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
-        return session, simulate(scenario, sinks=[recorder])
 
 
 @pytest.fixture(scope="module")
@@ -48,26 +33,6 @@ def run(tmp_path_factory):
     path = tmp_path_factory.mktemp("recording") / "run.rrd"
     session, finished = recorded(path)
     return path, session, finished
-
-
-def rows_of(path, entity, component, field=None):
-    """Times in ns and values of one component, or of one field of it, in order."""
-    times, values = [], []
-    chunks = (
-        RrdReader(path).stream().filter(content=f"/{entity}", components=component, has_timeline=TIMELINE)
-    )
-    for chunk in chunks:
-        batch = chunk.to_record_batch()
-        column = batch.column(component)
-        if field:
-            column = column.flatten().field(field)
-        while pa.types.is_nested(column.type):
-            column = column.flatten()
-        times.append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
-        values.append(np.asarray(column).reshape(len(batch), -1))
-    times, values = np.concatenate(times), np.concatenate(values)
-    order = np.argsort(times, kind="stable")
-    return times[order], values[order]
 
 
 def test_every_signal_is_recorded_bit_for_bit(run):
@@ -197,147 +162,6 @@ def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
         interrupted()
     times, _ = rows_of(path, TELEMETRY, "values_0", "q_rad")
     assert len(times) == 100
-
-
-def test_unwritable_path_is_bad_input(tmp_path, actuator):
-    facts = facts_of(scenarios.load("hold", {"drive.current_limit_A": 8.0}))
-    with pytest.raises(InputError, match="writable"):
-        Recorder(actuator, SIGNALS, facts, path=tmp_path / "missing" / "run.rrd")
-
-
-def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
-    session = Session(scenarios.load("hold", {"duration": 0.1}))
-    facts = facts_of(session.scenario)
-    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
-    backwards = Table(SIGNALS, np.zeros((2, width(SIGNALS))))
-    backwards.values[:, 0] = np.nan
-    recorder.write(backwards)
-    with pytest.raises(SpheretwinError, match=r"recording: .*run\.rrd could not be completed") as raised:
-        recorder.close()
-    (kept,) = os.listdir(tmp_path)
-    assert f"{raised.value}".endswith(kept)
-
-
-def hold_facts(**changes):
-    session = Session(scenarios.load("hold", {"duration": 0.1, **changes}))
-    return session, facts_of(session.scenario)
-
-
-def test_a_folder_in_the_place_of_a_recording_is_told_with_where_the_recording_is(tmp_path):
-    session, facts = hold_facts()
-    recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
-    follow(session, session.scenario.ticks, [recorder])
-    (tmp_path / "run.rrd").mkdir()
-    with pytest.raises(SpheretwinError, match=r"run\.rrd could not be written, ") as raised:
-        recorder.close()
-    (kept,) = tmp_path.glob(".run.rrd.*.part")
-    assert f"{raised.value}".endswith(f"; the recording is in {kept}")
-    assert len(rows_of(kept, TELEMETRY, "values_0", "q_rad")[0]) == 100
-
-
-def test_closing_twice_is_closing_once(tmp_path):
-    session, facts = hold_facts()
-    with Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd") as recorder:
-        follow(session, session.scenario.ticks, [recorder])
-        recorder.close()
-    assert os.listdir(tmp_path) == ["run.rrd"]
-
-
-def test_where_a_pipe_has_no_path_rerun_writes_the_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "PIPE_PATHS", tmp_path / "none")
-    recorded(path := tmp_path / "run.rrd", "hold", duration=0.1)
-    assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 100
-    assert os.listdir(tmp_path) == ["run.rrd"]
-
-
-def test_a_file_that_cannot_be_opened_again_leaves_nothing(tmp_path, monkeypatch):
-    def out_of_handles():
-        raise OSError(24, "Too many open files")
-
-    session, facts = hold_facts()
-    monkeypatch.setattr(os, "pipe", out_of_handles)
-    with pytest.raises(InputError, match="Too many open files"):
-        Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
-    assert os.listdir(tmp_path) == []
-
-
-def test_two_recorders_of_one_path_leave_the_last_whole(tmp_path):
-    path = tmp_path / "run.rrd"
-    (mine := tmp_path / "run.rrd.part").write_text("mine")
-    session, facts = hold_facts()
-    _, longer = hold_facts(duration=0.2)
-    with Recorder(session.actuator, session.signals, facts, path=path) as first:
-        with Recorder(session.actuator, session.signals, longer, path=path) as second:
-            simulate(scenarios.load("hold", {"duration": 0.2}), sinks=[second])
-            assert not path.exists()
-        assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 200
-        follow(session, session.scenario.ticks, [first])
-    assert len(rows_of(path, TELEMETRY, "values_0", "q_rad")[0]) == 100
-    assert sorted(os.listdir(tmp_path)) == ["run.rrd", "run.rrd.part"]
-    assert mine.read_text() == "mine"
-
-
-@pytest.mark.parametrize("there", [True, False])
-def test_recording_at_a_link_replaces_the_file_behind_it(tmp_path, there):
-    (folder := tmp_path / "folder").mkdir()
-    if there:
-        (folder / "real.rrd").write_text("old")
-    (link := tmp_path / "link.rrd").symlink_to("folder/real.rrd")
-    recorded(link, "hold", duration=0.1)
-    assert link.is_symlink()
-    assert os.listdir(folder) == ["real.rrd"]
-    assert len(rows_of(folder / "real.rrd", TELEMETRY, "values_0", "q_rad")[0]) == 100
-
-
-def broken_model(folder, content):
-    """The shipped model with one mesh missing, or with something else in its place."""
-    shutil.copytree(actuators.FOLDER / "assets", folder / "assets")
-    mesh = folder / "assets" / "stator.obj"
-    mesh.unlink()
-    if content is not None:
-        mesh.write_text(content)
-    return shutil.copy(actuators.MJCF_PATH, folder / "broken.xml")
-
-
-@pytest.mark.parametrize("content", [None, "no mesh"], ids=["missing", "garbage"])
-def test_mesh_that_cannot_be_read_is_bad_input_before_the_run(tmp_path, content):
-    (folder := tmp_path / "model").mkdir()
-    session, facts = hold_facts(**{"plant.mjcf": str(broken_model(folder, content))})
-    with pytest.raises(InputError, match=r"model .*broken\.xml: .*stator") as raised:
-        Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
-    assert "\n" not in f"{raised.value}"
-    assert os.listdir(tmp_path) == ["model"]
-
-
-LIMITED = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
-from spheretwin.twin.cli import main
-sys.exit(main(["simulate", "hold", "--duration", "0.5", "--record", sys.argv[2], "--json"]))
-"""
-
-
-def limited(path, size):
-    command = [sys.executable, "-c", LIMITED, f"{size}", path]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-def test_full_disk_costs_the_recording_and_not_the_run(tmp_path):
-    whole = limited(tmp_path / "whole.rrd", 10**9)
-    assert (whole.returncode, whole.stderr) == (0, "")
-    size = (tmp_path / "whole.rrd").stat().st_size
-    # Full from the first bytes, amid the chunks, and before the last bytes; the size varies by some bytes
-    # from run to run, as the wall clock's time in it is packed.
-    for full in (100, size // 2, size - 2000):
-        path = tmp_path / f"{full}.rrd"
-        broken = limited(path, full)
-        assert broken.returncode == 1
-        assert json.loads(broken.stdout)["status"] == "completed"
-        (line,) = broken.stderr.splitlines()
-        assert line.startswith(f"spheretwin: recording: {path} could not be completed, File too large;")
-        (kept,) = tmp_path.glob(f".{path.name}.*.part")
-        assert line.endswith(f"{kept}")
-        assert not path.exists()
 
 
 def busy(recorder):

@@ -47,7 +47,7 @@ class Turning:
             self._settle()
             done = chunk.run(self._works, ticks)
             self._look_around()
-        except Exception as error:
+        except Exception as error:  # of whatever kind, else the thread would end and STOP with it
             self._works.desk.fail(error)
             self._works.pause()
         self._settle()
@@ -58,7 +58,7 @@ class Turning:
         """Make the next picture; where it cannot be made, the last one says so."""
         try:
             self.state = picture(self._works)
-        except Exception as error:
+        except Exception as error:  # a page must never show an old state as the present one
             self.state = replace(self.state, mode="fault", reason=told(error))
 
     def _settle(self) -> None:

@@ -218,9 +218,8 @@ def _connected(ray: Any, order: Order) -> Iterator[None]:
             )
         else:
             ray.init(address=order.address, **quiet)
-    except Exception as error:
-        # Ray has no root for what fails as it starts or is joined: sockets, gRPC and its parts raise
-        # their own. None of our code runs in here, so that no fault of ours is hidden.
+    except Exception as error:  # Ray has no root for what fails as it starts: gRPC, sockets raise their own
+        # None of our code runs in here, so that no fault of ours is hidden.
         raise InputError(
             f"sweep: expected a Ray cluster {_where(order.address)}, received {without_breaks(error)}"
         ) from None
