@@ -12,9 +12,6 @@ Dash = str | tuple[int, tuple[int, ...]]
 AXIS_COLOURS: tuple[Colour, ...] = ((235, 87, 87), (76, 190, 120), (86, 140, 245))
 """α or x, β or y, γ or z."""
 
-DESIRED_COLOURS: tuple[Colour, ...] = ((150, 78, 78), (62, 112, 80), (70, 96, 150))
-"""The same axes, muted: what was asked for."""
-
 BACKGROUND: Colour = (20, 22, 26)
 TRACE: Colour = (255, 190, 60)
 NORTH: Colour = (150, 155, 163)

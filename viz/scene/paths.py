@@ -2,7 +2,6 @@
 
 WORLD = "world"
 COILS = f"{WORLD}/coils"
-MOVING = ("outer_ring", "inner_ring", "rotor")
 TORQUES = f"{WORLD}/torques"
 FAILURE = f"{WORLD}/failure"
 FAILURE_TEXT = f"{FAILURE}/text"
