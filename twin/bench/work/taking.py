@@ -79,10 +79,6 @@ class Taking:
                 return
             self._begin(following)
 
-    def prepare(self, work: Callable[[], Any]) -> Future[Any]:
-        """Do something beside the loop, after all that was given to do there before."""
-        return self._worker.submit(work)
-
     def close(self) -> None:
         """Take no more; wait for what is being prepared."""
         self._worker.shutdown()
@@ -100,7 +96,7 @@ class Taking:
         if work is None:
             self._act(waiting, lambda: None)
         else:
-            self._preparing = waiting, self.prepare(work)
+            self._preparing = waiting, self._worker.submit(work)
 
     def _act(self, waiting: Waiting, prepared: Callable[[], Any]) -> None:
         """Do what is commanded, or say why not."""
