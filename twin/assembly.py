@@ -20,7 +20,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown, without_breaks
 from spheretwin.models.lagrangian import loaded_inertia
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, kept_matrix, torque_model
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, scratch_of, torque_model
 from spheretwin.models.telemetry.signals import (
     Signal,
     common_signals,
@@ -163,19 +163,24 @@ def _each(values: tuple[float, float, float] | None) -> Array:
     return np.array(values or (0.0, 0.0, 0.0))
 
 
-def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, kept: KeptMatrix, wires: Wires) -> Plant:
+def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, wires: Wires) -> Plant:
     """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
-    section, groups = scenario.plant, len(actuator.groups)
+    section, groups, magnetics = scenario.plant, len(actuator.groups), torque_model(actuator)
     return Plant(
         rotor=stepped,
-        magnetics=torque_model(actuator),
-        kept=kept,
+        magnetics=magnetics,
+        G=np.empty((3, groups)),
+        scratch=scratch_of(magnetics),
         driving=driving_of(scenario, groups, wires),
         friction=_friction(section, actuator),
         group_gain=group_gain_of(section, groups),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
         hinge_range=actuator.hinge_range_rad,
         substeps=scenario.substeps,
+        step_s=section.step_s,
+        middle_q=np.empty(3),
+        middle_qdot=np.empty(3),
+        last_qdot=stepped.qdot.copy(),
         current=np.zeros(groups),
         mean_current=np.zeros(groups),
         pulling=np.zeros(groups),
@@ -202,12 +207,6 @@ def _friction(section: PlantSection, actuator: Actuator) -> Friction:
         loaded_inertia((1 + section.modelling_error) * actuator.inertia, section.payload_kg, height),
         section.step_s,
     )
-
-
-def kept_matrices(nominal: TorqueModel, true: TorqueModel) -> tuple[KeptMatrix, KeptMatrix]:
-    """Kept torque matrices of controller and plant: one and the same only where both have one model."""
-    kept = kept_matrix(nominal)
-    return kept, kept if nominal is true else kept_matrix(true)
 
 
 def rotor_of(scenario: Scenario, files: Files) -> Rotor:

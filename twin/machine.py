@@ -16,7 +16,7 @@ from spheretwin.control.supervision import detector, groups, watchdog
 from spheretwin.control.supervision.watchdog import REASONS, Reason
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.magnetics import torque_model
+from spheretwin.models.magnetics import kept_matrix
 from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
@@ -47,6 +47,7 @@ class State(NamedTuple):
     """All that the parts go on from."""
 
     rotor: NDArray[np.float64]
+    last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
     current: NDArray[np.float64]
     driving: NDArray[np.float64]
     parameters: NDArray[np.float64]
@@ -105,14 +106,13 @@ class Machine:
         self.signals = assembly.signals_of(scenario, files.actuator, self.law)
         self.columns = width(self.signals)
         magnetics = assembly.nominal_magnetics(scenario, files)
-        kept = assembly.kept_matrices(magnetics, torque_model(files.actuator))
         estimator = assembly.estimator_of(scenario)
         joined = wiring.wires_of(scenario, len(files.actuator.groups))
         supervision = wiring.supervision_of(scenario, files.nominal, joined)
         self._controller = assembly.controller_of(
-            scenario, self.law, magnetics, kept[0], estimator, supervision
+            scenario, self.law, magnetics, kept_matrix(magnetics), estimator, supervision
         )
-        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, kept[1], joined)
+        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, joined)
         self._sensors = wiring.sensors_of(scenario, joined)
         self._faults = wiring.faults_of(scenario, self._plant, self._sensors, supervision.groups)
         # The loop has bare addresses of its functions: they are held for as long as it is.
@@ -174,6 +174,7 @@ class Machine:
         law = own_law or self._law_for(scenario)
         made = Machine(scenario, files, law, moving)
         made._plant.current[:] = self._plant.current
+        made._plant.last_qdot[:] = self._plant.last_qdot
         made._last = self._last
         drivings.carried_on(self._plant.driving, made._plant.driving, self._last.command)
         senses.carried_on(self._sensors, made._sensors, self._last.q, self._last.noise)
@@ -207,6 +208,7 @@ class Machine:
         controller = self._controller
         return State(
             rotor=self._moving.rotor.state(),
+            last_qdot=self._plant.last_qdot.copy(),
             current=self._plant.current.copy(),
             driving=drivings.state_of(self._plant.driving),
             parameters=controller.parameters.copy(),
@@ -241,6 +243,7 @@ class Machine:
         _check_length("the sensors' state", state.sensing, own.sensing)
         _check_length("the groups", state.groups, own.groups)
         self._moving.rotor.restore(state.rotor)
+        self._plant.last_qdot[:] = state.last_qdot
         self._plant.current[:] = state.current
         drivings.restore(self._plant.driving, state.driving)
         self._controller.parameters[:] = state.parameters

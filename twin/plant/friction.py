@@ -4,23 +4,28 @@ On hinge i friction opposes the rate v with ``(viscous + coulomb / sqrt(v**2 + s
 jump at rest is thus smoothed over a stated rate: the term is odd and grows with v up to the Coulomb level,
 of which it has 71 % at the smoothing rate and 99.5 % at ten times that. A hyperbolic tangent would come
 closer to the level, but as a factor k(v) of the rate it is 0/0 at rest; the root is not, and needs no
-exponential. What holds the rotor at rest is k(0) = viscous + coulomb / smoothing, a stiff damping: taken at
-the rates before a step, its torque would turn the rotor back as soon as the step times k passes the inertia,
-and never let it rest. It is taken at the rates after the step instead (`friction_torque`): stable at any.
+exponential. What holds the rotor at rest is k(0) = viscous + coulomb / smoothing, a stiff damping: as an
+explicit torque it would turn the rotor back as soon as the step times k passes the inertia, and never let it
+rest. The rates are advanced under friction alone instead (`slow_down`), by half a physics step before the
+rotor's step and by half a step after it: this splitting is symmetric (Strang), and of second order.
 """
 
 from math import isfinite, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia, triple, turns
+from spheretwin.models.lagrangian import InertiaEntries, Triple, inertia_entries, solve_inertia, triple, turns
 
 # Far below any motion; its square is far above the smallest number, so that k(0) is one too.
 SLOWEST_SMOOTHING_rad_s = 1e-12
+
+# Where 1 / (1 + x + x**2 / 2) has a pole, as 1 + POLE x = 0; the other is its conjugate.
+_POLE: Any = 0.5 + 0.5j
+_RESIDUE: Any = 1.0 - 1.0j
 
 
 class Friction(NamedTuple):
@@ -54,7 +59,7 @@ def friction(
     inertia : (3,) array, kg·m²
         Principal inertias about the joint centre, modelling error and payload included.
     step_s : float, s
-        Physics step, over which the torque is held.
+        Physics step, of which `slow_down` takes one half.
 
     Raises
     ------
@@ -73,65 +78,79 @@ def friction(
 
 
 @allocation_free
-def friction_torque(
+def slow_down(
     friction: Friction,
     q: NDArray[np.float64],
     qdot: NDArray[np.float64],
-    torque_q: NDArray[np.float64],
+    mean_torque_q: NDArray[np.float64],
 ) -> None:
-    """Friction's generalised torque, to be held over one physics step beside all other torques.
+    """Advance the rates by half a physics step under friction alone.
 
     Parameters
     ----------
     friction : Friction
         Coefficients, inertia and physics step.
     q : (3,) array, rad
-        Pose at the start of the step, away from beta = +-90 degrees.
+        Pose, away from beta = +-90 degrees; held.
     qdot : (3,) array, rad/s
-        Hinge rates at the start of the step.
-    torque_q : (3,) array, N·m
-        Result, on (alpha, beta, gamma).
+        Hinge rates; changed in place.
+    mean_torque_q : (3,) array, N·m
+        Friction on (alpha, beta, gamma), mean over a whole physics step: this half is added.
 
     Notes
     -----
-    With K = diag(k(qdot)), the inertia matrix M at `q` and the step h, the torque is ``-K v`` at the rates v
-    that it leads to by itself, ``M (v - qdot) = -h K v``, so that ``(M + h K) v = M qdot``.
+    With the inertia matrix M at `q`, the time t = h/2 and K = diag(k), the rates v become ``R(X) v`` with
+    ``X = t M**-1 K`` and ``R(x) = 1 / (1 + x + x**2 / 2)``, the stability function of Lobatto IIIC of two
+    stages. k is taken at the rates in the middle, which one implicit Euler step over t/2 predicts with k at
+    v: the error is of third order in t.
 
-    It can neither amplify a motion nor reverse it, whatever the step and the coefficients. The scalar product
-    of that equation with v gives ``v.M v + h v.K v = v.M qdot``. K has no negative entry, and the right side
-    is at most ``|v| |qdot|`` in the norm of the kinetic energy (Cauchy and Schwarz), so ``|v| <= |qdot|``;
-    the left side is not negative, so ``v.M qdot >= 0``. The power ``-v.K v`` is never positive. No bound on h
-    or on the condition of M enters: it need only be positive definite, which it is where the joint turns.
+    It can neither amplify a motion nor reverse it, whatever the step and the coefficients. X is symmetric in
+    the scalar product of the kinetic energy, ``u.M v``, and has no negative eigenvalue, as K has no negative
+    entry. On such eigenvalues R is positive and at most 1. So ``|R(X) v| <= |v|`` in the norm of the kinetic
+    energy, and ``v.M R(X) v >= 0``. For large x, R is ``2 / x**2``: what is to rest comes to rest.
 
-    A rotor that is pushed by less than the Coulomb level creeps: by a torque T alone on one hinge, without
-    viscous friction, at ``smoothing T / sqrt(coulomb**2 - T**2)`` in the limit of a small step. As v leaves
-    the other torques out, a step h ends at the rate v1 with ``k(v1) (v1 - h T / inertia) = T``, faster by
-    a share of about ``h k(0) / inertia``.
+    R is the real part of ``(1 - i) / (1 + p x)`` with ``p = (1 + i) / 2``: one complex system
+    ``(M + p t K) u = M v``, of the same zeros as M.
     """
-    h = friction.step_s
+    t = 0.5 * friction.step_s
+    v = triple(qdot)
     M = inertia_entries(turns(triple(q)), triple(friction.inertia))
-    momentum = (
-        M.alpha * qdot[0] + M.alpha_beta * qdot[1] + M.alpha_gamma * qdot[2],
-        M.alpha_beta * qdot[0] + M.beta * qdot[1],
-        M.alpha_gamma * qdot[0] + M.gamma * qdot[2],
-    )
-    k = _factor(friction, qdot, 0), _factor(friction, qdot, 1), _factor(friction, qdot, 2)
-    damped = InertiaEntries(
-        alpha=M.alpha + h * k[0],
-        beta=M.beta + h * k[1],
-        gamma=M.gamma + h * k[2],
-        alpha_beta=M.alpha_beta,
-        alpha_gamma=M.alpha_gamma,
-    )
-    v = solve_inertia(damped, momentum)
+    momentum = _momentum(M, v)
+    middle = solve_inertia(_damped(friction, M, v, 0.5 * t), momentum)
+    slowed = solve_inertia(_damped(friction, M, middle, _POLE * t), momentum)
     for i in range(3):
-        torque_q[i] = -k[i] * v[i]
+        qdot[i] = (_RESIDUE * slowed[i]).real
+    gained = _momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]))
+    for i in range(3):
+        mean_torque_q[i] += gained[i] / friction.step_s
 
 
 @allocation_free
-def _factor(friction: Friction, qdot: NDArray[np.float64], hinge: int) -> float:
+def _momentum(M: InertiaEntries, v: Triple) -> Triple:
+    """``M v``."""
+    return (
+        M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2],
+        M.alpha_beta * v[0] + M.beta * v[1],
+        M.alpha_gamma * v[0] + M.gamma * v[2],
+    )
+
+
+@allocation_free
+def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> InertiaEntries:
+    """Inertia matrix plus a real or complex time over which friction acts, with its factors at given rates."""
+    return InertiaEntries(
+        alpha=M.alpha + time * _factor(friction, rates[0], 0),
+        beta=M.beta + time * _factor(friction, rates[1], 1),
+        gamma=M.gamma + time * _factor(friction, rates[2], 2),
+        alpha_beta=M.alpha_beta,
+        alpha_gamma=M.alpha_gamma,
+    )
+
+
+@allocation_free
+def _factor(friction: Friction, rate: float, hinge: int) -> float:
     """Friction of a hinge over its rate, N·m·s."""
-    rate, smoothing = qdot[hinge], friction.smoothing_rate_rad_s
+    smoothing = friction.smoothing_rate_rad_s
     return friction.viscous_Nm_s[hinge] + friction.coulomb_Nm[hinge] / sqrt(rate**2 + smoothing**2)
 
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.copying import copy_into
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, rotor_torque
+from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.twin.electronics.driving.stages import Stages, advance_currents, begin, end
-from spheretwin.twin.plant.friction import Friction, friction_torque
+from spheretwin.twin.plant.friction import Friction, slow_down
 from spheretwin.twin.plant.stepping import step
 
 GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
@@ -26,17 +26,22 @@ class Plant(NamedTuple):
 
     rotor: Any  # what compiled code steps, as the engine's row says
     magnetics: TorqueModel  # true
-    kept: KeptMatrix
+    G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
+    scratch: NDArray[np.float64]  # of `fill_torque_matrix`
     driving: Stages
     friction: Friction
     group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
     hinge_range: NDArray[np.float64]  # (3, 2) rad
     substeps: int
+    step_s: float
+    middle_q: NDArray[np.float64]  # (3,) rad, predicted pose in the middle of the physics step
+    middle_qdot: NDArray[np.float64]  # (3,) rad/s, predicted rates there
+    last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
     current: NDArray[np.float64]  # (n,) A, now
     mean_current: NDArray[np.float64]  # (n,) A, over the physics step
     pulling: NDArray[np.float64]  # (n,) A, the same times the gain
-    friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, in the physics step
+    friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, mean over the physics step
     first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
     draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and of sensors of currents
     current_noise_A: float
@@ -57,7 +62,9 @@ def plant_tick(
 ) -> int:
     """Advance the plant by one control period.
 
-    Each physics step: coil currents, torque of the coils at the true pose, friction, rotor.
+    Each physics step: half of the friction, coil currents and their torque, rotor, other half of the friction.
+    The torque matrix and the back-EMF are those of the predicted pose and rates in the middle of the step.
+    With friction split symmetrically around the rotor's step, the whole step is of second order.
 
     Parameters
     ----------
@@ -76,9 +83,10 @@ def plant_tick(
         `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, or `FAILSAFE` where a coil is too hot.
     """
     # Taken out of the tuple once: each time costs a count of references.
-    rotor, magnetics, kept = plant.rotor, plant.magnetics, plant.kept
+    rotor, magnetics, G, scratch = plant.rotor, plant.magnetics, plant.G, plant.scratch
     q, qdot, torque_S, torque_q = rotor.q, rotor.qdot, rotor.torque_S, rotor.torque_q
-    hinge_range = plant.hinge_range
+    middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
+    hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
     current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
     gain, unmodelled, friction, friction_q = (
         plant.group_gain,
@@ -89,22 +97,28 @@ def plant_tick(
     driving = plant.driving
     begin(driving, command)
     for substep in range(plant.substeps):
-        keep_torque_matrix(q, magnetics, kept)
-        advance_currents(driving, command, substep, q, qdot, kept.G, gain, current, mean_current)
+        for i in range(3):
+            middle_q[i] = q[i] + half_step_s * qdot[i]
+            middle_qdot[i] = qdot[i] + 0.5 * (qdot[i] - last_qdot[i])
+            last_qdot[i] = qdot[i]
+            torque_q[i] = -disturbance[i] - unmodelled[i]
+            friction_q[i] = 0.0
+        if friction.acts:
+            slow_down(friction, q, qdot, friction_q)
+        fill_torque_matrix(middle_q, magnetics, G, scratch)
+        advance_currents(
+            driving, command, substep, middle_q, middle_qdot, G, gain, current, mean_current
+        )
         for j in range(pulling.shape[0]):
             pulling[j] = gain[j] * mean_current[j]
-        rotor_torque(kept.G, pulling, torque_S)
-        for i in range(3):
-            torque_q[i] = -disturbance[i] - unmodelled[i]
+        rotor_torque(G, pulling, torque_S)
+        step(rotor)
         if friction.acts:
-            friction_torque(friction, q, qdot, friction_q)
-            for i in range(3):
-                torque_q[i] += friction_q[i]
+            slow_down(friction, q, qdot, friction_q)
         if substep == 0:
             copy_into(delivered.current, 0, mean_current, mean_current.shape[0])
             copy_into(delivered.torque_S, 0, torque_S, 3)
             copy_into(plant.first_friction_q, 0, friction_q, 3)
-        step(rotor)
         for i in range(3):
             if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
                 return DIVERGED
