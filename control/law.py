@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.control import lti
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown, told_apart
+from spheretwin.models.base.wording import is_plain, shown, told_apart
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, width
 
 _vector = types.float64[::1]
@@ -76,8 +76,8 @@ class Law:
     Raises
     ------
     InputError
-        The name is no text, the step no function, the numbers are not real, finite and in one dimension,
-        the signals do not fit the state, or the period is none.
+        The name is no text or has control characters, the step is no function, the numbers are not real,
+        finite and in one dimension, the signals do not fit the state, or the period is none.
     """
 
     name: str
@@ -123,8 +123,8 @@ class Law:
         return cls(name, lti.step, made.parameters, made.state, period_s=made.period_s)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise InputError(f"law: expected a name, received {shown(self.name)}")
+        if not isinstance(self.name, str) or not self.name or not is_plain(self.name):
+            raise InputError(f"law: expected a name without control characters, received {shown(self.name)}")
         if not callable(self.step):
             raise InputError(f"law {self.name}: expected step as a function, received {shown(self.step)}")
         for field in ("parameters", "state"):

@@ -77,7 +77,7 @@ def read(path: Path) -> Mjcf:
             raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
         key = (path.resolve(), fingerprint(path))
     except OSError as error:  # a name that no file can have, here or in the file
-        raise InputError(f"model: expected an MJCF file, {error}") from None
+        raise InputError(f"model: expected an MJCF file, {without_breaks(error)}") from None
     if key not in _KEPT:
         _KEPT[key] = _read(path)
         while len(_KEPT) > MOST_KEPT:

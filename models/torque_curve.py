@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import told_apart
+from spheretwin.models.base.wording import shown, told_apart, without_breaks
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -117,7 +117,9 @@ def read_bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise InputError(f"torque curve {path}: expected a readable text file, {error}") from None
+        raise InputError(
+            f"torque curve {path}: expected a readable text file, {without_breaks(error)}"
+        ) from None
 
 
 def parse(path: Path, content: bytes) -> TorqueCurve:
@@ -125,21 +127,23 @@ def parse(path: Path, content: bytes) -> TorqueCurve:
     try:
         text = content.decode("utf-8-sig")  # spreadsheets write a byte-order mark
     except UnicodeDecodeError as error:
-        raise InputError(f"torque curve {path}: expected a readable text file, {error}") from None
+        raise InputError(
+            f"torque curve {path}: expected a readable text file, {without_breaks(error)}"
+        ) from None
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     rows = csv.DictReader(lines, skipinitialspace=True)
     try:
         found = [name or "" for name in rows.fieldnames or ()]
         missing = [name for name in COLUMNS if name not in found]
         records = list(rows)
-        samples = np.array([] if missing else [[float(row[name]) for name in COLUMNS] for row in records])
-    except (TypeError, ValueError, csv.Error) as error:
+    except csv.Error as error:
         raise InputError(f"torque curve {path}: expected numbers only, received {error}") from None
     if missing:
         raise InputError(
             f"torque curve {path}: expected the columns {', '.join(COLUMNS)},"
             f" received {', '.join(found) or 'none'}"
         )
+    samples = np.array([[_number(path, row[name]) for name in COLUMNS] for row in records])
     uneven = next((i for i, row in enumerate(records) if None in row or None in row.values()), None)
     if uneven is not None or len(set(found)) < len(found):
         where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
@@ -147,6 +151,13 @@ def parse(path: Path, content: bytes) -> TorqueCurve:
     _check(path, samples)
     computed_for = _computed_for(path, text)
     return TorqueCurve(np.radians(samples[:, 0]), samples[:, 1], computed_for, f"torque curve {path.name}")
+
+
+def _number(path: Path, text: Any) -> float:
+    try:
+        return float(text)
+    except (TypeError, ValueError):  # a row that ends too early has none
+        raise InputError(f"torque curve {path}: expected numbers only, received {shown(text)}") from None
 
 
 def head(computed_for: Mapping[str, float]) -> list[str]:

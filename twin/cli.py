@@ -10,12 +10,14 @@ import errno
 import io
 import os
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from importlib.metadata import version
+from itertools import pairwise
 from typing import NoReturn
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.wording import is_plain, one_line, shown
+from spheretwin.models.base.wording import is_plain, one_line, shown, without_breaks
 from spheretwin.twin.commands import crosscheck, magnetics, recover, reproduce, review, simulate, sweep
 from spheretwin.twin.commands.benching import verb
 
@@ -30,7 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters
     try:
-        options, rest = _parser().parse_known_args(_plain(sys.argv[1:] if arguments is None else arguments))
+        given = _plain(sys.argv[1:] if arguments is None else arguments)
+        options, rest = _parser().parse_known_args(given)
+        _check_flags(given, options)
         succeeded = options.run(options, rest)
         sys.stdout.flush()
     except InputError as error:
@@ -44,9 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return FAILED
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:  # no file can have the name that was given
-            return _refused(f"command line: expected a shorter path, {error}", BAD_INPUT)
+            return _refused(f"command line: expected a shorter path, {without_breaks(error)}", BAD_INPUT)
         _discard_stdout()
-        return _refused(f"output: {error}", FAILED)
+        return _refused(f"output: {without_breaks(error)}", FAILED)
     return DONE if succeeded else FAILED
 
 
@@ -63,6 +67,25 @@ def _plain(arguments: Sequence[str]) -> Sequence[str]:
                 f"command line: expected text without control characters, received {shown(argument)}"
             )
     return arguments
+
+
+def _check_flags(arguments: Sequence[str], options: argparse.Namespace) -> None:
+    """Refuse a flag that is given twice, unless it is a list, and an empty value of a verb's own flag."""
+    if getattr(options, "help", False):
+        return
+    flags = [argument.partition("=")[0].replace("_", "-") for argument in arguments if argument[:2] == "--"]
+    for flag, count in Counter(flags).items():
+        name = flag[2:].replace("-", "_")
+        if count > 1 and not isinstance(getattr(options, name, None), list):
+            raise InputError(f"command line: expected {flag} once, received it {count} times")
+        if hasattr(options, name) and _is_empty(arguments, flag):
+            raise InputError(f"command line: expected a value after {flag}, received an empty text")
+
+
+def _is_empty(arguments: Sequence[str], flag: str) -> bool:
+    """True if a flag is followed by an empty text, as in ``--out ""`` or ``--out=``."""
+    following = pairwise(arguments)
+    return f"{flag}=" in arguments or (flag, "") in following
 
 
 def _discard_stdout() -> None:

@@ -21,7 +21,7 @@ from spheretwin.twin.electronics.driving.sections import DriveSection
 from spheretwin.twin.faults.fault import Fault
 from spheretwin.twin.plant.engine import integrator_name
 from spheretwin.twin.scenario.files import Files
-from spheretwin.twin.scenario.planned import planned
+from spheretwin.twin.scenario.planned import first_tick, planned
 from spheretwin.twin.scenario.sections import OwnController, OwnPath, Scenario
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.trajectories.registry import SHAPES
@@ -102,6 +102,18 @@ def warnings_of(scenario: Scenario, files: Files) -> list[str]:
         *disagreements(files.actuator),
         *_overridden(scenario.plant, files.model.described.opt),
         *(f"the event that sets {change.name} is not made: the run ends before" for change in late),
+        *_late_faults(scenario),
+    ]
+
+
+def _late_faults(scenario: Scenario) -> list[str]:
+    """Return a warning for each fault that starts after the last control tick of the run."""
+    period_s = scenario.controller.period_s
+    return [
+        f"the fault {fault.target} {fault.mode} does not occur: it starts at {fault.start_s:g} s,"
+        f" the run ends at {scenario.duration:g} s"
+        for fault in scenario.fault
+        if first_tick(fault.start_s / period_s) >= scenario.ticks
     ]
 
 

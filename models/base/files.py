@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.wording import without_breaks
 
 
 class OutputFile:
@@ -42,7 +43,7 @@ class OutputFile:
         try:
             self.path.open("xb").close()  # unlike `tempfile`, with the permissions of any new file
         except OSError as error:
-            raise InputError(f"output: expected a writable path, {error}") from None
+            raise InputError(f"output: expected a writable path, {without_breaks(error)}") from None
 
     def keep(self) -> None:
         """Put the file in its place, with the permissions of the file that it replaces.
@@ -87,7 +88,7 @@ def check_writable(path: Path) -> None:
         if target.exists():
             target.open("ab").close()
     except OSError as error:
-        raise InputError(f"output: expected a writable path, {error}") from None
+        raise InputError(f"output: expected a writable path, {without_breaks(error)}") from None
 
 
 @contextmanager
@@ -108,7 +109,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         yield output.path
         output.keep()
     except OSError as error:
-        raise SpheretwinError(f"output: {path} could not be written, {error}") from None
+        raise SpheretwinError(f"output: {path} could not be written, {without_breaks(error)}") from None
     finally:
         output.discard()
 
@@ -126,7 +127,7 @@ def make_folder(path: Path) -> None:
         with tempfile.TemporaryFile(dir=path):
             pass
     except OSError as error:
-        raise InputError(f"output: expected a writable folder, {error}") from None
+        raise InputError(f"output: expected a writable folder, {without_breaks(error)}") from None
 
 
 def _hidden(target: Path) -> Path:

@@ -78,7 +78,7 @@ def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
     try:
         source = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
-        raise InputError(f"{what}: expected a readable file of Python, {error}") from None
+        raise InputError(f"{what}: expected a readable file of Python, {without_breaks(error)}") from None
     digest = hashlib.sha256(source).hexdigest()
     module = _module(path, source, digest, what)
     defined = vars(module)

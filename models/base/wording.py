@@ -5,9 +5,15 @@ from __future__ import annotations
 import difflib
 import unicodedata
 from collections.abc import Iterable
+from itertools import islice
+
+import numpy as np
 
 # A path or a name of everyday length stays whole; digits by the thousand do not.
 LONGEST_VALUE, LONGEST_WORD, LONGEST_LINE = 120, 300, 2000
+
+# Entries and levels of a list or a table beyond which its text is cut in any case.
+MOST_ENTRIES, DEEPEST = 60, 10
 
 FEWEST_DIGITS, MOST_DIGITS = 6, 17  # 17 significant digits tell any two floats apart
 
@@ -23,7 +29,15 @@ def one_line(text: str) -> str:
 
 
 def without_breaks(error: BaseException) -> str:
-    """Message of another library's error, its lines joined by spaces."""
+    """Return the message of another library's error on one line, without numbers and names of Python."""
+    match error:
+        case UnicodeDecodeError():
+            return "it is not text in UTF-8"
+        case RecursionError():
+            return "it is nested too deeply"
+        case OSError() if error.strerror:
+            named = error.filename if error.filename2 is None else error.filename2
+            return error.strerror if named is None else f"{error.strerror}: {named}"
     return " ".join(str(error).split())
 
 
@@ -36,14 +50,37 @@ def shortened(text: str, longest: int) -> str:
 
 
 def shown(value: object) -> str:
-    """What was received, of any type, as Python writes it: on one line, and not without end."""
+    """Return what was received as JSON or TOML write it: on one line, and not without end.
+
+    What neither of them has is written as Python writes it.
+    """
     try:
-        text = repr(value)
+        text = _written(value, 0)
     except ValueError:  # an integer of more digits than Python writes
-        return f"{type(value).__name__} of too many digits"
+        return "a number of too many digits"
     except Exception as error:  # an object of the user's, which may raise whatever it will
-        return f"{type(value).__name__}, which raises {type(error).__name__} when it is written"
+        return (
+            f"a value of class {type(value).__name__}, which raises {type(error).__name__} when it is written"
+        )
     return shortened(" ".join(line.strip() for line in text.splitlines()), LONGEST_VALUE)
+
+
+def _written(value: object, depth: int) -> str:
+    """Text of a value; what is nested too deeply is left out, and so is what is behind many entries."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.ravel()[:MOST_ENTRIES].tolist() if value.size > MOST_ENTRIES else value.tolist()
+    if value is None or isinstance(value, bool):
+        return "none" if value is None else str(value).lower()
+    if isinstance(value, list | tuple | dict) and depth > DEEPEST:
+        return "…"
+    if isinstance(value, list | tuple):
+        texts = [_written(entry, depth + 1) for entry in value[:MOST_ENTRIES]]
+        return f"[{', '.join([*texts, '…'][: len(value)])}]"
+    if isinstance(value, dict):
+        pairs = islice(value.items(), MOST_ENTRIES)
+        texts = [f"{_written(name, depth + 1)}: {_written(entry, depth + 1)}" for name, entry in pairs]
+        return f"{{{', '.join([*texts, '…'][: len(value)])}}}"
+    return repr(value)
 
 
 def is_plain(text: str) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import check_writable, whole_file
+from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.parts import Parts, read_batches, read_schema
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table
@@ -128,7 +129,9 @@ class TelemetryFile:
             self._waiting = []
 
     def _unwritten(self, error: OSError) -> SpheretwinError:
-        return SpheretwinError(f"output: {self._path} could not be written, {error}{self._kept()}")
+        return SpheretwinError(
+            f"output: {self._path} could not be written, {without_breaks(error)}{self._kept()}"
+        )
 
     def _kept(self) -> str:
         return f"; {self._parts.rows} rows are kept in {self._parts.folder}" if self._parts.rows else ""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown, told_apart
+from spheretwin.models.base.wording import shown, told_apart, without_breaks
 
 TIME = "t_s"
 
@@ -171,7 +171,7 @@ def _rows(what: str, path: Path) -> list[Row]:
     try:
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
     except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
-        raise InputError(f"{what} {path}: expected a readable CSV file, {error}") from None
+        raise InputError(f"{what} {path}: expected a readable CSV file, {without_breaks(error)}") from None
     try:
         return list(_split(text)) or [Row(1, [])]
     except csv.Error as error:

@@ -78,6 +78,9 @@ def checked(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
         found = kind.model_validate_json(json.dumps(arguments, default=as_plain))
     except ValidationError as error:
         raise InputError(f"bench: {name}: {explain(error, kind)}") from None
-    except (TypeError, ValueError, RecursionError) as error:  # digits or depth without end
-        raise InputError(f"bench: {name}: expected arguments as JSON has them, {error}") from None
+    except (TypeError, ValueError, RecursionError):
+        raise InputError(
+            f"bench: {name}: expected arguments as JSON has them, received a name or a text that is none,"
+            " or digits or levels without end"
+        ) from None
     return {field: getattr(found, field) for field in kind.model_fields}

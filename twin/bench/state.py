@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spheretwin.models.telemetry.allocation import rank_lost, saturated
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.session import Session
 
@@ -58,6 +59,8 @@ class State:
         Share of the current limit that the group with the largest current asked for leaves, 0 to 1.
     saturated : bool
         Whether the current limit left less than the commanded torque.
+    rank_lost : bool
+        Whether the groups in use give no torque in one direction, so that no currents are commanded.
     status : str
         Of the session, as ``running`` or ``left_workspace``.
     reason : str or None
@@ -119,6 +122,7 @@ class State:
     temperature_C: tuple[float, ...] | None
     torque_margin: float
     saturated: bool
+    rank_lost: bool
     status: str
     reason: str | None
     faults: tuple[str, ...]
@@ -173,6 +177,7 @@ def pictured(shown: Shown, session: Session, **others: Any) -> State:
 def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
     error_rad = float(np.linalg.norm(row["error_rad"][0]))
     largest_A = float(np.abs(row["current_command_A"][0]).max())
+    lost = bool(rank_lost(row)[0])
     warm = any(signal.name == "coil_temperature_degC" for signal in row.signals)
     return {
         "t_s": float(row["t_s"][0]),
@@ -180,8 +185,9 @@ def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
         "error_mrad": 1e3 * error_rad,
         "error_deg": float(np.degrees(error_rad)),
         "temperature_C": tuple(row["coil_temperature_degC"][0].tolist()) if warm else None,
-        "torque_margin": max(0.0, 1.0 - largest_A / limit_A) if limit_A else 1.0,
-        "saturated": bool(row["allocation_scale"][0] < 1.0),
+        "torque_margin": 0.0 if lost else max(0.0, 1.0 - largest_A / limit_A) if limit_A else 1.0,
+        "saturated": bool(saturated(row)[0]),
+        "rank_lost": lost,
     }
 
 
@@ -207,4 +213,5 @@ def _at_start(session: Session) -> dict[str, Any]:
         "temperature_C": None,
         "torque_margin": 1.0,
         "saturated": False,
+        "rank_lost": False,
     }

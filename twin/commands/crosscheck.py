@@ -34,7 +34,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="write a page with figures into this folder")
     parser.add_argument("--json", action="store_true", help="print the checks as JSON, alone on stdout")
     parser.add_argument(
-        "--states", type=int, default=STATES, metavar="N", help=f"random states, {STATES} unless given"
+        "--states", type=_count, default=STATES, metavar="N", help=f"random states, {STATES} unless given"
     )
     parser.add_argument(
         "--mjcf", type=Path, default=actuators.MJCF_PATH, metavar="FILE.xml", help="model file"
@@ -48,10 +48,6 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     if rest:
         raise InputError(
             f"command line: expected --out, --json, --states, --mjcf or --verbose, received {' '.join(rest)}"
-        )
-    if not 1 <= options.states <= MOST_STATES:
-        raise InputError(
-            f"command line: expected --states from 1 to {MOST_STATES}, received {options.states}"
         )
     actuators.load(options.mjcf)  # a model that cannot be read leaves no folder
     from spheretwin.twin.crosscheck import page, suite  # their libraries are slow to import
@@ -70,3 +66,11 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         print_checks(f"crosscheck, {wall_s:.1f} s", checks, options.verbose)
         tables.print_written(written)
     return kept("crosscheck", checks)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or len(text) > 12 or not 1 <= int(text) <= MOST_STATES:
+        raise argparse.ArgumentTypeError(
+            f"expected a number of states from 1 to {MOST_STATES}, received {text}"
+        )
+    return int(text)

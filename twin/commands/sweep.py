@@ -62,7 +62,12 @@ def add_to(verbs: Any) -> None:
         help="for ray: auto, or HOST[:PORT] of a cluster that this machine is a node of; a cluster on this"
         " machine alone unless given",
     )
-    parser.add_argument("--limit", type=_count, metavar="ROWS", help="only the first rows")
+    parser.add_argument(
+        "--limit",
+        type=_count,
+        metavar="ROWS",
+        help="run only the first rows; finished ones behind them stay in the table",
+    )
     parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
     parser.add_argument(
         "--optimise", action="store_true", help="look for the gains that the study's [optimise] names"

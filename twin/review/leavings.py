@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.file import join
 from spheretwin.models.telemetry.parts import read_schema
 from spheretwin.models.telemetry.table import read_parquet
@@ -40,7 +41,7 @@ def found(path: Path) -> Path:
             each for kind in ("parts", "part") for each in path.parent.glob(f".{path.name}.*.{kind}")
         )
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
-        raise InputError(f"review {path}: expected the file of a run, {error}") from None
+        raise InputError(f"review {path}: expected the file of a run, {without_breaks(error)}") from None
     if len(left) == 1:
         return left[0]
     received = f"what {len(left)} processes left: {', '.join(map(str, left))}" if left else "none"

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import did_you_mean, shown
+from spheretwin.models.base.wording import did_you_mean, shown, without_breaks
 from spheretwin.twin.scenario.explaining import explain
 
 FOLDER = resources.files("spheretwin.twin.review") / "shipped"
@@ -66,7 +66,9 @@ def load(source: str) -> Tolerances:
     try:
         fields = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"tolerance {source}: expected a readable TOML file, {error}") from None
+        raise InputError(
+            f"tolerance {source}: expected a readable TOML file, {without_breaks(error)}"
+        ) from None
     try:
         return Tolerances.model_validate_json(json.dumps(fields, default=str))
     except ValidationError as error:

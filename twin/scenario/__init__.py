@@ -8,9 +8,9 @@ from typing import Any
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.twin.scenario.changing import check_events
+from spheretwin.twin.scenario.changing import check_events, fields_with
 from spheretwin.twin.scenario.hardware import left_open
-from spheretwin.twin.scenario.reading import beside, override, read, validated
+from spheretwin.twin.scenario.reading import beside, override, validated
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.registry import SHAPES
 
@@ -31,9 +31,7 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     InputError
         No such scenario, or a field that is unknown, of the wrong type or out of range.
     """
-    fields = read(source)
-    for dotted, value in (overrides or {}).items():
-        override(fields, dotted, value)
+    fields = fields_with(source, overrides or {})
     hardware = fields.get("hardware")
     for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
         override(fields, dotted, value)

@@ -13,9 +13,9 @@ from pydantic_core import to_jsonable_python
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
-from spheretwin.twin.scenario.fields import Kind, kind_of, section_kind
+from spheretwin.twin.scenario.fields import Kind, every_field, kind_of, section_kind
 from spheretwin.twin.scenario.own_law import scenario_with
-from spheretwin.twin.scenario.reading import beside, is_dotted, override, validated
+from spheretwin.twin.scenario.reading import beside, is_dotted, override, read, shipped, validated
 from spheretwin.twin.scenario.sections import OwnController, Scenario
 
 # What a run is begun with cannot be changed on its way.
@@ -37,6 +37,50 @@ FIXED = (
 
 
 FAULT = "fault"
+
+TAGS = frozenset(
+    kind.told_apart_by
+    for _, field in every_field(Scenario)
+    if (kind := kind_of(field)) and kind.told_apart_by
+)
+"""Names of the fields that choose a member of a family, as ``shape`` and ``law``."""
+
+
+def fields_with(source: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a scenario with some of them overridden.
+
+    A shipped scenario is not the user's text. If an override chooses another member of a family, such as
+    ``trajectory.shape``, what the shipped file says of the old member alone is dropped, so that the new one
+    starts from its own defaults. Nothing that a user wrote is dropped: a field of another member in a user's
+    file, or among the overrides, is refused when the scenario is checked.
+
+    Parameters
+    ----------
+    source : str
+        A shipped name, or the path of a TOML file.
+    overrides : mapping
+        Values by dotted name.
+
+    Raises
+    ------
+    InputError
+        The scenario cannot be read, or a name is not that of a field.
+    """
+    fields = read(source)
+    members = {dotted: value for dotted, value in overrides.items() if is_tag(dotted)}
+    if members and source in shipped():
+        base = validated(fields, source)
+        for dotted, value in members.items():
+            kind = scenario_with(value) if dotted == "controller.law" else Scenario
+            _keep_common(fields, dotted, value, kind, base)
+    for dotted, value in overrides.items():
+        override(fields, dotted, value)
+    return fields
+
+
+def is_tag(dotted: object) -> bool:
+    """True if a name may be that of a field that chooses a member of a family."""
+    return isinstance(dotted, str) and dotted.rpartition(".")[2] in TAGS
 
 
 def is_one_fault(dotted: str, value: Any) -> bool:

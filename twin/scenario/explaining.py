@@ -1,8 +1,9 @@
-"""What is wrong with a scenario, told on one line."""
+"""Messages about invalid sections: pydantic's errors in words of the domain, on one line."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -10,30 +11,75 @@ from pydantic import BaseModel, ValidationError
 from spheretwin.models.base.wording import did_you_mean, shown
 from spheretwin.twin.scenario.fields import INDEX, Kind, every_field, place_of
 
+EXPECTED = {
+    "bool_parsing": "true or false",
+    "bool_type": "true or false",
+    "dict_type": "a table of fields",
+    "finite_number": "a finite number",
+    "float_parsing": "a number",
+    "float_type": "a number",
+    "greater_than": "a number greater than {gt:.10g}",
+    "greater_than_equal": "a number greater than or equal to {ge:.10g}",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number of fewer digits",
+    "int_type": "a whole number",
+    "less_than": "a number less than {lt:.10g}",
+    "less_than_equal": "a number less than or equal to {le:.10g}",
+    "list_type": "a list",
+    "literal_error": "{expected}",
+    "missing": "a value",
+    "model_attributes_type": "a table of fields",
+    "model_type": "a table of fields",
+    "multiple_of": "a multiple of {multiple_of:.10g}",
+    "none_required": "no value",
+    "string_pattern_mismatch": "text of the form {pattern}",
+    "string_too_long": "text of at most {max_length} characters",
+    "string_too_short": "text of at least {min_length} characters",
+    "string_type": "text",
+    "string_unicode": "text",
+    "too_long": "at most {max_length} entries",
+    "too_short": "at least {min_length} entries",
+    "tuple_type": "a list",
+}
+"""What a kind of error asks for, with the figures of its context."""
+
+OTHERWISE = "a valid value"
+"""What is expected where a user's own section has a type that no shipped one has."""
+
 
 def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
     """First complaint of a validation on one line: field, what was expected, what was received."""
     first = error.errors(include_url=False)[0]
     path = first["loc"]
     place, received = place_of(scenario, path), shown(first["input"])
+    here = f"{place.dotted}: " if place.dotted else ""
     match first["type"]:
         case "value_error":
             complaint = str(first["ctx"]["error"])
-            return f"{place.dotted}: {complaint}" if path else complaint
+            return here + complaint
         case "json_invalid":
-            return f"expected sections and values as TOML has them, received {first['ctx']['error']}"
+            return "expected sections and values as TOML has them, nested less deeply or with fewer digits"
         case "extra_forbidden":
             return _unknown(path, scenario)
         case "missing":
-            return f"{place.dotted}: expected a value, received none"
+            return f"{here}expected a value, received none"
         case "union_tag_not_found" | "union_tag_invalid" if place.kind:
             return f"{place.dotted}.{_untold(place.kind, first['ctx'].get('tag'))}"
         case "literal_error":
             valid = re.findall("'([^']*)'", first["ctx"]["expected"])
-            near = did_you_mean(str(first["input"]), valid)
-            return f"{place.dotted}: expected {first['ctx']['expected']}, received {received}{near}"
-    expected = first["msg"].removeprefix("Input should be ")
-    return f"{place.dotted}: expected {expected}, received {received}"
+            received += did_you_mean(str(first["input"]), valid)
+    return f"{here}expected {_expected(first)}, received {received}"
+
+
+def _expected(error: Mapping[str, Any]) -> str:
+    """Return what a field asks for, without the words of Python and pydantic."""
+    context = error.get("ctx", {})
+    try:
+        text = EXPECTED.get(error["type"], OTHERWISE).format(**context)
+    except (KeyError, ValueError):  # a bound that is no number
+        text = OTHERWISE
+    return text.replace(" 1 characters", " 1 character").replace(" 1 entries", " 1 entry")
 
 
 def _untold(kind: Kind, tag: Any) -> str:

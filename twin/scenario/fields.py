@@ -87,9 +87,11 @@ def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> Place:
     dotted: list[str] = []
     kind: Kind | None = section_kind(scenario)
     entered: type[BaseModel] | None = scenario
+    has_keys = True
     for part in path:
         if kind is None:
-            dotted.append(str(part))
+            if isinstance(part, int) or has_keys:  # else it is the type of a member of a union
+                dotted.append(str(part))
         elif kind.is_list:
             dotted.append(str(part))
             kind = replace(kind, is_list=False)
@@ -101,6 +103,7 @@ def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> Place:
             dotted.append(str(part))
             field = entered.model_fields.get(str(part)) if entered else None
             kind = kind_of(field) if field else None
+            has_keys = field is None or _holds(field.annotation, Mapping)
             entered = kind.members[""] if kind and not kind.told_apart_by and not kind.is_list else None
     return Place(".".join(dotted), kind)
 
@@ -120,6 +123,13 @@ def files_in(fields: dict[str, Any], kind: Kind, prefix: str = "") -> Iterator[N
                 if isinstance(each, dict):
                     below = f"{prefix}{name}.{i}." if whole else f"{prefix}{name}."
                     yield from files_in(each, inside, below)
+
+
+def _holds(annotation: Any, kind: type) -> bool:
+    """True if an annotation is of a kind, or has a part that is."""
+    origin = get_origin(annotation) or annotation
+    is_kind = isinstance(origin, type) and issubclass(origin, kind)
+    return is_kind or any(_holds(part, kind) for part in get_args(annotation))
 
 
 def _names_file(field: FieldInfo, value: Any) -> bool:

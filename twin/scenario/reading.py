@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import file_of, is_reference
-from spheretwin.models.base.wording import did_you_mean, is_plain, shown
+from spheretwin.models.base.wording import did_you_mean, is_plain, shown, without_breaks
 from spheretwin.twin.scenario.explaining import explain
 from spheretwin.twin.scenario.fields import fields_of, files_in, section_kind
 from spheretwin.twin.scenario.own_law import scenario_with
@@ -45,7 +45,9 @@ def read(source: str) -> dict[str, Any]:
         try:
             text = Path(path).read_text(encoding="utf-8-sig")  # some editors write a byte-order mark
         except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
-            raise InputError(f"scenario {source}: expected a readable TOML file, {error}") from None
+            raise InputError(
+                f"scenario {source}: expected a readable TOML file, {without_breaks(error)}"
+            ) from None
     else:
         raise InputError(
             f"scenario: expected {', '.join(shipped())} or a .toml file,"
@@ -54,7 +56,7 @@ def read(source: str) -> dict[str, Any]:
     try:
         fields = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"scenario {source}: expected valid TOML, {error}") from None
+        raise InputError(f"scenario {source}: expected valid TOML, {without_breaks(error)}") from None
     return beside(os.path.dirname(path), fields)
 
 
@@ -232,9 +234,10 @@ def as_json(source: str, fields: Any) -> bytes:
     """
     try:
         return json.dumps(fields, default=as_plain, ensure_ascii=False).encode()
-    except (TypeError, ValueError, RecursionError) as error:  # endless digits, bytes that are no text, depth
+    except (TypeError, ValueError, RecursionError):  # names or bytes that are no text, endless digits, depth
         raise InputError(
-            f"scenario {source}: expected sections and values as TOML has them, {error}"
+            f"scenario {source}: expected sections and values as TOML has them,"
+            " received a name or a text that is none, or digits or levels without end"
         ) from None
 
 

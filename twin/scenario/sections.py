@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializeAsAny, field_validator, model_validator
-from pydantic_core import PydanticCustomError
 
 from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.estimation.ideal import Ideal
@@ -163,7 +162,7 @@ class Nominal(_Section):
     @classmethod
     def _not_nothing(cls, scale: float) -> float:
         if abs(scale) < LEAST_SCALE:
-            raise PydanticCustomError("scale", f"Input should be at least {LEAST_SCALE:g} in magnitude")
+            raise ValueError(f"expected a magnitude of at least {LEAST_SCALE:g}, received {scale!r}")
         return scale
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from spheretwin.twin.scenario.changing import fields_with
 from spheretwin.twin.scenario.hardware import left_open
 from spheretwin.twin.scenario.reading import override, read, shipped, validated
 from spheretwin.twin.scenario.sections import Scenario
@@ -44,10 +45,7 @@ def as_command(scenario: Scenario) -> str:
         name = PLAIN
     base = _flat(_completed(read(name)))
     flags = {dotted: value for dotted, value in chosen.items() if base.get(dotted) != value}
-    begun = read(name)
-    for dotted, value in flags.items():
-        override(begun, dotted, value)
-    known = _flat(_completed(begun))
+    known = _flat(_completed(fields_with(name, flags)))
     flags |= {dotted: value for dotted, value in _flat(fields).items() if known.get(dotted, known) != value}
     tokens = [token for dotted, value in flags.items() for token in _flag(dotted, value)]
     return shlex.join(["spheretwin", "simulate", name, *tokens])

@@ -38,7 +38,8 @@ def run(
     threads : int, optional
         Rows at a time; as many as there are cores unless given, and the table does not depend on it.
     limit : int, optional
-        Rows at most, from the first on.
+        Run only the first rows, as many as this. The table keeps rows behind them that were finished
+        earlier.
     done : callable
         Told of the rows that are finished, and of how many there are, as they are finished.
     stop_requested : callable

@@ -21,7 +21,7 @@ from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.records.facts import record_of
 from spheretwin.twin.records.summary import OwnMetric, check_names, own_value
 from spheretwin.twin.scenario import reading
-from spheretwin.twin.scenario.changing import check_events
+from spheretwin.twin.scenario.changing import check_events, fields_with, is_tag
 from spheretwin.twin.scenario.fields import INDEX, every_field
 from spheretwin.twin.scenario.files import Files, files_of, named_files
 from spheretwin.twin.scenario.hardware import left_open
@@ -73,9 +73,7 @@ class Rows:
         self._telemetry = telemetry
         self._files: dict[tuple[str | None, ...], Files] = {}
         self._templates: dict[tuple[Any, ...], Template | None] = {}
-        self._fields = reading.read(study.source)
-        for dotted, value in self._found(study.fields).items():
-            reading.override(self._fields, dotted, value)
+        self._fields = fields_with(study.source, self._found(study.fields))
         self._names_files = True
         self.base = self._validated(copy.deepcopy(self._fields))
         self._names_files = bool(study.law) or not all(map(_is_of_numbers, study.axis))
@@ -161,7 +159,7 @@ class Rows:
 
     def _fields_of(self, row: Row, engine: str | None) -> dict[str, Any]:
         """Fields of a row by section."""
-        fields = copy.deepcopy(self._fields)
+        fields = self._fields_under(row.values)
         if row.law is not None:
             law = self._found({"controller": dict(row.law)})["controller"]
             fields["controller"] = {**_period(fields), **law}
@@ -172,6 +170,13 @@ class Rows:
         if engine or self.chooses_plant:
             reading.override(fields, ENGINE, engine or self._fast_engine(fields))
         return fields
+
+    def _fields_under(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Fields that all rows have; read anew if a row chooses another member of a family."""
+        members = {name: value for name, value in values.items() if is_tag(name)}
+        if not members:
+            return copy.deepcopy(self._fields)
+        return fields_with(self.study.source, self._found({**self.study.fields, **members}))
 
     def _found(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values by dotted name, the paths in them taken from where the study is."""

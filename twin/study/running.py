@@ -34,7 +34,7 @@ class Found(NamedTuple):
     rows : int
         Finished, those of earlier runs included.
     of : int
-        Wanted.
+        Requested: the first rows up to the limit, and those behind it that were finished earlier.
     study_rows : int
         Of the whole study.
     failed : int
@@ -87,22 +87,22 @@ def carried_out(
     checking.check(grid, rows)
     wanted = min(len(grid), limit or len(grid))
     with Journal(folder / journal.NAME, digest_of(rows), len(grid)) as kept:
-        resumed = kept.done(wanted)
+        resumed, missing = kept.done(), wanted - kept.done(wanted)
         work = Work(rows)
         todo = (number for number in range(wanted) if not kept.has(number))
-        order = Order(todo, wanted - resumed, grid, work, threads, address, stop_requested)
+        order = Order(todo, missing, grid, work, threads, address, stop_requested)
         try:
-            first = _fill(kept, wanted, chosen, order, done)
+            first = _fill(kept, resumed + missing, chosen, order, done)
         except BaseException:
             with suppress(SpheretwinError):  # what came first is told, as that the disk is full
-                table.write(folder / table.NAME, grid, kept, rows, wanted)
+                table.write(folder / table.NAME, grid, kept, rows)
             raise
-        table.write(folder / table.NAME, grid, kept, rows, wanted)
+        table.write(folder / table.NAME, grid, kept, rows)
         return Found(
-            rows=kept.done(wanted),
-            of=wanted,
+            rows=kept.done(),
+            of=resumed + missing,
             study_rows=len(grid),
-            failed=sum(result.status != Status.COMPLETED for _, result in kept.results(wanted)),
+            failed=sum(result.status != Status.COMPLETED for _, result in kept.results()),
             resumed=resumed,
             torn=kept.torn,
             damaged=kept.damaged,
@@ -124,7 +124,7 @@ def _fill(
         One of the rows has shown that the others cannot be believed; those in flight are finished and kept.
     """
     work, asked = order.work, order.stop_requested
-    finished = kept.done(wanted)
+    finished = kept.done()
     done(finished, wanted)
     first = None
     stopping = order._replace(stop_requested=lambda: bool(work.faults) or asked())

@@ -24,7 +24,7 @@ from pydantic import (
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.models.base.wording import did_you_mean, is_plain, shown
+from spheretwin.models.base.wording import did_you_mean, is_plain, shown, without_breaks
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.scenario.explaining import explain
 from spheretwin.twin.study.axes.axis import MOST_VALUES, Axis
@@ -195,7 +195,9 @@ def load(source: str) -> Study:
             path = Path(source).expanduser()
             text, folder = path.read_text(encoding="utf-8-sig"), os.path.dirname(path)
         except (OSError, ValueError, RuntimeError) as error:
-            raise InputError(f"study {source}: expected a readable TOML file, {error}") from None
+            raise InputError(
+                f"study {source}: expected a readable TOML file, {without_breaks(error)}"
+            ) from None
     else:
         raise InputError(
             f"study: expected {', '.join(shipped())} or a .toml file,"
@@ -204,8 +206,9 @@ def load(source: str) -> Study:
     try:
         fields = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"study {source}: expected valid TOML, {error}") from None
-    fields["folder"] = os.path.join(folder, str(fields.get("folder", "")))
+        raise InputError(f"study {source}: expected valid TOML, {without_breaks(error)}") from None
+    if isinstance(given := fields.get("folder", ""), str):  # anything else is refused below
+        fields["folder"] = os.path.join(folder, given)
     return made(fields, source)
 
 

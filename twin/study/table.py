@@ -45,8 +45,8 @@ def check_names(rows: Rows) -> None:
         )
 
 
-def write(path: Path, grid: Grid, journal: Journal, rows: Rows, wanted: int) -> None:
-    """Write those of the first rows that are finished, in the order of the study, whole or not at all.
+def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> None:
+    """Write all finished rows, in the order of the study, whole or not at all.
 
     Raises
     ------
@@ -56,14 +56,14 @@ def write(path: Path, grid: Grid, journal: Journal, rows: Rows, wanted: int) -> 
     import pyarrow as pa  # slow to import
     import pyarrow.parquet as parquet
 
-    schema = _schema(grid, journal, rows, wanted)
+    schema = _schema(grid, journal, rows)
     base = _base(rows)
     metadata = {"study": rows.study.model_dump_json(), "scenario": json.dumps(base)}
     with (
         whole_file(path) as temporary,
         parquet.ParquetWriter(temporary, schema.with_metadata(metadata), compression="zstd") as writer,
     ):
-        finished = journal.results(wanted)
+        finished = journal.results()
         while batch := list(islice(finished, BATCH_ROWS)):
             columns = _columns(
                 schema, [_record(grid[number], result, rows, base) for number, result in batch]
@@ -71,10 +71,10 @@ def write(path: Path, grid: Grid, journal: Journal, rows: Rows, wanted: int) -> 
             writer.write_table(pa.table(columns, schema=schema))
 
 
-def _schema(grid: Grid, journal: Journal, rows: Rows, wanted: int) -> pa.Schema:
+def _schema(grid: Grid, journal: Journal, rows: Rows) -> pa.Schema:
     import pyarrow as pa
 
-    own = _own_kinds(journal, rows, wanted)
+    own = _own_kinds(journal, rows)
     return pa.schema(
         [
             pa.field("row", pa.int64()),
@@ -105,13 +105,13 @@ def _kind_of(values: Iterable[Any] | None) -> pa.DataType:
     return next((kind for test, kind in tests if listed and all(map(test, listed))), pa.string())
 
 
-def _own_kinds(journal: Journal, rows: Rows, wanted: int) -> dict[str, pa.DataType]:
+def _own_kinds(journal: Journal, rows: Rows) -> dict[str, pa.DataType]:
     """Types of the user's figures: numbers where all rows have numbers, text of JSON else."""
     import pyarrow as pa
 
     may_be = dict.fromkeys(rows.own_metrics, True)
     if may_be:
-        for _, result in journal.results(wanted):
+        for _, result in journal.results():
             for name in may_be:
                 value = result.figures.get(name)
                 may_be[name] &= value is None or _is_number(value)

@@ -25,6 +25,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import without_breaks
 
 HOST = "127.0.0.1"
 
@@ -74,7 +75,9 @@ def listen(port: int) -> socket.socket:
         listening.listen()  # now, not by the server: until then another may take a port that is bound alone
     except (OSError, OverflowError) as error:
         listening.close()
-        raise InputError(f"bench: expected a port that is free, received {port}: {error}") from None
+        raise InputError(
+            f"bench: expected a port that is free, received {port}: {without_breaks(error)}"
+        ) from None
     return listening
 
 

@@ -122,6 +122,8 @@ def _alarms(state: Any) -> list[str]:
         alarms.append(_badge("FAULT", BAD))
     if state.saturated:
         alarms.append(_badge("SATURATED", WARN))
+    if state.rank_lost:
+        alarms.append(_badge("RANK LOST", BAD))
     return alarms
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import without_breaks
 
 # Rerun's file format 2: magic, version and options, then messages, each with its kind and its length before
 # it. The one that ends a file is the footer, by which a reader finds the others.
@@ -76,5 +77,5 @@ def whole_messages(path: Path) -> Iterator[tuple[Path, Extent]]:
             with copy.open("r+b") as file:
                 file.truncate(found.whole_bytes)
         except OSError as error:
-            raise InputError(f"recording {path}: expected room for a copy, {error}") from None
+            raise InputError(f"recording {path}: expected room for a copy, {without_breaks(error)}") from None
         yield copy, found

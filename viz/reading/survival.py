@@ -9,6 +9,7 @@ from pathlib import Path
 import rerun_cli
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.wording import without_breaks
 
 PROGRAM = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
 
@@ -43,7 +44,9 @@ def check_readable(path: Path, named: Path) -> None:
             check=False,
         ).returncode
     except OSError as error:
-        raise SpheretwinError(f"recording {named}: expected Rerun at {PROGRAM}, {error}") from None
+        raise SpheretwinError(
+            f"recording {named}: expected Rerun at {PROGRAM}, {without_breaks(error)}"
+        ) from None
     if ended < 0 or ended >= _PANICS:
         raise InputError(
             f"recording {named}: expected one of a run, received one so damaged that Rerun ends at it"

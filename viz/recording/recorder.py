@@ -10,6 +10,7 @@ import rerun as rr
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile
+from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.viz.layout.view import OVERVIEW
@@ -111,4 +112,4 @@ def _pipe_to(output: OutputFile) -> FilePipe:
         return FilePipe(output.path)
     except OSError as error:
         output.discard()
-        raise InputError(f"output: expected a writable path, {error}") from None
+        raise InputError(f"output: expected a writable path, {without_breaks(error)}") from None

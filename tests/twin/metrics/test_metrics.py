@@ -61,7 +61,9 @@ PLAIN = {
     "settling_time_s": lambda run: list(plain_settling(run)),
     "overshoot_rad": lambda run: list(plain_overshoot(run)),
     "max_abs_current_A": lambda run: np.abs(run.telemetry["current_A"]).max(),
-    "saturated_fraction": lambda run: np.mean(run.telemetry["allocation_scale"] < 1),
+    "saturated_fraction": lambda run: np.mean(
+        (run.telemetry["allocation_scale"] < 1) & (run.telemetry["allocation_scale"] > 0)
+    ),
     "rms_torque_Nm": lambda run: np.sqrt(np.mean(np.linalg.norm(run.telemetry["torque_Nm"], axis=1) ** 2)),
     "current_variation_A_s": plain_variation,
     "copper_loss_J": plain_copper,
@@ -190,3 +192,31 @@ def test_a_run_at_the_limit_warns(still, share, lines):
     metric.write(table)
     assert metric.value() == share
     assert len(metric.warnings()) == lines
+
+
+@pytest.mark.parametrize("allocation", ["least_norm", "bounded"])
+def test_a_lost_rank_is_not_reported_as_the_current_limit(allocation):
+    """Two groups cannot give torque in three directions."""
+    overrides = {
+        "duration": 0.1,
+        "allocation": allocation,
+        "plant.engine": "lagrangian",
+        "fault": [
+            {"target": f"coil.{group:02d}", "mode": "open", "start_s": 0.05, "known": True}
+            for group in range(16)
+        ],
+    }
+    run = simulate(scenarios.load("nutation", overrides))
+    lost = run.telemetry["allocation_scale"] == 0
+    assert not lost[:50].any()
+    assert lost[50:].all()
+    assert not run.telemetry["current_command_A"][50:].any()
+    metric = METRICS["saturated_fraction"](Planned(run.scenario, run.actuator, run.scenario.ticks))
+    metric.write(run.telemetry)
+    assert metric.warnings()[0] == (
+        "the torque matrix of the groups in use has less than rank 3 at 50 of 100 ticks:"
+        " no currents are commanded there"
+    )
+    limited = np.mean((run.telemetry["allocation_scale"] < 1) & ~lost)
+    assert metric.value() == limited
+    assert len(metric.warnings()) == 1 + (limited > 0.05)

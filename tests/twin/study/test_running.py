@@ -1,5 +1,6 @@
 """A study as a whole: the same table however it is run, failures that are rows, plants that agree."""
 
+import json
 import re
 
 import pytest
@@ -50,14 +51,29 @@ def test_a_study_that_is_stopped_goes_on_to_the_same_table(whole, tmp_path, thre
     assert table(tmp_path) == table(whole)
 
 
-def test_a_limit_has_the_first_rows_whatever_is_there_already(whole, tmp_path):
+def test_a_limit_runs_the_first_rows_and_drops_no_finished_one(whole, tmp_path):
     assert found(loads(), tmp_path, limit=5) == rows_of(whole)[:5]
-    first = table(tmp_path)
+    done = run(loads(), tmp_path, limit=3)
+    assert (done.rows, done.of, done.study_rows, done.resumed) == (5, 5, 24, 5)
+    assert rows_of(tmp_path) == rows_of(whole)[:5]
     found(loads(), tmp_path)
     assert table(tmp_path) == table(whole)
     done = run(loads(), tmp_path, limit=5)
-    assert (done.rows, done.of, done.study_rows, done.resumed) == (5, 5, 24, 5)
-    assert table(tmp_path) == first
+    assert (done.rows, done.of, done.study_rows, done.resumed) == (24, 24, 24, 24)
+    assert table(tmp_path) == table(whole)
+
+
+def test_rows_behind_a_limit_stay_where_rows_before_it_are_missing(whole, tmp_path):
+    found(loads(), tmp_path)
+    journal = tmp_path / "journal.jsonl"
+    head, *lines = journal.read_bytes().splitlines(keepends=True)
+    # Rows 3, 4 and 5 are left.
+    journal.write_bytes(head + b"".join(line for line in lines if json.loads(line)[0] in (3, 4, 5)))
+    counts = []
+    done = run(loads(), tmp_path, limit=2, done=lambda rows, of: counts.append((rows, of)))
+    assert (done.rows, done.of, done.resumed) == (5, 5, 3)
+    assert counts == [(3, 5), (4, 5), (5, 5)]
+    assert rows_of(tmp_path) == [rows_of(whole)[row] for row in (0, 1, 3, 4, 5)]
 
 
 def test_a_table_in_many_batches_has_the_same_rows(whole, tmp_path, monkeypatch):

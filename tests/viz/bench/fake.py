@@ -35,6 +35,7 @@ STATE = {
     "temperature_C": None,
     "torque_margin": 0.75,
     "saturated": False,
+    "rank_lost": False,
     "status": "running",
     "reason": None,
     "faults": (),

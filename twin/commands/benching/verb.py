@@ -52,7 +52,7 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument(
         "--port",
-        type=int,
+        type=_port,
         default=PORT,
         metavar="P",
         help=f"of the page, on 127.0.0.1; {PORT} unless given, 0 for any that is free",
@@ -60,7 +60,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument("--no-browser", action="store_true", help="only say where the page is")
     parser.add_argument(
         "--hold-after",
-        type=float,
+        type=_seconds,
         default=GONE_s,
         metavar="S",
         help=f"how long the twin goes on after the page that operates it is gone; {GONE_s:g} s unless given",
@@ -75,10 +75,6 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         raise InputError(
             "bench: expected viser, which the extra bench brings: pip install 'spheretwin[bench]'"
         )
-    if not 0 <= options.port <= LARGEST_PORT:
-        raise InputError(f"command line: expected a port from 0 to {LARGEST_PORT}, received {options.port}")
-    if not 0 <= options.hold_after < math.inf:
-        raise InputError(f"command line: expected --hold-after from 0 s on, received {options.hold_after:g}")
     scenario = scenarios.load(options.scenario, flags.overrides(rest))
     outputs.check([options.record] if options.record else [])
     # Slow to import, and only a bench needs it.
@@ -101,6 +97,22 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             webbrowser.open(page.address)
         page.show(stop_requested)
     return _told(bench)
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdecimal()) or len(text) > 5 or int(text) > LARGEST_PORT:
+        raise argparse.ArgumentTypeError(f"expected a port from 0 to {LARGEST_PORT}, received {text}")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0 <= seconds < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a time from 0 s on, received {text}")
+    return seconds
 
 
 def _record(bench: Bench, recording: Path | None) -> None:

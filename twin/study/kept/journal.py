@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.wording import without_breaks
 from spheretwin.twin.study.grid import Row
 from spheretwin.twin.study.kept.lock import lock
 from spheretwin.twin.study.row import Result
@@ -76,8 +77,8 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    def done(self, below: int) -> int:
-        """How many of the rows below a number are finished."""
+    def done(self, below: int | None = None) -> int:
+        """Number of finished rows below a number; of all unless given."""
         return int(np.count_nonzero(self._places[:below]))
 
     def has(self, number: int) -> bool:
@@ -96,10 +97,10 @@ class Journal:
         self._write(_line([row.number, row.key, *result]))
         self._places[row.number] = place
 
-    def results(self, below: int) -> Iterator[tuple[int, Result]]:
-        """Finished rows below a number, in the order of the study: the number of each, and its result."""
+    def results(self) -> Iterator[tuple[int, Result]]:
+        """Finished rows in the order of the study: the number of each, and its result."""
         with self.path.open("rb") as file:
-            for number in np.flatnonzero(self._places[:below]):
+            for number in np.flatnonzero(self._places):
                 file.seek(int(self._places[number]))
                 yield int(number), _result(json.loads(file.readline()))
 
@@ -155,7 +156,7 @@ def _opened(path: Path) -> BinaryIO:
     try:
         file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b", 0)
     except OSError as error:
-        raise InputError(f"study: expected a folder for its journal, {error}") from None
+        raise InputError(f"study: expected a folder for its journal, {without_breaks(error)}") from None
     try:
         lock(file)
     except OSError:

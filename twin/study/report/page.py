@@ -93,7 +93,7 @@ def _ends(rows: Rows, of: int, whole: int) -> str:
     count = len(rows.laws)
     ends = ", ".join(f"{number} {status}" for status, number in Counter(rows.statuses.tolist()).items())
     missing = f" The other {of - count} are still to be run: the same command goes on." if count < of else ""
-    first = f" Only the first {of} of the study's {whole} were wanted." if of < whole else ""
+    first = f" Only {of} of the study's {whole} rows were requested." if of < whole else ""
     return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
 
 

@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.wording import without_breaks
 from spheretwin.twin.study.kept.lock import lock
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def _held(path: Path) -> Iterator[BinaryIO]:
     try:
         file = path.open("r+b" if path.exists() else "x+b")
     except OSError as error:
-        raise InputError(f"study: expected a folder for its trials, {error}") from None
+        raise InputError(f"study: expected a folder for its trials, {without_breaks(error)}") from None
     with file:
         try:
             lock(file)

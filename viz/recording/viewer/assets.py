@@ -16,6 +16,7 @@ from typing import NamedTuple
 import rerun_cli
 
 from spheretwin.models.base.errors import SpheretwinError
+from spheretwin.models.base.wording import without_breaks
 
 HOST = "127.0.0.1"
 INDEX = "/index.html"
@@ -77,7 +78,9 @@ def read_assets() -> dict[str, Asset]:
             assets = {path: _read(port, path, process) for path in FILES}
             process.stdin.close()  # type: ignore[union-attr]
     except OSError as error:
-        raise SpheretwinError(f"viewer: expected the files of Rerun's viewer, {error}") from None
+        raise SpheretwinError(
+            f"viewer: expected the files of Rerun's viewer, {without_breaks(error)}"
+        ) from None
     return {**assets, INDEX: _kept_here(assets[INDEX])}
 
 

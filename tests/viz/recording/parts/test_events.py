@@ -27,6 +27,14 @@ def test_every_status_ends_a_log(status):
     assert events.end(status) == (0.5, status.level, status.told)
 
 
+def test_a_lost_rank_is_an_event_of_its_own():
+    t_s = np.arange(6) * 1.0
+    found = Events().of(rows(t_s, [1.0, 0.5, 0.0, 1.0, 0.0, 0.5]))
+    assert [event[0] for event in found] == [1.0, 2.0, 4.0, 5.0]
+    assert ["rank lost" in event[2] for event in found] == [False, True, True, False]
+    assert ["current limit" in event[2] for event in found] == [True, False, False, True]
+
+
 def test_a_spell_at_the_limit_is_one_event():
     t_s = np.arange(1000) * 1e-3
     scale = np.ones(1000)

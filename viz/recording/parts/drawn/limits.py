@@ -6,6 +6,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from spheretwin.models.telemetry.allocation import rank_lost, saturated
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import palette
@@ -18,7 +19,12 @@ from spheretwin.viz.recording.parts.part import Part, Subject
 RUN = f"{STATES}/run"
 LIMITS = f"{STATES}/limits"
 
-WITHIN, VOLTAGE, CURRENT = LEVELS = ("within limits", "voltage at its limit", "saturated")
+WITHIN, VOLTAGE, CURRENT, RANK = LEVELS = (
+    "within limits",
+    "voltage at its limit",
+    "saturated",
+    "rank lost",
+)
 """From what holds nothing back to what holds back most."""
 
 Change = tuple[float, str]
@@ -59,7 +65,8 @@ def _levels(rows: Table) -> NDArray[np.int64]:
     levels = np.zeros(len(rows), dtype=np.int64)
     if any(signal.name == "voltage_limited" for signal in rows.signals):
         levels[np.any(rows["voltage_limited"] > 0, axis=1)] = LEVELS.index(VOLTAGE)
-    levels[rows["allocation_scale"] < 1] = LEVELS.index(CURRENT)
+    levels[saturated(rows)] = LEVELS.index(CURRENT)
+    levels[rank_lost(rows)] = LEVELS.index(RANK)
     return levels
 
 
@@ -74,7 +81,9 @@ class Limits(Part):
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log colours, and how a run begins."""
         endings = {status.replace("_", " "): _colour(status) for status in Status}
-        levels = dict(zip(LEVELS, (palette.FINE, palette.BELIEVED, palette.WARNING), strict=True))
+        levels = dict(
+            zip(LEVELS, (palette.FINE, palette.BELIEVED, palette.WARNING, palette.FAILURE), strict=True)
+        )
         for lane, colours in ((RUN, endings), (LIMITS, levels)):
             states = rr.StateConfiguration(values=list(colours), colors=list(colours.values()))
             recording.log(lane, states, static=True)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.telemetry.allocation import rank_lost, saturated
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
@@ -33,7 +34,7 @@ class Summary:
         self._facts = facts
         self.last_s = 0.0
         self._ticks = 0
-        self._saturated = 0
+        self._saturated = self._rank_lost = 0
         self._largest_deg = 0.0
         self._squares = 0.0
 
@@ -41,7 +42,8 @@ class Summary:
         """Add the rows of a chunk, with the error angle of each."""
         self.last_s = float(rows["t_s"][-1])
         self._ticks += len(rows)
-        self._saturated += int(np.count_nonzero(rows["allocation_scale"] < 1))
+        self._saturated += int(np.count_nonzero(saturated(rows)))
+        self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
         told = error_deg[np.isfinite(error_deg)]  # the last rows of a run that diverged may hold no numbers
         self._largest_deg = max(self._largest_deg, float(np.max(told, initial=0.0)))
         self._squares += float(np.sum(told**2))
@@ -56,10 +58,11 @@ class Summary:
         at = "" if status == Status.COMPLETED else f" at {self.last_s:.3g} s of {self._facts.duration_s:g} s"
         if not self._ticks:
             return _told(f"{self._what()} — {how}")
+        lost = f"; rank lost {_percent(self._rank_lost / self._ticks)} of the time" if self._rank_lost else ""
         rms_deg = np.sqrt(self._squares / self._ticks)
         return _told(
             f"{self._what()} — {how}{at}; error largest **{self._largest_deg:.3g}°**, RMS **{rms_deg:.3g}°**;"
-            f" saturated {_percent(self._saturated / self._ticks)} of the time"
+            f" saturated {_percent(self._saturated / self._ticks)} of the time{lost}"
         )
 
     def _what(self) -> str:
