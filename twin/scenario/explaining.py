@@ -65,7 +65,7 @@ def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
         case "missing":
             return f"{here}expected a value, received none"
         case "union_tag_not_found" | "union_tag_invalid" if place.kind:
-            return f"{place.dotted}.{_untold(place.kind, first['ctx'].get('tag'))}"
+            return f"{place.dotted}.{_untold(place.kind, first['input'])}"
         case "literal_error":
             valid = re.findall("'([^']*)'", first["ctx"]["expected"])
             received += did_you_mean(str(first["input"]), valid)
@@ -82,8 +82,9 @@ def _expected(error: Mapping[str, Any]) -> str:
     return text.replace(" 1 characters", " 1 character").replace(" 1 entries", " 1 entry")
 
 
-def _untold(kind: Kind, tag: Any) -> str:
+def _untold(kind: Kind, table: Any) -> str:
     """Complaint about a member that its family does not have."""
+    tag = table.get(kind.told_apart_by) if isinstance(table, dict) else None  # the error's own tag is text
     near = did_you_mean(str(tag), kind.members)
     received = "none" if tag is None else shown(tag)
     own = " or FILE.py:NAME" if _may_be_own(kind) else ""

@@ -1,0 +1,185 @@
+"""No message about an input holds words of Python or of the library that checks it."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.review import tolerances
+from spheretwin.twin.scenario import explaining, flags
+from spheretwin.twin.scenario.changing import changed
+from spheretwin.twin.scenario.fields import every_field
+from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.study import study as studies
+from spheretwin.twin.study.tuning.section import Optimise
+
+# Names of types count where they stand alone: "string" of a text that a user gave must not be counted.
+FORBIDDEN = re.compile(
+    r"pydantic|Input should|Value error|Extra inputs|Field required|Traceback|\[type=|Errno|discriminator"
+    r"|\b(?:str|dict|tuple|Tuple|Dictionary|NoneType|None|float|int|bool|True|False|boolean|array|object"
+    r"|validation|validator|repr|TypeError|ValueError|KeyError|codec)\b"
+)
+
+NAMES = sorted({name.replace("#", "0") for name, _ in every_field(Scenario)})
+
+VALUES = [
+    None, True, False, 3, -1, 1.5, -1e300, float("nan"), float("inf"), 10**400, "x", "", "12", "x" * 200, [], [1],
+    [1, 2, 3, 4], ["a", "b", "c"], [[1]], [None], [{}], {}, {"a": 1}, {"kind": "x"}, [{"kind": 3}], {"shape": 1},
+]  # fmt: skip
+
+
+def message(call, *arguments):
+    """Return the message of a refusal; None if the input is accepted."""
+    try:
+        call(*arguments)
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def test_the_list_of_words_finds_what_it_must():
+    for text in ("received None", "Input should be", "a dict,", "[type=missing", "NoneType", "valid boolean"):
+        assert FORBIDDEN.search(text)
+    assert not FORBIDDEN.search("expected a number, received 'string' for controller.integral_rate")
+
+
+@pytest.mark.parametrize("law", ["pd", "afsm_eso"])
+def test_overrides(law):
+    told = set()
+    for name in NAMES:
+        for value in VALUES:
+            told.add(message(scenarios.load, "hold", {"controller.law": law, name: value}))
+    assert len(told) > 500  # of 5,000: most values do not fit most fields
+    for line in told - {None}:
+        assert not FORBIDDEN.search(line), line
+        assert not line.isspace()
+
+
+@pytest.mark.parametrize("value", ["null", "true", "x", "[]", '{"a": 1}', "1.5", "nan", "9" * 5000, "-1e300"])
+def test_flags(value):
+    for name in NAMES:
+        line = message(lambda text: scenarios.load("hold", flags.overrides([f"--{name}", text])), value)  # noqa: B023
+        assert line is None or not FORBIDDEN.search(line), line
+
+
+def test_changes_of_a_run():
+    scenario = scenarios.load("hold")
+    told = {message(changed, scenario, name, value) for name in NAMES for value in VALUES}
+    assert len(told) > 500
+    for line in told - {None}:
+        assert not FORBIDDEN.search(line), line
+
+
+def test_studies():
+    told = set()
+    for value in VALUES:
+        for name in studies.Study.model_fields:
+            told.add(message(studies.made, {"name": "a", "scenario": "hold", name: value}, "mine"))
+        for name in Optimise.model_fields:
+            fields = {"name": "a", "scenario": "hold", "optimise": {name: value}}
+            told.add(message(studies.made, fields, "mine"))
+        for name in ("field", "kind", "zip", "values", "low", "high", "count", "mean"):
+            for kind in ("values", "linspace", "logspace", "uniform", "normal"):
+                axis = {"field": "duration", "kind": kind, name: value}
+                told.add(message(studies.made, {"name": "a", "scenario": "hold", "axis": [axis]}, "mine"))
+    assert len(told) > 150
+    for line in told - {None}:
+        assert not FORBIDDEN.search(line), line
+
+
+@pytest.mark.parametrize("text", ["folder = [[1]]", "folder = 3", "folder = {a = 1}"])
+def test_the_folder_of_a_study_is_text(tmp_path, text):
+    path = tmp_path / "mine.toml"
+    path.write_text(f'name = "a"\nscenario = "hold"\n{text}\n')
+    assert "folder: expected text, received" in message(studies.load, str(path))
+
+
+TOLERANCES = [
+    "signals = 3", "signals = []", "[signals]", "[signals]\nq_rad = 3", "[signals.q_rad]\nabsolute = 'x'",
+    "[signals.q_rad]\nabsolute = -1", "[signals.q_rad]\nabsolute = nan", "[signals.q_rad]\nabsolute = true",
+    "[signals.q_rad]\nabsolut = 1", "[signals.q_rad]\nabsolute = 2024-01-01", "description = 3", "a = 1",
+    "[signals.q_rad]\ntime_s = 1e9", "[[signals]]", "description = 1979-05-27T07:32:00Z", "[signals", "\x00",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", TOLERANCES)
+def test_tolerances(tmp_path, text):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    assert not FORBIDDEN.search(message(tolerances.load, str(path)))
+
+
+@pytest.mark.parametrize("load", [scenarios.load, studies.load, tolerances.load])
+@pytest.mark.parametrize(
+    "content", [b"\xff\xfe", b"a = [[[", b"a" * 9, b"a = " + b"[" * 5000, b"a = 2024-13-01", None]
+)
+def test_files_that_cannot_be_read(tmp_path, load, content):
+    path = tmp_path / "mine.toml"
+    if content is not None:
+        path.write_bytes(content)
+    assert not FORBIDDEN.search(message(load, str(path)))
+
+
+def test_values_that_toml_does_not_have():
+    circle = []
+    circle.append(circle)
+    for value in ({(1, 2): 3}, circle, "\udcff", {"a": {1, 2}}, b"x", object(), np.zeros(3), 1j):
+        line = message(scenarios.load, "hold", {"trajectory.angle_rad": value})
+        assert line is None or not FORBIDDEN.search(line.replace("<object object", "<")), line
+
+
+def test_every_kind_of_error_of_the_sections_has_words():
+    """Types of pydantic's schema of a scenario lead to no error for which there are no words."""
+    kinds = set()
+    for name in NAMES:
+        for value in VALUES:
+            fields = {"trajectory": {"shape": "hold"}, **scenarios.reading.alone(name, value)}
+            try:
+                Scenario.model_validate_json(json.dumps(fields))
+            except explaining.ValidationError as error:
+                kinds |= {each["type"] for each in error.errors()}
+    own = {"value_error", "extra_forbidden", "union_tag_not_found", "union_tag_invalid", "json_invalid"}
+    assert kinds - own <= set(explaining.EXPECTED)
+    assert len(kinds) > 10
+
+
+def test_a_user_s_field_of_several_types_is_named_without_them(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from spheretwin.control.parts.parameters import LawParameters\n"
+        "class Mine(LawParameters):\n"
+        "    gain: float | tuple[float, float] = 1.0\n"
+        "    def build(self, known): ...\n"
+    )
+    line = message(scenarios.load, "hold", {"controller.law": f"{path}:Mine", "controller.gain": "x"})
+    assert line == "scenario hold: controller.gain: expected a number, received 'x'"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "none"),
+        (True, "true"),
+        ((1, None, "a"), "[1, none, 'a']"),
+        ({"a": [False]}, "{'a': [false]}"),
+        (np.array([1.0, 2.0]), "[1.0, 2.0]"),
+        (np.float64(0.5), "0.5"),
+        pytest.param(10**5000, "a number of too many digits", id="digits"),
+    ],
+)
+def test_values_are_shown_as_toml_writes_them(value, text):
+    assert shown(value) == text
+
+
+def test_shown_ends_whatever_it_is_given():
+    circle = [1]
+    circle.append(circle)
+    deep = []
+    for _ in range(100_000):
+        deep = [deep]
+    for value in (circle, deep, list(range(10**6)), np.zeros((1000, 1000)), {i: i for i in range(10**5)}):
+        assert len(shown(value)) <= 120
