@@ -52,8 +52,7 @@ def allocate_bounded(G: Array, torque_S: Array, limit: float, current: Array, sc
     """Smallest currents within the limit that give the torque, or else the most torque in its direction.
 
     Never less torque than `control.allocation.least_norm.allocate` gives, and the same currents where they
-    respect the limit. On a 2024 server core and with 18 groups, 0.06 µs where they do; about 3 where the
-    limit acts, and 11 at most, where the path has lost its way.
+    respect the limit.
 
     Parameters
     ----------

@@ -17,17 +17,8 @@ where it takes nearly all, a tenth of R is, and u is cut at ±R. A motion within
 its change of acceleration within a period.
 
 *What it is worth* depends on whether the acceleration becomes torque: by the law itself, or by
-`feed_forward.inertia`. Largest true error of α on the prototype's tilt (60), median of 20 seeds, degrees:
-
-| R, rad/s² | none | 3 | 5 | 10 | 15 | 20 | 30 | 40 |
-|---|---|---|---|---|---|---|---|---|
-| PID, inertia fed forward | 0.065 | 0.138 | 0.092 | 0.065 | 0.056 | 0.054 | 0.054 | 0.053 |
-| AFSM, inertia fed forward | 0.205 | 0.216 | 0.168 | 0.135 | 0.125 | 0.125 | 0.127 | 0.126 |
-| PID alone | 0.065 | 0.164 | 0.123 | 0.096 | – | 0.079 | – | – |
-| AFSM alone | 0.205 | 0.292 | 0.249 | 0.222 | – | 0.213 | – | – |
-
-20 rad/s² is the least that is as good as any. Alone, around a law that makes no use of the acceleration, the
-governor only holds the reference back. The variation of the commands stays what it is.
+`feed_forward.inertia`. Alone, around a law that makes no use of the acceleration, the governor only holds the
+reference back. The study `compensators` measures it on the prototype's tilt.
 """
 
 from __future__ import annotations

@@ -21,9 +21,8 @@ what is to be said against this estimator; a filter of second order (`kalman`) m
 
 A ramp of the angle is followed with an error that falls by p at each tick; a constant one gives rate 0.
 
-*Default.* ω = 150 1/s, half as much again as AFSM needs: a lag of 6.7 ms. The prototype's 0.02° rms on α and
-β is then 0.05 rad/s, and γ's rounding to 0.18° is 0.13 rad/s (by its variance; in slow motion it is a pulse
-of (1 − p) 0.18°/T, 0.44 rad/s, at each count, which decays in 1/ω).
+*Default.* ω = 150 1/s, half as much again as AFSM needs on the prototype. In slow motion a count c of an encoder
+is a pulse of (1 − p) c/T, which decays in 1/ω.
 """
 
 from typing import Literal

@@ -1,8 +1,6 @@
 """Adaptive fuzzy law (AF): AFSM without its switching terms, ``v = theta^T Psi - K s``.
 
-With the printed gains it errs by 0.47° on the prototype's tilt, worst of 20 seeds, at 14 A/s of variation; of
-40 trials of the study `tuning`, by 0.14° at 84 A/s with λ 127 and K 83, by 0.17° at 48 A/s with λ 98 and K
-55.
+`spheretwin reproduce figure11` has its errors with the printed gains; the study `tuning` searches others.
 """
 
 from typing import Literal

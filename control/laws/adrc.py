@@ -19,13 +19,9 @@ to 0, and with it that of the angle.
 *Two numbers.* Model and observer separate: the poles are two at −ω and three at −ω_o, in either order.
 
 *Default.* ω = 140 1/s before an observer of 80, and of 40 for γ, which is counted: a slow observer is the
-filter that lets the feedback be fast. On the tilt (60) with the prototype the largest true error of α and β
-is 0.105° at 36 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study `tuning` seven
-beat it in both, the quietest with 0.103° at 7.6 A/s for 69 and 57 1/s. They pay where loads come at once:
-it lets α go 14.5 mrad on the sinusoid of m = 0.2 and L = 1, where the default has 5.3. On ideal hardware
-an observer is better fast: ω = 80 and ω_o = 400 leave at most 4.4 mrad of the sinusoid of m = 0.2 and L = 1,
-and 9.3 at m = 0.5 and L = 5, against 12 and 57 (γ; 5.3 and 24 of α and β), and would vary the prototype's
-currents by 515 A/s.
+filter that lets the feedback be fast. Slower pairs vary the currents less on the prototype's tilt, and err
+more where loads come at once; on ideal hardware a fast observer is better. `spheretwin reproduce rivals` has
+the figures; the study `tuning` searches both bandwidths.
 """
 
 from typing import Literal

@@ -4,9 +4,8 @@
 ``theta' = -eta s Psi``, ``xi' = sigma |s|``, ``zeta' = varsigma |s| S``, all from 0. As in the paper, xi and
 zeta only ever grow.
 
-With the printed gains it errs by 0.24° on the prototype's tilt, worst of 20 seeds, at 47 A/s of variation; of
-40 trials of the study `tuning`, by 0.13° at 119 A/s with λ 51 and K 128, by 0.15° at 72 A/s with λ 70 and K
-48.
+`spheretwin reproduce figure11` has its errors with the printed gains, `spheretwin reproduce stability` what the
+growth of ξ and ζ leads to; the study `tuning` searches other gains.
 """
 
 from typing import Literal

@@ -21,10 +21,9 @@ rest.
 (s + λ)(s² + h(1 + β/δ) s + γ): with λ = ω, h(1 + β/δ) = 2ω and γ = ω² three poles at −ω. β/δ = ½ leaves
 h = 4ω/3 outside.
 
-*Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s. On the tilt (60) with the prototype the largest true
-error of α and β is 0.095° at 66 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study
-`tuning` none beats it in both; a layer six times as wide has 0.097° at 59 A/s, at 43 1/s. On ideal hardware a
-faster one is better: the sinusoid of m = 0.2 and L = 1 has at most 7.7 mrad at 40, 4.6 at 60.
+*Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s, chosen for the tilt (60) with the prototype's hardware; on
+ideal hardware a faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning`
+searches ω and the layer.
 """
 
 from typing import Literal

@@ -12,12 +12,8 @@ the two papers.
 
 *Tuning by one number.* (3ω², 3ω, ω³) puts three poles at −ω; without an integral (ω², 2ω, 0) puts two.
 
-*Default.* ω = 40 1/s, as PID's. On the tilt (60) with the prototype the largest true error of α and β is
-0.099° at 76 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study `tuning` none beats
-it in both; 0.103° at 64 A/s are had at ω = 28 1/s with 1.4 times the damping. On ideal hardware a faster one
-is better: the sinusoid of m = 0.2 and L = 1 has at most 6.4 mrad at 40, 3.8 at 60; without an integral, at
-90, 4.1. What the integral is for shows at m = 0.5 and L = 5: without it the RMS of the second half is 15
-mrad, with it, at 60, 0.2.
+*Default.* ω = 40 1/s, as PID's. On ideal hardware a faster one is better. `spheretwin reproduce rivals` has the
+figures; the study `tuning` searches ω and the damping.
 """
 
 from typing import Literal

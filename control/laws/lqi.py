@@ -12,10 +12,9 @@ stiffness² = w_e² + 2 integral damping and damping² = w_r² + 2 stiffness. Th
 places Butterworth's poles of radius ω; w_e as a share of ω² damps them more; and w_e = √3ω², w_r = √3ω,
 w_i = ω³ are those of PID's triple pole.
 
-*Default.* ω = 60 1/s, no other weight. On the tilt (60) with the prototype the largest true error of α and β
-is 0.103° at 96 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study `tuning` none
-beats it in both; half the variation costs little: 0.113° at 50 A/s for ω = 30 1/s with w_e = 2.9 ω². On ideal
-hardware a faster one is better: the sinusoid of m = 0.2 and L = 1 has at most 5.8 mrad at 60, 4.1 at 80.
+*Default.* ω = 60 1/s, no other weight, chosen for the tilt (60) with the prototype's hardware; on ideal
+hardware a faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning` searches ω
+and w_e.
 """
 
 from typing import Literal

@@ -1,8 +1,7 @@
 """Proportional-derivative law, the paper's baseline: ``v = -stiffness e - damping edot``.
 
-The gains are λ and K of (58), as the paper gives none. With them it errs by 9.0° on the prototype's tilt,
-worst of 20 seeds, at 11 A/s of variation; of 40 trials of the study `tuning`, by 0.14° at 66 A/s with a
-stiffness of 9201 and a damping of 58, by 0.19° at 36 A/s with 5147 and 31.
+The gains are λ and K of (58), as the paper gives none. `spheretwin reproduce figure11` has its errors with
+them; the study `tuning` searches others.
 """
 
 from typing import Literal

@@ -6,11 +6,9 @@ s³ + damping s² + stiffness s + integral. With (3ω, 3ω², ω³) all three po
 *Windup.* The integral is back-calculated at √(integral/damping), ω/√3 for a triple pole: see
 `control.parts.integral_feedback`.
 
-*Default.* ω = 40 1/s: of 30, 35, 38, 40, 42, 45, 50 the one with the least of the largest true errors of any
-hinge on the tilt (60) with the prototype's delay, noise, friction and Kalman filter, median over 20 seeds:
-0.084, 0.081, 0.079, 0.078, 0.080, 0.083, 0.093°. Below it the corners of the reference cost more, above it γ
-hunts between counts of its encoder. On ideal hardware a faster one is better: 0.044° at 40, 0.018° at 100. Of
-the front of 200 trials of the study `tuning` none beats it in error and variation under fresh seeds.
+*Default.* ω = 40 1/s, chosen for the least error on the tilt (60) with the prototype's hardware: below it the
+corners of the reference cost more, above it γ hunts between counts of its encoder. On ideal hardware a faster
+one is better. `spheretwin reproduce rivals` has the figures; the study `tuning` searches all three gains.
 """
 
 from typing import Literal

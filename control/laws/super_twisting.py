@@ -19,11 +19,8 @@ in `control.parts.integral_feedback`, at λ/√3.
 λ = ω, k₁ = 2ω/μ and k₂ = ω²/μ² three poles at −ω. The smaller μ, the more of it is root, and the more
 restless are the currents.
 
-*Default.* ω = 40 1/s, μ = 8. On the tilt (60) with the prototype the largest true error of α and β is 0.104°
-at 89 A/s of variation, worst of 20 seeds. Of the front of 60 trials of the study `tuning` none beats it in
-both; 0.106° at 50 A/s are had at ω = 28 1/s with μ = 19, which is hardly a root any more. On ideal hardware a
-faster one is better: the sinusoid of m = 0.2 and L = 1 has at most 5.6 mrad at 40, 3.4 at 60, and 3.1 at 60
-with μ = 5.
+*Default.* ω = 40 1/s, μ = 8, chosen for the tilt (60) with the prototype's hardware; on ideal hardware a faster
+one is better. `spheretwin reproduce rivals` has the figures; the study `tuning` searches ω and μ.
 """
 
 from math import sqrt

@@ -15,15 +15,23 @@ F = (1 − l e₁ᵀ) A and A is the matrix of a triple integrator over T. Its c
 
     l₁ = 1 − a² b,   l₃ = (1 − a)² (1 − b)/T²,   l₂ = (3 − 2a − b − l₁ − ½ l₃ T²)/T.
 
-*Error.* Only the rate of d drives it, ν = M̂⁻¹ ḋ: ε⁺ = F ε − (1 − l e₁ᵀ) e₃ T ν, so that a constant load
-leaves none. While d rises steadily, l₃ i = T ν gives the error that stays, for small T the second,
+*Error at the ticks.* Only the rate of d drives it, ν = M̂⁻¹ ḋ. Over one period, with s the time that is left
+of it, ε⁺ = F ε − (1 − l e₁ᵀ) ∫ (s²/2, s, 1) ν ds, so that a constant load leaves none. The response of each
+component to a step of d at any instant has one sign: d̂ follows it without overshoot, as l₃ times c₀ z² + c₁ z
++ c₂ and a power of z over the polynomial, with 2c₀ = s², 2c₁ = T² + 2Ts − 2s² and 2c₂ = (T − s)², none below
+0; the innovation is d̂'s step over l₃; and of the rate it is checked for all a, b and s by the tests. The sum
+of magnitudes is then what a steady rise leaves, where l₃ i = T ν. With p = 1/(1 − a) and r = 1/(1 − b) and for
+any d with |ν| ≤ N, beside what is left of the start,
 
-    ε = −(ν/l₃) (T (1 − l₁), l₁ − ½ l₂ T, l₂),
-    ε = −ν (1/(ω_o² ω_d), (2 ω_o + ω_d)/(ω_o² ω_d), 2/ω_o + 1/ω_d).
+    |ε| ≤ N (T³ a² b p² r, T² (p² + 2pr − 3p − 3r/2 + 11/6), T (2p + r − 2)).
 
-The response to one step of d has one sign in each component (d̂ follows it without overshoot, as ½ T² l₃
-times z + 1 and a power of z over the polynomial), so that its sum is its sum of magnitudes: |ν| times these
-factors is also the least bound of |ε| for any d of rate at most |ν|, beside what is left of the start.
+No smaller factors hold: the steady rise attains all three. If d is constant over each period and changes by at
+most N T from one to the next, ε⁺ = F ε − e₃ T ν, and the factors that a staircase attains are
+
+    |ε| ≤ N (T³ a² b p² r, T² (p² + 2pr − 3p − 3r/2 + 7/4), T (2p + r − 3/2)).
+
+Both are for a fixed ω_d, the exact model and a first order in ε. For T → 0 both are
+N (1/(ω_o² ω_d), (2 ω_o + ω_d)/(ω_o² ω_d), 2/ω_o + 1/ω_d).
 
 *Schedule.* ω_d may move from tick to tick, as it likes. The left eigenvectors of the double pole a,
 e₁ᵀA (A − a)⁻¹ and e₁ᵀA (A − a)⁻², do not depend on b: in their coordinates F is triangular for all b at once,

@@ -259,3 +259,38 @@ def test_a_constant_load_leaves_no_error(preset):
     last = run.telemetry.rows(len(run.telemetry) - 100, len(run.telemetry))
     # After 3 s the slowest pole, 20 1/s, has left e^-60 of 0.2 rad; the rest is rounding.
     assert np.abs(last["error_rad"]).max() < 1e-14
+
+
+@pytest.mark.parametrize("bandwidths", [(800.0, 20.0), (800.0, 400.0), (700.0, 100.0)])
+def test_in_a_run_the_error_of_the_observed_disturbance_stays_within_its_bound(actuator, bandwidths):
+    """A slow sinusoidal load on the nominal rotor, held over each period as the loop holds it."""
+    frequency_Hz = bandwidths[1] / 20 / (2 * np.pi)
+    sinusoid = {"kind": "sinusoidal", "amplitude_Nm": [0.0, 0.02, 0.0], "frequency_Hz": [frequency_Hz] * 3}
+    run = simulate(
+        scenarios.load(
+            "hold",
+            {
+                "duration": 8.0,
+                "plant.engine": "lagrangian",
+                "plant.gravity_m_s2": 0.0,
+                "drive.time_constant_s": 0.0,
+                "trajectory.angle_rad": [0.0, 0.0, 0.0],
+                "disturbance.load": 0.0,
+                "disturbance.random_bound_Nm": 0.0,
+                "disturbance.terms": [sinusoid],
+                "controller.law": "afsm_eso",
+                "controller.observer_bandwidth_rad_s": bandwidths[0],
+                "controller.disturbance_bandwidth_rad_s": bandwidths[1],
+                "controller.fast_disturbance_bandwidth_rad_s": bandwidths[1],
+            },
+        )
+    )
+    table, wo, wd = run.telemetry, *bandwidths
+    true = -table["disturbance_Nm"][:, 1]
+    error = np.abs(table["observed_disturbance_Nm"][:, 1] - true)[2000:]  # e^-40 of the start is left
+    a, b = np.exp(-wo * PERIOD), np.exp(-wd * PERIOD)
+    rate = np.abs(np.diff(true)).max() / PERIOD
+    bound = rate * PERIOD * (2 / (1 - a) + 1 / (1 - b) - 1.5)
+    assert error.max() <= bound
+    # At a twentieth of ω_d the sinusoid is nearly a steady rise: its lag loses half of (1/20)² of the peak.
+    assert error.max() > 0.98 * bound

@@ -27,8 +27,9 @@ FORBIDDEN = re.compile(
 NAMES = sorted({name.replace("#", "0") for name, _ in every_field(Scenario)})
 
 VALUES = [
-    None, True, False, 3, -1, 1.5, -1e300, float("nan"), float("inf"), 10**400, "x", "", "12", "x" * 200, [], [1],
-    [1, 2, 3, 4], ["a", "b", "c"], [[1]], [None], [{}], {}, {"a": 1}, {"kind": "x"}, [{"kind": 3}], {"shape": 1},
+    None, True, False, 3, -1, 1.5, -1e300, float("nan"), float("inf"), 10**400, "x", "", "12", "x" * 200,
+    [], [1], [1, 2, 3, 4], ["a", "b", "c"], [[1]], [None], [{}], {}, {"a": 1}, {"kind": "x"},
+    [{"kind": 3}], {"shape": 1},
 ]  # fmt: skip
 
 

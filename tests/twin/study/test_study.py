@@ -13,12 +13,21 @@ PD = [{"law": "pd"}]
 
 
 def test_studies_ship_and_each_has_the_rows_that_it_says():
-    assert shipped() == ["paper", "robustness", "tuning"]
-    paper, robustness, tuning = (load(name) for name in shipped())
-    assert (len(Grid(paper)), len(Grid(robustness)), len(Grid(tuning))) == (108, 10_000, 50)
-    assert [law["law"] for law in paper.law] == ["pd", "adaptive_fuzzy", "afsm"]
-    assert robustness.fields["duration"] == 1.0
-    for chosen in (paper, robustness, tuning):
+    rows = {
+        "compensators": 720,
+        "delays": 320,
+        "estimators": 60,
+        "paper": 108,
+        "robustness": 10_000,
+        "sensors": 480,
+        "tuning": 50,
+    }
+    assert shipped() == list(rows)
+    studies = {name: load(name) for name in shipped()}
+    assert {name: len(Grid(chosen)) for name, chosen in studies.items()} == rows
+    assert [law["law"] for law in studies["paper"].law] == ["pd", "adaptive_fuzzy", "afsm"]
+    assert studies["robustness"].fields["duration"] == 1.0
+    for chosen in studies.values():
         checking.check(Grid(chosen), Rows(chosen))
 
 
