@@ -21,8 +21,8 @@ what is to be said against this estimator; a filter of second order (`kalman`) m
 
 A ramp of the angle is followed with an error that falls by p at each tick; a constant one gives rate 0.
 
-*Default.* ω = 150 1/s, half as much again as AFSM needs on the prototype. In slow motion a count c of an encoder
-is a pulse of (1 − p) c/T, which decays in 1/ω.
+*Default.* ω = 150 1/s, half as much again as AFSM needs on the prototype. In slow motion a count c of an
+encoder is a pulse of (1 − p) c/T, which decays in 1/ω.
 """
 
 from typing import Literal

@@ -46,10 +46,10 @@ Where a largest jerk is known it is given instead. After a jump of the rate by v
 3.1 √(v/L) and three ticks (by simulation; that √(v/L) is the only time there is follows from homogeneity),
 not after so many 1/ω: what is robust to noise is slow after a jump larger than noise.
 
-*Default.* ω = 800 1/s, where noise of 0.02° rms gives L = 40,000 rad/s³ and more noise of the rate than the other
-estimators have. The motion of the paper's sinusoid alone, of 6 rad/s³, would do with much less, but a loop
-makes motions of its own: at a small ω the estimate comes back late after a jump of the rate, and the loop
-loses the rotor. Where references have corners and loads jump, a linear estimator is the better choice.
+*Default.* ω = 800 1/s, where noise of 0.02° rms gives L = 40,000 rad/s³ and more noise of the rate than the
+other estimators have. The motion of the paper's sinusoid alone, of 6 rad/s³, would do with much less, but a
+loop makes motions of its own: at a small ω the estimate comes back late after a jump of the rate, and the
+loop loses the rotor. Where references have corners and loads jump, a linear estimator is the better choice.
 """
 
 import math

@@ -11,10 +11,10 @@ Every estimator is told it, so that they compare. It does not say which is fast 
 loses counts, and that differs with the order.
 
 The defaults come from the loop: AFSM with the paper's gains at 1 kHz, angles with the prototype's noise
-(0.02° rms on α and β, 0.18° a count on γ), one period of delay. Noise costs little but current; what is too slow
-makes the sliding variable swing, which shows first in the largest errors. The study `estimators` measures each
-over its bandwidth on the sinusoid and the nutation; `spheretwin reproduce figure11` draws error and lag of the
-rates alone.
+(0.02° rms on α and β, 0.18° a count on γ), one period of delay. Noise costs little but current; what is too
+slow makes the sliding variable swing, which shows first in the largest errors. The study `estimators`
+measures each over its bandwidth on the sinusoid and the nutation; `spheretwin reproduce figure11` draws error
+and lag of the rates alone.
 """
 
 from __future__ import annotations

@@ -32,8 +32,8 @@ Unlike the difference's it falls with the period: all samples within 1/ω are av
 
 A ramp of the angle is followed with an error that falls by |z| ≈ e^(−ωT/√2) at each tick.
 
-*Default.* ω = 400 1/s has about the noise of the filtered difference at its default with less than half of its
-lag. Being of second order it costs the loop more phase at the same lag.
+*Default.* ω = 400 1/s has about the noise of the filtered difference at its default with less than half of
+its lag. Being of second order it costs the loop more phase at the same lag.
 """
 
 from functools import lru_cache

@@ -4,8 +4,8 @@
 ``theta' = -eta s Psi``, ``xi' = sigma |s|``, ``zeta' = varsigma |s| S``, all from 0. As in the paper, xi and
 zeta only ever grow.
 
-`spheretwin reproduce figure11` has its errors with the printed gains, `spheretwin reproduce stability` what the
-growth of ξ and ζ leads to; the study `tuning` searches other gains.
+`spheretwin reproduce figure11` has its errors with the printed gains, `spheretwin reproduce stability` what
+the growth of ξ and ζ leads to; the study `tuning` searches other gains.
 """
 
 from typing import Literal

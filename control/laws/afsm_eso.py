@@ -49,10 +49,9 @@ Where it is stable a constant load leaves no error, as d̂ rests only where angl
 *Not proven:* the current limit, the lag of the coils, a delay that is not known, the sampled boost.
 `spheretwin reproduce stability` measures how much of each the loop bears.
 
-*Presets.* `ideal` and `fast` are for angles without noise. `prototype` is for the prototype's, with ω_d fixed,
-and has a governor and most of the friction fed forward. `spheretwin reproduce rivals` compares them with the
-other laws, `spheretwin reproduce budget` has what each part of the prototype costs, and the study `sensors`
-which error of the sensors does.
+*Presets.* `ideal` and `fast` are for angles without noise. `prototype` is for the prototype's, with ω_d
+fixed, and has a governor and most of the friction fed forward. `spheretwin reproduce rivals` compares them
+with the other laws; the study `sensors` has what each error of the sensors costs.
 """
 
 from math import exp

@@ -21,8 +21,8 @@ rest.
 (s + λ)(s² + h(1 + β/δ) s + γ): with λ = ω, h(1 + β/δ) = 2ω and γ = ω² three poles at −ω. β/δ = ½ leaves
 h = 4ω/3 outside.
 
-*Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s, chosen for the tilt (60) with the prototype's hardware; on
-ideal hardware a faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning`
+*Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s, chosen for the tilt (60) with the prototype's hardware;
+on ideal hardware a faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning`
 searches ω and the layer.
 """
 

@@ -12,8 +12,8 @@ the two papers.
 
 *Tuning by one number.* (3ω², 3ω, ω³) puts three poles at −ω; without an integral (ω², 2ω, 0) puts two.
 
-*Default.* ω = 40 1/s, as PID's. On ideal hardware a faster one is better. `spheretwin reproduce rivals` has the
-figures; the study `tuning` searches ω and the damping.
+*Default.* ω = 40 1/s, as PID's. On ideal hardware a faster one is better. `spheretwin reproduce rivals` has
+the figures; the study `tuning` searches ω and the damping.
 """
 
 from typing import Literal

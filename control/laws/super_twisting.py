@@ -19,8 +19,8 @@ in `control.parts.integral_feedback`, at λ/√3.
 λ = ω, k₁ = 2ω/μ and k₂ = ω²/μ² three poles at −ω. The smaller μ, the more of it is root, and the more
 restless are the currents.
 
-*Default.* ω = 40 1/s, μ = 8, chosen for the tilt (60) with the prototype's hardware; on ideal hardware a faster
-one is better. `spheretwin reproduce rivals` has the figures; the study `tuning` searches ω and μ.
+*Default.* ω = 40 1/s, μ = 8, chosen for the tilt (60) with the prototype's hardware; on ideal hardware a
+faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning` searches ω and μ.
 """
 
 from math import sqrt

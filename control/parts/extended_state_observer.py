@@ -20,13 +20,13 @@ of it, ε⁺ = F ε − (1 − l e₁ᵀ) ∫ (s²/2, s, 1) ν ds, so that a con
 component to a step of d at any instant has one sign: d̂ follows it without overshoot, as l₃ times c₀ z² + c₁ z
 + c₂ and a power of z over the polynomial, with 2c₀ = s², 2c₁ = T² + 2Ts − 2s² and 2c₂ = (T − s)², none below
 0; the innovation is d̂'s step over l₃; and of the rate it is checked for all a, b and s by the tests. The sum
-of magnitudes is then what a steady rise leaves, where l₃ i = T ν. With p = 1/(1 − a) and r = 1/(1 − b) and for
-any d with |ν| ≤ N, beside what is left of the start,
+of magnitudes is then what a steady rise leaves, where l₃ i = T ν. With p = 1/(1 − a) and r = 1/(1 − b) and
+for any d with |ν| ≤ N, beside what is left of the start,
 
     |ε| ≤ N (T³ a² b p² r, T² (p² + 2pr − 3p − 3r/2 + 11/6), T (2p + r − 2)).
 
-No smaller factors hold: the steady rise attains all three. If d is constant over each period and changes by at
-most N T from one to the next, ε⁺ = F ε − e₃ T ν, and the factors that a staircase attains are
+No smaller factors hold: the steady rise attains all three. If d is constant over each period and changes by
+at most N T from one to the next, ε⁺ = F ε − e₃ T ν, and the factors that a staircase attains are
 
     |ε| ≤ N (T³ a² b p² r, T² (p² + 2pr − 3p − 3r/2 + 7/4), T (2p + r − 3/2)).
 

@@ -334,6 +334,15 @@ def test_an_event_after_the_end_is_warned_of():
         assert session.warnings() == ["the event that sets disturbance.load is not made: the run ends before"]
 
 
+@pytest.mark.parametrize(("start_s", "warns"), [(0.049, False), (0.0495, True), (0.05, True), (3.0, True)])
+def test_a_fault_that_starts_after_the_last_tick_is_warned_of(start_s, warns):
+    """The last tick of 0.05 s is at 0.049 s; a fault starts at the first tick from its time on."""
+    fault = {"target": "coil.00", "mode": "open", "start_s": start_s}
+    with Session(scenarios.load("hold", {"duration": 0.05, "fault": [fault]})) as session:
+        told = f"the fault coil.00 open does not occur: it starts at {start_s:g} s, the run ends at 0.05 s"
+        assert session.warnings() == [told] * warns
+
+
 def test_another_member_keeps_what_it_has_of_the_same_kind(file):
     with Session(hold(**{"controller.surface_slope": 60.0})) as session:
         session.set("controller.law", "adaptive_fuzzy")

@@ -45,6 +45,14 @@ def test_a_restored_session_goes_on_bit_for_bit(law, engine, at):
     assert other.begun_as == original.begun_as
 
 
+@pytest.mark.parametrize("bad", [None, 3, "snapshot", {}, object()])
+def test_what_is_no_snapshot_is_refused(bad):
+    running = session(name="hold")
+    with pytest.raises(InputError, match="session: expected a snapshot of a session, received"):
+        running.restore(bad)
+    assert len(running.advance(2)) == 2
+
+
 def test_a_snapshot_is_not_moved_by_what_the_session_does_next():
     original = session(**WORN)
     original.advance(50)
