@@ -55,7 +55,7 @@ def shown(value: object) -> str:
     What neither of them has is written as Python writes it.
     """
     try:
-        text = _written(value, 0)
+        text = _written(value)
     except ValueError:  # an integer of more digits than Python writes
         return "a number of too many digits"
     except Exception as error:  # an object of the user's, which may raise whatever it will
@@ -65,22 +65,27 @@ def shown(value: object) -> str:
     return shortened(" ".join(line.strip() for line in text.splitlines()), LONGEST_VALUE)
 
 
-def _written(value: object, depth: int) -> str:
-    """Text of a value; what is nested too deeply is left out, and so is what is behind many entries."""
+def _written(value: object, above: tuple[int, ...] = ()) -> str:
+    """Text of a value; what is nested too deeply is left out, and so is what is behind many entries.
+
+    `above` has the identities of the lists and tables that the value is in.
+    """
     if isinstance(value, np.ndarray | np.generic):
         value = value.ravel()[:MOST_ENTRIES].tolist() if value.size > MOST_ENTRIES else value.tolist()
     if value is None or isinstance(value, bool):
         return "none" if value is None else str(value).lower()
-    if isinstance(value, list | tuple | dict) and depth > DEEPEST:
-        return "…"
-    if isinstance(value, list | tuple):
-        texts = [_written(entry, depth + 1) for entry in value[:MOST_ENTRIES]]
-        return f"[{', '.join([*texts, '…'][: len(value)])}]"
+    if not isinstance(value, list | tuple | dict):
+        return repr(value)
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    if id(value) in above or len(above) > DEEPEST:
+        return f"{opening}...{closing}"
+    inside = *above, id(value)
     if isinstance(value, dict):
         pairs = islice(value.items(), MOST_ENTRIES)
-        texts = [f"{_written(name, depth + 1)}: {_written(entry, depth + 1)}" for name, entry in pairs]
-        return f"{{{', '.join([*texts, '…'][: len(value)])}}}"
-    return repr(value)
+        texts = [f"{_written(name, inside)}: {_written(entry, inside)}" for name, entry in pairs]
+    else:
+        texts = [_written(entry, inside) for entry in value[:MOST_ENTRIES]]
+    return f"{opening}{', '.join([*texts, '…'][: len(value)])}{closing}"
 
 
 def is_plain(text: str) -> bool:

@@ -44,7 +44,7 @@ def test_a_dataclass_of_the_file_finds_its_module(tmp_path):
 @pytest.mark.parametrize(
     ("text", "spec", "told"),
     [
-        (None, "gone.py:f", "law: expected a readable file of Python, [Errno 2] No such file"),
+        (None, "gone.py:f", "law: expected a readable file of Python, No such file"),
         ("", "mine.py", "law: expected path/to/file.py:name, received "),
         ("", "mine.txt:f", "law: expected path/to/file.py:name, received "),
         ("", "mine.py:", "law: expected path/to/file.py:name, received "),

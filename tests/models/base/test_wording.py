@@ -47,8 +47,8 @@ def test_what_cannot_be_shown_is_escaped(text, shown):
 
 
 def test_a_long_value_keeps_both_its_ends_and_its_sentence():
-    line = one_line(f"seed: expected a valid integer, received 12{'9' * 5000}34, which is none")
-    assert line.startswith("seed: expected a valid integer, received 129")
+    line = one_line(f"seed: expected a whole number, received 12{'9' * 5000}34, which is none")
+    assert line.startswith("seed: expected a whole number, received 129")
     assert line.endswith("934, which is none")
     assert "…" in line
     assert len(line) < LONGEST_WORD + 100

@@ -103,13 +103,13 @@ def test_every_part_is_a_flag_and_told():
 @pytest.mark.parametrize(
     ("field", "value", "part"),
     [
-        ("governor.acceleration_rad_s2", 0.0, "governor.acceleration_rad_s2.0: expected greater than 0"),
+        ("governor.acceleration_rad_s2", 0.0, "governor.acceleration_rad_s2.0: expected a number greater than 0"),
         ("governor.acceleration", 1.0, "expected one of acceleration_rad_s2 in controller.governor"),
-        ("prediction.on", 1, "prediction.on: expected a valid boolean"),
+        ("prediction.on", 1, "prediction.on: expected true or false"),
         (
             "feed_forward.friction",
             [1.0, -0.1, 0.0],
-            "feed_forward.friction.1: expected greater than or equal",
+            "feed_forward.friction.1: expected a number greater than or equal",
         ),
     ],
 )

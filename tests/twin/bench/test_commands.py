@@ -70,7 +70,7 @@ def test_a_value_is_refused_in_the_words_of_the_command_line(common, name, value
         ("speed", {"factor": 0.01}, "bench: speed: factor: expected"),
         ("speed", {}, "factor: expected a value, received none"),
         ("speed", {"factor": 1.0, "colour": "red"}, "bench: speed: expected factor, received colour"),
-        ("speed", {"factor": "2"}, "bench: speed: factor: expected a valid number, received '2'"),
+        ("speed", {"factor": "2"}, "bench: speed: factor: expected a number, received '2'"),
         ("off", {"now": True}, "expected no arguments, received now"),
         ("off", {"now": {1, 2}}, "received now"),
         ("point", {"pose_rad": [0, 1]}, "pose_rad"),

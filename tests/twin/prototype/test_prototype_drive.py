@@ -147,9 +147,9 @@ def test_the_controller_reckons_with_the_drive_s_delay_and_bandwidth():
     [
         ({"drive.supply_V": 24.0, "drive.time_constant_s": 1e-3}, "either a supply_V"),
         ({"drive.delay_s": 3e-4}, "expected drive.delay_s a whole multiple of plant.step_s"),
-        ({"drive.delay_s": -1e-3}, "drive.delay_s: expected greater than or equal to 0"),
+        ({"drive.delay_s": -1e-3}, "drive.delay_s: expected a number greater than or equal to 0"),
         ({"drive.supply_V": 4.0, "drive.drop_up_V": 4.8}, "below drive.supply_V"),
-        ({"drive.dac_bits": 16.5}, "drive.dac_bits: expected a valid integer"),
+        ({"drive.dac_bits": 16.5}, "drive.dac_bits: expected a whole number"),
     ],
 )
 def test_a_drive_that_cannot_be_is_refused_on_one_line(changes, part):

@@ -33,7 +33,7 @@ def loaded(tmp_path, text):
         ),
         (
             HOLD + 'kind = "constant"\ntorque_Nm = [1.0, 2.0, "x"]',
-            "disturbance.terms.0.torque_Nm.2: expected a valid number, received 'x'",
+            "disturbance.terms.0.torque_Nm.2: expected a number, received 'x'",
         ),
         (
             SINES + "amplitude = [1.0, 2.0, 3.0]",

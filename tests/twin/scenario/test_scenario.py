@@ -67,8 +67,8 @@ def test_flags_reach_every_field():
         ({"duration": -1.0}, ["duration", "greater than 0", "-1"]),
         ({"duration": 1e-9}, ["duration", "control period"]),
         ({"duration": "long"}, ["duration", "number", "long"]),
-        ({"seed": 1.5}, ["seed", "integer", "1.5"]),
-        ({"seed": True}, ["seed", "integer", "True"]),
+        ({"seed": 1.5}, ["seed", "whole number", "1.5"]),
+        ({"seed": True}, ["seed", "whole number", "true"]),
         ({"plant.payload_kg": -0.1}, ["payload_kg", "0", "-0.1"]),
         ({"plant.modelling_error": -1.0}, ["modelling_error", "-1"]),
         ({"drive.current_limit_A": 0}, ["current_limit_A", "greater than 0", "0"]),
@@ -89,7 +89,7 @@ def test_flags_reach_every_field():
         ({"trajectory": 3}, ["trajectory", "3"]),
         ({"controller.period_s": 1.0000001e-3}, ["received 0.0010000001 and 0.0005 s"]),
         ({"seed": 10**5000}, ["digits"]),
-        ({"seed": "9" * 5000}, ["seed", "integer", "9…9"]),
+        ({"seed": "9" * 5000}, ["seed", "whole number", "9…9"]),
         ({"seed": None}, ["seed", "None"]),
         ({"name": "a\x1b[31mb"}, ["name: expected text without control characters", r"a\x1b[31mb"]),
         ({"name": "a\nb"}, ["name", r"a\nb"]),
@@ -184,7 +184,7 @@ def test_a_description_may_have_several_lines(tmp_path):
 def test_a_long_seed_is_taken_and_an_endless_one_told():
     assert scenarios.load("hold", flags.overrides(["--seed", "9" * 4000])).seed == 10**4000 - 1
     for digits in (4301, 100_000):
-        with pytest.raises(InputError, match=r"seed: expected a valid integer, received '9+…9+'"):
+        with pytest.raises(InputError, match=r"seed: expected a whole number, received '9+…9+'"):
             scenarios.load("hold", flags.overrides(["--seed", "9" * digits]))
 
 

@@ -196,7 +196,7 @@ def not_compilable(t, reference, measurement, parameters, state, torque):
 REFUSED = [
     ("disturbance.loud", 1.0, "did you mean load"),
     ("disturbance.load", 1e9, "1000"),
-    ("disturbance.load", "much", "valid number"),
+    ("disturbance.load", "much", "expected a number"),
     ("disturbance.load", float("nan"), "finite number"),
     ("controller.law", "pdd", "did you mean pd"),
     ("controller.law", 3, "expected one of pd, pid, lqi"),

@@ -84,7 +84,7 @@ def test_a_table_in_many_batches_has_the_same_rows(whole, tmp_path, monkeypatch)
 def test_a_row_that_is_refused_is_a_row_with_its_error(tmp_path):
     rows = found(study(values("plant.payload_kg", 0.0, -1.0, 0.01)), tmp_path)
     assert [row["status"] for row in rows] == ["completed", "refused", "completed"]
-    assert "plant.payload_kg: expected greater than or equal to 0, received -1.0" in rows[1]["error"]
+    assert "plant.payload_kg: expected a number greater than or equal to 0, received -1.0" in rows[1]["error"]
     assert rows[1]["rms_error_rad"] is rows[0]["error"] is None
 
 

@@ -51,7 +51,7 @@ def failing(t):
 @pytest.mark.parametrize(
     ("own", "complaint"),
     [
-        (None, "an object with sample(t), received None"),
+        (None, "an object with sample(t), received none"),
         (3.0, "an object with sample(t), received 3.0"),
         (Own, "an object with sample(t), received <class"),
         (Own(1.0), "an object with sample(t)"),

@@ -145,7 +145,7 @@ def test_the_page_tells_of_a_study(tmp_path):
         (row for row in told if row["status"] == "completed"), key=lambda row: max(row["max_abs_error_rad"])
     )
     assert f"| {worst['row']} | `{worst['key']}` |" in text
-    assert "payload_kg: expected greater than or equal to 0, received -1.0 | 12 |" in text
+    assert "payload_kg: expected a number greater than or equal to 0, received -1.0 | 12 |" in text
     assert "`spheretwin sweep 'my study.toml' --row KEY`" in text
     for line in text.splitlines():
         if line.startswith("!["):
