@@ -20,7 +20,7 @@ from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, 
 from spheretwin.models.base.callbacks import function_at
 from spheretwin.models.base.compiled import compilable
 from spheretwin.models.kinematics import cartesian_torque
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix
+from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, kept_matrix
 
 # Whatever a law may ask for while it loses the rotor; beyond it the allocation's products would overflow.
 LARGEST_TORQUE_Nm = 1e100
@@ -75,7 +75,6 @@ class Controller(NamedTuple):
 def controller(
     law: laws.Law,
     magnetics: TorqueModel,
-    kept: KeptMatrix,
     current_limit_A: float,
     logged: int,
     belief: Belief,
@@ -92,8 +91,6 @@ def controller(
         Its parameters and state are copied: a law may change both.
     magnetics : TorqueModel
         Nominal.
-    kept : KeptMatrix
-        Shared with the plant only where both have the same model.
     current_limit_A : float, A
         Largest group current the controller asks for.
     logged : int
@@ -113,7 +110,7 @@ def controller(
         parameters=law.parameters.copy(),
         memory=law.state.copy(),
         magnetics=magnetics,
-        kept=kept,
+        kept=kept_matrix(magnetics),
         current_limit_A=current_limit_A,
         logged=logged,
         torque_q=np.zeros(3),
@@ -238,16 +235,17 @@ def _supervise(controller: Controller, t: float) -> None:
 
 @compilable
 def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64]) -> float:
-    """Currents for the law's torque, from the groups that may be used."""
+    """Currents for the law's torque, from the groups that may be used.
+
+    The allocation is handed a copy of the torque matrix: what it writes reaches nothing else.
+    """
     groups, pose, G = controller.supervision.groups, controller.pose, controller.kept.G
     if controller.around.prediction.on:
         pose, G = controller.around.prediction.pose, controller.around.prediction.kept.G
     cartesian_torque(pose, controller.torque_q, controller.torque_S)
-    if groups.some_out[0]:
-        leave_out(groups, G)
-        G = groups.G
+    leave_out(groups, G)
     return allocation_at(allocate)(
-        G, controller.torque_S, controller.current_limit_A, command, controller.scratch
+        groups.G, controller.torque_S, controller.current_limit_A, command, controller.scratch
     )
 
 

@@ -20,7 +20,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import shown, without_breaks
 from spheretwin.models.lagrangian import loaded_inertia
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, scratch_of, torque_model
+from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
 from spheretwin.models.telemetry.signals import (
     Signal,
     common_signals,
@@ -28,7 +28,6 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
-from spheretwin.twin.electronics.sensing.chain import reckoned
 from spheretwin.twin.faults.plan import part_names
 from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.friction import Friction, friction
@@ -36,14 +35,13 @@ from spheretwin.twin.plant.plant import Plant
 from spheretwin.twin.plant.registry import ENGINES
 from spheretwin.twin.plant.rotor import Rotor, Setting
 from spheretwin.twin.scenario.files import Files
-from spheretwin.twin.scenario.sections import Plant as PlantSection
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedPlant, ResolvedScenario
 from spheretwin.twin.wiring.wires import Wires, driving_of
 
 Array = NDArray[np.float64]
 
 
-def law_of(scenario: Scenario) -> Law:
+def law_of(scenario: ResolvedScenario) -> Law:
     """Law that a resolved scenario names, for its nominal model.
 
     Raises
@@ -67,22 +65,22 @@ def law_of(scenario: Scenario) -> Law:
     return law
 
 
-def same_known(scenario: Scenario, other: Scenario) -> bool:
+def same_known(scenario: ResolvedScenario, other: ResolvedScenario) -> bool:
     """Whether a law is told the same of both."""
     first, second = _known(scenario), _known(other)
     same = np.array_equal(first.inertia, second.inertia)
     return same and first._replace(inertia=second.inertia) == second
 
 
-def _known(scenario: Scenario) -> Known:
+def _known(scenario: ResolvedScenario) -> Known:
     nominal, period_s = scenario.nominal, scenario.controller.period_s
-    delay_s, inertia = nominal.delay_s or 0.0, np.array(nominal.inertia_kg_m2)
+    delay_s, inertia = nominal.delay_s, np.array(nominal.inertia_kg_m2)
     if scenario.controller.prediction.on:
         return Known(period_s, 0.0, inertia, ahead_s=delay_s)
     return Known(period_s, delay_s, inertia)
 
 
-def signals_of(scenario: Scenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
+def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
     """Columns of a run's telemetry: common ones, those of its stages, then the law's own.
 
     Raises
@@ -108,49 +106,56 @@ def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
     return Places(of_stages, width(signals) - width(law.signals))
 
 
-def nominal_magnetics(scenario: Scenario, files: Files) -> TorqueModel:
-    """Magnetics as the controller has them; the plant's very own where nothing says otherwise."""
+def nominal_magnetics(scenario: ResolvedScenario, files: Files) -> TorqueModel:
+    """Magnetics of the controller's data sheet."""
     model, scale = torque_model(files.nominal), scenario.nominal.torque_scale
     return model if scale == 1 else model._replace(line_weights=scale * model.line_weights)
 
 
-def estimator_of(scenario: Scenario) -> Estimator | None:
-    """Estimator of the rates, tuned to what the controller reckons with; None where the rates are true.
+def estimator_of(scenario: ResolvedScenario) -> Estimator | None:
+    """Estimator of the rates, tuned to the nominal sensors; None where the rates are true.
 
     Raises
     ------
     InputError
         Its parameters do not fit the control period or the sensors.
     """
-    noise_rad, quantum_rad = reckoned(scenario.sensors)
+    nominal = scenario.nominal
+    noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
     return scenario.estimator.build(Sampling(scenario.controller.period_s, noise_rad, quantum_rad))
 
 
 def controller_of(
-    scenario: Scenario,
+    scenario: ResolvedScenario,
     law: Law,
     magnetics: TorqueModel,
-    kept: KeptMatrix,
     estimator: Estimator | None,
     supervision: Supervision,
 ) -> Controller:
     """Controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
-    limit_A, lag_s = nominal.current_limit_A or 0.0, nominal.time_constant_s or 0.0
     asked = law.asks_torque or scenario.detects or scenario.controller.prediction.on
-    believed = belief(asked, groups, scenario.controller.period_s, nominal.delay_s or 0.0, lag_s)
+    believed = belief(asked, groups, scenario.controller.period_s, nominal.delay_s, nominal.time_constant_s)
     around = _around_of(scenario, magnetics)
     by_hand = manual(scenario.manual, groups)
     return controller(
-        law, magnetics, kept, limit_A, width(law.signals), believed, around, supervision, by_hand, estimator
+        law,
+        magnetics,
+        nominal.current_limit_A,
+        width(law.signals),
+        believed,
+        around,
+        supervision,
+        by_hand,
+        estimator,
     )
 
 
-def _around_of(scenario: Scenario, magnetics: TorqueModel) -> Around:
+def _around_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Around:
     """What stands around the law of a resolved scenario."""
     section, nominal, known = scenario.controller, scenario.nominal, _known(scenario)
-    delayed = Delayed(known.period_s, known.ahead_s, nominal.time_constant_s or 0.0, known.inertia)
-    rotor = NominalRotor(known.inertia, _each(nominal.coulomb_Nm), _each(nominal.viscous_Nm_s))
+    delayed = Delayed(known.period_s, known.ahead_s, nominal.time_constant_s, known.inertia)
+    rotor = NominalRotor(known.inertia, np.array(nominal.coulomb_Nm), np.array(nominal.viscous_Nm_s))
     return Around(
         section.governor.on or section.prediction.on or section.feed_forward.on,
         governor(section.governor, known.period_s),
@@ -159,11 +164,7 @@ def _around_of(scenario: Scenario, magnetics: TorqueModel) -> Around:
     )
 
 
-def _each(values: tuple[float, float, float] | None) -> Array:
-    return np.array(values or (0.0, 0.0, 0.0))
-
-
-def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, wires: Wires) -> Plant:
+def plant_of(scenario: ResolvedScenario, actuator: Actuator, stepped: Any, wires: Wires) -> Plant:
     """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
     section, groups, magnetics = scenario.plant, len(actuator.groups), torque_model(actuator)
     return Plant(
@@ -173,7 +174,7 @@ def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, wires: Wires)
         scratch=scratch_of(magnetics),
         driving=driving_of(scenario, groups, wires),
         friction=_friction(section, actuator),
-        group_gain=group_gain_of(section, groups),
+        group_gain=np.array(section.group_gain),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
         hinge_range=actuator.hinge_range_rad,
         substeps=scenario.substeps,
@@ -193,12 +194,7 @@ def plant_of(scenario: Scenario, actuator: Actuator, stepped: Any, wires: Wires)
     )
 
 
-def group_gain_of(section: PlantSection, groups: int) -> Array:
-    """Torque an ampere of each group over that of the torque curve, (n,), while none fails."""
-    return np.array(section.group_gain or (1.0,) * groups)
-
-
-def _friction(section: PlantSection, actuator: Actuator) -> Friction:
+def _friction(section: ResolvedPlant, actuator: Actuator) -> Friction:
     height = float(actuator.payload_mount_m[2])
     return friction(
         np.array(section.coulomb_Nm),
@@ -209,7 +205,7 @@ def _friction(section: PlantSection, actuator: Actuator) -> Friction:
     )
 
 
-def rotor_of(scenario: Scenario, files: Files) -> Rotor:
+def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:
     """Rotor of a resolved scenario, in the engine that it names.
 
     Raises

@@ -13,15 +13,14 @@ from spheretwin.models.telemetry.signals import Signal
 from spheretwin.twin import assembly, resolving
 from spheretwin.twin.scenario.changing import changed
 from spheretwin.twin.scenario.files import Files, files_again, files_of
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, checked
 
 
 class InForce(NamedTuple):
     """All that a machine is built from; a change gives another."""
 
-    scenario: Scenario
-    """Resolved."""
+    scenario: ResolvedScenario
     files: Files
     own_law: Law | None
     own_trajectory: OwnTrajectory | None

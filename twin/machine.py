@@ -16,7 +16,6 @@ from spheretwin.control.supervision import detector, groups, watchdog
 from spheretwin.control.supervision.watchdog import REASONS, Reason
 from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.magnetics import kept_matrix
 from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
@@ -24,8 +23,7 @@ from spheretwin.twin.electronics.driving import stages as drivings
 from spheretwin.twin.electronics.sensing import stages as senses
 from spheretwin.twin.plant.rotor import Rotor
 from spheretwin.twin.scenario.files import Files
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.trajectories.trajectory import Triple
+from spheretwin.twin.scenario.sections import ResolvedScenario
 from spheretwin.twin.wiring import wires as wiring
 from spheretwin.twin.wiring.matching import matching
 
@@ -74,8 +72,7 @@ class Machine:
 
     Parameters
     ----------
-    scenario : Scenario
-        Resolved.
+    scenario : ResolvedScenario
     files : Files
         Model and torque curves.
     law : Law
@@ -98,7 +95,9 @@ class Machine:
         The engine does not know all that the model holds, or the law cannot be used.
     """
 
-    def __init__(self, scenario: Scenario, files: Files, law: Law, moving: Moving | None = None) -> None:
+    def __init__(
+        self, scenario: ResolvedScenario, files: Files, law: Law, moving: Moving | None = None
+    ) -> None:
         self._scenario = scenario
         self._moving = moving or _started(scenario, files)
         self._last = Last(np.empty(0), np.empty(0), np.zeros(len(files.actuator.groups)))
@@ -109,9 +108,7 @@ class Machine:
         estimator = assembly.estimator_of(scenario)
         joined = wiring.wires_of(scenario, len(files.actuator.groups))
         supervision = wiring.supervision_of(scenario, files.nominal, joined)
-        self._controller = assembly.controller_of(
-            scenario, self.law, magnetics, kept_matrix(magnetics), estimator, supervision
-        )
+        self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, supervision)
         self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, joined)
         self._sensors = wiring.sensors_of(scenario, joined)
         self._faults = wiring.faults_of(scenario, self._plant, self._sensors, supervision.groups)
@@ -162,7 +159,7 @@ class Machine:
             )
         return ticks, code
 
-    def changed(self, scenario: Scenario, files: Files, own_law: Law | None) -> Machine:
+    def changed(self, scenario: ResolvedScenario, files: Files, own_law: Law | None) -> Machine:
         """Machine of another scenario that carries on what this one is in the midst of.
 
         A law that stays keeps its memory, and its parameters, which it may have changed. With other gains, or
@@ -196,7 +193,7 @@ class Machine:
             after.memory[:] = before.memory
         arounds.carried_on(before.around, after.around)
 
-    def _law_for(self, scenario: Scenario) -> Law:
+    def _law_for(self, scenario: ResolvedScenario) -> Law:
         """Law that a scenario names: the present one where nothing that it is made from has changed."""
         before = self._scenario
         same = before.controller.alone() == scenario.controller.alone()
@@ -258,12 +255,12 @@ class Machine:
         self._last = state.last
 
 
-def _started(scenario: Scenario, files: Files) -> Moving:
+def _started(scenario: ResolvedScenario, files: Files) -> Moving:
     rotor, section = assembly.rotor_of(scenario, files), scenario.plant
-    return Moving(rotor, rotor.start(_array(section.initial_rad), _array(section.initial_rad_s)))
+    return Moving(rotor, rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s)))
 
 
-def _carried_on(moving: Moving, scenario: Scenario, files: Files) -> Moving:
+def _carried_on(moving: Moving, scenario: ResolvedScenario, files: Files) -> Moving:
     """Rotor of another scenario, in the same state."""
     rotor, state = assembly.rotor_of(scenario, files), moving.rotor.state()
     stepped = rotor.start(moving.stepped.q, moving.stepped.qdot)
@@ -278,10 +275,6 @@ def _supervised_on(before: Supervision, after: Supervision) -> None:
     if before.detector.on:
         detector.restore(after.detector, detector.state_of(before.detector))
     watchdog.carried_on(before.watchdog, after.watchdog)
-
-
-def _array(values: Triple | None) -> NDArray[np.float64]:
-    return np.array(values or (0.0, 0.0, 0.0))
 
 
 def _check_length(what: str, received: NDArray[np.float64], own: NDArray[np.float64]) -> None:

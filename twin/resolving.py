@@ -1,28 +1,40 @@
-"""What a scenario leaves open, filled in from its files; what it overrides in them; its lists, checked."""
+"""Defaults of a scenario from its files; what it overrides in them; checks of its lists."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 import mujoco
 import numpy as np
+from pydantic import BaseModel
 
 from spheretwin.control.law import Law
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models import mjcf
-from spheretwin.models.actuator import Actuator
+from spheretwin.models.actuator import Actuator, Group
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.base.wording import told_apart
+from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import disagreements
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.models.model_file.joint import HINGES
-from spheretwin.twin.electronics.driving.sections import DriveSection
+from spheretwin.twin.electronics.data_sheet import drive_sheet, sensor_sheet
+from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedDrive
+from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.faults.fault import Fault
 from spheretwin.twin.plant.engine import integrator_name
-from spheretwin.twin.scenario.files import Files
+from spheretwin.twin.scenario.files import Files, nominal_curve
 from spheretwin.twin.scenario.planned import first_tick, planned
-from spheretwin.twin.scenario.sections import OwnController, OwnPath, Scenario
+from spheretwin.twin.scenario.sections import (
+    OwnController,
+    OwnPath,
+    ResolvedNominal,
+    ResolvedPlant,
+    ResolvedScenario,
+    Scenario,
+)
 from spheretwin.twin.scenario.sections import Plant as PlantSection
 from spheretwin.twin.trajectories.registry import SHAPES
 from spheretwin.twin.trajectories.trajectory import OwnTrajectory, Sampled, Triple
@@ -33,8 +45,10 @@ UNWRITTEN_INTEGRATOR = "Euler"
 UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
 
 
-def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None) -> Scenario:
-    """Scenario whose open values are filled in from the model and the trajectory.
+def resolved(
+    scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None
+) -> ResolvedScenario:
+    """Return a scenario with every default filled in, from its files, its trajectory and its hardware.
 
     Raises
     ------
@@ -42,57 +56,93 @@ def resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnT
         The first pose is outside the hinges' range, a list does not fit the actuator, or the law is made for
         another control period.
     """
-    actuator, given, nominal, section = files.actuator, scenario.drive, scenario.nominal, scenario.plant
-    group = actuator.group
-    lag_s, limit_A = given.time_constant_s, given.current_limit_A
-    resistance_ohm = group.resistance_ohm if given.resistance_ohm is None else given.resistance_ohm
-    inductance_H = group.inductance_H if given.inductance_H is None else given.inductance_H
-    if lag_s is None and given.supply_V is None:
-        lag_s = inductance_H / resistance_ohm
-    drive_section = given.model_copy(
-        update={
-            "time_constant_s": lag_s,
-            "current_limit_A": group.current_limit_A if limit_A is None else limit_A,
-            "resistance_ohm": resistance_ohm,
-            "inductance_H": inductance_H,
-        }
+    actuator, section = files.actuator, scenario.plant
+    _check_groups(scenario, actuator)
+    drive = _drive(scenario.drive, actuator.group)
+    plant = _with(
+        ResolvedPlant,
+        section,
+        initial_rad=section.initial_rad or _first_pose(trajectory or scenario.trajectory),
+        gravity_m_s2=_gravity(section, files.model),
+        group_gain=section.group_gain or (1.0,) * len(actuator.groups),
     )
-    filled: dict[str, Any] = {
-        "drive": drive_section,
-        "nominal": nominal.model_copy(
-            update={
-                "inertia_kg_m2": nominal.inertia_kg_m2 or tuple(actuator.inertia.tolist()),
-                "current_limit_A": nominal.current_limit_A or drive_section.current_limit_A,
-                "time_constant_s": (
-                    lag_of(drive_section) if nominal.time_constant_s is None else nominal.time_constant_s
-                ),
-                "delay_s": given.delay_s if nominal.delay_s is None else nominal.delay_s,
-                "coulomb_Nm": nominal.coulomb_Nm or section.coulomb_Nm,
-                "viscous_Nm_s": nominal.viscous_Nm_s or section.viscous_Nm_s,
-            }
-        ),
-        "plant": section.model_copy(
-            update={
-                "initial_rad": section.initial_rad or _first_pose(trajectory or scenario.trajectory),
-                "gravity_m_s2": _gravity(section, files.model),
-            }
-        ),
-    }
+    made = _with(
+        ResolvedScenario, scenario, drive=drive, plant=plant, nominal=_nominal(scenario, drive, actuator)
+    )
     if law:
         law.check_period(scenario.controller.period_s)
-        filled["controller"] = OwnController(
+        controller = OwnController(
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
             parameters=tuple(law.parameters.tolist()),
             **scenario.controller.around,
         )
+        made = made.model_copy(update={"controller": controller})
     if trajectory:
-        filled["trajectory"] = OwnPath(shape=name_of_own(trajectory.name))
-    made = scenario.model_copy(update=filled)
-    _check_pose(made.plant.initial_rad or (0.0, 0.0, 0.0), actuator)
-    _check_groups(made, actuator)
+        made = made.model_copy(update={"trajectory": OwnPath(shape=name_of_own(trajectory.name))})
+    _check_pose(plant.initial_rad, actuator)
     _check_faults(made.fault, actuator)
     return made
+
+
+Section = TypeVar("Section", bound=BaseModel)
+
+
+def _with(kind: type[Section], section: BaseModel, **values: Any) -> Section:
+    """Section of a resolved kind: the fields of one that is checked, some of them with other values."""
+    return kind.model_construct(**{**dict(section), **values})
+
+
+def _drive(section: DriveSection, group: Group) -> ResolvedDrive:
+    """Drive whose coils and limit are the model file's unless given, and so its lag without a supply."""
+    sheet = {
+        "resistance_ohm": group.resistance_ohm,
+        "inductance_H": group.inductance_H,
+        "current_limit_A": group.current_limit_A,
+    }
+    drive = _with(ResolvedDrive, section, **_given_or(section, sheet))
+    if drive.time_constant_s is not None or drive.supply_V is not None:
+        return drive
+    return drive.model_copy(update={"time_constant_s": drive.inductance_H / drive.resistance_ohm})
+
+
+def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> ResolvedNominal:
+    """Data sheet of the controller: a value that is not given is the model file's, or the true one."""
+    section = scenario.nominal
+    sheet = _truth(scenario, drive, actuator) if section.equals_truth else _model_sheet(actuator)
+    sheet["torque_curve"] = nominal_curve(scenario)
+    return _with(ResolvedNominal, section, **_given_or(section, sheet))
+
+
+def _given_or(section: BaseModel, sheet: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of a sheet, in place of each the value of the section where that is given."""
+    given = {name: getattr(section, name) for name in sheet}
+    return {name: sheet[name] if value is None else value for name, value in given.items()}
+
+
+def _model_sheet(actuator: Actuator) -> dict[str, Any]:
+    """Nominal values of a model file: ideal sensors, amplifiers and bearings, and the coils' lag."""
+    group, ideal = actuator.group, (0.0, 0.0, 0.0)
+    return {
+        "coulomb_Nm": ideal,
+        "viscous_Nm_s": ideal,
+        "inertia_kg_m2": tuple(actuator.inertia.tolist()),
+        **drive_sheet(_drive(DriveSection(), group)),
+        **sensor_sheet(SensorsSection()),
+    }
+
+
+def _truth(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> dict[str, Any]:
+    """Nominal values that are true: with the modelling error and the payload in the inertia."""
+    plant, height_m = scenario.plant, float(actuator.payload_mount_m[2])
+    inertia = loaded_inertia((1 + plant.modelling_error) * actuator.inertia, plant.payload_kg, height_m)
+    return {
+        "coulomb_Nm": plant.coulomb_Nm,
+        "viscous_Nm_s": plant.viscous_Nm_s,
+        "inertia_kg_m2": tuple(inertia.tolist()),
+        **drive_sheet(drive),
+        **sensor_sheet(scenario.sensors),
+    }
 
 
 def warnings_of(scenario: Scenario, files: Files) -> list[str]:
@@ -140,11 +190,6 @@ def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
 def name_of_own(name: str) -> str:
     """Name of a law or trajectory of the user's, where it must not be taken for one that can be had."""
     return f"{name} of the user's" if name in LAWS or name in SHAPES or is_reference(name) else name
-
-
-def lag_of(drive: DriveSection) -> float:
-    """Lag of the currents while no voltage is at its limit."""
-    return 1 / drive.bandwidth_rad_s if drive.supply_V is not None else drive.time_constant_s or 0.0
 
 
 def _first_pose(trajectory: Sampled) -> Triple:

@@ -32,7 +32,7 @@ from spheretwin.twin.scenario.changing import from_now_on, is_fixed
 from spheretwin.twin.scenario.files import Files
 from spheretwin.twin.scenario.planned import planned
 from spheretwin.twin.scenario.reading import as_plain, is_dotted
-from spheretwin.twin.scenario.sections import OwnPath, Scenario
+from spheretwin.twin.scenario.sections import OwnPath, ResolvedScenario, Scenario
 from spheretwin.twin.snapshot import OwnLaws, Snapshot
 from spheretwin.twin.trajectories.trajectory import Sampled
 
@@ -53,8 +53,8 @@ class Session:
 
     Attributes
     ----------
-    begun_as : Scenario
-        The scenario at tick 0, resolved; with the journal it says all that has happened.
+    begun_as : ResolvedScenario
+        The scenario at tick 0; with the journal it says all that has happened.
     signals : tuple of Signal
         Columns of the telemetry; a change of law, friction or sensors may change them.
     journal : tuple of Change
@@ -106,7 +106,7 @@ class Session:
         return self._in_force.files.actuator
 
     @property
-    def scenario(self) -> Scenario:
+    def scenario(self) -> ResolvedScenario:
         """In force now: what was left open is filled in from the model and the trajectory."""
         return self._in_force.scenario
 

@@ -18,7 +18,7 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, allocated
 from spheretwin.twin.faults.told import FaultLines
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedScenario, Scenario
 from spheretwin.twin.session import Session
 from spheretwin.twin.trajectories.trajectory import Sampled
 
@@ -46,8 +46,8 @@ class Run:
 
     Attributes
     ----------
-    scenario : Scenario
-        Resolved: what was left open is filled in from the model and the trajectory.
+    scenario : ResolvedScenario
+        In force at the start: what was left open is filled in from the model and the trajectory.
     status : Status
         ``completed``, or why it ended before.
     telemetry : Table
@@ -58,7 +58,7 @@ class Run:
         What was simulated.
     """
 
-    scenario: Scenario
+    scenario: ResolvedScenario
     status: Status
     telemetry: Table
     wall_s: float

@@ -12,7 +12,7 @@ from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.machine import State
 from spheretwin.twin.scenario.files import Files, digest
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedScenario
 
 
 class OwnLaws:
@@ -58,8 +58,8 @@ class OwnLaws:
 class Snapshot:
     """A session at one tick; it can be pickled."""
 
-    scenario: Scenario
-    begun_as: Scenario
+    scenario: ResolvedScenario
+    begun_as: ResolvedScenario
     own_law: str | None
     files: str
     """Digest of model and torque curves."""

@@ -55,16 +55,16 @@ class DetectorSection(BaseModel):
     detect: bool = Field(False, description="whether the controller looks for groups that do not follow")
     threshold_A: Annotated[float, Field(ge=1e-6, le=1e3)] | None = Field(
         None,
-        description="current below which a group may carry none, A; derived unless given",
+        description="current below which a group may carry none, A; derived from `nominal` unless given",
     )
     ticks: Annotated[int, Field(ge=1, le=1000)] | None = Field(
         None,
-        description="control ticks in a row that must speak for a fault; derived from the drive unless given",
+        description="control ticks in a row that must speak for a fault; derived from `nominal` unless given",
     )
 
 
 class Followed(NamedTuple):
-    """What the controller reckons with of its drive and of the sensors of its currents."""
+    """Nominal drive and nominal sensors of the currents."""
 
     period_s: float
     current_limit_A: float

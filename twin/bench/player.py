@@ -46,7 +46,7 @@ class Player:
         self.period_s = run.period_s
         self.name, self.law = str(scenario["name"]), str(scenario["controller"]["law"])
         self.shape, self.allocation = str(scenario["trajectory"]["shape"]), str(scenario["allocation"])
-        self.current_limit_A = float(scenario["nominal"]["current_limit_A"] or 0.0)
+        self.current_limit_A = float(scenario["nominal"]["current_limit_A"])
         self.place = 1
         self.history = History(groups, self.period_s)
         self.history.write(0, self.row)

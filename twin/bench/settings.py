@@ -6,7 +6,7 @@ from typing import Any
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.scenario.changing import changed
-from spheretwin.twin.scenario.hardware import HARDWARE
+from spheretwin.twin.scenario.hardware import fields_of_set
 from spheretwin.twin.scenario.reading import override, validated
 from spheretwin.twin.scenario.sections import Scenario
 
@@ -37,8 +37,9 @@ def _with_hardware(settings: Scenario, hardware: str) -> Scenario:
     fields = settings.model_dump(mode="json")
     fields["hardware"] = hardware
     untouched = Scenario(trajectory=settings.trajectory).model_dump(mode="json")
-    plain = {dotted: _value(untouched, dotted) for dotted in HARDWARE[settings.hardware]}
-    for dotted, value in (plain | HARDWARE[hardware]).items():
+    knows_truth = settings.nominal.equals_truth
+    plain = {dotted: _value(untouched, dotted) for dotted in fields_of_set(settings.hardware, knows_truth)}
+    for dotted, value in (plain | fields_of_set(hardware, knows_truth)).items():
         if dotted == "estimator.kind":  # another member of a family has other fields
             fields["estimator"] = {}
         override(fields, dotted, value)

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator
 from spheretwin.twin import assembly
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.resolving import lag_of
 from spheretwin.twin.scenario.files import Files
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedScenario
 
 Array = NDArray[np.float64]
 
@@ -42,10 +41,10 @@ class Knowledge(NamedTuple):
     lag_s: float
     """Time constant of the currents."""
     current_limit_A: float
-    """Least of those that the allocation and the drive keep to."""
+    """Of the allocation; that of the drive where it is the lower of the two and the model is the true one."""
 
 
-def knowledge(scenario: Scenario, files: Files, *, nominal: bool) -> Knowledge:
+def knowledge(scenario: ResolvedScenario, files: Files, *, nominal: bool) -> Knowledge:
     """Numbers of a resolved scenario, true or nominal.
 
     Raises
@@ -56,17 +55,16 @@ def knowledge(scenario: Scenario, files: Files, *, nominal: bool) -> Knowledge:
     known, section, drive = scenario.nominal, scenario.plant, scenario.drive
     groups = len(files.actuator.groups)
     believed = Magnetics(files.nominal, np.full(groups, known.torque_scale))
-    limit_A = min(known.current_limit_A or np.inf, drive.current_limit_A or np.inf)
     if nominal:
         return Knowledge(
             inertia=np.array(known.inertia_kg_m2),
             weight_moment=0.0,
-            viscous_Nm_s=np.zeros(3),
+            viscous_Nm_s=np.array(known.viscous_Nm_s),
             unknown_torque_Nm=np.zeros(3),
             magnetics=believed,
             believed=believed,
-            lag_s=known.time_constant_s or 0.0,
-            current_limit_A=limit_A,
+            lag_s=known.time_constant_s,
+            current_limit_A=known.current_limit_A,
         )
     rotor = _rotor(scenario, files)
     return Knowledge(
@@ -74,14 +72,14 @@ def knowledge(scenario: Scenario, files: Files, *, nominal: bool) -> Knowledge:
         weight_moment=rotor.weight_moment,
         viscous_Nm_s=np.array(section.viscous_Nm_s),
         unknown_torque_Nm=np.array(section.modelling_torque_Nm),
-        magnetics=Magnetics(files.actuator, assembly.group_gain_of(section, groups)),
+        magnetics=Magnetics(files.actuator, np.array(section.group_gain)),
         believed=believed,
-        lag_s=lag_of(drive),
-        current_limit_A=limit_A,
+        lag_s=drive.lag_s,
+        current_limit_A=min(known.current_limit_A, drive.current_limit_A),
     )
 
 
-def _rotor(scenario: Scenario, files: Files) -> LagrangianRotor:
+def _rotor(scenario: ResolvedScenario, files: Files) -> LagrangianRotor:
     """Rotor whose equations of motion are known in closed form, whichever engine is to move it."""
     section = scenario.plant.model_copy(update={"engine": "lagrangian", "integrator": "RK4"})
     return cast("LagrangianRotor", assembly.rotor_of(scenario.model_copy(update={"plant": section}), files))

@@ -72,8 +72,8 @@ def linearise(
         Whether the lag of the currents, where the drive has one, adds states: the torque of the coils, or
         their currents.
     nominal : bool
-        The model as the controller has it, not the true one: nominal inertia, magnetics and lag; no payload,
-        gravity or friction.
+        The model as the controller has it, not the true one: nominal inertia, magnetics, friction, lag
+        and current limit; no payload or gravity.
     kind : {"scipy", "control"}
         Whose class the system is of; python-control is imported for its own alone.
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedScenario
 
 
 @dataclass(frozen=True)
@@ -17,15 +17,15 @@ class Planned:
 
     Attributes
     ----------
-    scenario : Scenario
-        Resolved, in force at the start.
+    scenario : ResolvedScenario
+        In force at the start.
     actuator : Actuator
         What is simulated.
     ticks : int
         Control ticks that the run is to have; it may end before.
     """
 
-    scenario: Scenario
+    scenario: ResolvedScenario
     actuator: Actuator
     ticks: int
 

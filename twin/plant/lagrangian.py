@@ -155,8 +155,8 @@ def _moved(start: Triple, time: float, rate: Triple) -> Triple:
 
 
 def _set_up(setting: Setting) -> LagrangianRotor:
-    told = setting.gravity_m_s2 is not None
-    known = (mjcf.OTHER_GRAVITY,) if told else ()
+    gravity_m_s2 = setting.gravity_m_s2
+    known = () if gravity_m_s2 is None else (mjcf.OTHER_GRAVITY,)
     unknown = [name for name in setting.model.unknown_to_the_lagrangian if name not in known]
     if unknown:
         raise InputError(
@@ -169,7 +169,7 @@ def _set_up(setting: Setting) -> LagrangianRotor:
         setting.integrator,
         setting.modelling_error,
         setting.payload_kg,
-        gravity_m_s2=setting.gravity_m_s2 or 0.0,
+        gravity_m_s2=0.0 if gravity_m_s2 is None else gravity_m_s2,
     )
 
 

@@ -14,24 +14,23 @@ from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.record import Change, RunRecord
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.scenario import reading
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedScenario
 from spheretwin.twin.session import Session
 
 
-def facts_of(scenario: Scenario) -> RunFacts:
+def facts_of(scenario: ResolvedScenario) -> RunFacts:
     """What is known of a run from its start.
 
     Parameters
     ----------
-    scenario : Scenario
-        Resolved, as a session has it.
+    scenario : ResolvedScenario
     """
     return RunFacts(
         name=scenario.name,
         description=scenario.description,
         law=scenario.controller.law,
         duration_s=scenario.duration,
-        current_limit_A=scenario.drive.current_limit_A or 0.0,
+        current_limit_A=scenario.drive.current_limit_A,
         payload_kg=scenario.plant.payload_kg,
         gravity_m_s2=scenario.plant.gravity_m_s2,
         mjcf=Path(scenario.plant.mjcf or MJCF_PATH),

@@ -9,15 +9,14 @@ import numpy as np
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
+from spheretwin.twin.in_force import InForce, at_start
 from spheretwin.twin.metrics.metric import Planned
 from spheretwin.twin.records.summary import Figures
 from spheretwin.twin.review.happened import events
 from spheretwin.twin.review.run import Reviewed
 from spheretwin.twin.review.spectrum import peaks
 from spheretwin.twin.review.work import mechanical_work_J
-from spheretwin.twin.scenario.files import files_of
 from spheretwin.twin.scenario.reading import validated
-from spheretwin.twin.scenario.sections import Scenario
 
 
 def figures(run: Reviewed) -> dict[str, Any]:
@@ -67,21 +66,21 @@ def _figures(run: Reviewed) -> dict[str, Any]:
 
 
 def _metrics(run: Reviewed) -> dict[str, Any]:
-    scenario = of_the_actuator(run)
-    gathered = Figures(Planned(scenario, files_of(scenario).actuator, scenario.ticks))
+    scenario, files, *_ = of_the_actuator(run)
+    gathered = Figures(Planned(scenario, files.actuator, scenario.ticks))
     gathered.write(run.every_tick)
     return gathered.values()
 
 
-def of_the_actuator(run: Reviewed) -> Scenario:
-    """What a run's scenario says of plant and drive; its law and trajectory, which may be gone, are others.
+def of_the_actuator(run: Reviewed) -> InForce:
+    """Return plant, drive and files of a run; law and trajectory, which may be gone, are others.
 
     Raises
     ------
     InputError
         It is none of this version's.
     """
-    return validated(_what_metrics_take(run), str(run.path))
+    return at_start(validated(_what_metrics_take(run), str(run.path)), None, None)
 
 
 def _what_metrics_take(run: Reviewed) -> dict[str, Any]:

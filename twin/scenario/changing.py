@@ -14,7 +14,7 @@ from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
 from spheretwin.twin.scenario.fields import Kind, every_field, kind_of, section_kind
-from spheretwin.twin.scenario.own_law import scenario_with
+from spheretwin.twin.scenario.own_law import kind_of_scenario, scenario_with
 from spheretwin.twin.scenario.reading import beside, is_dotted, override, read, shipped, validated
 from spheretwin.twin.scenario.sections import OwnController, Scenario
 
@@ -97,6 +97,7 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
     """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
 
     Another member of a family, as another law, keeps the fields that it has too; its own have their defaults.
+    A nominal model that is set to equal the truth keeps no value of its own.
     One table for the list of faults is one more of them. What files of trajectories and disturbances held
     stays, unless it is they that are changed.
 
@@ -124,8 +125,10 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
         fields["controller"]["law"] = next(iter(LAWS))
     untouched = _set_aside(fields, dotted)
     # A user's law stays the one that was read, whatever has become of its file.
-    kind = scenario_with(value) if dotted in ("controller", "controller.law") else type(scenario)
+    kind = scenario_with(value) if dotted in ("controller", "controller.law") else kind_of_scenario(scenario)
     _keep_common(fields, dotted, value, kind, scenario)
+    if dotted == "nominal.equals_truth" and value is True:
+        fields["nominal"] = {}
     override(fields, dotted, [*fields[FAULT], value] if is_one_fault(dotted, value) else value)
     chosen = None if dotted == "controller" else kind
     made = validated(beside("", fields), source or scenario.name, chosen)

@@ -15,6 +15,9 @@ from spheretwin.models.base.user_code import is_reference
 INDEX = "#"
 """In a dotted name: any place of a list."""
 
+SHIPPED = "shipped"
+"""Name of the shipped file in a field that holds a path."""
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -135,7 +138,9 @@ def _holds(annotation: Any, kind: type) -> bool:
 def _names_file(field: FieldInfo, value: Any) -> bool:
     extra = field.json_schema_extra
     mark = extra.get("path") if isinstance(extra, dict) else None
-    return is_reference(value) if mark == "code" else bool(mark and isinstance(value, str) and value)
+    if mark == "code":
+        return is_reference(value)
+    return bool(mark and isinstance(value, str) and value not in ("", SHIPPED))
 
 
 def _kind(annotation: Any, told_apart_by: Any) -> Kind | None:

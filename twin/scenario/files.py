@@ -13,7 +13,8 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf, torque_curve
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.mjcf import Mjcf
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.fields import SHIPPED
+from spheretwin.twin.scenario.sections import ResolvedScenario, Scenario
 
 
 class Files(NamedTuple):
@@ -22,40 +23,53 @@ class Files(NamedTuple):
     model: Mjcf
     actuator: Actuator
     nominal: Actuator
-    """As the controller has it: the very same unless it has another torque curve."""
+    """Actuator of the controller's data sheet: the same model file with the nominal torque curve."""
 
 
 def files_of(scenario: Scenario) -> Files:
     """Read model file and torque curves of a scenario."""
     path = Path(scenario.plant.mjcf or actuators.MJCF_PATH)
-    curve = Path(scenario.plant.torque_curve or actuators.TORQUE_CURVE_PATH)
-    actuator = actuators.load(path, curve)
-    other = scenario.nominal.torque_curve
-    return Files(mjcf.read(path), actuator, actuators.load(path, Path(other)) if other else actuator)
+    true, nominal = scenario.plant.torque_curve or SHIPPED, nominal_curve(scenario)
+    actuator = actuators.load(path, _path(true))
+    return Files(
+        mjcf.read(path), actuator, actuator if nominal == true else actuators.load(path, _path(nominal))
+    )
 
 
-def files_again(files: Files, before: Scenario, scenario: Scenario) -> Files:
+def nominal_curve(scenario: Scenario) -> str:
+    """Return the torque curve of the controller's data sheet: a path, or `SHIPPED`.
+
+    A model file of the user's is another machine: the curve that comes with it belongs to its data sheet.
+    """
+    if scenario.nominal.torque_curve is not None:
+        return scenario.nominal.torque_curve
+    follows = scenario.nominal.equals_truth or scenario.plant.mjcf is not None
+    return (scenario.plant.torque_curve if follows else None) or SHIPPED
+
+
+def files_again(files: Files, before: ResolvedScenario, scenario: Scenario) -> Files:
     """Files of a changed scenario: what it names as before stays as it was read."""
     if scenario.plant.mjcf != before.plant.mjcf:
         return files_of(scenario)
-    actuator, nominal, other = files.actuator, files.nominal, scenario.nominal.torque_curve
+    actuator, nominal, curve = files.actuator, files.nominal, nominal_curve(scenario)
     if scenario.plant.torque_curve != before.plant.torque_curve:
-        actuator = _with_curve(files.model, scenario.plant.torque_curve)
-    if other is None:
-        nominal = actuator
-    elif other != before.nominal.torque_curve:
-        nominal = _with_curve(files.model, other)
+        actuator = _with_curve(files.model, scenario.plant.torque_curve or SHIPPED)
+    if curve != before.nominal.torque_curve:
+        nominal = _with_curve(files.model, curve)
     return Files(files.model, actuator, nominal)
 
 
-def _with_curve(model: Mjcf, curve: str | None) -> Actuator:
-    read = torque_curve.read(Path(curve or actuators.TORQUE_CURVE_PATH))
-    return actuators.from_model(model.described, read)
+def _with_curve(model: Mjcf, curve: str) -> Actuator:
+    return actuators.from_model(model.described, torque_curve.read(_path(curve)))
+
+
+def _path(curve: str) -> Path:
+    return actuators.TORQUE_CURVE_PATH if curve == SHIPPED else Path(curve)
 
 
 def named_files(scenario: Scenario) -> tuple[str | None, ...]:
     """Names by which a scenario finds its files."""
-    return scenario.plant.mjcf, scenario.plant.torque_curve, scenario.nominal.torque_curve
+    return scenario.plant.mjcf, scenario.plant.torque_curve, nominal_curve(scenario)
 
 
 def digest(files: Files) -> str:

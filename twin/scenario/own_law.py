@@ -25,6 +25,14 @@ def scenario_with(law: Any) -> type[Scenario]:
     return _extended(parameters_of(law)) if is_reference(law) else Scenario
 
 
+def kind_of_scenario(scenario: Scenario) -> type[Scenario]:
+    """Class of the scenarios with the law of a scenario, as it was read."""
+    controller = scenario.controller
+    if is_reference(controller.law) and isinstance(controller, LawParameters):
+        return _extended(type(controller))
+    return Scenario
+
+
 @lru_cache(maxsize=32)
 def _extended(own: type[LawParameters]) -> type[Scenario]:
     laws: Any = Annotated[get_args(AnyLaw)[0] | own, Field(discriminator="law")]

@@ -17,7 +17,7 @@ from spheretwin.control.supervision.detector import DetectorSection
 from spheretwin.control.supervision.watchdog import WatchdogSection
 from spheretwin.twin.disturbances.disturbance import Disturbance
 from spheretwin.twin.electronics.driving.delay import delay
-from spheretwin.twin.electronics.driving.sections import DriveSection
+from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedDrive
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.faults.fault import Fault, check_gains
 from spheretwin.twin.plant.registry import ENGINES
@@ -130,10 +130,22 @@ class Plant(_Section):
 
 
 class Nominal(_Section):
-    """The model that the controller has; what is not given is as the plant is without modelling error."""
+    """Data sheet of the controller: its own value of every quantity that it uses.
 
+    `hardware` and the user write it. A change of `plant`, `drive` or `sensors` does not change it. A value
+    that is not given is that of the model file, for ideal sensors, amplifiers and bearings.
+    """
+
+    equals_truth: bool = Field(
+        False,
+        description="whether a value that is not given here is the true one (plant, drive, sensors) at the"
+        " start, or when this field is set; neither `hardware` nor the model file gives it then",
+    )
     torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
-        None, description="torque curve as CSV; the plant's unless given", json_schema_extra={"path": True}
+        None,
+        description="torque curve as CSV, or `shipped`; shipped unless given, and with a plant.mjcf, which is"
+        " another machine, plant.torque_curve",
+        json_schema_extra={"path": True},
     )
     torque_scale: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
         1.0, description="torque matrix over that of the torque curve; below 0, its sign is wrong"
@@ -142,20 +154,41 @@ class Nominal(_Section):
         None, description="principal inertias of the rotor, kg·m²; the model file's unless given"
     )
     current_limit_A: Positive | None = Field(
-        None, description="largest group current asked for, A; the drive's unless given"
+        None, description="largest group current that is commanded, A; the model file's unless given"
     )
     coulomb_Nm: NonNegativeTriple | None = Field(
-        None, description="Coulomb friction of each hinge, N·m; the plant's unless given"
+        None, description="Coulomb friction of each hinge, N·m; 0 unless given"
     )
     viscous_Nm_s: NonNegativeTriple | None = Field(
-        None, description="viscous friction of each hinge, N·m·s; the plant's unless given"
-    )
-    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
-        None, description="current lag that the controller reckons with, s; the drive's unless given"
+        None, description="viscous friction of each hinge, N·m·s; 0 unless given"
     )
     delay_s: Annotated[float, Field(ge=0, le=1)] | None = Field(
-        None,
-        description="delay that the controller reckons with, s; the drive's unless given",
+        None, description="delay from a command to the amplifiers, s; 0 unless given"
+    )
+    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
+        None, description="lag of the currents, s; L/R of the model file unless given"
+    )
+    resistance_ohm: Positive | None = Field(
+        None, description="of a group, ohm; the model file's unless given"
+    )
+    inductance_H: Positive | None = Field(None, description="of a group, H; the model file's unless given")
+    swing_V: NonNegative | None = Field(
+        None, description="largest voltage of the amplifiers, V; 0 for no limit; 0 unless given"
+    )
+    offset_error_A: NonNegative | None = Field(
+        None, description="largest offset of a group current from its command, A; 0 unless given"
+    )
+    gain_error: NonNegative | None = Field(
+        None, description="largest relative error of a group current; 0 unless given"
+    )
+    angle_noise_rad: NonNegativeTriple | None = Field(
+        None, description="standard deviation of the noise of each measured angle, rad; 0 unless given"
+    )
+    angle_resolution_rad: NonNegativeTriple | None = Field(
+        None, description="step between two values of each measured angle, rad; 0 for none; 0 unless given"
+    )
+    current_noise_A: NonNegative | None = Field(
+        None, description="standard deviation of the noise of a measured current, A; 0 unless given"
     )
 
     @field_validator("torque_scale")
@@ -206,10 +239,10 @@ class Scenario(_Section):
                 f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
                 f" received {self.controller.period_s!r} and {self.plant.step_s!r} s"
             )
-        if (self.nominal.delay_s or 0.0) > MOST_DELAY * self.controller.period_s:
+        known_s = self.nominal.delay_s
+        if known_s is not None and known_s > MOST_DELAY * self.controller.period_s:
             raise ValueError(
-                f"expected nominal.delay_s of at most {MOST_DELAY} control periods,"
-                f" received {self.nominal.delay_s!r} s"
+                f"expected nominal.delay_s of at most {MOST_DELAY} control periods, received {known_s!r} s"
             )
         delay(self.drive, self.plant.step_s, self.substeps, 1)  # a whole number of physics steps
         if self.ticks < 1:
@@ -256,6 +289,41 @@ class Scenario(_Section):
     def substeps(self) -> int:
         """Physics steps in a control period."""
         return round(self.controller.period_s / self.plant.step_s)
+
+
+class ResolvedPlant(Plant):
+    """Plant of a run. Without a gravity of its own, that of the model file acts, whatever its direction."""
+
+    group_gain: tuple[Bounded, ...]
+    initial_rad: Triple
+
+
+class ResolvedNominal(Nominal):
+    """Data sheet of the controller of a run: every value is given."""
+
+    torque_curve: str
+    inertia_kg_m2: tuple[Positive, Positive, Positive]
+    current_limit_A: Positive
+    coulomb_Nm: NonNegativeTriple
+    viscous_Nm_s: NonNegativeTriple
+    delay_s: float
+    time_constant_s: float
+    resistance_ohm: Positive
+    inductance_H: Positive
+    swing_V: NonNegative
+    offset_error_A: NonNegative
+    gain_error: NonNegative
+    angle_noise_rad: NonNegativeTriple
+    angle_resolution_rad: NonNegativeTriple
+    current_noise_A: NonNegative
+
+
+class ResolvedScenario(Scenario):
+    """Scenario of a run: every default that depends on files, trajectory or hardware is filled in."""
+
+    nominal: ResolvedNominal
+    plant: ResolvedPlant
+    drive: ResolvedDrive
 
 
 def _check_late(name: str, delay_s: float, step_s: float, period_s: float) -> None:

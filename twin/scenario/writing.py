@@ -54,6 +54,8 @@ def as_command(scenario: Scenario) -> str:
 def _chosen(scenario: Scenario, fields: Mapping[str, Any]) -> dict[str, Any]:
     """What has to be said: the named set, the member of each family, and what a member has no default for."""
     found: dict[str, Any] = {"hardware": fields["hardware"]}
+    if scenario.nominal.equals_truth:
+        found["nominal.equals_truth"] = True
     for section, tag in FAMILIES:
         found[f"{section}.{tag}"] = fields[section][tag]
         member: BaseModel = getattr(scenario, section)

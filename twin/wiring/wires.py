@@ -18,14 +18,13 @@ from spheretwin.twin.electronics.driving import stages
 from spheretwin.twin.electronics.driving.faulty import FaultyDriving, drive_faults
 from spheretwin.twin.electronics.driving.stages import Stages
 from spheretwin.twin.electronics.sensing import stages as senses
-from spheretwin.twin.electronics.sensing.chain import reckoned
 from spheretwin.twin.electronics.sensing.faulty import FaultySensing, sensor_faults
 from spheretwin.twin.electronics.sensing.stages import Sensors
 from spheretwin.twin.faults.plan import FaultPlan, draws_width
 from spheretwin.twin.faults.target import Effects
 from spheretwin.twin.faults.work import FaultsAtWork
 from spheretwin.twin.plant.plant import Plant
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedNominal, ResolvedScenario, Scenario
 
 Array = NDArray[np.float64]
 
@@ -61,7 +60,7 @@ def _delays_s(scenario: Scenario, target: str) -> list[float]:
     return [each.number for each in scenario.fault if each.mode == "delay" and each.kind.name == target]
 
 
-def driving_of(scenario: Scenario, groups: int, wires: Wires) -> Stages:
+def driving_of(scenario: ResolvedScenario, groups: int, wires: Wires) -> Stages:
     """Drive of a resolved scenario, at rest; with what may fail where faults are planned.
 
     A watchdog acts on the drive itself: it would else wait for commands that are on their way.
@@ -73,49 +72,41 @@ def driving_of(scenario: Scenario, groups: int, wires: Wires) -> Stages:
     return stages.made(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, most_late)
 
 
-def supervision_of(scenario: Scenario, actuator: Actuator, wires: Wires) -> Supervision:
+def supervision_of(scenario: ResolvedScenario, actuator: Actuator, wires: Wires) -> Supervision:
     """What looks after the groups, the measurements and the commands.
 
     Parameters
     ----------
-    scenario : Scenario
-        Resolved.
+    scenario : ResolvedScenario
     actuator : Actuator
         As the controller has it.
     wires : Wires
     """
-    groups, period_s = len(actuator.groups), scenario.controller.period_s
-    noise_rad, quantum_rad = reckoned(scenario.sensors)
+    groups, period_s, nominal = len(actuator.groups), scenario.controller.period_s, scenario.nominal
+    noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
     watched = Watched(period_s, noise_rad, quantum_rad, actuator.hinge_range_rad)
     return Supervision(
         all_in_use(groups),
-        detector(scenario.detector, scenario.detects, groups, _followed(scenario)),
+        detector(scenario.detector, scenario.detects, groups, _followed(nominal, period_s)),
         watchdog(scenario.watchdog, watched, wires.fresh, wires.halt),
     )
 
 
-def _followed(scenario: Scenario) -> Followed:
-    """How well healthy currents follow, as the sheets of the drive tell it to the controller."""
-    drive, limit_A = scenario.drive, scenario.nominal.current_limit_A or 0.0
-    volts = drive.amplifier_offset_V
-    if drive.dac_bits:
-        lsb_V = 2 * drive.dac_range_V / 2**drive.dac_bits
-        volts += drive.dac_offset_V + (drive.dac_inl_lsb + 0.5) * lsb_V
-        volts += drive.dac_gain_error * limit_A / drive.transconductance_A_V
-    swing_V = inf if drive.supply_V is None else drive.supply_V - max(drive.drop_up_V, drive.drop_down_V)
+def _followed(nominal: ResolvedNominal, period_s: float) -> Followed:
+    """How well healthy currents follow, by the controller's data sheet."""
     return Followed(
-        period_s=scenario.controller.period_s,
-        current_limit_A=limit_A,
-        static_error_A=drive.transconductance_A_V * volts,
-        noise_A=scenario.sensors.current.noise_A,
-        time_constant_s=scenario.nominal.time_constant_s or 0.0,
-        swing_V=swing_V,
-        resistance_ohm=drive.resistance_ohm or 1.0,
-        inductance_H=drive.inductance_H or 1.0,
+        period_s=period_s,
+        current_limit_A=nominal.current_limit_A,
+        static_error_A=nominal.offset_error_A + nominal.gain_error * nominal.current_limit_A,
+        noise_A=nominal.current_noise_A,
+        time_constant_s=nominal.time_constant_s,
+        swing_V=nominal.swing_V if nominal.swing_V > 0 else inf,
+        resistance_ohm=nominal.resistance_ohm,
+        inductance_H=nominal.inductance_H,
     )
 
 
-def faults_of(scenario: Scenario, plant: Plant, sensors: Sensors, groups: Groups) -> FaultsAtWork:
+def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: Groups) -> FaultsAtWork:
     """Faults of a scenario, and the parts of its loop that they strike."""
     period_s, count = scenario.controller.period_s, len(plant.current)
     plan = FaultPlan(scenario.fault, count, period_s, scenario.seed)

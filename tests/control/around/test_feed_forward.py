@@ -79,6 +79,7 @@ def alone(name="hold", **changes):
     fields = {
         "plant.engine": "lagrangian", "plant.modelling_error": 0.0, "plant.modelling_torque_Nm": [0, 0, 0],
         "disturbance.load": 0.0, "disturbance.random_bound_Nm": 0.0, "drive.time_constant_s": 0.0,
+        "nominal.equals_truth": True,
     }  # fmt: skip
     return scenarios.load(name, fields | {key.replace("__", "."): value for key, value in changes.items()})
 
@@ -131,6 +132,9 @@ def test_a_law_s_account_of_its_own_torque_closes(delay_s, predicted):
 
 def test_the_controller_knows_the_nominal_friction_alone():
     worn = {"plant__coulomb_Nm": [2e-3] * 3, "controller__feed_forward__friction": 0.5, "duration": 0.05}
+    unknown = simulate(alone("sinusoid", **worn, nominal__equals_truth=False))
+    assert unknown.scenario.nominal.coulomb_Nm == (0.0,) * 3
+    assert not unknown.telemetry["feed_forward_Nm"].any()
     known = simulate(alone("sinusoid", **worn)).scenario.nominal
     assert (known.coulomb_Nm, known.viscous_Nm_s) == ((2e-3,) * 3, (0.0,) * 3)
     other = simulate(alone("sinusoid", **worn, nominal__coulomb_Nm=[0.0, 0.0, 4e-3]))

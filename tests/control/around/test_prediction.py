@@ -131,7 +131,7 @@ def still_air(**changes):
     alone = {
         "plant.engine": "lagrangian", "plant.modelling_error": 0.0, "plant.modelling_torque_Nm": [0, 0, 0],
         "disturbance.load": 0.0, "disturbance.random_bound_Nm": 0.0, "duration": 0.5,
-        "controller.prediction.on": True, "plant.step_s": 1e-4,
+        "controller.prediction.on": True, "plant.step_s": 1e-4, "nominal.equals_truth": True,
     }  # fmt: skip
     return scenarios.load(
         "sinusoid", alone | {key.replace("__", "."): value for key, value in changes.items()}

@@ -18,10 +18,11 @@ from spheretwin.control.supervision.detector import (
 from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, groups
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
+from spheretwin.twin.electronics.data_sheet import drive_sheet
 from spheretwin.twin.electronics.driving.amplifier import AmplifierSection, amplifier, drive_coils, flow
 from spheretwin.twin.electronics.driving.coil import CoilSection, coil
 from spheretwin.twin.electronics.driving.dac import convert, dac
-from spheretwin.twin.electronics.driving.sections import DriveSection
+from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedDrive
 from spheretwin.twin.electronics.hardware import PROTOTYPE_DRIVE
 
 COUNT, R_OHM, L_H, PERIOD_S = 18, 1.3, 0.9e-3, 1e-3
@@ -54,6 +55,19 @@ def test_the_prototype_s_threshold_and_ticks():
     assert derived_ticks(ideal._replace(time_constant_s=0.0)) == 1
     given = made(threshold_A=0.3, ticks=9)
     assert (given.threshold_A, given.ticks) == (0.3, 9)
+
+
+def test_the_sheet_of_the_prototype_s_drive_is_its_static_error_and_swing():
+    fields = {name.removeprefix("drive."): value for name, value in PROTOTYPE_DRIVE.items()}
+    sheet = drive_sheet(ResolvedDrive(**fields))
+    error_A = sheet["offset_error_A"] + sheet["gain_error"] * sheet["current_limit_A"]
+    assert error_A == pytest.approx(PROTOTYPE.static_error_A, rel=1e-14)  # a sum of four products
+    assert sheet["swing_V"] == PROTOTYPE.swing_V
+    assert sheet["time_constant_s"] == pytest.approx(PROTOTYPE.time_constant_s, rel=1e-14)
+    # A converter without steps has no error, whatever is stated of it; without a supply there is no limit.
+    plain = drive_sheet(ResolvedDrive(**fields | {"dac_bits": 0, "supply_V": None, "time_constant_s": 1e-3}))
+    assert plain["offset_error_A"] == pytest.approx(0.8 * 1e-3)
+    assert (plain["gain_error"], plain["swing_V"], plain["time_constant_s"]) == (0.0, 0.0, 1e-3)
 
 
 def test_no_command_of_a_healthy_drive_is_further_off_than_the_static_error():

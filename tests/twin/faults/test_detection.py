@@ -44,6 +44,20 @@ def test_every_group_that_fails_is_found_and_named_and_no_other(hardware, mode, 
 
 MINUTES = 600_000
 HOT = {"drive.shutdown_degC": 1e4}  # the sinusoid takes the coils past 155 °C within minutes
+SLOW = {"drive.bandwidth_rad_s": 300.0, "nominal.time_constant_s": 1 / 300}
+LATE = {"drive.delay_s": 5e-4, "nominal.delay_s": 5e-4}
+# An amplifier gives 0.8 A a volt; 4.5 steps of a converter of 16 bits and ±10 V.
+OFF_ZERO = {
+    "drive.dac_offset_V": 0.5,
+    "nominal.offset_error_A": 0.8 * (1e-3 + 0.5 + 4.5 * 20 / 2**16),
+}
+
+
+def supply(volts):
+    """A supply that the controller knows, less the larger drop of the prototype's amplifiers."""
+    return {"drive.supply_V": volts, "nominal.swing_V": volts - 4.8}
+
+
 LONG = [
     ("ideal-afsm", "sinusoid", "ideal", MINUTES, {}),
     ("prototype-afsm", "sinusoid", "prototype", MINUTES, HOT),
@@ -52,17 +66,17 @@ SHORT = [
     ("pd", "sinusoid", "prototype", 60_000, {"controller.law": "pd"}),
     ("fuzzy", "sinusoid", "prototype", 60_000, {"controller.law": "adaptive_fuzzy"}),
     ("nutation", "nutation", "prototype", 5_000, {}),
-    ("weak supply", "sinusoid", "prototype", 60_000, {"drive.supply_V": 8.0, **HOT}),
-    ("hardly a supply", "sinusoid", "prototype", 20_000, {"drive.supply_V": 5.1, **HOT}),
-    ("none to speak of", "hold", "prototype", 5_000, {"drive.supply_V": 4.9, "controller.law": "pd"}),
+    ("weak supply", "sinusoid", "prototype", 60_000, {**supply(8.0), **HOT}),
+    ("hardly a supply", "sinusoid", "prototype", 20_000, {**supply(5.1), **HOT}),
+    ("none to speak of", "hold", "prototype", 5_000, {**supply(4.9), "controller.law": "pd"}),
     ("bounded", "sinusoid", "prototype", 20_000, {"allocation": "bounded", **HOT}),
-    ("slow amplifiers", "sinusoid", "prototype", 20_000, {"drive.bandwidth_rad_s": 300.0, **HOT}),
-    ("half a period late", "sinusoid", "prototype", 20_000, {"drive.delay_s": 5e-4, **HOT}),
+    ("slow amplifiers", "sinusoid", "prototype", 20_000, SLOW | HOT),
+    ("half a period late", "sinusoid", "prototype", 20_000, LATE | HOT),
     (
         "fast clock", "sinusoid", "prototype", 60_000,
-        {"controller.period_s": 2e-4, "plant.step_s": 1e-4, "drive.supply_V": 12.0, **HOT},
+        {"controller.period_s": 2e-4, "plant.step_s": 1e-4, **supply(12.0), **HOT},
     ),
-    ("far off zero", "sinusoid", "prototype", 20_000, {"drive.dac_offset_V": 0.5, **HOT}),
+    ("far off zero", "sinusoid", "prototype", 20_000, OFF_ZERO | HOT),
 ]  # fmt: skip
 
 
@@ -85,6 +99,16 @@ def test_no_healthy_group_is_ever_found(label, name, hardware, ticks, changes):
         assert limited > 18 * last / 4
     if label not in ("hardly a supply", "none to speak of"):  # with which the rotor may fall over
         assert last == ticks
+
+
+def test_a_supply_that_the_controller_does_not_know_leaves_its_thresholds():
+    told, weak = scenario(duration=0.1), scenario(duration=0.1, **{"drive.supply_V": 8.0})
+    figures = []
+    for each in (told, weak, scenario(duration=0.1, **supply(8.0))):
+        with Session(each) as session:
+            detector = session._machine._controller.supervision.detector
+            figures.append((detector.threshold_A, detector.ticks, detector.reach_A))
+    assert figures[0] == figures[1] != figures[2]
 
 
 def test_what_is_known_is_left_out_from_its_tick_on_and_taken_back():

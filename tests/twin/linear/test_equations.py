@@ -12,6 +12,7 @@ from spheretwin.models.magnetics import torque_matrix
 from spheretwin.twin import assembly
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.in_force import at_start
+from spheretwin.twin.linear.knowledge import knowledge
 from spheretwin.twin.linear.model import linearise
 from spheretwin.twin.plant.friction import friction, friction_torque
 from spheretwin.twin.plant.stepping import step
@@ -204,6 +205,19 @@ def test_the_nominal_model_is_what_the_controller_knows():
     np.testing.assert_array_equal(model.system.A[3:6, :6], 0)
     np.testing.assert_array_equal(model.system.B[6:], np.eye(3) / 3e-3)
     np.testing.assert_array_equal(model.input_at_rest, 0)
+
+
+def test_nominal_friction_and_limit_are_those_of_the_data_sheet():
+    told = {
+        "nominal.inertia_kg_m2": [2e-3, 3e-3, 4e-3], "nominal.viscous_Nm_s": [1e-3, 2e-3, 3e-3],
+        "plant.viscous_Nm_s": [0.1] * 3, "drive.current_limit_A": 1e-3, "nominal.current_limit_A": 5.0,
+    }  # fmt: skip
+    model = linearise(scenario(told), np.zeros(3), nominal=True)
+    # A product and a quotient round.
+    np.testing.assert_allclose(model.system.A[3:6, 3:6], -np.diag([0.5, 2 / 3, 0.75]), rtol=1e-12, atol=1e-15)
+    resting = at_start(scenario(told), None, None)
+    assert knowledge(resting.scenario, resting.files, nominal=True).current_limit_A == 5.0
+    assert knowledge(resting.scenario, resting.files, nominal=False).current_limit_A == 1e-3
 
 
 def test_a_constant_torque_is_held_beside_gravity():

@@ -134,12 +134,15 @@ def test_chunks_and_threads_of_a_prototype_move_no_bit():
     assert set(runs) == {whole}
 
 
-def test_the_controller_reckons_with_the_drive_s_delay_and_bandwidth():
-    with Session(driven()) as session:
-        assert session.scenario.nominal.delay_s == 1e-3
-        assert session.scenario.nominal.time_constant_s == pytest.approx(1 / 12566.370614359172)
-    with Session(driven(**{"nominal.delay_s": 0.0})) as session:
-        assert session.scenario.nominal.delay_s == 0.0
+def test_the_controller_knows_the_drive_s_delay_and_bandwidth_if_its_sheet_states_them():
+    def known(**changes):
+        with Session(driven(**changes)) as session:
+            return session.scenario.nominal.delay_s, session.scenario.nominal.time_constant_s
+
+    stated = (1e-3, pytest.approx(1 / 12566.370614359172))
+    assert known(hardware="prototype") == known(**{"nominal.equals_truth": True}) == stated
+    assert known() == (0.0, pytest.approx(0.9e-3 / 1.3))  # L/R of the model file
+    assert known(**{"nominal.equals_truth": True, "nominal.delay_s": 0.0})[0] == 0.0
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.electronics.sensing.chain import accuracy
 from spheretwin.twin.reproduce.budget import budget
 from spheretwin.twin.reproduce.budget.stages import (
     ALL,
@@ -18,6 +19,7 @@ from spheretwin.twin.reproduce.budget.stages import (
 )
 from spheretwin.twin.reproduce.planning import planned
 from spheretwin.twin.reproduce.running import carried_out
+from spheretwin.twin.scenario.hardware import PROTOTYPE_NOMINAL
 from spheretwin.twin.simulation import simulate
 
 BY_NAME = {stage.name: stage for stage in STAGES}
@@ -30,7 +32,7 @@ def scenario(stage, **more):
 
 def test_single_stages_together_are_the_prototype():
     single = [dotted for stage in STAGES if stage.name != ALL for dotted in stage.fields]
-    assert set(single) | set(WITHOUT_ERROR) == set(PROTOTYPE)
+    assert set(single) | set(WITHOUT_ERROR) | set(PROTOTYPE_NOMINAL) == set(PROTOTYPE)
     assert not set(single) & set(WITHOUT_ERROR)
     named = {"delay", "quantisation", "sensor noise", "sensor nonlinearity", "friction", "voltage limit"}
     assert {IDEAL, ALL, "amplifier bandwidth", *named} <= set(BY_NAME)
@@ -48,6 +50,18 @@ def test_ideal_has_the_true_state_and_currents_at_once():
     names = {signal.name for signal in run.telemetry.signals}
     assert not names & {"q_measured_rad", "friction_Nm", "supply_power_W"}
     np.testing.assert_array_equal(run.telemetry["current_A"], run.telemetry["current_command_A"])
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+def test_the_controller_knows_the_parts_of_a_stage_but_not_the_mass(stage, actuator):
+    """Were they not known, a stage would show a mismatch beside the cost of its parts."""
+    run = simulate(scenario(stage, duration=0.002)).scenario
+    nominal, drive = run.nominal, run.drive
+    assert run.plant.payload_kg > 0
+    assert nominal.inertia_kg_m2 == tuple(actuator.inertia.tolist())
+    assert (nominal.delay_s, nominal.time_constant_s) == (drive.delay_s, drive.lag_s)
+    assert (nominal.coulomb_Nm, nominal.viscous_Nm_s) == (run.plant.coulomb_Nm, run.plant.viscous_Nm_s)
+    assert (nominal.angle_noise_rad, nominal.angle_resolution_rad) == accuracy(run.sensors)
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)

@@ -45,7 +45,7 @@ def _shown(works: Works) -> Shown:
     player, desk = works.player, works.desk
     if player:
         return Shown(player.row, player.place, player.period_s, player.current_limit_A)
-    limit_A = desk.session.scenario.nominal.current_limit_A or 0.0
+    limit_A = desk.session.scenario.nominal.current_limit_A
     return Shown(desk.row, desk.session.tick, works.period_s, limit_A)
 
 

@@ -15,7 +15,7 @@ from spheretwin.twin.electronics.driving.dac import Dac, convert, dac
 from spheretwin.twin.electronics.driving.delay import Delay, delay, due, latch
 from spheretwin.twin.electronics.driving.lag import Drive, drive
 from spheretwin.twin.electronics.driving.lag import advance as follow
-from spheretwin.twin.electronics.driving.sections import DriveSection
+from spheretwin.twin.electronics.driving.sections import ResolvedDrive
 
 Array = NDArray[np.float64]
 
@@ -38,13 +38,12 @@ class Driving(NamedTuple):
     drawn_As: Array  # (1,) from the supply in this control period
 
 
-def driving(section: DriveSection, step_s: float, substeps: int, groups: int, seed: int) -> Driving:
+def driving(section: ResolvedDrive, step_s: float, substeps: int, groups: int, seed: int) -> Driving:
     """Stages at rest, with errors of their own.
 
     Parameters
     ----------
-    section : DriveSection
-        Resolved: current limit, resistance and inductance are given.
+    section : ResolvedDrive
     step_s : float, s
         Physics step.
     substeps : int
@@ -58,16 +57,15 @@ def driving(section: DriveSection, step_s: float, substeps: int, groups: int, se
     ValueError
         The delay is no whole number of physics steps.
     """
-    resistance_ohm, inductance_H = section.resistance_ohm or 1.0, section.inductance_H or 1.0
     return Driving(
         converts=section.converts,
         supplied=section.supply_V is not None,
-        supply_V=section.supply_V or 0.0,
-        lag=drive(section.time_constant_s or 0.0, step_s, section.current_limit_A or 0.0),
+        supply_V=0.0 if section.supply_V is None else section.supply_V,
+        lag=drive(section.lag_s, step_s, section.current_limit_A),
         delay=delay(section, step_s, substeps, groups),
         dac=dac(section, section.transconductance_A_V, groups, seed),
-        amplifier=amplifier(section, section.current_limit_A or 0.0, step_s, groups, seed),
-        coil=coil(section, resistance_ohm, inductance_H, substeps * step_s, groups),
+        amplifier=amplifier(section, section.current_limit_A, step_s, groups, seed),
+        coil=coil(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
         flow=flow(groups),
         asked=np.zeros(groups),
         emf=np.zeros(groups),

@@ -1,8 +1,8 @@
-"""What a scenario says of amplifiers and coils, stage by stage."""
+"""Sections of amplifiers and coils, stage by stage."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, cast
 
 from pydantic import Field, model_validator
 
@@ -34,3 +34,16 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
     def converts(self) -> bool:
         """Whether what is asked of the amplifiers is other than the command."""
         return self.delay_s > 0 or self.dac_bits > 0
+
+
+class ResolvedDrive(DriveSection):
+    """Drive of a run: coils and limit are given, and the lag where there is no supply."""
+
+    resistance_ohm: Positive
+    inductance_H: Positive
+    current_limit_A: Positive
+
+    @property
+    def lag_s(self) -> float:
+        """Lag of the currents while no voltage is at its limit."""
+        return cast("float", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s

@@ -18,7 +18,7 @@ from spheretwin.twin.electronics.driving.chain import Driving
 from spheretwin.twin.electronics.driving.delay import due
 from spheretwin.twin.electronics.driving.faulty import DriveFaults, FaultyDriving
 from spheretwin.twin.electronics.driving.lag import Drive, advance, drive
-from spheretwin.twin.electronics.driving.sections import DriveSection
+from spheretwin.twin.electronics.driving.sections import ResolvedDrive
 
 
 class Lag(NamedTuple):
@@ -58,7 +58,7 @@ _TELL: dict[type, Any] = {Lag: _lag_tells, Driving: chain.tell, FaultyDriving: f
 
 
 def made(
-    section: DriveSection,
+    section: ResolvedDrive,
     step_s: float,
     substeps: int,
     groups: int,
@@ -82,7 +82,7 @@ def made(
             chain.driving(section, step_s, substeps, groups, seed), faults, most_late_steps
         )
     if section.supply_V is None and not section.converts:
-        return Lag(drive(section.time_constant_s or 0.0, step_s, section.current_limit_A or 0.0))
+        return Lag(drive(section.lag_s, step_s, section.current_limit_A))
     return chain.driving(section, step_s, substeps, groups, seed)
 
 

@@ -16,6 +16,7 @@ from spheretwin.twin.electronics.sensing.encoder import Encoder, counted, encode
 from spheretwin.twin.electronics.sensing.potentiometer import Potentiometer, potentiometer, wiper_voltage
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.electronics.streams import errors, uniforms
+from spheretwin.twin.trajectories.trajectory import Triple
 
 CHANNELS = 2
 """Angles that are voltages on their way: α and β."""
@@ -65,22 +66,22 @@ def noise_width(section: SensorsSection) -> int:
     return CHANNELS * section.adc.oversampling if _noise_V(section) else 0
 
 
-def reckoned(section: SensorsSection) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Noise and resolution of the three measured angles, as their sheets tell them to the controller.
+def accuracy(section: SensorsSection) -> tuple[Triple, Triple]:
+    """Return noise and resolution of the three measured angles.
 
     Returns
     -------
-    (3,) array, rad
+    tuple of 3 floats, rad
         Standard deviation of the noise of each; with oversampling, of the mean of all conversions.
-    (3,) array, rad
-        Distance between two values that each can have; 0 for any.
+    tuple of 3 floats, rad
+        Step between two values that each can have; 0 for none.
     """
     track, converter, lines = section.potentiometer, section.adc, section.encoder.counts
     noise_rad = _noise_V(section) / track.volts_per_rad / converter.oversampling**0.5
     step_V = 2 * converter.range_V / 2**converter.bits if converter.bits else 0.0
     step_rad = step_V / track.volts_per_rad / converter.oversampling
     count_rad = 2 * np.pi / lines if lines else 0.0
-    return np.array([noise_rad, noise_rad, 0.0]), np.array([step_rad, step_rad, count_rad])
+    return (noise_rad, noise_rad, 0.0), (step_rad, step_rad, count_rad)
 
 
 @allocation_free

@@ -29,7 +29,7 @@ class CopperLoss(Metric):
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned)
         section = planned.scenario.drive
-        lag_s, self._limit_A = section.time_constant_s or 0.0, section.current_limit_A or 0.0
+        lag_s, self._limit_A = section.lag_s, section.current_limit_A
         # Shares of the distance to the command that are left on average: over the first step, over the tick,
         # and of its square over the tick, which decays twice as fast.
         self._first_step, self._tick, self._tick_squared = (
@@ -41,7 +41,7 @@ class CopperLoss(Metric):
             )
         )
         self._follows = not section.converts
-        self._resistance_ohm = section.resistance_ohm or planned.actuator.group.resistance_ohm
+        self._resistance_ohm = section.resistance_ohm
         self._rows, self._squares = 0, np.zeros(len(planned.actuator.groups))
         self._told_W = np.zeros(len(planned.actuator.groups))
 

@@ -4,6 +4,9 @@
 have either: its amplifiers drive the current, and lag by their own bandwidth, or by what voltage is left.
 The plain lag, which ideal hardware has elsewhere, is a row of its own.
 
+The controller knows the electronics and the bearings of each stage, but not the mass on the shaft: a stage is
+what a part costs a controller that is built for it.
+
 No sensor measures a rate. The rows of single sensor errors have the estimator too, as there would be no rates
 else; *estimator* is what it costs by itself, and what these rows are to be compared with.
 """
@@ -11,8 +14,10 @@ else; *estimator* is what it costs by itself, and what these rows are to be comp
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, NamedTuple
 
+from spheretwin.models import actuator
 from spheretwin.twin.scenario.hardware import HARDWARE
 
 PROTOTYPE = HARDWARE["prototype"]
@@ -63,7 +68,21 @@ class Stage(NamedTuple):
     def overrides(self) -> dict[str, Any]:
         """Fields of the scenario."""
         values = {dotted: PROTOTYPE[dotted] for dotted in self.fields}
-        return {**({} if "drive.supply_V" in {*values, *self.beside} else NO_LAG), **values, **self.beside}
+        if self.name == ALL:
+            return values  # the set has a data sheet of its own
+        return {
+            **_known(),
+            **({} if "drive.supply_V" in {*values, *self.beside} else NO_LAG),
+            **values,
+            **self.beside,
+        }
+
+
+@cache
+def _known() -> dict[str, Any]:
+    """Nominal model of a single stage: all is known but the mass on the shaft."""
+    inertia = tuple(actuator.load().inertia.tolist())
+    return {"nominal.equals_truth": True, "nominal.inertia_kg_m2": inertia}
 
 
 STAGES = (

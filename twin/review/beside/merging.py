@@ -16,8 +16,7 @@ from spheretwin.twin.review.beside import naming
 from spheretwin.twin.review.figures import of_the_actuator
 from spheretwin.twin.review.happened import events
 from spheretwin.twin.review.run import Reviewed
-from spheretwin.twin.scenario.files import files_of
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.twin.scenario.sections import ResolvedScenario
 from spheretwin.viz.compared.run import Run
 from spheretwin.viz.quantities.quantity import Rows
 
@@ -63,8 +62,8 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
                 f" received one of {count}"
             )
     subjects = [
-        Subject(files_of(scenario).actuator, run.table.signals, _facts(scenario, _law(run)))
-        for run, scenario in zip(runs, map(of_the_actuator, runs), strict=True)
+        Subject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
+        for run, of in zip(runs, map(of_the_actuator, runs), strict=True)
     ]
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
         recording.write(path, compared, subjects, _told(runs))
@@ -103,17 +102,17 @@ def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
 
 
 def _rows(run: Reviewed, table: Table) -> Rows:
-    scenario = of_the_actuator(run)
-    return Rows(table, table.rows(0, 1), files_of(scenario).actuator, scenario.drive.current_limit_A or 0.0)
+    scenario, files, *_ = of_the_actuator(run)
+    return Rows(table, table.rows(0, 1), files.actuator, scenario.drive.current_limit_A)
 
 
-def _facts(scenario: Scenario, law: str) -> RunFacts:
+def _facts(scenario: ResolvedScenario, law: str) -> RunFacts:
     return RunFacts(
         name=scenario.name,
         description=scenario.description,
         law=law,
         duration_s=scenario.duration,
-        current_limit_A=scenario.drive.current_limit_A or 0.0,
+        current_limit_A=scenario.drive.current_limit_A,
         payload_kg=scenario.plant.payload_kg,
         gravity_m_s2=scenario.plant.gravity_m_s2,
         mjcf=Path(scenario.plant.mjcf or MJCF_PATH),

@@ -1,0 +1,330 @@
+"""The controller's data sheet: who writes it, what it does not follow, and what stays out of its reach."""
+
+import json
+import pickle
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from spheretwin.control.allocation.least_norm import allocate
+from spheretwin.control.allocation.registry import ALLOCATIONS
+from spheretwin.control.law import Law
+from spheretwin.models import actuator as actuators
+from spheretwin.models.lagrangian import loaded_inertia
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.scenario.fields import every_field, kind_of
+from spheretwin.twin.scenario.sections import ResolvedScenario, Scenario
+from spheretwin.twin.scenario.writing import as_command, as_toml
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import simulate
+from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import load
+
+# Every part of a controller is at work: estimator, governor, prediction, feed-forward, detector, watchdog.
+WHOLE = {
+    "hardware": "prototype", "controller.law": "adrc", "detector.detect": True, "duration": 0.2,
+    "controller.governor.acceleration_rad_s2": 20.0, "controller.prediction.on": True,
+    "controller.feed_forward.friction": 0.8, "controller.feed_forward.inertia": 1.0,
+}  # fmt: skip
+
+# Another value of everything that is true of plant, drive and sensors.
+TRUTH = {
+    "plant.modelling_error": 0.4,
+    "plant.modelling_torque_Nm": [0.01, 0.0, 0.0],
+    "plant.gravity_m_s2": 5.0,
+    "plant.coulomb_Nm": [5e-3, 5e-3, 5e-3],
+    "plant.viscous_Nm_s": [3e-4, 3e-4, 3e-4],
+    "plant.friction_smoothing_rad_s": 0.1,
+    "plant.group_gain": [0.9] * 18,
+    "plant.payload_kg": 0.04,
+    "drive.delay_s": 5e-3,
+    "drive.time_constant_s": None,
+    "drive.dac_bits": 12,
+    "drive.dac_range_V": 12.0,
+    "drive.dac_offset_V": 1e-2,
+    "drive.dac_gain_error": 1e-2,
+    "drive.dac_inl_lsb": 8.0,
+    "drive.supply_V": 12.0,
+    "drive.drop_up_V": 9.0,
+    "drive.drop_down_V": 9.0,
+    "drive.bandwidth_rad_s": 1e3,
+    "drive.transconductance_A_V": 0.5,
+    "drive.amplifier_offset_V": 1e-2,
+    "drive.current_limit_A": 4.0,
+    "drive.resistance_ohm": 2.0,
+    "drive.inductance_H": 2e-3,
+    "drive.resistance_per_K": 0.0,
+    "drive.heat_capacity_J_K": 10.0,
+    "drive.thermal_resistance_K_W": 1.0,
+    "drive.ambient_degC": 40.0,
+    "drive.shutdown_degC": 100.0,
+    "sensors.angle_offset_rad": [0.01, 0.0, 0.0],
+    "sensors.potentiometer.electrical_angle_rad": 6.0,
+    "sensors.potentiometer.supply_V": 4.0,
+    "sensors.potentiometer.nonlinearity_rad": 1e-3,
+    "sensors.potentiometer.noise_rad": 2e-3,
+    "sensors.adc.bits": 12,
+    "sensors.adc.range_V": 5.0,
+    "sensors.adc.offset_V": 1e-2,
+    "sensors.adc.gain_error": 1e-2,
+    "sensors.adc.noise_V": 1e-2,
+    "sensors.adc.oversampling": 4,
+    "sensors.encoder.counts": 500,
+    "sensors.current.noise_A": 0.2,
+}
+# Numerics and the start are no knowledge; a model file is another machine; the curve has a test of its own.
+NOT_TRUTH = {
+    f"plant.{name}"
+    for name in ("engine", "step_s", "integrator", "initial_rad", "initial_rad_s", "mjcf", "torque_curve")
+}
+
+
+def resolved(name="tilt", **changes):
+    with Session(scenarios.load(name, changes)) as session:
+        return session.scenario
+
+
+def numbers(part, path=""):
+    """Every number of a controller by its place; what is computed anew in each tick is left out."""
+    if isinstance(part, tuple):
+        names = getattr(part, "_fields", range(len(part)))
+        inside = [numbers(value, f"{path}.{name}") for name, value in zip(names, part, strict=True)]
+        return {place: value for each in inside for place, value in each.items()}
+    computed = path.rpartition(".")[2] in ("scratch", "G")
+    return {} if computed else {path: np.asarray(part).tobytes()}
+
+
+def controller(changes):
+    with Session(scenarios.load("tilt", changes)) as session:
+        return numbers(session._machine._controller)
+
+
+def same_controller(one, other):
+    assert [place for place in one if one[place] != other[place]] == []
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return controller(WHOLE)
+
+
+def test_the_list_of_what_is_true_is_complete():
+    leaves = {name for name, field in every_field(Scenario) if not kind_of(field)}
+    of_the_truth = {name for name in leaves if name.partition(".")[0] in ("plant", "drive", "sensors")}
+    assert of_the_truth == set(TRUTH) | NOT_TRUTH
+
+
+@pytest.mark.parametrize("dotted", TRUTH)
+def test_a_change_of_the_truth_does_not_reach_the_controller(dotted, whole):
+    other = WHOLE | {dotted: TRUTH[dotted]}
+    assert resolved(**other).nominal == resolved(**WHOLE).nominal
+    same_controller(controller(other), whole)
+
+
+def test_nor_does_a_change_during_the_run():
+    with Session(scenarios.load("tilt", WHOLE)) as session:
+        known = session.scenario.nominal
+        session.advance(3)
+        for dotted in ("plant.coulomb_Nm", "drive.delay_s", "sensors.current.noise_A", "drive.supply_V"):
+            if dotted == "drive.supply_V":
+                session.set("drive.drop_up_V", 0.0)
+            session.set(dotted, TRUTH[dotted])
+        assert session.scenario.nominal == known
+
+
+def test_friction_that_is_not_known_is_not_fed_forward():
+    def fed(**changes):
+        scenario = scenarios.load("tilt", WHOLE | {"detector.detect": False} | changes)
+        return simulate(scenario).telemetry["feed_forward_Nm"]
+
+    known, stiff = fed(), fed(**{"plant.coulomb_Nm": [5e-3] * 3})
+    assert np.abs(known).max() > 1e-3
+    np.testing.assert_array_equal(stiff, known)
+    assert not np.array_equal(fed(**{"nominal.coulomb_Nm": [5e-3] * 3}), known)
+
+
+def test_the_controller_knows_nothing_of_what_the_robustness_study_draws():
+    study = load("robustness")
+    rows = Rows(study)
+    drawn = [rows.scenario(row) for row in islice(Grid(study), 5)]
+    assert len({scenario.plant.coulomb_Nm for scenario in drawn}) == 5
+    stated = scenarios.load("sinusoid", {"hardware": "prototype"}).nominal
+    assert [scenario.nominal for scenario in drawn] == [stated] * 5
+
+
+@pytest.mark.parametrize("hardware", ["ideal", "prototype"])
+def test_where_the_sheet_is_right_it_equals_the_truth(hardware):
+    stated = resolved("hold", hardware=hardware).nominal
+    true = resolved("hold", hardware=hardware, **{"nominal.equals_truth": True}).nominal
+    assert true.equals_truth
+    assert true.model_copy(update={"equals_truth": False}) == stated
+
+
+def test_a_nominal_model_that_equals_the_truth_is_recorded_with_its_values(actuator):
+    fields = WHOLE | TRUTH | {"drive.dac_bits": 16, "nominal.equals_truth": True, "nominal.delay_s": 2e-3}
+    scenario = resolved(**fields)
+    nominal, height_m = scenario.nominal, actuator.payload_mount_m[2]
+    assert nominal.equals_truth
+    inertia = loaded_inertia(1.4 * actuator.inertia, 0.04, height_m)
+    assert nominal.inertia_kg_m2 == tuple(inertia.tolist())
+    assert nominal.coulomb_Nm == (5e-3,) * 3
+    assert (nominal.swing_V, nominal.time_constant_s, nominal.current_limit_A) == (3.0, 1e-3, 4.0)
+    assert (nominal.resistance_ohm, nominal.inductance_H) == (2.0, 2e-3)
+    assert nominal.current_noise_A == 0.2
+    assert nominal.gain_error == 1e-2
+    # 0.5 A a volt; 10 mV of the amplifier, 10 mV of the converter and 8.5 steps of 24 V / 2^16.
+    assert nominal.offset_error_A == pytest.approx(0.5 * (2e-2 + 8.5 * 24 / 2**16))
+    assert nominal.angle_resolution_rad[2] == pytest.approx(2 * np.pi / 500)
+    assert nominal.delay_s == 2e-3  # what the user states counts
+
+
+def test_the_truth_is_read_once():
+    changes = {"nominal.equals_truth": True, "plant.coulomb_Nm": [1e-3] * 3}
+    with Session(scenarios.load("hold", changes)) as session:
+        known = session.scenario.nominal
+        session.set("plant.coulomb_Nm", [4e-3] * 3)
+        session.set("drive.supply_V", None)
+        session.set("plant.torque_curve", str(actuators.TORQUE_CURVE_PATH))
+        assert session.scenario.nominal == known
+        assert session.scenario.plant.coulomb_Nm == (4e-3,) * 3
+        restored = pickle.loads(pickle.dumps(session.snapshot())).scenario
+        assert isinstance(restored, ResolvedScenario)
+        assert restored == session.scenario
+
+
+def test_set_during_a_run_it_takes_the_truth_of_then():
+    with Session(scenarios.load("hold", {"nominal.torque_scale": 1.1})) as session:
+        session.set("plant.coulomb_Nm", [4e-3] * 3)
+        assert session.scenario.nominal.coulomb_Nm == (0.0,) * 3
+        session.set("nominal.equals_truth", True)
+        nominal = session.scenario.nominal
+        assert (nominal.coulomb_Nm, nominal.torque_scale) == ((4e-3,) * 3, 1.0)
+        session.set("nominal.equals_truth", False)
+        assert session.scenario.nominal.coulomb_Nm == (4e-3,) * 3
+
+
+@pytest.mark.parametrize("knows", [False, True])
+def test_a_resolved_scenario_written_down_is_the_same_when_it_is_read_again(knows, tmp_path):
+    changes = {"hardware": "prototype", "nominal.equals_truth": knows, "plant.coulomb_Nm": [3e-3] * 3}
+    scenario = resolved(**changes)
+    (tmp_path / "again.toml").write_text(as_toml(scenario))
+    again = resolved(str(tmp_path / "again.toml"))
+    assert again.nominal == scenario.nominal
+    assert again.plant == scenario.plant
+    assert ("--nominal.equals-truth true" in as_command(scenario)) is knows
+
+
+# --- torque curves and model files
+
+
+@pytest.fixture
+def half(tmp_path, actuator):
+    curve = actuator.torque_curve
+    pairs = zip(np.degrees(curve.phi_rad).tolist(), (0.5 * curve.torque_Nm_per_A).tolist(), strict=True)
+    path = tmp_path / "half.csv"
+    path.write_text("\n".join(["phi_deg,torque_Nm_per_A", *(f"{phi!r},{torque!r}" for phi, torque in pairs)]))
+    return str(path)
+
+
+def first_row(changes):
+    with Session(scenarios.load("hold", {"controller.law": "pd", **changes})) as session:
+        return session.advance(1), session.scenario.nominal.torque_curve
+
+
+def test_another_curve_of_the_shipped_machine_is_the_truth_alone(half):
+    shipped, name = first_row({})
+    assert name == "shipped"
+    weak, name = first_row({"plant.torque_curve": half})
+    assert name == "shipped"
+    np.testing.assert_array_equal(weak["current_command_A"], shipped["current_command_A"])
+    # Samples are halved without rounding; the spline through them rounds anew.
+    np.testing.assert_allclose(weak["torque_Nm"], 0.5 * shipped["torque_Nm"], rtol=1e-9, atol=1e-12)
+
+
+def test_the_curve_of_a_machine_of_one_s_own_is_in_its_data_sheet(half):
+    own = {"plant.mjcf": str(actuators.MJCF_PATH), "plant.torque_curve": half}
+    shipped, _ = first_row({})
+    weak, name = first_row(own)
+    assert name == half
+    # The controller knows that it takes twice the current, and the torque is the commanded one.
+    for signal, factor in (("current_command_A", 2.0), ("torque_Nm", 1.0)):
+        np.testing.assert_allclose(weak[signal], factor * shipped[signal], rtol=1e-9, atol=1e-12)
+    _, name = first_row(own | {"nominal.torque_curve": "shipped"})
+    assert name == "shipped"
+
+
+@pytest.mark.parametrize("fields", [{"nominal.equals_truth": True}, {"plant.mjcf": str(actuators.MJCF_PATH)}])
+def test_a_curve_that_was_resolved_does_not_follow_a_later_one(fields, half):
+    with Session(scenarios.load("hold", fields | {"controller.law": "pd"})) as session:
+        nominal = session._in_force.files.nominal.torque_curve
+        session.set("plant.torque_curve", half)
+        assert session.scenario.nominal.torque_curve == "shipped"
+        assert session._in_force.files.nominal.torque_curve is nominal
+        assert session.actuator.torque_curve.peak_Nm_per_A == 0.5 * nominal.peak_Nm_per_A
+
+
+# --- older records
+
+
+def test_a_record_of_a_version_without_a_data_sheet_knows_drive_and_sensors_as_they_were():
+    scenario = resolved("hold", hardware="prototype", **{"drive.supply_V": 12.0, "nominal.delay_s": 0.0})
+    fields = json.loads(scenario.model_dump_json())
+    older = (
+        "torque_scale", "inertia_kg_m2", "current_limit_A", "coulomb_Nm", "viscous_Nm_s", "time_constant_s",
+        "delay_s",
+    )  # fmt: skip
+    fields["nominal"] = {name: fields["nominal"][name] for name in older} | {"torque_curve": None}
+    with Session(scenarios.from_record(fields, "older")) as session:
+        nominal = session.scenario.nominal
+    assert (nominal.swing_V, nominal.current_noise_A, nominal.delay_s) == (12.0 - 4.8, 0.02, 0.0)
+    assert nominal.angle_noise_rad == scenario.nominal.angle_noise_rad
+    assert nominal.inertia_kg_m2 == scenario.nominal.inertia_kg_m2
+
+
+# --- what law and allocation write reaches nothing else
+
+
+def overwriting(G, torque_S, limit, current, scratch):
+    """The least-norm allocation, which leaves nothing of what it was handed."""
+    share = allocate(G, torque_S, limit, current)
+    G[:] = 0.0
+    torque_S[:] = np.nan
+    scratch[:] = np.nan
+    return share
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, WHOLE, {"detector.detect": True, "controller.law": "afsm_eso"}],
+    ids=["plain", "whole", "eso"],
+)
+def test_an_allocation_that_overwrites_its_arguments_changes_no_byte(changes, monkeypatch):
+    scenario = scenarios.load("hold", {"duration": 0.2, **changes})
+    plain = simulate(scenario).telemetry
+    assert np.abs(plain["torque_Nm"]).max() > 1e-3
+    monkeypatch.setitem(ALLOCATIONS, "least_norm", overwriting)
+    assert simulate(scenario).telemetry.values.tobytes() == plain.values.tobytes()
+
+
+def springy(t, reference, measurement, parameters, state, torque):
+    for i in range(3):
+        error, rate = measurement[0, i] - reference[0, i], measurement[1, i] - reference[1, i]
+        torque[i] = -2.0 * error - 0.1 * rate
+
+
+def careless(t, reference, measurement, parameters, state, torque):
+    springy(t, reference, measurement, parameters, state, torque)
+    reference[:] = np.nan
+    measurement[:] = np.nan
+
+
+def test_a_law_that_overwrites_its_arguments_changes_no_byte():
+    changes = {name: value for name, value in WHOLE.items() if name != "controller.law"}
+    scenario = scenarios.load("hold", changes)
+    tidy, other = (
+        simulate(scenario, Law("own", step, [], [], asks_torque=True)).telemetry
+        for step in (springy, careless)
+    )
+    assert other.values.tobytes() == tidy.values.tobytes()

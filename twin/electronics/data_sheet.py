@@ -1,0 +1,46 @@
+"""Data sheet of the electronics: the nominal values of a controller whose sheet is that of its hardware."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedDrive
+from spheretwin.twin.electronics.sensing.chain import accuracy
+from spheretwin.twin.electronics.sensing.sections import SensorsSection
+
+
+def drive_sheet(drive: ResolvedDrive) -> dict[str, Any]:
+    """Nominal values of amplifiers and coils, by field of `nominal`."""
+    return {
+        "current_limit_A": drive.current_limit_A,
+        "delay_s": drive.delay_s,
+        "time_constant_s": drive.lag_s,
+        "resistance_ohm": drive.resistance_ohm,
+        "inductance_H": drive.inductance_H,
+        "swing_V": _swing_V(drive),
+        "offset_error_A": drive.transconductance_A_V * _offset_V(drive),
+        "gain_error": drive.dac_gain_error if drive.dac_bits else 0.0,
+    }
+
+
+def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
+    """Nominal values of the sensors, by field of `nominal`."""
+    noise_rad, resolution_rad = accuracy(sensors)
+    return {
+        "angle_noise_rad": noise_rad,
+        "angle_resolution_rad": resolution_rad,
+        "current_noise_A": sensors.current.noise_A,
+    }
+
+
+def _swing_V(drive: DriveSection) -> float:
+    """Largest voltage in the worse direction; 0 for amplifiers without a supply, which have no limit."""
+    return 0.0 if drive.supply_V is None else drive.supply_V - max(drive.drop_up_V, drive.drop_down_V)
+
+
+def _offset_V(drive: DriveSection) -> float:
+    """Largest offset at the input of an amplifier: its own, and that of the converter with its rounding."""
+    if not drive.dac_bits:
+        return drive.amplifier_offset_V
+    lsb_V = 2 * drive.dac_range_V / 2**drive.dac_bits
+    return drive.amplifier_offset_V + (drive.dac_offset_V + (drive.dac_inl_lsb + 0.5) * lsb_V)
