@@ -11,7 +11,7 @@ import hashlib
 import json
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
@@ -338,9 +338,23 @@ def checked_bytes(path: Path) -> int | None:
 # --- rows and texts
 
 
-def text_checksum(*texts: object) -> str:
-    """Return the checksum of some texts, in hexadecimal digits."""
-    return f"{zlib.crc32(json.dumps([str(each) for each in texts]).encode()):08x}"
+def text_checksum(text: str) -> str:
+    """Return the checksum of a text, in hexadecimal digits."""
+    return f"{zlib.crc32(text.encode()):08x}"
+
+
+def line_checksums(lines: Sequence[tuple[int, str, str]], first: int) -> NDArray[np.uint64]:
+    """Return number and checksum of each line of a log: the number in the upper 32 bits.
+
+    Parameters
+    ----------
+    lines : sequence of tuple
+        Time in ns, level and text.
+    first : int
+        Number of the first line.
+    """
+    sums = [zlib.crc32(json.dumps(line).encode()) for line in lines]
+    return _numbered(np.array(sums, dtype=np.uint64), first)
 
 
 def row_checksums(rows: Table, first: int) -> NDArray[np.uint64]:
@@ -359,8 +373,16 @@ def row_checksums(rows: Table, first: int) -> NDArray[np.uint64]:
     """
     bits = np.ascontiguousarray(rows.values).view(np.uint64)
     sums = (bits ^ (bits >> _HALF)) @ _multipliers(rows.signals)
-    numbers = np.arange(first, first + len(rows), dtype=np.uint64)
-    return (numbers << _HALF) | (sums >> _HALF)
+    return _numbered(sums >> _HALF, first)
+
+
+def row_numbers(checksums: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Return the numbers of rows or lines."""
+    return (checksums >> _HALF).astype(np.int64)
+
+
+def _numbered(sums: NDArray[np.uint64], first: int) -> NDArray[np.uint64]:
+    return (np.arange(first, first + len(sums), dtype=np.uint64) << _HALF) | sums
 
 
 @cache
@@ -370,7 +392,3 @@ def _multipliers(signals: tuple[Signal, ...]) -> NDArray[np.uint64]:
     digests = [hashlib.blake2b(name.encode(), digest_size=8).digest() for name in names]
     return np.array([int.from_bytes(digest, "little") | 1 for digest in digests], dtype=np.uint64)
 
-
-def row_numbers(checksums: NDArray[np.uint64]) -> NDArray[np.int64]:
-    """Return the numbers of rows."""
-    return (checksums >> _HALF).astype(np.int64)
