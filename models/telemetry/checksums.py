@@ -273,8 +273,8 @@ def _group(file: pyarrow.parquet.ParquetFile, place: int) -> str:
 
 # --- Arrow streams
 
-_LISTED = re.compile(r"(\d{12}) ([0-9a-f]{8})\n")
-_LISTED_BYTES = 22
+# A line of a list: length and checksum of a segment, checksum of the line.
+_LINE_BYTES = len("000000000000 00000000 00000000\n")
 
 
 class SegmentList:
@@ -293,7 +293,7 @@ class SegmentList:
 
     def append(self, segment: Segment) -> None:
         """Add a segment."""
-        self._file.write(f"{segment.size:012d} {segment.crc32:08x}\n".encode())
+        self._file.write(_line(segment))
 
     def close(self) -> None:
         """Close the list."""
@@ -318,21 +318,34 @@ def checked_bytes(path: Path) -> int | None:
     listed = list_of(path)
     if not listed.is_file():
         return None
-    lines = listed.read_bytes()
-    done = 0
+    lines, done = listed.read_bytes(), 0
     with path.open("rb") as file:
-        for place in range(len(lines) // _LISTED_BYTES):
-            line = lines[place * _LISTED_BYTES : (place + 1) * _LISTED_BYTES]
-            if not (found := _LISTED.fullmatch(line.decode(errors="replace"))):
+        for place in range(len(lines) // _LINE_BYTES):
+            written = _segment(lines[place * _LINE_BYTES : (place + 1) * _LINE_BYTES])
+            if written is None:
                 raise damaged(listed, f"line {place}")
-            size = int(found[1])
-            received = _read_segment(file, size)
-            if received.size < size:
+            received = _read_segment(file, written.size)
+            if received.size < written.size:
                 break
-            if received.crc32 != int(found[2], 16):
+            if received != written:
                 raise damaged(path, f"batch {place}")
-            done += size
+            done += written.size
     return done
+
+
+def _line(segment: Segment) -> bytes:
+    text = f"{segment.size:012d} {segment.crc32:08x}"
+    return f"{text} {text_checksum(text)}\n".encode()
+
+
+def _segment(line: bytes) -> Segment | None:
+    """Segment of a line; None if the line is not what was written."""
+    try:
+        size, crc32, _ = line.split()
+        segment = Segment(int(size), int(crc32, 16))
+    except ValueError:
+        return None
+    return segment if _line(segment) == line else None
 
 
 # --- rows and texts

@@ -102,16 +102,27 @@ def rewrite(path: Path, target: Path) -> Recorded:
 @contextmanager
 def _chunks(path: Path) -> Iterator[tuple[Iterable[Chunk], bool]]:
     """Whole chunks of a recording, and whether it was closed."""
+    done = 0
+
+    def counted(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
+        nonlocal done
+        for chunk in chunks:
+            yield chunk
+            done += 1
+
     try:
         with whole_messages(path) as (readable, extent), warnings.catch_warnings():
             warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # that it has no footer is told here
             check_readable(readable, path)
-            yield RrdReader(readable).stream(), extent.ended
+            yield counted(RrdReader(readable).stream()), extent.ended
     except (SpheretwinError, KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # a panic inside Rerun is no `Exception`
         told = shortened(without_breaks(error), LONGEST_WORD)
-        raise InputError(f"recording {path}: expected one of a run, {told}") from None
+        place = f"chunk {done}" if done else "its footer or first chunk"
+        raise InputError(
+            f"recording {path}: expected one of a run, received one that cannot be read in {place}: {told}"
+        ) from None
 
 
 def _exact(t_ns: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
