@@ -1,8 +1,8 @@
 """Checksums of telemetry: of the bytes of Parquet files and Arrow streams, and of rows and texts.
 
-The bytes of a file are checked in segments, each with its length and its CRC-32. In a Parquet file a segment is
-a row group, and the footer, which lists the segments, has a checksum of its own: no bit of the file is left out.
-Readers compare before they decode anything.
+The bytes of a file are checked in segments, each with its length and its CRC-32. In a Parquet file a segment
+is a row group. The footer lists the segments and has a checksum of its own, so that every bit of the file is
+checked. Readers compare before they decode anything.
 """
 
 from __future__ import annotations
@@ -404,4 +404,3 @@ def _multipliers(signals: tuple[Signal, ...]) -> NDArray[np.uint64]:
     names = [f"{signal.name} {place}" for signal in signals for place in range(signal.size)]
     digests = [hashlib.blake2b(name.encode(), digest_size=8).digest() for name in names]
     return np.array([int.from_bytes(digest, "little") | 1 for digest in digests], dtype=np.uint64)
-

@@ -2,7 +2,8 @@
 
 A stream grows by whole batches of rows, so that a killed process leaves all it had flushed: at worst the last
 batch of the last stream is torn, and is left out when they are read. A file next to each stream lists the
-checksums of its batches. Writing one takes little memory; that of a Parquet file grows with each group of rows.
+checksums of its batches. Writing a stream takes little memory; that of a Parquet file grows with each row
+group.
 """
 
 from __future__ import annotations
@@ -251,4 +252,3 @@ def _is_signal(field: pa.Field) -> bool:
     return {b"unit", b"meaning", b"labels"} <= set(field.metadata or {}) and pa.types.is_float64(
         field.type.value_type if of_vector else field.type
     )
-

@@ -105,9 +105,12 @@ class Contents:
     def checked(self) -> bool:
         """True if the recording has checksums."""
         texts = [*([self._facts] if self._facts else []), *self._described.values()]
-        has_any = any(each.checksum for each in texts)
-        chunks = [*self._rows, *self._lines]
-        return bool(has_any or self._totals or any(each.checksums is not None for each in chunks))
+        checksums = [*(each.checksums for each in self._rows), *(each.checksums for each in self._lines)]
+        return bool(
+            self._totals
+            or any(each.checksum for each in texts)
+            or any(each is not None for each in checksums)
+        )
 
     @property
     def counts(self) -> dict[str, int]:
@@ -254,7 +257,8 @@ class Contents:
         table = Table(present, np.concatenate(values, axis=1))
         numbers = row_numbers(rows.checksums)
         expected = row_checksums(table, int(numbers[0]))
-        changed = (expected != rows.checksums) | (nanoseconds(table["t_s"]) != rows.t_ns)
+        with np.errstate(invalid="ignore"):  # a damaged time may be no number
+            changed = (expected != rows.checksums) | (nanoseconds(table["t_s"]) != rows.t_ns)
         if np.any(changed):
             place = int(np.argmax(changed))
             t_s = rows.t_ns[place] * 1e-9

@@ -27,7 +27,7 @@ RATE = "record_rate_Hz"
 def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
     """Facts of a run from its start, the versions that it was made with, and the rate of the rows kept."""
     text = json.dumps({**asdict(facts), RATE: rate_Hz, "versions": versions()}, default=str)
-    return rr.AnyValues(**{FACTS: text, FACTS_CHECKSUM: text_checksum(text)})
+    return rr.AnyValues(facts=text, facts_checksum=text_checksum(text))
 
 
 def signals_as_json(arrival: int, signals: Sequence[Signal]) -> list[rr.DescribedComponentBatch]:
