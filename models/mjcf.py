@@ -23,7 +23,7 @@ import mujoco
 import numpy as np
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.mujoco_library import silence_warnings
+from spheretwin.models.base.mujoco_library import compiler_warnings, silence_warnings
 from spheretwin.models.base.wording import without_breaks
 
 PAYLOAD = "payload"
@@ -52,11 +52,14 @@ class Mjcf:
     bare, loaded : MjModel
         To be stepped, without and with the body that carries the payload; the same where anything else
         hangs on that body.
+    warnings : tuple of str
+        What the engine's compiler warns of, a line each.
     """
 
     described: mujoco.MjModel
     bare: mujoco.MjModel
     loaded: mujoco.MjModel
+    warnings: tuple[str, ...] = ()
 
     @cached_property
     def unknown_to_the_lagrangian(self) -> tuple[str, ...]:
@@ -173,6 +176,15 @@ def _body_names(model: mujoco.MjModel) -> list[str]:
 def _read(path: Path) -> Mjcf:
     silence_warnings()
     mujoco.mj_clearCache(mujoco.mj_getCache())  # the engine's own misses a mesh edited within a second
+    with compiler_warnings() as lines:
+        compiled = _compiled(path)
+    for model in compiled:
+        _turn_principal_axes_back(model)
+    return Mjcf(*compiled, tuple(f"model {path}: {line}" for line in lines))
+
+
+def _compiled(path: Path) -> tuple[mujoco.MjModel, mujoco.MjModel, mujoco.MjModel]:
+    """Models of a file: described, bare, loaded."""
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
@@ -186,10 +198,7 @@ def _read(path: Path) -> Mjcf:
         loaded = spec.compile()
     except ValueError as error:
         raise InputError(f"model {path}: expected valid MJCF, {without_breaks(error)}") from None
-    kept = Mjcf(described, _without_mount(spec, loaded), loaded)
-    for model in (kept.described, kept.loaded, kept.bare):
-        _turn_principal_axes_back(model)
-    return kept
+    return described, _without_mount(spec, loaded), loaded
 
 
 # Whatever can hang on a body, or refer to one.

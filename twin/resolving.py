@@ -149,6 +149,7 @@ def warnings_of(scenario: Scenario, files: Files) -> list[str]:
     """What a user should know of model and scenario before believing the figures; one line each."""
     late = [change for change in planned(scenario) if change.tick >= scenario.ticks]
     return [
+        *files.model.warnings,
         *disagreements(files.actuator),
         *_overridden(scenario.plant, files.model.described.opt),
         *(f"the event that sets {change.name} is not made: the run ends before" for change in late),

@@ -1,10 +1,12 @@
 """MuJoCo's own shared library: its functions by address, and its messages kept quiet."""
 
 import ctypes
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from threading import Lock
 
 import mujoco
 
@@ -39,6 +41,22 @@ def timers_stopped() -> Iterator[None]:
         yield
     finally:
         clock.value = before
+
+
+_COMPILING = Lock()  # Python's warnings are one list for all threads
+
+
+@contextmanager
+def compiler_warnings() -> Iterator[list[str]]:
+    """Give a list of what MuJoCo's compiler warns of while the block runs: a line each, none twice.
+
+    Its Python package raises them as warnings, several lines each, again at each compilation.
+    """
+    lines: list[str] = []
+    with _COMPILING, warnings.catch_warnings(record=True) as raised:
+        warnings.simplefilter("always")
+        yield lines
+        lines += dict.fromkeys(" ".join(str(each.message).split()) for each in raised)
 
 
 def silence_warnings() -> None:

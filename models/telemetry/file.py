@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.files import OPEN_FILES, PartialFile, check_writable, whole_file
+from spheretwin.models.base.files import OPEN_FILES, PartialFile, check_writable
 from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.telemetry.checksums import write_parquet
 from spheretwin.models.telemetry.parts import Parts, read_batches, read_schema
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table
 
 if TYPE_CHECKING:
     import pyarrow as pa
-    import pyarrow.parquet
 
 # Rows of a batch of a part: four seconds at 1 kHz, some 3 MB in memory.
 PART_ROWS = 4096
@@ -189,33 +189,24 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
     SpheretwinError
         Writing failed; what was there before is untouched.
     """
-    import pyarrow.parquet  # slow to import, and most runs write no file
-
     if not parts:
         raise InputError("telemetry: expected at least one part, received none")
     schema = _joint_schema(parts, facts)
+    return write_parquet(path, schema, _groups(parts, schema), **PARQUET_FORMAT)
+
+
+def _groups(parts: Sequence[Path], schema: pa.Schema) -> Iterator[pa.Table]:
+    """Row groups of the file; at least one."""
+    import pyarrow as pa  # slow to import, and most runs write no file
+
     batches = (_widened(batch, schema) for batch in _batches(parts))
     rows = 0
-    with (
-        whole_file(path) as temporary,
-        pyarrow.parquet.ParquetWriter(temporary, schema, **PARQUET_FORMAT) as writer,
-    ):
-        while written := _write_group(writer, batches):
-            rows += written
-        if not rows:
-            raise _empty(parts)
-    return rows
-
-
-def _write_group(writer: pyarrow.parquet.ParquetWriter, batches: Iterator[pa.RecordBatch]) -> int:
-    """Write the next batches as one row group; returns its rows, 0 at the end."""
-    import pyarrow as pa
-
-    group = pa.Table.from_batches(islice(batches, GROUP_BATCHES), writer.schema)
-    if group.num_rows:
-        writer.write_table(group, row_group_size=group.num_rows)
+    while len(group := pa.Table.from_batches(islice(batches, GROUP_BATCHES), schema)):
+        rows += len(group)
+        yield group
         pa.default_memory_pool().release_unused()  # else Arrow keeps what a hundred groups have needed
-    return int(group.num_rows)
+    if not rows:
+        raise _empty(parts)
 
 
 def _batches(parts: Sequence[Path]) -> Iterator[pa.RecordBatch]:

@@ -1,8 +1,9 @@
 """Rows that a run has flushed: Arrow streams in a hidden folder beside its file, one for each set of columns.
 
 A stream grows by whole batches of rows, so that a killed process leaves all it had flushed: at worst the last
-batch of the last stream is torn, and is left out when they are read. Writing one takes little memory; that of
-a Parquet file grows with each group of rows.
+batch of the last stream is torn, and is left out when they are read. A file next to each stream lists the
+checksums of its batches. Writing a stream takes little memory; that of a Parquet file grows with each row
+group.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.base.wording import shown
+from spheretwin.models.telemetry.checksums import (
+    SegmentedFile,
+    SegmentList,
+    checked_bytes,
+    list_of,
+    unreadable,
+)
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import Table
 
@@ -26,6 +34,8 @@ if TYPE_CHECKING:
 
 # What each message of a stream begins with; the length of its description follows, in as many bytes.
 _MESSAGE = b"\xff\xff\xff\xff"
+
+_STREAM = "an Arrow stream of a run"
 
 
 class Parts:
@@ -51,7 +61,9 @@ class Parts:
         self.paths: list[Path] = []
         self.rows = 0
         self._signals: tuple[Signal, ...] = ()
-        self._sink: Any = None  # an `OSFile` and the stream's writer to it, once there are rows
+        # Of the last stream: its file, the list of its checksums, what writes to it.
+        self._sink: SegmentedFile | None = None
+        self._list: SegmentList | None = None
         self._writer: Any = None
 
     @property
@@ -86,9 +98,10 @@ class Parts:
         OSError
             Its end could not be written; all its rows were.
         """
-        if self._writer is not None:
+        if self._writer is not None and self._sink is not None:
             self._writer.close()
-            self._sink.close()
+            self._end_batch()
+            self._close_files()
 
     def remove(self) -> None:
         """Delete all of them; they must be closed."""
@@ -101,11 +114,12 @@ class Parts:
         folder = self.folder if self.paths else self._new_folder()
         part = folder / f"{len(self.paths):06d}.arrows"
         try:
-            self._sink = pa.OSFile(str(part), "wb")  # without a buffer of its own
+            self._sink, self._list = SegmentedFile(part), SegmentList(part)
             self._writer = pa.ipc.new_stream(self._sink, _schema(rows.signals, self._facts))
             self._write(rows)
         except OSError:
             part.unlink(missing_ok=True)
+            list_of(part).unlink(missing_ok=True)
             if not self.paths:
                 shutil.rmtree(folder, ignore_errors=True)
             raise
@@ -114,14 +128,24 @@ class Parts:
 
     def _write(self, rows: Table) -> None:
         self._writer.write_table(rows.arrow({}))
-        self._sink.flush()
+        self._end_batch()
+
+    def _end_batch(self) -> None:
+        """Hand a batch to the operating system, then its checksum."""
+        if self._sink is not None and self._list is not None:
+            self._sink.flush()
+            self._list.append(self._sink.end_segment())
+
+    def _close_files(self) -> None:
+        for file in (self._sink, self._list):
+            if file is not None:
+                file.close()
 
     def _abandon(self) -> None:
         """Let go of a stream that can take no more, without an end: it is read up to its last whole batch."""
-        if self._sink is not None:
-            with suppress(OSError):
-                self._sink.close()
-        self._sink = self._writer = None
+        with suppress(OSError):
+            self._close_files()
+        self._sink = self._list = self._writer = None
 
     def _new_folder(self) -> Path:
         target = self._path.resolve()
@@ -142,15 +166,20 @@ def read_schema(part: Path) -> pa.Schema | None:
     """
     import pyarrow as pa
 
+    if _checked_bytes(part) == 0:
+        return None
     with _opened(part) as source:
         try:
             schema = pa.ipc.open_stream(source).schema
         except (pa.ArrowException, OSError) as error:
             if _is_torn_at_its_start(part):
                 return None
-            raise _foreign(part, without_breaks(error)) from None
+            raise unreadable(part, error, _STREAM) from None
     if not _is_telemetry(schema):
-        raise _foreign(part, f"received one of {', '.join(schema.names) or 'nothing'}")
+        raise InputError(
+            f"telemetry {part}: expected {_STREAM},"
+            f" received {shown(', '.join(schema.names)) if schema.names else 'one without columns'}"
+        )
     return schema
 
 
@@ -160,15 +189,18 @@ def read_batches(part: Path) -> Generator[pa.RecordBatch, None, bool]:
     Raises
     ------
     InputError
-        It cannot be read.
+        It cannot be read, or a batch is not what was written.
     """
     import pyarrow as pa
 
+    checked = _checked_bytes(part)
+    if checked == 0:
+        return True
     try:
         with _opened(part) as source:
             schema = pa.ipc.open_stream(source).schema
             place = source.tell()
-        while True:
+        while checked is None or place < checked:
             # A mapping for each batch: what was read of a mapped file is the process's memory while it lasts.
             with _opened(part) as source:
                 source.seek(place)
@@ -180,6 +212,14 @@ def read_batches(part: Path) -> Generator[pa.RecordBatch, None, bool]:
         return False
     except (pa.ArrowException, OSError):
         return True
+    return checked is not None and checked < part.stat().st_size
+
+
+def _checked_bytes(part: Path) -> int | None:
+    try:
+        return checked_bytes(part)
+    except OSError as error:
+        raise unreadable(part, error, _STREAM) from None
 
 
 @contextmanager
@@ -189,7 +229,7 @@ def _opened(part: Path) -> Iterator[pa.MemoryMappedFile]:
     try:
         source = pa.memory_map(str(part))
     except OSError as error:
-        raise _foreign(part, without_breaks(error)) from None
+        raise unreadable(part, error, _STREAM) from None
     with source:
         yield source
 
@@ -212,7 +252,3 @@ def _is_signal(field: pa.Field) -> bool:
     return {b"unit", b"meaning", b"labels"} <= set(field.metadata or {}) and pa.types.is_float64(
         field.type.value_type if of_vector else field.type
     )
-
-
-def _foreign(part: Path, why: str) -> InputError:
-    return InputError(f"telemetry {part}: expected an Arrow stream of a run, {why}")

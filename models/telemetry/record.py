@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.status import Status, named
+
+_RUN = "scenario, journal and ticks of a run"
 
 
 class Change(NamedTuple):
@@ -69,17 +73,39 @@ class RunRecord:
         Raises
         ------
         InputError
-            The status is none.
-        KeyError, TypeError, ValueError, OverflowError, RecursionError
             Scenario, journal or ticks are missing, or a text is not what this package writes.
         """
-        journal = json.loads(texts["journal"])
         return cls(
-            scenario=json.loads(texts["scenario"]),
-            journal=tuple(Change(int(tick), str(name), value) for tick, name, value in journal),
-            ticks=int(texts["ticks"]),
-            files=json.loads(texts.get("files", "{}")),
-            versions=json.loads(texts.get("versions", "{}")),
+            scenario=_read(texts, "scenario", _mapping),
+            journal=_read(texts, "journal", _journal),
+            ticks=_read(texts, "ticks", int),
+            files=_read(texts, "files", _mapping, "{}"),
+            versions=_read(texts, "versions", _mapping, "{}"),
             status=named(texts["status"]) if "status" in texts else None,
-            first_tick=int(texts.get("first_tick", "0")),
+            first_tick=_read(texts, "first_tick", int, "0"),
         )
+
+
+def _read(
+    texts: Mapping[str, str], name: str, parse: Callable[[str], Any], default: str | None = None
+) -> Any:
+    """The value of one text; `InputError` if it is missing and has no default, or cannot be read."""
+    expected = f"metadata: expected {_RUN}"
+    text = texts.get(name, default)
+    if text is None:
+        raise InputError(f"{expected}, received no {name}")
+    try:
+        return parse(text)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise InputError(f"{expected}, received {name} as {shown(text)}") from None
+
+
+def _mapping(text: str) -> Mapping[str, Any]:
+    fields = json.loads(text)
+    if not isinstance(fields, dict):
+        raise TypeError
+    return fields
+
+
+def _journal(text: str) -> tuple[Change, ...]:
+    return tuple(Change(int(tick), str(name), value) for tick, name, value in json.loads(text))

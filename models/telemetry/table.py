@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.files import whole_file
-from spheretwin.models.base.wording import did_you_mean, without_breaks
+from spheretwin.models.base.wording import did_you_mean
+from spheretwin.models.telemetry import checksums
 from spheretwin.models.telemetry.signals import Signal, offsets, width
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class Table:
         return Table(self.signals, self.values[first:last])
 
     def write_parquet(self, path: Path, metadata: Mapping[str, str]) -> None:
-        """Write all columns, their units, and `metadata`, whole or not at all.
+        """Write all columns, their units, `metadata` and checksums, whole or not at all.
 
         Raises
         ------
@@ -98,10 +98,8 @@ class Table:
         SpheretwinError
             Writing failed; what was there before is untouched.
         """
-        import pyarrow.parquet  # slow to import, and most runs write no file
-
-        with whole_file(path) as temporary:
-            pyarrow.parquet.write_table(self.arrow(metadata), temporary, **PARQUET_FORMAT)
+        table = self.arrow(metadata)
+        checksums.write_parquet(path, table.schema, [table], **PARQUET_FORMAT)
 
     def arrow(self, metadata: Mapping[str, str]) -> pa.Table:
         """Arrow table of the same columns; units and words as metadata of the fields."""
@@ -120,41 +118,49 @@ class Table:
 
 
 def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str]]:
-    """Read a table back, with the metadata of its file.
+    """Read a table back, with the metadata of its file, and compare its checksums.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The file; one of an earlier version has no checksums (`checksums.has_checksums`).
     rows : bool
         Without them the table is empty, and only the file's end is read.
 
     Raises
     ------
     InputError
-        The file is missing, is no telemetry of this package, or has two columns of one name.
+        The file is missing, is no telemetry of this package, is damaged, or has two columns of one name.
     """
     import pyarrow as pa
-    import pyarrow.parquet
 
     try:
-        with pyarrow.parquet.ParquetFile(path) as file:  # `read_table` would import the datasets of Arrow
+        with checksums.open_parquet(path, rows=rows) as file:
             arrow = file.read(use_threads=False) if rows else file.schema_arrow.empty_table()
         signals = tuple(_signal(field) for field in arrow.schema)
-    except (OSError, pa.ArrowException, KeyError) as error:
+        metadata = _texts(arrow.schema.metadata)
+    except KeyError as error:
         raise InputError(
-            f"telemetry {path}: expected a Parquet file of a run, {without_breaks(error)}"
+            f"telemetry {path}: expected a Parquet file of a run, received a column without its {error}"
         ) from None
+    except UnicodeDecodeError:
+        raise InputError(f"telemetry {path}: expected metadata as text, received other bytes") from None
+    except (OSError, pa.ArrowException) as error:
+        raise checksums.unreadable(path, error) from None
     names = [signal.name for signal in signals]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"telemetry {path}: expected each column once, received {', '.join(twice)} twice")
     parts = [_flat(arrow[signal.name], signal.size) for signal in signals]
-    metadata = {key.decode(): value.decode() for key, value in (arrow.schema.metadata or {}).items()}
-    return Table(signals, np.concatenate(parts, axis=1)), metadata
+    texts = {name: text for name, text in metadata.items() if name not in checksums.METADATA}
+    return Table(signals, np.concatenate(parts, axis=1)), texts
+
+
+def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
+    return {name.decode(): text.decode() for name, text in (metadata or {}).items()}
 
 
 def _signal(field) -> Signal:  # type: ignore[no-untyped-def]
-    described = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+    described = _texts(field.metadata)
     size = getattr(field.type, "list_size", 1)
     labels, states = (tuple(filter(None, text.split(","))) for text in _named(described))
     return Signal(field.name, described["unit"], size, described["meaning"], labels, states)

@@ -11,7 +11,7 @@ from typing import Any
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.versions import versions
-from spheretwin.twin.commands.reporting import add_verbose, kept, print_json
+from spheretwin.twin.commands.reporting import add_verbose, kept, print_json, warn_of_model
 from spheretwin.twin.crosscheck.part import STATES
 from spheretwin.viz.page.folder import prepare
 from spheretwin.viz.terminal import tables
@@ -50,6 +50,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             f"command line: expected --out, --json, --states, --mjcf or --verbose, received {' '.join(rest)}"
         )
     actuators.load(options.mjcf)  # a model that cannot be read leaves no folder
+    warn_of_model(options.mjcf)
     from spheretwin.twin.crosscheck import page, suite  # their libraries are slow to import
 
     if options.out:

@@ -9,6 +9,8 @@ from typing import Any
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
+from spheretwin.models.telemetry.checksums import NO_CHECKSUMS
+from spheretwin.twin.commands.reporting import warn
 from spheretwin.twin.review.leavings import recover
 from spheretwin.viz.terminal import tables
 
@@ -36,7 +38,9 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     if rest:
         raise InputError(f"command line: expected FILE and --out, received {' '.join(rest)}")
     check_writable(options.out)
-    rows, seconds = recover(options.file, options.out)
-    print(f"recovered {rows} rows, {seconds:.3f} s of the run")
+    recovered = recover(options.file, options.out)
+    print(f"recovered {recovered.rows} rows, {recovered.seconds:.3f} s of the run")
     tables.print_written([options.out])
+    if not recovered.checked:
+        warn([f"{options.file} {NO_CHECKSUMS}"])
     return True

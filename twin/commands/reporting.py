@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from spheretwin.models import mjcf
 from spheretwin.models.base.check import Check, broken
 from spheretwin.models.base.files import whole_file
 
@@ -23,6 +24,11 @@ def warn(lines: Iterable[str]) -> None:
     """Print warnings on stderr, one line each."""
     for line in lines:
         print(f"spheretwin: warning: {line}", file=sys.stderr)
+
+
+def warn_of_model(path: Path) -> None:
+    """Print what the engine warns of in a model file."""
+    warn(mjcf.read(path).warnings)
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
+from spheretwin.models.telemetry.checksums import NO_CHECKSUMS
 from spheretwin.twin.commands.reporting import print_json, warn
 from spheretwin.twin.review import columns, tolerances
 from spheretwin.twin.review.beside import merging, picturing
@@ -81,6 +82,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     else:
         reviews.print_runs(told)
         tables.print_written([path for path in (options.export, options.merge, page) if path])
+    warn(f"{each.path} {NO_CHECKSUMS}" for each in runs if not each.checked)
     warn(_recovered(each) for each in runs if not each.whole)
     warn(_thinned(each) for each in runs if each.rate_Hz)
     for places in filter(None, over):

@@ -14,13 +14,14 @@ import numpy as np
 
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
 from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.commands.outputs import Outputs
 from spheretwin.twin.commands.own_metrics import OwnMetrics
-from spheretwin.twin.commands.reporting import print_json
+from spheretwin.twin.commands.reporting import print_json, warn
 from spheretwin.twin.metrics.metric import Planned
 from spheretwin.twin.records import replay
 from spheretwin.twin.records.replay import Plan
@@ -150,7 +151,10 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
             raise InputError(
                 f"command line: expected --replay without scenario and fields, received {received}"
             )
-        return replay.read(options.replay)
+        plan = replay.read(options.replay)
+        if not has_checksums(options.replay):
+            warn([f"{options.replay} {NO_CHECKSUMS}"])
+        return plan
     if options.scenario is None:
         raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
     scenario = scenarios.load(options.scenario, flags.overrides(rest))

@@ -37,16 +37,15 @@ def read(path: Path) -> Plan:
     """
     _, metadata = read_parquet(path, rows=False)
     try:
-        return _plan(_record(metadata, path), str(path))
-    except (KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        raise InputError(f"replay {path}: expected scenario, journal and ticks of a run, {error!r}") from None
-
-
-def _record(metadata: Mapping[str, str], path: Path) -> RunRecord:
-    try:
-        return RunRecord.from_metadata(metadata)
+        record = RunRecord.from_metadata(metadata)
     except InputError as error:
         raise InputError(f"replay {path}: {error}") from None
+    try:
+        return _plan(record, str(path))
+    except (KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise InputError(
+            f"replay {path}: expected scenario, journal and ticks of a run, received others"
+        ) from None
 
 
 def _plan(record: RunRecord, source: str) -> Plan:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.in_force import InForce, at_start
@@ -30,8 +31,12 @@ def figures(run: Reviewed) -> dict[str, Any]:
     try:
         with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
             return _figures(run)
-    except (KeyError, ValueError, TypeError, AttributeError, IndexError) as error:
-        raise InputError(f"review {run.path}: expected facts and rows of a run, {error!r}") from None
+    except KeyError as error:
+        raise InputError(
+            f"review {run.path}: expected facts and rows of a run, received no {shown(error.args[0])}"
+        ) from None
+    except (ValueError, TypeError, AttributeError, IndexError):
+        raise InputError(f"review {run.path}: expected facts and rows of a run, received others") from None
 
 
 def _figures(run: Reviewed) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.telemetry.checksums import list_of
 from spheretwin.models.telemetry.file import join
 from spheretwin.models.telemetry.parts import read_schema
 from spheretwin.models.telemetry.table import read_parquet
@@ -24,6 +25,8 @@ class Recovered(NamedTuple):
 
     rows: int
     seconds: float
+    checked: bool
+    """True if what was left has checksums; they were compared."""
 
 
 def found(path: Path) -> Path:
@@ -89,7 +92,7 @@ def recover(path: Path, out: Path) -> Recovered:
         parts = _parts(left)
         period_s = _period_s(parts[0])
         rows = join(parts, out)
-        return Recovered(rows, rows * period_s)
+        return Recovered(rows, rows * period_s, are_checked(left))
     if left.suffix in RECORDINGS or is_recording(left):
         from spheretwin.viz.reading import messages, reading  # Rerun is slow to import
 
@@ -99,7 +102,8 @@ def recover(path: Path, out: Path) -> Recovered:
             )
         recorded = reading.rewrite(left, out)
         period_s = recorded.facts["sections"]["controller"]["period_s"]
-        return Recovered(len(recorded.table), len(held(recorded.table, period_s)) * period_s)
+        seconds = len(held(recorded.table, period_s)) * period_s
+        return Recovered(len(recorded.table), seconds, recorded.checked)
     read_parquet(left, rows=False)  # what is no telemetry is told as such
     raise InputError(f"recover {left}: expected what a killed process left, received a whole telemetry file")
 
@@ -109,8 +113,15 @@ def _period_s(part: Path) -> float:
     schema = read_schema(part)
     try:
         return float(json.loads((schema.metadata if schema else {})[b"scenario"])["controller"]["period_s"])
-    except (KeyError, ValueError, TypeError, RecursionError) as error:
-        raise InputError(f"telemetry {part}: expected a part with a run's scenario, {error!r}") from None
+    except (KeyError, ValueError, TypeError, RecursionError):
+        raise InputError(
+            f"telemetry {part}: expected a part with the scenario of a run, received none that can be read"
+        ) from None
+
+
+def are_checked(folder: Path) -> bool:
+    """Return whether all parts in a folder have checksums."""
+    return all(list_of(part).is_file() for part in _parts(folder))
 
 
 def _parts(folder: Path) -> list[Path]:

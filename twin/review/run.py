@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.wording import shown
+from spheretwin.models.telemetry.checksums import has_checksums
 from spheretwin.models.telemetry.record import RunRecord
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, read_parquet
@@ -44,6 +46,8 @@ class Reviewed:
         The record as a telemetry file keeps it.
     rate_Hz : float or None
         Rows a second that the file keeps beside those that stand out; None for every row.
+    checked : bool
+        True if the file has checksums; they were compared.
     """
 
     path: Path
@@ -53,6 +57,7 @@ class Reviewed:
     whole: bool
     metadata: Mapping[str, str]
     rate_Hz: float | None = None
+    checked: bool = True
 
     @property
     def period_s(self) -> float:
@@ -85,23 +90,36 @@ def read(path: Path) -> Reviewed:
         if found.is_dir():
             with leavings.joined(found) as joined:
                 table, metadata = read_parquet(joined)
-            return _of_telemetry(found, table, metadata, whole=False)
-        return _of_telemetry(found, *read_parquet(found), whole=True)
-    except (KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        raise InputError(f"review {found}: expected the file of a run, {error!r}") from None
+            return _of_telemetry(found, table, metadata, whole=False, checked=leavings.are_checked(found))
+        table, metadata = read_parquet(found)
+        return _of_telemetry(found, table, metadata, whole=True, checked=has_checksums(found))
+    except KeyError as error:
+        raise InputError(
+            f"review {found}: expected the file of a run, received one without {shown(error.args[0])}"
+        ) from None
+    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise InputError(
+            f"review {found}: expected the file of a run, received one that cannot be read"
+        ) from None
 
 
-def _of_telemetry(path: Path, table: Table, metadata: dict[str, str], *, whole: bool) -> Reviewed:
+def _of_telemetry(
+    path: Path, table: Table, metadata: dict[str, str], *, whole: bool, checked: bool
+) -> Reviewed:
     _check_times(path, table)
     rate_Hz = float(metadata[_RATE]) if _RATE in metadata else None
-    return Reviewed(path, RunRecord.from_metadata(metadata), table, (), whole, metadata, rate_Hz)
+    try:
+        record = RunRecord.from_metadata(metadata)
+    except InputError as error:
+        raise InputError(f"review {path}: {error}") from None
+    return Reviewed(path, record, table, (), whole, metadata, rate_Hz, checked)
 
 
 def _of_recording(path: Path) -> Reviewed:
     from spheretwin.viz.reading import reading  # Rerun is slow to import
     from spheretwin.viz.recording.parts.described import RATE
 
-    facts, table, log, whole = reading.read(path)
+    facts, table, log, whole, checked = reading.read(path)
     _check_times(path, table)
     statuses = {status.told: status for status in Status}
     scenario, status = _scenario(facts), statuses.get(log[-1][2] if log else "")
@@ -112,7 +130,7 @@ def _of_recording(path: Path) -> Reviewed:
     rate_Hz, metadata = facts.get(RATE), record.metadata()
     if rate_Hz:
         metadata = {**metadata, _RATE: repr(rate_Hz)}
-    return Reviewed(path, record, table, tuple(log), whole, metadata, rate_Hz)
+    return Reviewed(path, record, table, tuple(log), whole, metadata, rate_Hz, checked)
 
 
 def _check_times(path: Path, table: Table) -> None:

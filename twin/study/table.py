@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.files import whole_file
+from spheretwin.models.telemetry import checksums
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.scenario import reading
 from spheretwin.twin.study.grid import Grid, Row
@@ -53,22 +53,20 @@ def write(path: Path, grid: Grid, journal: Journal, rows: Rows) -> None:
     SpheretwinError
         It could not be written; what was there before is untouched.
     """
-    import pyarrow as pa  # slow to import
-    import pyarrow.parquet as parquet
-
     schema = _schema(grid, journal, rows)
     base = _base(rows)
     metadata = {"study": rows.study.model_dump_json(), "scenario": json.dumps(base)}
-    with (
-        whole_file(path) as temporary,
-        parquet.ParquetWriter(temporary, schema.with_metadata(metadata), compression="zstd") as writer,
-    ):
-        finished = journal.results()
-        while batch := list(islice(finished, BATCH_ROWS)):
-            columns = _columns(
-                schema, [_record(grid[number], result, rows, base) for number, result in batch]
-            )
-            writer.write_table(pa.table(columns, schema=schema))
+    records = (_record(grid[number], result, rows, base) for number, result in journal.results())
+    checksums.write_parquet(
+        path, schema.with_metadata(metadata), _batches(schema, records), compression="zstd"
+    )
+
+
+def _batches(schema: pa.Schema, records: Iterator[dict[str, Any]]) -> Iterator[pa.Table]:
+    import pyarrow as pa  # slow to import
+
+    while batch := list(islice(records, BATCH_ROWS)):
+        yield pa.table(_columns(schema, batch), schema=schema)
 
 
 def _schema(grid: Grid, journal: Journal, rows: Rows) -> pa.Schema:

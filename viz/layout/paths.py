@@ -21,6 +21,11 @@ VALUES, STYLES, DESCRIBED = "values", "styles", "described"
 
 The first two are structs with a field a signal: each component would cost some bytes more in every row."""
 
+CHECKSUM, TOTAL = "checksum", "total"
+"""Components of `TELEMETRY` and `EVENTS`: number and checksum of each row or line, and how many there are.
+
+`CHECKSUM` also ends the names of the components that hold the checksum of a text of the same entity."""
+
 
 def component(kind: str, arrival: int) -> str:
     """Component of the signals that came together: 0 for those of the start; a change of law brings others.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.viz.layout.paths import TIMELINE
+from spheretwin.viz.layout.paths import CHECKSUM, TIMELINE, TOTAL
 
 Index = list[rr.TimeColumn]
 
@@ -18,8 +18,12 @@ _SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descrip
 
 def time_index(t_s: NDArray[np.float64]) -> Index:
     """Times in whole nanoseconds: Rerun would cut the fraction of seconds off, a nanosecond too early."""
-    nanoseconds = np.round(t_s * 1e9).astype("timedelta64[ns]")
-    return [rr.TimeColumn(TIMELINE, duration=nanoseconds)]
+    return [rr.TimeColumn(TIMELINE, duration=nanoseconds(t_s).astype("timedelta64[ns]"))]
+
+
+def nanoseconds(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return times as a recording has them."""
+    return np.round(t_s * 1e9).astype(np.int64)
 
 
 def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
@@ -41,6 +45,27 @@ class Struct:
     def as_arrow_array(self) -> pa.Array:
         """What Rerun asks for."""
         return self._array
+
+
+class Numbers:
+    """Whole numbers as a component."""
+
+    def __init__(self, values: Sequence[int] | NDArray[np.uint64]) -> None:
+        self._array = pa.array(values, type=pa.uint64())
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return what Rerun asks for."""
+        return self._array
+
+
+def checksums(values: NDArray[np.uint64]) -> rr.ComponentColumn:
+    """Return the component with number and checksum of each row or line."""
+    return rr.ComponentColumn(CHECKSUM, Numbers(values))
+
+
+def total(count: int) -> rr.DescribedComponentBatch:
+    """Return the component with the number of rows or lines of a complete recording."""
+    return rr.DescribedComponentBatch(Numbers([count]), rr.ComponentDescriptor(TOTAL))
 
 
 def vectors(values: NDArray[np.float64], size: int) -> pa.Array:

@@ -17,7 +17,7 @@ from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.status import Level, Status, named
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.view import application
-from spheretwin.viz.recording.parts.log import log_lines
+from spheretwin.viz.recording.parts.events import Event
 from spheretwin.viz.recording.parts.part import Rows, Subject
 from spheretwin.viz.recording.parts.registry import PARTS
 from spheretwin.viz.recording.thinning import Thinning
@@ -118,7 +118,7 @@ class Stream(ABC):
     def note(self, t_s: float, text: str) -> None:
         """Record what happened before the tick at `t_s`."""
         self._hand_over()
-        self._submit(log_lines, self.recording, [(t_s, Level.INFO, text)])
+        self._submit(self._note, (t_s, Level.INFO, text))
 
     def finish(self, status: Status) -> None:
         """Record how the run ended."""
@@ -190,8 +190,14 @@ class Stream(ABC):
                 part.write(self.recording, rows)
         self.send()
 
+    def _note(self, event: Event) -> None:
+        for part in self._parts:
+            part.note(self.recording, event)
+
     def _write_rest(self) -> None:
         self._write_kept(self._thinning.rest())
+        for part in self._parts:
+            part.close(self.recording)
         self.send()
 
     def _write_kept(self, kept: list[Table]) -> None:

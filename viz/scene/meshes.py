@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import read_magnet_and_coil
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.mujoco_library import compiler_warnings
 from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.mjcf import fingerprint
 from spheretwin.viz import palette
@@ -96,7 +97,8 @@ def _meshes(mjcf: Path, _: str) -> Meshes:
     mujoco.mj_clearCache(mujoco.mj_getCache())  # it misses a mesh edited within a second
     try:
         # Not `models.mjcf.read`: it leaves out what is only drawn, which is all that is wanted here.
-        model = mujoco.MjModel.from_xml_path(str(mjcf))
+        with compiler_warnings():  # a run has them from there
+            model = mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as error:
         raise InputError(
             f"model {mjcf}: expected meshes that can be drawn, {without_breaks(error)}"

@@ -61,5 +61,5 @@ def test_a_status_that_is_none_is_refused():
 def test_a_record_needs_what_a_run_is_made_of(missing):
     known = {"scenario": "{}", "journal": json.dumps([]), "ticks": "1"}
     del known[missing]
-    with pytest.raises(KeyError, match=missing):
+    with pytest.raises(InputError, match=f"received no {missing}"):
         RunRecord.from_metadata(known)

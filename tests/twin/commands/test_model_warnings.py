@@ -133,3 +133,51 @@ def test_weightlessness_is_no_negative_zero(written):
     for edit in ((FLAGS, '<flag gravity="disable"/>'), (OPTION, OPTION.replace(">", ' gravity="0 0 0">'))):
         with Session(scenarios.load("hold", {"plant.mjcf": str(written(edit))})) as session:
             assert str(session.scenario.plant.gravity_m_s2) == "0.0"
+
+
+DEPRECATED = 'autolimits="true"', 'autolimits="true" settotalmass="3"'
+FLEX = '<deformable><flex name="cloth" dim="1" body="rotor payload" element="0 1"/></deformable>'
+COMPILER = {
+    "settotalmass": (DEPRECATED, "compiler attribute 'settotalmass' is deprecated"),
+    "flex": (("</mujoco>", FLEX + "</mujoco>"), "flex 'cloth' is not rigid and has no equality constraints"),
+}
+
+
+@pytest.mark.parametrize("told", [told_by_a_session, told_by_the_command])
+@pytest.mark.parametrize(("edit", "line"), COMPILER.values(), ids=COMPILER)
+def test_a_warning_of_the_compiler_is_one_line_of_ours(written, told, edit, line, capfd):
+    """The engine's Python package raises it as a warning at each of three compilations, in several lines."""
+    path = written(edit)
+    (received,) = told(path, {"plant.engine": "mujoco"})
+    assert received.startswith(f"model {path}: {line}")
+    assert "\n" not in received
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_flexible_grid_has_no_line_but_the_refusal(written, capfd):
+    grid = (
+        '<flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.05 0.05 0.05" dim="2" mass="0.1"'
+        ' pos="0 0 1"/></worldbody>'
+    )
+    path = written(("</worldbody>", grid))
+    assert cli.main(["simulate", "hold", "--plant.mjcf", str(path)]) == cli.BAD_INPUT
+    printed = capfd.readouterr()
+    (line,) = printed.err.splitlines()
+    assert line.startswith("spheretwin: model: expected three degrees of freedom, received 30")
+    assert printed.out == ""
+
+
+def test_a_recording_adds_no_second_line(written, capfd, tmp_path):
+    """Meshes are read by a compilation of their own."""
+    text = TEXT.replace('meshdir="assets"', f'meshdir="{actuators.MJCF_PATH.parent / "assets"}"')
+    (path := tmp_path / "drawn.xml").write_text(text.replace(*DEPRECATED), encoding="utf-8")
+    (line,) = told_by_the_command(path, {"record": tmp_path / "run.rrd"})
+    printed = capfd.readouterr()
+    assert "settotalmass" in line
+    assert printed.err == ""
+
+
+def test_other_verbs_print_it_once(written, capfd):
+    assert cli.main(["magnetics", "map", "--mjcf", str(written(DEPRECATED))]) == cli.DONE
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("spheretwin: warning: model ")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import field_verdict
-from spheretwin.twin.commands.reporting import kept, print_json, warn
+from spheretwin.twin.commands.reporting import kept, print_json, warn, warn_of_model
 from spheretwin.viz.terminal import magnetic_tables
 from spheretwin.viz.terminal.checks import print_checks
 from spheretwin.viz.terminal.progress import tracked
@@ -23,6 +23,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         )
     actuator = actuators.load(options.mjcf, options.csv)
     verdict = field_verdict.judge(actuator, options.poses, options.seed, tracked("direct sums"))
+    warn_of_model(options.mjcf)
     warn(verdict.warnings)
     if options.json:
         print_json(verdict._asdict())

@@ -12,7 +12,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.design import curve_verdict
 from spheretwin.models.design.curve_verdict import ComputedCurve
-from spheretwin.twin.commands.reporting import kept, print_json, warn, write_text
+from spheretwin.twin.commands.reporting import kept, print_json, warn, warn_of_model, write_text
 from spheretwin.viz.terminal import magnetic_tables, tables
 from spheretwin.viz.terminal.checks import print_checks
 from spheretwin.viz.terminal.progress import tracked
@@ -36,6 +36,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
 def _compute(options: argparse.Namespace) -> bool:
     """Compute the curve, check it, write it."""
     computed = curve_verdict.compute(options.mjcf, tracked("torque curve"))
+    warn_of_model(options.mjcf)
     warn(computed.warnings)
     if options.out:
         write_text(options.out, computed.csv)
@@ -72,6 +73,7 @@ def _print_text(computed: ComputedCurve) -> None:
 def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
     """Tell how smooth a user's curve is, and how far it is from the geometry's."""
     judged = curve_verdict.judge(torque_curve.read(csv), mjcf, tracked("the geometry's own curve"))
+    warn_of_model(mjcf)
     warn(judged.warnings)
     if as_json:
         print_json(

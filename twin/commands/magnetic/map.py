@@ -13,7 +13,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import make_folder
 from spheretwin.models.design import workspace_verdict
 from spheretwin.models.design.workspace_verdict import Survey
-from spheretwin.twin.commands.reporting import kept, print_json, warn
+from spheretwin.twin.commands.reporting import kept, print_json, warn, warn_of_model
 from spheretwin.viz.terminal import magnetic_tables, tables
 from spheretwin.viz.terminal.checks import print_checks
 from spheretwin.viz.terminal.progress import tracked
@@ -32,6 +32,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         make_folder(options.out)
     surveyed = workspace_verdict.survey(actuator, options.largest_tilt, tracked("torque capability"))
     verdict = workspace_verdict.judge(surveyed, options.need)
+    warn_of_model(options.mjcf)
     warn(verdict.warnings)
     files = _draw(plots, options.out, surveyed) if plots else []
     if options.json:

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.telemetry import checksums
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.study.row import FAILED
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.parquet
 
 Array = NDArray[np.float64]
 Texts = NDArray[np.object_]
@@ -75,11 +77,21 @@ class Rows(NamedTuple):
 
 
 def read(table: Path) -> Rows:
-    """Rows of a table."""
-    import pyarrow as pa  # slow to import
-    import pyarrow.parquet as parquet
+    """Read the rows of a table.
 
-    schema = parquet.read_schema(table)
+    Raises
+    ------
+    InputError
+        The table is damaged.
+    """
+    with checksums.open_parquet(table) as file:
+        return _rows(file)
+
+
+def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
+    import pyarrow as pa
+
+    schema = file.schema_arrow
     study = json.loads(schema.metadata[b"study"])
     axes = [axis["field"] for axis in study["axis"]]
     figures = [
@@ -87,7 +99,7 @@ def read(table: Path) -> Rows:
         for field in schema
         if field.name not in (*BESIDE, *axes) and not pa.types.is_string(field.type)
     ]
-    found = parquet.read_table(table, columns=[*TEXTS, "row", *axes, *figures])
+    found = file.read(columns=[*TEXTS, "row", *axes, *figures], use_threads=False)
     texts = {name: np.array(found[name].to_pylist(), dtype=object) for name in TEXTS}
     return Rows(
         study,

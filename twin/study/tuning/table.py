@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from spheretwin.models.base.files import whole_file
+from spheretwin.models.telemetry import checksums
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.tuning import gains
@@ -32,7 +32,6 @@ def write(path: Path, study: Study, rows: Rows, laws: Sequence[OfLaw]) -> None:
         It could not be written; what was there before is untouched.
     """
     import pyarrow as pa  # slow to import
-    import pyarrow.parquet as parquet
 
     optimise = gains.section_of(study)
     objectives = optimise.objective
@@ -61,17 +60,14 @@ def write(path: Path, study: Study, rows: Rows, laws: Sequence[OfLaw]) -> None:
         for law, of_law, kept, best in laws
         for each in kept
     ]
-    schema = pa.schema([pa.field(name, kind) for name, kind in kinds.items()])
     metadata = {
         "study": study.model_dump_json(),
         "optimise": optimise.model_dump_json(),
         "scenario": rows.base.model_dump_json(),
     }
     columns = [pa.array([each.get(name) for each in records], type=kind) for name, kind in kinds.items()]
-    with whole_file(path) as temporary:
-        parquet.write_table(
-            pa.table(columns, schema=schema.with_metadata(metadata)), temporary, compression="zstd"
-        )
+    schema = pa.schema([pa.field(name, kind) for name, kind in kinds.items()], metadata=metadata)
+    checksums.write_parquet(path, schema, [pa.table(columns, schema=schema)], compression="zstd")
 
 
 def _head(law: str, kept: Kept, best: Sequence[int]) -> dict[str, Any]:

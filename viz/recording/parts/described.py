@@ -8,13 +8,17 @@ from dataclasses import asdict
 
 import rerun as rr
 
+from spheretwin.models.telemetry.checksums import text_checksum
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.versions import versions
-from spheretwin.viz.layout.paths import DESCRIBED, component
+from spheretwin.viz.layout.paths import CHECKSUM, DESCRIBED, component
 
 FACTS = "facts"
-"""Name of the component below."""
+FACTS_CHECKSUM = f"{FACTS}_{CHECKSUM}"
+"""Names of the components below."""
+
+DESCRIBED_CHECKSUM = f"{DESCRIBED}_{CHECKSUM}"
 
 RATE = "record_rate_Hz"
 """Among the facts: rows a second that are kept beside those that stand out; null for every row."""
@@ -22,15 +26,20 @@ RATE = "record_rate_Hz"
 
 def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
     """Facts of a run from its start, the versions that it was made with, and the rate of the rows kept."""
-    described = {**asdict(facts), RATE: rate_Hz, "versions": versions()}
-    return rr.AnyValues(facts=json.dumps(described, default=str))
+    text = json.dumps({**asdict(facts), RATE: rate_Hz, "versions": versions()}, default=str)
+    return rr.AnyValues(facts=text, facts_checksum=text_checksum(text))
 
 
-def signals_as_json(arrival: int, signals: Sequence[Signal]) -> rr.DescribedComponentBatch:
-    """Signals that come together, in the order of their columns."""
+def signals_as_json(arrival: int, signals: Sequence[Signal]) -> list[rr.DescribedComponentBatch]:
+    """Signals that come together, in the order of their columns, and the checksum of their text."""
     text = json.dumps([asdict(signal) for signal in signals])
-    descriptor = rr.ComponentDescriptor(component(DESCRIBED, arrival))
-    return rr.DescribedComponentBatch(rr.components.TextBatch(text), descriptor)
+    texts = {DESCRIBED: text, DESCRIBED_CHECKSUM: text_checksum(text)}
+    return [
+        rr.DescribedComponentBatch(
+            rr.components.TextBatch(each), rr.ComponentDescriptor(component(kind, arrival))
+        )
+        for kind, each in texts.items()
+    ]
 
 
 def signals_of(text: str) -> list[Signal]:

@@ -13,6 +13,7 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.view import OVERVIEW, View
+from spheretwin.viz.recording.parts.events import Event
 from spheretwin.viz.scene.marks import size_of
 
 
@@ -82,5 +83,11 @@ class Part:
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Log the rows of one chunk, of which there is at least one."""
 
+    def note(self, recording: rr.RecordingStream, event: Event) -> None:
+        """Log an event that the rows do not show."""
+
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:
         """Log how the run ended."""
+
+    def close(self, recording: rr.RecordingStream) -> None:
+        """Log what is known when nothing else will be logged."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import pyarrow as pa
 import rerun as rr
 
+from spheretwin.models.telemetry.checksums import row_checksums
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.paths import STYLES, TELEMETRY, VALUES, component
 from spheretwin.viz.layout.styles import LOOKS, signal_style
-from spheretwin.viz.recording.columns import Struct, no_vectors, time_index, vectors
+from spheretwin.viz.recording.columns import Struct, checksums, no_vectors, time_index, total, vectors
 from spheretwin.viz.recording.parts.described import signals_as_json
 from spheretwin.viz.recording.parts.part import Part, Rows, Subject
 
@@ -25,6 +26,7 @@ class Signals(Part):
     def __init__(self, subject: Subject) -> None:
         super().__init__(subject)
         self._arrived: list[list[Signal]] = []
+        self._rows = 0
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Say what the signals are."""
@@ -39,7 +41,13 @@ class Signals(Part):
             for arrival, signals in enumerate(self._arrived)
             if any(signal.name in names for signal in signals)
         ]
-        recording.send_columns(TELEMETRY, time_index(rows["t_s"]), columns)
+        sums = checksums(row_checksums(rows, self._rows))
+        self._rows += len(rows)
+        recording.send_columns(TELEMETRY, time_index(rows["t_s"]), [*columns, sums])
+
+    def close(self, recording: rr.RecordingStream) -> None:
+        """Log the number of rows."""
+        recording.log(TELEMETRY, [total(self._rows)], static=True)
 
     def _describe(self, recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
         """Say of signals that come for the first time what they are; a change of law may bring some."""
@@ -51,7 +59,7 @@ class Signals(Part):
         self._arrived.append(new)
         styles = Struct({signal.name: _style(signal) for signal in new if signal.name != TIME})
         drawn = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
-        recording.log(TELEMETRY, [signals_as_json(arrival, new), drawn], static=True)
+        recording.log(TELEMETRY, [*signals_as_json(arrival, new), drawn], static=True)
         recording.flush()  # before their rows: what a killed process leaves says what they are
 
 

@@ -1,0 +1,406 @@
+"""Checksums of telemetry: of the bytes of Parquet files and Arrow streams, and of rows and texts.
+
+The bytes of a file are checked in segments, each with its length and its CRC-32. In a Parquet file a segment
+is a row group. The footer lists the segments and has a checksum of its own, so that every bit of the file is
+checked. Readers compare before they decode anything.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import zlib
+from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import whole_file
+from spheretwin.models.base.wording import LONGEST_WORD, shortened, without_breaks
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    from spheretwin.models.telemetry.signals import Signal
+    from spheretwin.models.telemetry.table import Table
+
+NO_CHECKSUMS = "has no checksums, it was written by an earlier version: damage may be unnoticed"
+"""Said of a file that is read without a check."""
+
+# Metadata of a Parquet file. Two names: damage to one of them is not taken for a file without checksums.
+_SEGMENTS, _FOOTER = "row_group_checksums", "footer_checksum"
+METADATA = (_SEGMENTS, _FOOTER)
+
+# The value of a name in the footer is a text in Thrift's compact form: this byte, its length, its bytes.
+_TEXT = b"\x18"
+_FOOTER_VALUE = re.compile(_FOOTER.encode() + _TEXT + rb"\x08([0-9a-f]{8})")
+_UNSIGNED = "0" * 8
+_FOOTER_END = 8  # bytes: length of the footer, magic
+_MAGIC = b"PAR1"
+
+# Rows of a row group at most, as pyarrow has them.
+_GROUP_ROWS = 1 << 20
+_BLOCK_BYTES = 1 << 20
+
+_HALF = np.uint64(32)
+
+
+class Segment(NamedTuple):
+    """A stretch of a file, behind the one before it."""
+
+    size: int
+    crc32: int
+
+
+class SegmentedFile:
+    """New file that sums up what is written to it; pyarrow writes to it as to any file object."""
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa  # slow to import, and most runs write no file
+
+        self._file = pa.OSFile(str(path), "wb")  # without a buffer of its own
+        self._segment = Segment(0, 0)
+
+    @property
+    def closed(self) -> bool:
+        """True if nothing can be written any more."""
+        return bool(self._file.closed)
+
+    def write(self, block: bytes) -> int:
+        """Append some bytes to the segment."""
+        self._segment = Segment(self._segment.size + len(block), zlib.crc32(block, self._segment.crc32))
+        self._file.write(block)
+        return len(block)
+
+    def tell(self) -> int:
+        """Return the number of bytes written."""
+        return int(self._file.tell())
+
+    def flush(self) -> None:
+        """Hand what was written to the operating system."""
+        self._file.flush()
+
+    def end_segment(self) -> Segment:
+        """Return the segment up to here; what is written next begins another."""
+        segment, self._segment = self._segment, Segment(0, 0)
+        return segment
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+# --- Parquet
+
+
+def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table], **options: Any) -> int:
+    """Write a Parquet file with checksums of its pages, row groups and footer, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    schema : pa.Schema
+        Columns and metadata.
+    tables : iterable of pa.Table
+        A row group each, or several where one has more rows than a group holds.
+    **options
+        Of `pyarrow.parquet.ParquetWriter`.
+
+    Returns
+    -------
+    int
+        Rows of the file.
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    SpheretwinError
+        Writing failed; what was there before is untouched.
+    """
+    import pyarrow.parquet  # slow to import, and most runs write no file
+
+    rows, segments = 0, []
+    with whole_file(path) as temporary:
+        sink = SegmentedFile(temporary)
+        try:
+            with pyarrow.parquet.ParquetWriter(sink, schema, write_page_checksum=True, **options) as writer:
+                for table in tables:
+                    for first in range(0, max(len(table), 1), _GROUP_ROWS):
+                        writer.write_table(table.slice(first, _GROUP_ROWS), row_group_size=_GROUP_ROWS)
+                        segments.append(sink.end_segment())
+                    rows += len(table)
+                listed = " ".join(f"{size} {crc32:08x}" for size, crc32 in segments)
+                writer.add_key_value_metadata({_SEGMENTS: listed, _FOOTER: _UNSIGNED})
+        finally:
+            sink.close()
+        _sign(temporary)
+    return rows
+
+
+def open_parquet(path: Path, *, rows: bool = True) -> pyarrow.parquet.ParquetFile:
+    """Open a Parquet file whose bytes are those that were written, as far as it has checksums.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    rows : bool
+        Without them only the footer is compared.
+
+    Raises
+    ------
+    InputError
+        A checksum differs: the message names the footer, or the row group and where possible the column.
+    OSError, pa.ArrowException
+        The file is missing or no Parquet file.
+    """
+    import pyarrow.parquet
+
+    checked = has_checksums(path)
+    file = pyarrow.parquet.ParquetFile(path, page_checksum_verification=True)
+    if checked and rows:
+        listed = file.metadata.metadata[_SEGMENTS.encode()].decode().split()
+        segments = [
+            Segment(int(size), int(crc32, 16)) for size, crc32 in zip(listed[::2], listed[1::2], strict=True)
+        ]
+        if (place := _first_changed(path, segments)) is not None:
+            raise damaged(path, _group(file, place))
+    return file
+
+
+def has_checksums(path: Path) -> bool:
+    """Return whether a Parquet file has checksums; compare that of its footer.
+
+    Raises
+    ------
+    InputError
+        The footer is not the one that was written.
+    OSError
+        The file cannot be read.
+    """
+    with path.open("rb") as file:
+        _, footer = _footer(file)
+    found = _FOOTER_VALUE.search(footer)
+    listed = _SEGMENTS.encode() + _TEXT in footer
+    if found is None and not listed:
+        return False
+    if found is None or not listed or _footer_checksum(footer, found) != found[1].decode():
+        raise damaged(path, "the footer")
+    return True
+
+
+def damaged(path: Path, place: str) -> InputError:
+    """Return the error for a telemetry file that differs from what was written."""
+    return InputError(
+        f"telemetry {path}: expected the bytes that were written, received others in {place}:"
+        " the file is damaged, or was changed by another program"
+    )
+
+
+def unreadable(path: Path, error: BaseException, expected: str = "a Parquet file of a run") -> InputError:
+    """Return the error for a file that another library could not read."""
+    told = shortened(without_breaks(error), LONGEST_WORD)
+    return InputError(f"telemetry {path}: expected {expected}, {told}")
+
+
+def _sign(path: Path) -> None:
+    """Put the checksum of the footer in its place."""
+    with path.open("r+b") as file:
+        start, footer = _footer(file)
+        found = _FOOTER_VALUE.search(footer)
+        assert found is not None  # it was written a moment ago
+        file.seek(start + found.start(1))
+        file.write(_footer_checksum(footer, found).encode())
+
+
+def _footer_checksum(footer: bytes, found: re.Match[bytes]) -> str:
+    unsigned = footer[: found.start(1)] + _UNSIGNED.encode() + footer[found.end(1) :]
+    return f"{zlib.crc32(unsigned):08x}"
+
+
+def _footer(file: BinaryIO) -> tuple[int, bytes]:
+    """Place and bytes of the footer, with its length and the magic behind it; no bytes if there is none."""
+    size = file.seek(0, 2)
+    file.seek(max(size - _FOOTER_END, 0))
+    end = file.read()
+    start = size - _FOOTER_END - int.from_bytes(end[:4], "little")
+    if not end.endswith(_MAGIC) or start < 0:
+        return 0, b""
+    file.seek(start)
+    return start, file.read()
+
+
+def _first_changed(path: Path, segments: Iterable[Segment]) -> int | None:
+    """Place of the first segment that is not what was written; None if all are."""
+    with path.open("rb") as file:
+        for place, segment in enumerate(segments):
+            if _read_segment(file, segment.size) != segment:
+                return place
+    return None
+
+
+def _read_segment(file: BinaryIO, size: int) -> Segment:
+    """The next bytes of a file, fewer at its end."""
+    done, crc32 = 0, 0
+    while block := file.read(min(size - done, _BLOCK_BYTES)):
+        done, crc32 = done + len(block), zlib.crc32(block, crc32)
+    return Segment(done, crc32)
+
+
+def _group(file: pyarrow.parquet.ParquetFile, place: int) -> str:
+    """A row group by its number and rows, with the first column whose pages are not what was written."""
+    import pyarrow as pa
+
+    if not file.metadata.num_rows:
+        return f"row group {place}"
+    counts = [file.metadata.row_group(each).num_rows for each in range(place + 1)]
+    text = f"row group {place}, rows {sum(counts[:-1])} to {sum(counts) - 1}"
+    for name in file.schema_arrow.names:
+        try:
+            file.read_row_group(place, columns=[name], use_threads=False)
+        except (OSError, pa.ArrowException):
+            return f"{text}, column {name}"
+    return text
+
+
+# --- Arrow streams
+
+# A line of a list: length and checksum of a segment, checksum of the line.
+_LINE_BYTES = len("000000000000 00000000 00000000\n")
+
+
+class SegmentList:
+    """Segments of a file that grows, in a file next to it: a line each, written behind the segment.
+
+    Parameters
+    ----------
+    path : Path
+        The file that grows.
+    """
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+
+        self._file = pa.OSFile(str(list_of(path)), "wb")
+
+    def append(self, segment: Segment) -> None:
+        """Add a segment."""
+        self._file.write(_line(segment))
+
+    def close(self) -> None:
+        """Close the list."""
+        self._file.close()
+
+
+def list_of(path: Path) -> Path:
+    """Return the path of the list of a file's segments."""
+    return path.with_name(f"{path.name}.checksums")
+
+
+def checked_bytes(path: Path) -> int | None:
+    """Return how many bytes from the start of a listed file are those that were written; None without a list.
+
+    What a killed process leaves behind its last segment, and a segment that was cut off, are not among them.
+
+    Raises
+    ------
+    InputError
+        A segment is not what was written.
+    """
+    listed = list_of(path)
+    if not listed.is_file():
+        return None
+    lines, done = listed.read_bytes(), 0
+    with path.open("rb") as file:
+        for place in range(len(lines) // _LINE_BYTES):
+            written = _segment(lines[place * _LINE_BYTES : (place + 1) * _LINE_BYTES])
+            if written is None:
+                raise damaged(listed, f"line {place}")
+            received = _read_segment(file, written.size)
+            if received.size < written.size:
+                break
+            if received != written:
+                raise damaged(path, f"batch {place}")
+            done += written.size
+    return done
+
+
+def _line(segment: Segment) -> bytes:
+    text = f"{segment.size:012d} {segment.crc32:08x}"
+    return f"{text} {text_checksum(text)}\n".encode()
+
+
+def _segment(line: bytes) -> Segment | None:
+    """Segment of a line; None if the line is not what was written."""
+    try:
+        size, crc32, _ = line.split()
+        segment = Segment(int(size), int(crc32, 16))
+    except ValueError:
+        return None
+    return segment if _line(segment) == line else None
+
+
+# --- rows and texts
+
+
+def text_checksum(text: str) -> str:
+    """Return the checksum of a text, in hexadecimal digits."""
+    return f"{zlib.crc32(text.encode()):08x}"
+
+
+def line_checksums(lines: Sequence[tuple[int, str, str]], first: int) -> NDArray[np.uint64]:
+    """Return number and checksum of each line of a log: the number in the upper 32 bits.
+
+    Parameters
+    ----------
+    lines : sequence of tuple
+        Time in ns, level and text.
+    first : int
+        Number of the first line.
+    """
+    sums = [zlib.crc32(json.dumps(line).encode()) for line in lines]
+    return _numbered(np.array(sums, dtype=np.uint64), first)
+
+
+def row_checksums(rows: Table, first: int) -> NDArray[np.uint64]:
+    """Return number and checksum of each row: the number in the upper 32 bits, the checksum in the lower.
+
+    The checksum is the upper half of ``Σ a_j y_j`` modulo 2⁶⁴ with odd ``a_j`` that belong to the name of the
+    signal and the place in it, and ``y_j = x_j ^ (x_j >> 32)`` of the bit patterns ``x_j`` of the row. One
+    number that differs always changes the sum, and its upper half but for one case in 2³²; the order of the
+    signals does not matter.
+
+    Parameters
+    ----------
+    rows : Table
+    first : int
+        Number of the first row.
+    """
+    bits = np.ascontiguousarray(rows.values).view(np.uint64)
+    sums = (bits ^ (bits >> _HALF)) @ _multipliers(rows.signals)
+    return _numbered(sums >> _HALF, first)
+
+
+def row_numbers(checksums: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Return the numbers of rows or lines."""
+    return (checksums >> _HALF).astype(np.int64)
+
+
+def _numbered(sums: NDArray[np.uint64], first: int) -> NDArray[np.uint64]:
+    return (np.arange(first, first + len(sums), dtype=np.uint64) << _HALF) | sums
+
+
+@cache
+def _multipliers(signals: tuple[Signal, ...]) -> NDArray[np.uint64]:
+    """An odd number for each entry of each signal."""
+    names = [f"{signal.name} {place}" for signal in signals for place in range(signal.size)]
+    digests = [hashlib.blake2b(name.encode(), digest_size=8).digest() for name in names]
+    return np.array([int.from_bytes(digest, "little") | 1 for digest in digests], dtype=np.uint64)

@@ -1,0 +1,307 @@
+"""The contents of a recording, gathered from its chunks and compared with their checksums."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from rerun.chunk import Chunk
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.checksums import (
+    line_checksums,
+    row_checksums,
+    row_numbers,
+    text_checksum,
+)
+from spheretwin.models.telemetry.signals import Signal, offsets, width
+from spheretwin.models.telemetry.table import Table, allocated
+from spheretwin.viz.layout.paths import (
+    CHECKSUM,
+    DESCRIBED,
+    EVENTS,
+    SCENARIO,
+    TELEMETRY,
+    TIMELINE,
+    TOTAL,
+    VALUES,
+    component,
+)
+from spheretwin.viz.recording.columns import nanoseconds
+from spheretwin.viz.recording.parts.described import (
+    DESCRIBED_CHECKSUM,
+    FACTS,
+    FACTS_CHECKSUM,
+    signals_of,
+)
+
+Line = tuple[int, str, str]
+"""Time in ns, level, text."""
+
+Checksums = NDArray[np.uint64]
+
+
+class _Text(NamedTuple):
+    """A text, and its checksum if there is one."""
+
+    text: str
+    checksum: str | None
+
+
+class _Rows(NamedTuple):
+    """Rows of one chunk: values by signal, and checksums if there are any."""
+
+    t_ns: NDArray[np.int64]
+    values: dict[str, NDArray[np.float64]]
+    checksums: Checksums | None
+
+
+class _Lines(NamedTuple):
+    """Lines of one chunk of the log, and checksums if there are any."""
+
+    lines: list[Line]
+    checksums: Checksums | None
+
+
+class Contents:
+    """What the chunks of a recording hold of its run; poses and colours are not read.
+
+    Parameters
+    ----------
+    path : Path
+        The recording, for messages.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._facts: _Text | None = None
+        self._described: dict[int, _Text] = {}
+        self._rows: list[_Rows] = []
+        self._lines: list[_Lines] = []
+        self._totals: dict[str, int] = {}
+
+    def take(self, chunk: Chunk) -> None:
+        """Take what a chunk holds.
+
+        Raises
+        ------
+        InputError
+            It is an entity of the run without what belongs to it.
+        """
+        entity = chunk.entity_path.removeprefix("/")
+        takers = {SCENARIO: self._take_scenario, TELEMETRY: self._take_telemetry, EVENTS: self._take_events}
+        if entity not in takers:
+            return
+        try:
+            takers[entity](chunk.to_record_batch())
+        except (KeyError, ValueError, TypeError, IndexError, AttributeError, pa.ArrowException):
+            raise self._damaged(f"entity {entity}") from None
+
+    @property
+    def checked(self) -> bool:
+        """True if the recording has checksums."""
+        texts = [*([self._facts] if self._facts else []), *self._described.values()]
+        checksums = [*(each.checksums for each in self._rows), *(each.checksums for each in self._lines)]
+        return bool(
+            self._totals
+            or any(each.checksum for each in texts)
+            or any(each is not None for each in checksums)
+        )
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Rows of the telemetry and lines of the log, by entity."""
+        return {
+            TELEMETRY: sum(len(each.t_ns) for each in self._rows),
+            EVENTS: sum(len(each.lines) for each in self._lines),
+        }
+
+    def facts(self) -> dict[str, Any]:
+        """Return the facts of the run.
+
+        Raises
+        ------
+        InputError
+            There are none, or they are not what was written.
+        """
+        if self._facts is None:
+            raise InputError(
+                f"recording {self._path}: expected one of a run, received one without a run's facts"
+            )
+        facts = json.loads(self._checked_text(self._facts, SCENARIO, FACTS))
+        if not isinstance(facts, dict):
+            raise self._damaged(f"entity {SCENARIO}, component {FACTS}")
+        return facts
+
+    def table(self, *, ended: bool) -> Table:
+        """Return all rows by tick, NaN where a run had no such column.
+
+        Parameters
+        ----------
+        ended : bool
+            Whether the recording was closed: it has to state how many rows it has.
+
+        Raises
+        ------
+        InputError
+            A row is not what was written, or is missing.
+        """
+        signals = self._signals()
+        if self.checked:
+            chunks = [each.checksums for each in self._rows]
+            self._check_numbers(TELEMETRY, chunks, ended=ended)
+        ticks = np.unique(np.concatenate([each.t_ns for each in self._rows] or [np.empty(0, np.int64)]))
+        values = allocated(len(ticks), width(signals))
+        values[:] = np.nan
+        first = offsets(signals)
+        for rows in self._rows:
+            if self.checked:
+                self._check_rows(rows, signals)
+            places = np.searchsorted(ticks, rows.t_ns)
+            for name, columns in rows.values.items():
+                values[places, first[name] : first[name] + columns.shape[1]] = columns
+        return Table(signals, values)
+
+    def log(self, *, ended: bool) -> list[Line]:
+        """Return the lines of the log, in the order in which they were written.
+
+        Parameters
+        ----------
+        ended : bool
+            Whether the recording was closed: it has to state how many lines it has.
+
+        Raises
+        ------
+        InputError
+            A line is not what was written, or is missing.
+        """
+        if self.checked:
+            self._check_numbers(EVENTS, [each.checksums for each in self._lines], ended=ended)
+            for lines, checksums in self._lines:
+                assert checksums is not None  # the numbers were checked
+                first = int(row_numbers(checksums[:1])[0]) if len(checksums) else 0
+                changed = np.flatnonzero(line_checksums(lines, first) != checksums)
+                if len(changed):
+                    raise self._damaged(f"entity {EVENTS}, line {first + changed[0]}")
+        return [line for each in self._lines for line in each.lines]
+
+    # --- gathering
+
+    def _take_scenario(self, batch: pa.RecordBatch) -> None:
+        if FACTS in batch.schema.names or FACTS_CHECKSUM in batch.schema.names:
+            self._facts = _Text(_text(batch, FACTS), _text_or_none(batch, FACTS_CHECKSUM))
+
+    def _take_telemetry(self, batch: pa.RecordBatch) -> None:
+        self._take_total(TELEMETRY, batch)
+        values: dict[str, NDArray[np.float64]] = {}
+        for name in batch.schema.names:
+            kind, _, arrival = name.rpartition("_")
+            if kind == DESCRIBED:
+                checksum = _text_or_none(batch, component(DESCRIBED_CHECKSUM, int(arrival)))
+                self._described[int(arrival)] = _Text(_text(batch, name), checksum)
+            elif kind == VALUES:
+                values |= _columns(batch.column(name).flatten())
+        if TIMELINE in batch.schema.names:
+            self._rows.append(_Rows(_times(batch), values, _checksums(batch)))
+
+    def _take_events(self, batch: pa.RecordBatch) -> None:
+        self._take_total(EVENTS, batch)
+        if TIMELINE in batch.schema.names:
+            levels, texts = (batch.column(f"TextLog:{each}").to_pylist() for each in ("level", "text"))
+            lines = [
+                (t_ns, level[0], text[0])
+                for t_ns, level, text in zip(_times(batch).tolist(), levels, texts, strict=True)
+            ]
+            self._lines.append(_Lines(lines, _checksums(batch)))
+
+    def _take_total(self, entity: str, batch: pa.RecordBatch) -> None:
+        if TOTAL in batch.schema.names:
+            self._totals[entity] = int(_only(batch, TOTAL))
+
+    # --- comparing
+
+    def _signals(self) -> tuple[Signal, ...]:
+        signals: list[Signal] = []
+        for arrival, text in sorted(self._described.items()):
+            signals += signals_of(self._checked_text(text, TELEMETRY, component(DESCRIBED, arrival)))
+        return tuple(signals)
+
+    def _checked_text(self, text: _Text, entity: str, name: str) -> str:
+        if self.checked and text.checksum != text_checksum(text.text):
+            raise self._damaged(f"entity {entity}, component {name}")
+        return text.text
+
+    def _check_numbers(self, entity: str, chunks: list[Checksums | None], *, ended: bool) -> None:
+        """Refuse numbers with a gap, chunks without numbers, and fewer than a closed recording states."""
+        present = [each for each in chunks if each is not None]
+        if len(present) < len(chunks):
+            raise self._damaged(f"entity {entity}, component {CHECKSUM}")
+        numbers = np.sort(row_numbers(np.concatenate(present or [np.empty(0, np.uint64)])))
+        missing = np.flatnonzero(numbers != np.arange(len(numbers)))
+        if len(missing):
+            raise self._damaged(f"entity {entity} at number {missing[0]}")
+        if (ended or entity in self._totals) and self._totals.get(entity) != len(numbers):
+            raise self._damaged(f"entity {entity} behind number {len(numbers) - 1}")
+
+    def _check_rows(self, rows: _Rows, signals: tuple[Signal, ...]) -> None:
+        present = tuple(signal for signal in signals if signal.name in rows.values)
+        values = [rows.values[signal.name] for signal in present]
+        assert rows.checksums is not None  # the numbers were checked
+        known = len(present) == len(rows.values) and any(signal.name == "t_s" for signal in present)
+        if not known or [each.shape[1] for each in values] != [signal.size for signal in present]:
+            raise self._damaged(f"entity {TELEMETRY}, components {DESCRIBED}")
+        table = Table(present, np.concatenate(values, axis=1))
+        numbers = row_numbers(rows.checksums)
+        expected = row_checksums(table, int(numbers[0]))
+        with np.errstate(invalid="ignore"):  # a damaged time may be no number
+            changed = (expected != rows.checksums) | (nanoseconds(table["t_s"]) != rows.t_ns)
+        if np.any(changed):
+            place = int(np.argmax(changed))
+            t_s = rows.t_ns[place] * 1e-9
+            raise self._damaged(f"entity {TELEMETRY}, row {numbers[place]} at {t_s:.6g} s")
+
+    def _damaged(self, place: str) -> InputError:
+        return InputError(
+            f"recording {self._path}: expected what was written, received something else in {place}:"
+            " the file is damaged, or was changed by another program"
+        )
+
+
+def _text(batch: pa.RecordBatch, name: str) -> str:
+    return str(_only(batch, name))
+
+
+def _only(batch: pa.RecordBatch, name: str) -> Any:
+    """The one value of a component; Rerun may put rows without it into the same chunk."""
+    (value,) = [each[0] for each in batch.column(name).to_pylist() if each]
+    return value
+
+
+def _text_or_none(batch: pa.RecordBatch, name: str) -> str | None:
+    return _text(batch, name) if name in batch.schema.names else None
+
+
+def _checksums(batch: pa.RecordBatch) -> Checksums | None:
+    if CHECKSUM not in batch.schema.names:
+        return None
+    sums = np.asarray(batch.column(CHECKSUM).flatten(), dtype=np.uint64)
+    if len(sums) != len(batch):
+        raise ValueError
+    return sums
+
+
+def _columns(values: pa.StructArray) -> dict[str, NDArray[np.float64]]:
+    """Signals of a struct that are in its rows at all."""
+    return {
+        field.name: np.asarray(column.flatten()).reshape(len(column), -1)
+        for field, column in zip(values.type, values.flatten(), strict=True)
+        if column.null_count < len(column)
+    }
+
+
+def _times(batch: pa.RecordBatch) -> NDArray[np.int64]:
+    return np.asarray(batch.column(TIMELINE).cast(pa.int64()))
