@@ -14,7 +14,7 @@ from spheretwin.twin.reproduce.planning import PLANT
 def command_line(case: Case, plant: str, seed: int = 0) -> str:
     """Command that runs a case alone, under one seed."""
     words = ["spheretwin", "simulate", case.scenario]
-    for dotted, value in {**case.fields, PLANT: plant, "seed": seed}.items():
+    for dotted, value in {**case.fields_of(seed), PLANT: plant, "seed": seed}.items():
         for flag, texts in _flags(dotted, value):
             words += [f"--{flag.replace('_', '-')}", *texts]
     return shlex.join(words)

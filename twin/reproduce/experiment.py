@@ -25,6 +25,7 @@ class Case(NamedTuple):
     """Within its experiment; no two have the same."""
     scenario: str
     fields: Mapping[str, Any]
+    """Fields that all of its runs share."""
     told: Mapping[str, Any] = {}
     """What its row in the JSON says besides the figures."""
     draws: bool = True
@@ -36,6 +37,12 @@ class Case(NamedTuple):
     compared: bool = True
     """Whether it may be in the sample that runs on both plants: a loop driven beyond its margin amplifies
     what rounding leaves, and is the same on no two plants."""
+    drawn: Callable[[int], Mapping[str, Any]] = lambda seed: {}
+    """Fields that depend on the seed, a function of the seed alone."""
+
+    def fields_of(self, seed: int) -> dict[str, Any]:
+        """Return the fields of the run with a seed, without the seed itself."""
+        return {**self.fields, **self.drawn(seed)}
 
 
 class Outcome(NamedTuple):

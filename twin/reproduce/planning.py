@@ -73,7 +73,7 @@ def scenario_of(case: Case, wanted: str | None, seed: int = 0) -> Scenario:
     InputError
         Its fields make no scenario.
     """
-    fields = {**case.fields, "seed": seed}
+    fields = {**case.fields_of(seed), "seed": seed}
     plant = plant_of(case, wanted)
     if plant is None:
         section = scenarios.load(case.scenario, fields).plant

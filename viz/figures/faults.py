@@ -1,4 +1,4 @@
-"""Figures of a study of faults: shares by number, a triangle of pairs, and errors against what is left."""
+"""Figures of a study of faults: shares by number, latencies, a triangle of pairs, errors against torque."""
 
 from __future__ import annotations
 
@@ -40,6 +40,36 @@ def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: st
     axes.set_ylim(-3, 103)
     axes.grid(visible=True, axis="y", color=FAINT, alpha=0.4, linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.set_title(title, fontsize="medium")
+    axes.legend(frameon=False)
+    return figure
+
+
+def remaining(by_name: Mapping[str, Sequence[float]], x: str, y: str, title: str) -> Figure:
+    """Steps of the share in percent whose time has not come, on logarithmic axes.
+
+    Parameters
+    ----------
+    by_name : mapping of name to times
+        Positive; infinite times never come.
+    x, y, title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 4.2), layout="constrained")
+    axes = figure.subplots()
+    finite = [time for times in by_name.values() for time in times if np.isfinite(time)]
+    end = max(finite, default=1.0)
+    for (name, times), colour in zip(by_name.items(), SERIES, strict=False):
+        rising = np.sort([time for time in times if np.isfinite(time)])
+        left = 100 * (1 - np.arange(len(rising) + 1) / len(times))
+        percent = np.append(left[1:], left[-1])
+        axes.step(np.append(rising, end), percent, where="post", color=colour, linewidth=1.4, label=name)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.grid(visible=True, color=FAINT, alpha=0.4, linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize="medium")

@@ -15,6 +15,10 @@ def shares():
     return faults.shares(SHARES, "open groups", "runs that track, %", "shares")
 
 
+def remaining():
+    return faults.remaining({"open": [4e-3, 5e-3, 0.2, np.inf]}, "time, s", "not detected, %", "latency")
+
+
 def triangles():
     return faults.triangles({"told": TRIANGLE, "not told": TRIANGLE}, "group", "ratio", 2.0, "pairs")
 
@@ -23,7 +27,7 @@ def clouds():
     return faults.clouds(POINTS, ("torque", "error", "groups"), (1.0, 2.0), "clouds")
 
 
-@pytest.mark.parametrize("draw", [shares, triangles, clouds])
+@pytest.mark.parametrize("draw", [shares, remaining, triangles, clouds])
 def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
@@ -75,3 +79,15 @@ def test_panels_without_a_point_or_a_square_are_drawn_too(tmp_path):
     plots.save(empty, tmp_path / "empty.png")
     cloud = faults.clouds({"told": [(0.5, 3.0, 9)]}, ("torque", "error", "groups"), (1.0, 2.0), "clouds")
     plots.save(cloud, tmp_path / "cloud.png")
+
+
+def test_what_remains_falls_at_each_time_and_ends_at_what_never_comes():
+    figure = faults.remaining({"open": [0.004, 0.005, 0.2, np.inf]}, "s", "%", "latency")
+    (line,) = figure.axes[0].get_lines()
+    np.testing.assert_allclose(line.get_xdata(), [0.004, 0.005, 0.2, 0.2])
+    np.testing.assert_allclose(line.get_ydata(), [75, 50, 25, 25])
+
+
+def test_what_remains_can_be_drawn_where_nothing_comes():
+    figure = faults.remaining({"open": [np.inf]}, "s", "%", "latency")
+    assert len(figure.axes[0].get_lines()) == 1

@@ -9,28 +9,29 @@ import numpy as np
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Table
 from spheretwin.twin.reproduce.faults import drawing
-from spheretwin.twin.reproduce.faults.conditions.cases import FAULT_s, of_groups, sets
+from spheretwin.twin.reproduce.faults.conditions.cases import of_groups, sets
 from spheretwin.twin.reproduce.faults.conditions.sets import DRAWN, SIZES, Groups, drawn, pairs, singles
-from spheretwin.twin.reproduce.faults.conditions.ways import DETECTING, OF_GROUPS, TOLD, Way
+from spheretwin.twin.reproduce.faults.conditions.ways import DETECTING, NOT_TOLD, OF_GROUPS, TOLD, Way
 from spheretwin.twin.reproduce.faults.found import TWICE, tracks
 
 HOW = (
     "Coils on ideal hardware, the least-norm allocation with its limit of 8 A unless it says *bounded* (all"
     " that the limit allows). *Not told*: nobody knows. *Told*: the allocation leaves the groups out from the"
     " tick on at which they open. *Detecting*: it leaves out what the detector has found by itself.\n\n"
-    f"A run *tracks* where it completes and its largest error of any hinge after the fault, at {FAULT_s:g} s,"
-    f" is at most {TWICE:g} times that of the healthy run of the same seed. The fault is not at the start:"
-    " there the rotor is at rest and the reference is not, and that first error, larger than all that"
-    " follow, would hide what the fault does. The column *whole run* has it in; bounded currents make less of"
-    " it, with or without a fault.\n\n"
+    "The fault starts at a control tick drawn from the seed, evenly over the whole run; all ways of a set share"
+    " it. The *error ratio* is the largest error of any hinge from the start of the fault to the end of the"
+    " run, divided by the same error of the healthy run with the same seed, allocation and window. A run"
+    f" *tracks* if it completes and its error ratio is at most {TWICE:g}.\n\n"
     f"Every group and every pair runs with every seed; {DRAWN} larger sets, drawn once, run with one each."
 )
 HEAD = (
     "open groups", "way", "sets", "runs", "completed", "track",
-    "error / healthy: median", "largest", "whole run: largest",
-    "found after, ms: median", "longest", "not found",
+    "error ratio: median", "95 %", "99 %", "largest",
 )  # fmt: skip
 OUT_OF = 2
+BY_START = ("fault starts, s", "way", "runs", "track", "error ratio: median", "95 %", "99 %", "largest")
+INTERVALS_s = ((0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 4.0), (4.0, 5.0))
+"""Intervals of the run, of 5 s, in which faults start."""
 
 
 def section(outcomes: Outcomes) -> Section:
@@ -42,11 +43,15 @@ def section(outcomes: Outcomes) -> Section:
         for way in OF_GROUPS
         if (row := _row(outcomes, number, listed, way))
     ]
-    title = "Open groups by their number and way; errors of any hinge over those of the healthy run"
+    title = "Open groups by their number and way"
+    by_start = [row for interval in INTERVALS_s for way in OF_GROUPS if (row := _started(outcomes, interval, way))]
     return Section(
         "Open groups",
         f"{HOW} {_numbers(outcomes)}{_goal(outcomes)}",
-        [Table(title, HEAD, rows, OUT_OF)],
+        [
+            Table(title, HEAD, rows, OUT_OF),
+            Table("One or two open groups, by the start of the fault", BY_START, by_start, 2),
+        ],
         [lambda: drawing.shares(_shares(outcomes)), lambda: drawing.pairs(outcomes)] if rows else [],
     )
 
@@ -70,24 +75,26 @@ def _row(outcomes: Outcomes, number: int, listed: Sequence[Groups], way: Way) ->
     runs = [outcome for _, each in found for outcome in each]
     if not runs:
         return None
-    after, whole = ([getattr(run.kept, name) for run in runs] for name in ("after", "whole"))
     completed = [run.status == Status.COMPLETED for run in runs]
-    return (
-        str(number), way.name, str(len(found)), str(len(runs)),
-        percent(completed), percent([tracks(run) for run in runs]),
-        f"{np.median(after):.2f}", f"{max(after):.2f}", f"{max(whole):.2f}", *_delays(runs, way),
-    )  # fmt: skip
+    return (str(number), way.name, str(len(found)), str(len(runs)), percent(completed), *_tracking(runs))
 
 
-def _delays(runs: Sequence[Outcome], way: Way) -> tuple[str, str, str]:
-    """How soon open groups were found: median and longest, ms, and how many were not."""
-    if way is not DETECTING:
-        return "–", "–", "–"
-    times = [time_s for run in runs for time_s in run.kept.found_s]
-    known = [1e3 * time_s for time_s in times if time_s is not None]
-    if not known:
-        return "–", "–", str(len(times))
-    return f"{np.median(known):.0f}", f"{max(known):.0f}", str(len(times) - len(known))
+def _started(outcomes: Outcomes, interval_s: tuple[float, float], way: Way) -> tuple[str, ...] | None:
+    """Row of the faults of one or two groups that start in an interval."""
+    first, end = interval_s
+    runs = [run for run in few(outcomes, way) if first <= run.kept.start_s < end]
+    return (f"{first:g} to {end:g}", way.name, str(len(runs)), *_tracking(runs)) if runs else None
+
+
+def _tracking(runs: Sequence[Outcome]) -> tuple[str, ...]:
+    """Return the share that tracks, and quantiles of the error ratio."""
+    ratios = np.quantile([run.kept.ratio for run in runs], [0.5, 0.95, 0.99, 1.0])
+    return percent([tracks(run) for run in runs]), *(f"{ratio:.2f}" for ratio in ratios)
+
+
+def few(outcomes: Outcomes, way: Way) -> list[Outcome]:
+    """Return the runs with one or two open groups in a way."""
+    return [run for _, runs in found_of(outcomes, [*singles(), *pairs()], way) for run in runs]
 
 
 def percent(true: Sequence[bool]) -> str:
@@ -111,13 +118,15 @@ def _numbers(outcomes: Outcomes) -> str:
 def _goal(outcomes: Outcomes) -> str:
     """Whether every single group and every pair may be open."""
     told = []
-    for way in (TOLD, DETECTING):
-        runs = [run for _, each in found_of(outcomes, [*singles(), *pairs()], way) for run in each]
+    for way in (TOLD, DETECTING, NOT_TOLD):
+        runs = few(outcomes, way)
         if runs:
-            count = sum(map(tracks, runs))
-            worst = max(run.kept.after for run in runs)
-            told.append(f"{way.name}, {count} of {len(runs)} runs track, the worst with {worst:.2f}")
-    return f" With one or two groups open: {'; '.join(told)} times the healthy error." if told else ""
+            ratios = [run.kept.ratio for run in runs]
+            told.append(
+                f"{way.name}, {sum(map(tracks, runs))} of {len(runs)} runs track, with a median error ratio of"
+                f" {np.median(ratios):.2f} and at most {max(ratios):.2f}"
+            )
+    return f" With one or two groups open: {'; '.join(told)}." if told else ""
 
 
 def _shares(outcomes: Outcomes) -> dict[str, dict[int, float]]:

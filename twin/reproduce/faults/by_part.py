@@ -9,7 +9,7 @@ import numpy as np
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Outcome, Outcomes, Section, Table
-from spheretwin.twin.reproduce.faults.conditions.cases import HEALTHY_PROTOTYPE, FAULT_s, of_part
+from spheretwin.twin.reproduce.faults.conditions.cases import HEALTHY_PROTOTYPE, of_part
 from spheretwin.twin.reproduce.faults.conditions.parts import Failure, failures
 from spheretwin.twin.reproduce.faults.conditions.ways import ALONE, BRAKE, OF_PARTS, RELEASE
 from spheretwin.twin.reproduce.faults.found import tracks
@@ -18,9 +18,9 @@ from spheretwin.twin.reproduce.rows import ended
 HOW = (
     "The prototype, as nothing else has these parts. There are no groups to leave out, so the ways are"
     " others: *no watchdog*; one that takes the currents away (*release*); one that shorts the coils, which"
-    " brakes (*short*). The number is the largest error of any hinge from the fault to the end of the run"
-    " over that of the healthy prototype with the same seed, median over the seeds. A run that is stopped is"
-    " soon over, and its error is small for that reason alone. What is intermittent fails in every other"
+    " brakes (*short*). The number is the error ratio as above, with the healthy prototype as"
+    " reference, median over the seeds. The window of a run that is"
+    " stopped ends there. What is intermittent fails in every other"
     " stretch of 10 ms, by a coin; what is stuck stays where it was."
 )
 HEAD = ("part and mode", *(way.name for way in OF_PARTS), "stopped for", "after the fault, ms")
@@ -30,7 +30,7 @@ def section(outcomes: Outcomes) -> Section:
     """How every mode of every part ends in its three ways."""
     ran = [failure for failure in failures() if of_part(failure, ALONE).name in outcomes]
     rows = [_row(outcomes, failure) for failure in ran]
-    title = f"Failures from {FAULT_s:g} s on: how the runs ended, and their error over the healthy one"
+    title = "Failures that start at a drawn time: how the runs ended, and their error ratio"
     return Section(
         "Sensors, supply and controller",
         f"{HOW}{_healthy(outcomes)}{_seen(outcomes, ran)}",
@@ -45,7 +45,7 @@ def _row(outcomes: Outcomes, failure: Failure) -> tuple[str, ...]:
 
 
 def _cell(runs: Sequence[Outcome]) -> str:
-    return f"{ended(runs)}: {np.median([run.kept.after for run in runs]):.3g}" if runs else "not run"
+    return f"{ended(runs)}: {np.median([run.kept.ratio for run in runs]):.3g}" if runs else "not run"
 
 
 def _stopped(runs: Sequence[Outcome]) -> tuple[str, str]:
@@ -54,14 +54,14 @@ def _stopped(runs: Sequence[Outcome]) -> tuple[str, str]:
     if not kept:
         return "–", "–"
     reasons = dict.fromkeys(each.stopped.told for each in kept)
-    return "; ".join(reasons), f"{np.median([1e3 * (each.stopped_s - FAULT_s) for each in kept]):.0f}"
+    return "; ".join(reasons), f"{np.median([1e3 * (each.stopped_s - each.start_s) for each in kept]):.0f}"
 
 
 def _healthy(outcomes: Outcomes) -> str:
     if HEALTHY_PROTOTYPE.name not in outcomes:
         return ""
     errors = [np.degrees(run.kept.after_rad) for run in outcomes[HEALTHY_PROTOTYPE.name]]
-    return f" The healthy prototype errs by {np.median(errors):.2f}° after {FAULT_s:g} s."
+    return f" The largest error of the healthy prototype is {np.median(errors):.2f}° (median over the seeds)."
 
 
 def _seen(outcomes: Outcomes, ran: Sequence[Failure]) -> str:

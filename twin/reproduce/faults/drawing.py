@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.twin.reproduce.experiment import Outcomes
-from spheretwin.twin.reproduce.faults.conditions.cases import FAULT_s, of_groups
+from spheretwin.twin.reproduce.faults.conditions.cases import of_groups
 from spheretwin.twin.reproduce.faults.conditions.sets import count, singles
 from spheretwin.twin.reproduce.faults.conditions.sets import pairs as all_pairs
 from spheretwin.twin.reproduce.faults.conditions.ways import DETECTING, NOT_TOLD, TOLD, Way
 from spheretwin.twin.reproduce.faults.found import TWICE
 from spheretwin.viz.figures.drawing import Drawing
 
-ERROR = f"error after {FAULT_s:g} s over the healthy run's"
+ERROR = "error ratio"
 
 
 def shares(by_way: Mapping[str, Mapping[int, float]]) -> Drawing:
@@ -37,8 +37,8 @@ def pairs(outcomes: Outcomes) -> Drawing:
     panels = {way.name: ratios(outcomes, way) for way in (NOT_TOLD, TOLD, DETECTING)}
     figure = figures.triangles(panels, "open group", ERROR, TWICE, "Every pair of groups open")
     caption = (
-        "Largest error of any hinge after the fault over the healthy run's, median over the seeds; on the"
-        f" diagonal a single group. A cross: more than {TWICE:g}."
+        "Largest error of any hinge after the fault over that of the healthy run over the same window, median"
+        f" over the seeds; on the diagonal a single group. A cross: more than {TWICE:g}."
     )
     return Drawing("faults_pairs.png", caption, figure)
 
@@ -49,8 +49,19 @@ def ratios(outcomes: Outcomes, way: Way) -> NDArray[np.float64]:
     for groups in (*singles(), *all_pairs()):
         runs = outcomes.get(of_groups(groups, way).name, ())
         if runs:
-            found[groups[-1], groups[0]] = np.median([run.kept.after for run in runs])
+            found[groups[-1], groups[0]] = np.median([run.kept.ratio for run in runs])
     return found
+
+
+def latencies(by_kind: Mapping[str, Sequence[float]]) -> Drawing:
+    """Share of the faults that are not detected yet, over the time since the fault."""
+    from spheretwin.viz.figures import faults as figures
+
+    figure = figures.remaining(
+        by_kind, "time since the fault, s", "faults not detected yet, %", "Detection latency"
+    )
+    caption = "Share of the faults that are not detected yet. What remains at the right is not detected in the run."
+    return Drawing("faults_latency.png", caption, figure)
 
 
 def torque_left(points: Mapping[str, Sequence[tuple[float, float, int]]]) -> Drawing:

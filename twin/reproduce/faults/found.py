@@ -1,4 +1,4 @@
-"""What the study keeps of a run, and what it calls tracking."""
+"""Result of one run of the fault study, and the criterion of tracking."""
 
 from __future__ import annotations
 
@@ -8,26 +8,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spheretwin.control.supervision.detector import LEAST_SHARE
 from spheretwin.control.supervision.groups import TOLD
 from spheretwin.control.supervision.watchdog import REASONS, Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.reproduce.experiment import Outcome
 from spheretwin.twin.reproduce.faults.left import Left
-from spheretwin.twin.reproduce.faults.reference import healthy, largest, left_by, reference
+from spheretwin.twin.reproduce.faults.reference import healthy, largest, left_by, reference, start_tick
 from spheretwin.twin.simulation import Run
 
 TWICE = 2.0
-"""A run tracks where it completes, and errs after the fault no more than so many times as the healthy run."""
+"""A run tracks if it completes and its error ratio is at most this."""
 
 
 class Found(NamedTuple):
-    """What remains of a run; errors are those of any hinge over the healthy run's of the same seed."""
+    """Result of a run. Errors are the largest of any hinge from the start of the fault to the run's end."""
 
-    after: float
-    """From the fault on."""
-    whole: float
+    start_s: float
+    """Start of the fault; 0 for a healthy run."""
     after_rad: float
+    healthy_rad: float
+    """The same error of the healthy run with the same seed, over the same control ticks."""
     ended_s: float
     numbers: bool
     """Whether all of its telemetry are numbers."""
@@ -42,38 +44,45 @@ class Found(NamedTuple):
     left: Left | None
     """None where no groups are open."""
     found_s: tuple[float | None, ...]
-    """For each open group, time from the fault until the detector found it."""
+    """For each failed group, detection latency: time from the fault to its detection; None if not detected."""
+    driven_ticks: tuple[int, ...]
+    """For each failed group, control ticks from the fault to its detection, or to the end of the run, at
+    which its command is above the threshold of the detector."""
     wrongly_found: int
     """Groups that work, and were found not to."""
+
+    @property
+    def ratio(self) -> float:
+        """Error over that of the healthy run."""
+        return self.after_rad / self.healthy_rad
 
 
 def keep(run: Run) -> Found:
     """Reduce a run."""
-    base = healthy(run.scenario)
-    beside, table = reference(base), run.telemetry
-    opened = tuple(fault.place for fault in run.scenario.fault if fault.kind.each_group)
+    base, first, table = healthy(run.scenario), start_tick(run.scenario), run.telemetry
+    failed = tuple(fault.place for fault in run.scenario.fault if fault.kind.each_group)
     detected = _detected_s(table)
-    after_rad = largest(table, run.scenario)
     stopped, stopped_s = _stopped(table)
     return Found(
-        after=after_rad / beside.after_rad,
-        whole=largest(table) / beside.largest_rad,
-        after_rad=after_rad,
+        start_s=first * run.scenario.controller.period_s,
+        after_rad=largest(table["error_rad"][first:]),
+        healthy_rad=largest(reference(base).error_rad[first : len(table)]),
         ended_s=len(table) * run.scenario.controller.period_s,
         numbers=bool(np.isfinite(table.values).all()),
         stopped=stopped,
         stopped_s=stopped_s,
         told=run.scenario.detects or any(fault.known for fault in run.scenario.fault),
         least_norm=run.scenario.allocation == "least_norm",
-        left=left_by(base, opened) if opened else None,
-        found_s=tuple(detected.get(group) for group in opened),
-        wrongly_found=len(set(detected) - set(opened)),
+        left=left_by(base, failed, first) if failed else None,
+        found_s=tuple(detected.get(group) for group in failed),
+        driven_ticks=tuple(_driven_ticks(run, group, first, detected.get(group)) for group in failed),
+        wrongly_found=len(set(detected) - set(failed)),
     )
 
 
 def tracks(outcome: Outcome) -> bool:
     """Whether a run completed, and stayed close."""
-    return outcome.status == Status.COMPLETED and outcome.kept.after <= TWICE
+    return outcome.status == Status.COMPLETED and outcome.kept.ratio <= TWICE
 
 
 def reason(outcome: Outcome) -> str | None:
@@ -99,16 +108,16 @@ def more(outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
     return {
         "tracks": [tracks(outcome) for outcome in outcomes].count(True),
         "reason": reasons[0] if reasons else None,
-        "error_ratio": _plain(np.median([each.after for each in kept])),
+        "start_s": [each.start_s for each in kept],
+        "error_after_fault_rad": [_plain(each.after_rad) for each in kept],
+        "healthy_error_after_fault_rad": [_plain(each.healthy_rad) for each in kept],
+        "error_ratio": _plain(np.median([each.ratio for each in kept])),
         "error_ratio_range": [
-            _plain(min(each.after for each in kept)),
-            _plain(max(each.after for each in kept)),
+            _plain(min(each.ratio for each in kept)),
+            _plain(max(each.ratio for each in kept)),
         ],
-        "error_ratio_whole_run": _plain(np.median([each.whole for each in kept])),
         "ended_s": float(np.median([each.ended_s for each in kept])),
-        "time_to_detection_s": [
-            _middle(times) for times in zip(*(each.found_s for each in kept), strict=True)
-        ],
+        "time_to_detection_s": [list(each.found_s) for each in kept],
         "wrongly_found": sum(each.wrongly_found for each in kept),
         "torque_left_over_needed": min((each.torque for each in sets), default=None),
         "least_norm_torque_over_needed": min((each.least_norm for each in sets), default=None),
@@ -136,10 +145,17 @@ def _stopped(table: Table) -> tuple[Reason, float]:
     return REASONS[int(table["failsafe_reason"][ticks[0]])], float(table["t_s"][ticks[0]])
 
 
-def _middle(times_s: Sequence[float | None]) -> float | None:
-    """Median over the seeds; None where one was not found under each of them."""
-    known = [time_s for time_s in times_s if time_s is not None]
-    return float(np.median(known)) if known and len(known) == len(times_s) else None
+def _driven_ticks(run: Run, group: int, first: int, latency_s: float | None) -> int:
+    """Count the ticks from the fault to the detection at which a group is commanded more than the threshold.
+
+    The detector compares the measured current with that of the command of the tick before. On ideal hardware
+    its threshold is a share of the current limit.
+    """
+    threshold_A = LEAST_SHARE * run.actuator.group.current_limit_A
+    ticks = None if latency_s is None else round(latency_s / run.scenario.controller.period_s)
+    command_A = run.telemetry["current_command_A"][:, group]
+    rows = slice(max(first - 1, 0), None if ticks is None else first + ticks)
+    return int(np.count_nonzero(np.abs(command_A[rows]) > threshold_A))
 
 
 def _plain(value: Any) -> float | None:

@@ -41,7 +41,7 @@ HEAD = (
     "told rightly",
 )
 SMALL = (
-    "open groups", "way", "seeds that do not track", "how the worst ended", "error / healthy",
+    "open groups", "way", "seeds that do not track", "how the worst ended", "error ratio",
     "rank", "least singular value, N·m/A", "torque left / needed", "by least norm",
 )  # fmt: skip
 JUDGED = (
@@ -160,15 +160,15 @@ def _smallest(found: Sequence[tuple[Groups, Sequence[Outcome]]], way: Way) -> li
 
 def _listed(groups: Groups, runs: Sequence[Outcome], way: Way) -> tuple[str, ...]:
     bad = [run for run in runs if not tracks(run)]
-    worst = max(bad, key=lambda run: run.kept.after)
+    worst = max(bad, key=lambda run: run.kept.ratio)
     left = worst.kept.left
     return (
         " ".join(map(str, groups)), way.name, f"{len(bad)} of {len(runs)}", str(worst.status),
-        f"{worst.kept.after:.2f}", str(left.rank), f"{left.singular_value_Nm_per_A:.4f}",
+        f"{worst.kept.ratio:.2f}", str(left.rank), f"{left.singular_value_Nm_per_A:.4f}",
         f"{left.torque:.2f}", f"{left.least_norm:.2f}",
     )  # fmt: skip
 
 
 def _points(found: Sequence[tuple[Groups, Sequence[Outcome]]]) -> list[tuple[float, float, int]]:
     """Torque left, error over the healthy one, and number of open groups, of each run."""
-    return [(run.kept.left.torque, run.kept.after, len(groups)) for groups, runs in found for run in runs]
+    return [(run.kept.left.torque, run.kept.ratio, len(groups)) for groups, runs in found for run in runs]

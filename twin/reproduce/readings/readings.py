@@ -70,7 +70,26 @@ def tell(outcomes: Outcomes) -> list[Section]:
         ("reading of (41)", "score", *laws, "at the current limit", "ended early"),
         [_row(each) for each in tried],
     )
-    return [Section("Readings of the control law", HOW, [table], [lambda: _draw(tried)] if tried else [])]
+    text = HOW + "".join(f" {_with_slope(each)}" for each in tried if each.reading.surface_slope is not None)
+    return [Section("Readings of the control law", text, [table], [lambda: _draw(tried)] if tried else [])]
+
+
+def _with_slope(of: Found) -> str:
+    """State the range of the ratios of every law that has λ, by load, for a reading with another λ."""
+    laws = [
+        f"{law.label} by {_ranges(of, place)}"
+        for place, law in enumerate(OF_PAPER)
+        if case(of.reading, law, *next(iter(PRINTED_rad))) != case(AS_SHIPPED, law, *next(iter(PRINTED_rad)))
+    ]
+    return f"With λ = {of.reading.surface_slope:g} the errors differ from the print: {', '.join(laws)}."
+
+
+def _ranges(of: Found, law: int) -> str:
+    """Return the least and largest ratio of the hinges under each load."""
+    return " and ".join(
+        f"a factor of {ratios.min():.2f} to {ratios.max():.2f} at L = {L:g}"
+        for (_, L), ratios in zip(PRINTED_rad, of.ratios[:, law], strict=True)
+    )
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
@@ -88,9 +107,17 @@ def findings(outcomes: Outcomes) -> list[Finding]:
             held,
             f"nearest to all {best.ratios.size} printed errors is (41) read {best.reading.label}, with an RMS"
             f" log ratio of {best.score:.2f}; with the printed gains it is {tried[AS_SHIPPED].score:.2f} read"
-            f" {AS_SHIPPED.label}, and at best {torque.score:.2f} read as a torque",
+            f" {AS_SHIPPED.label}, and at best {torque.score:.2f} read as a torque{_of_afsm(best)}",
         )
     ]
+
+
+def _of_afsm(best: Found) -> str:
+    """State how far AFSM is from the print where the best reading has another λ."""
+    if best.reading.surface_slope is None:
+        return ""
+    law = next(place for place, law in enumerate(OF_PAPER) if law.law == "afsm")
+    return f"; AFSM's errors then differ from the print by {_ranges(best, law)}"
 
 
 def _row(of: Found) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from collections import Counter
 from itertools import combinations
 
+import numpy as np
 import pytest
 
 from spheretwin.twin import scenario as scenarios
@@ -10,11 +11,14 @@ from spheretwin.twin.faults.targets.registry import TARGETS
 from spheretwin.twin.reproduce.faults.conditions import sets
 from spheretwin.twin.reproduce.faults.conditions.cases import (
     SAMPLE,
-    FAULT_s,
+    SCENARIO,
     cases,
     of_groups,
     of_part,
+    on_other_engine,
     sample,
+    shorted,
+    start_s,
 )
 from spheretwin.twin.reproduce.faults.conditions.parts import VALUES, failures
 from spheretwin.twin.reproduce.faults.conditions.ways import (
@@ -61,6 +65,7 @@ def test_every_set_has_its_ways_and_a_sample_runs_on_the_other_engine():
         "pair": 153 * ways,
         "drawn": 2000 * ways,
         "part": len(failures()) * len(OF_PARTS),
+        "short": 18,
         "MuJoCo": len(sample()) * ways,
     }
     assert len(sample()) == -(-2171 // SAMPLE)
@@ -94,16 +99,47 @@ def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_on
         for way in OF_PARTS:
             scenario = scenarios.load("nutation", of_part(failure, way).fields)  # refuses what lacks a value
             assert scenario.hardware == "prototype"
-            assert scenario.fault[0].start_s == FAULT_s
+            assert scenario.fault[0].target == failure.part
 
 
 @pytest.mark.parametrize("limit", [25, 60])
 def test_a_limit_leaves_some_of_each_kind(limit):
     kinds = Counter(case.told["kind"] for case in ALL[:limit])
-    assert set(kinds) == {"healthy", "single", "pair", "drawn", "part", "MuJoCo"}
+    assert set(kinds) == {"healthy", "single", "pair", "drawn", "part", "short", "MuJoCo"}
     named = {case.name for case in ALL[:limit]}
     other = [case.name.removesuffix(", MuJoCo") for case in ALL[:limit] if case.told["kind"] == "MuJoCo"]
     assert named & set(other)
+
+
+def test_starts_are_spread_evenly_over_the_whole_run():
+    """No tick is left out, and none is more likely: the fifths of the run have a fifth of the starts each."""
+    run = scenarios.load(SCENARIO)
+    starts = np.array([start_s(f"set {name}", seed) for name in range(200) for seed in range(20)])
+    ticks = starts / run.controller.period_s
+    np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
+    assert 0.0 <= starts.min() < 0.01
+    assert run.duration - 0.01 < starts.max() <= run.duration - run.controller.period_s
+    counted, _ = np.histogram(starts, 5, (0.0, run.duration))
+    # Each fifth has 800 of 4,000 draws, but for six standard deviations.
+    assert np.all(np.abs(counted - 800) < 6 * (4000 * 0.2 * 0.8) ** 0.5)
+
+
+def test_all_ways_and_engines_of_a_set_share_the_start_of_a_seed_and_other_seeds_have_others():
+    def starts(case, seed):
+        faults = scenarios.load(SCENARIO, {**case.fields_of(seed), "seed": seed}).fault
+        return {fault.start_s for fault in faults}
+
+    for groups in ((3,), (3, 11), (1, 4, 7, 9)):
+        both = [make(groups, way) for make in (of_groups, on_other_engine) for way in OF_GROUPS]
+        drawn = [[starts(case, seed) for case in both] for seed in range(5)]
+        assert all(one == of_seed[0] and len(one) == 1 for of_seed in drawn for one in of_seed)
+        assert len({one for of_seed in drawn for one in of_seed[0]}) == 5
+    for failure in failures()[:3]:
+        first, *others = (starts(of_part(failure, way), 0) for way in OF_PARTS)
+        assert len(first) == 1
+        assert all(other == first for other in others)
+    (alone,) = starts(shorted((3,), DETECTING), 1)
+    assert alone == start_s("group 3", 1)
 
 
 def test_only_what_is_drawn_or_a_sample_runs_once():

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator, Sequence
+from functools import cache
 from itertools import chain, zip_longest
 from typing import Any
 
+import numpy as np
+
 from spheretwin.models.telemetry.status import Status
+from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.reproduce.experiment import Case
 from spheretwin.twin.reproduce.faults.conditions.parts import Failure, failures
 from spheretwin.twin.reproduce.faults.conditions.sets import Groups, drawn, pairs, singles
-from spheretwin.twin.reproduce.faults.conditions.ways import OF_GROUPS, OF_PARTS, Way
-
-FAULT_s = 1.0
-"""When everything fails: in mid-flight. By then the error of a start from rest, which is larger than all that
-follows, has died away, so that what is seen is the fault; the axis gyrates by 12° and widens on to 57°."""
+from spheretwin.twin.reproduce.faults.conditions.ways import DETECTING, OF_GROUPS, OF_PARTS, Way
+from spheretwin.twin.scenario.sections import Scenario
 
 SCENARIO = "nutation"
 BASE: dict[str, Any] = {"disturbance.load": 1.0, "plant.engine": "lagrangian"}
@@ -43,6 +45,7 @@ def cases() -> list[Case]:
         [[of_groups(groups, way) for way in OF_GROUPS] for groups in pairs()],
         [[of_groups(groups, way) for way in OF_GROUPS] for groups in drawn()],
         [[of_part(failure, way) for way in OF_PARTS] for failure in failures()],
+        [[shorted(groups, DETECTING)] for groups in singles()],
         [[on_other_engine(groups, way) for way in OF_GROUPS] for groups in sample()],
     ]
     return [HEALTHY, HEALTHY_PROTOTYPE, *_in_turn(kinds)]
@@ -51,14 +54,12 @@ def cases() -> list[Case]:
 def of_groups(groups: Groups, way: Way) -> Case:
     """Open groups in one way."""
     kind = {1: "single", 2: "pair"}.get(len(groups), "drawn")
-    return Case(
-        name=f"{_named(groups)} open, {way.name}",
-        scenario=SCENARIO,
-        fields={**BASE, **way.fields, "fault": [_open(group, way) for group in groups]},
-        told={"kind": kind, "groups": list(groups), "way": way.name},
-        once=kind == "drawn",
-        ends=ENDS,
-    )
+    return _of_coils(groups, way, "open", kind)
+
+
+def shorted(groups: Groups, way: Way) -> Case:
+    """Groups shorted at their ends in one way."""
+    return _of_coils(groups, way, "short", "short")
 
 
 def on_other_engine(groups: Groups, way: Way) -> Case:
@@ -74,13 +75,13 @@ def on_other_engine(groups: Groups, way: Way) -> Case:
 
 def of_part(failure: Failure, way: Way) -> Case:
     """A failure of what all groups share, in one way."""
-    fault = {"target": failure.part, "mode": failure.mode, "start_s": FAULT_s}
+    fault = {"target": failure.part, "mode": failure.mode}
     if failure.value is not None:
         fault["value"] = failure.value
     return Case(
         name=f"{failure.name}, {way.name}",
         scenario=SCENARIO,
-        fields={**PROTOTYPE, **way.fields, "fault": [fault]},
+        fields={**PROTOTYPE, **way.fields, **_planned([fault])},
         told={
             "kind": "part",
             "groups": [],
@@ -90,6 +91,7 @@ def of_part(failure: Failure, way: Way) -> Case:
             "value": failure.value,
         },
         ends=ENDS,
+        drawn=lambda seed: _starts(1, start_s(failure.name, seed)),
     )
 
 
@@ -103,8 +105,46 @@ def sample() -> list[Groups]:
     return sets()[::SAMPLE]
 
 
-def _open(group: int, way: Way) -> dict[str, Any]:
-    return {"target": f"coil.{group:02d}", "mode": "open", "start_s": FAULT_s, **way.of_fault}
+def start_s(what: str, seed: int) -> float:
+    """Return the start of a fault: a control tick of the run, drawn evenly from the seed.
+
+    Parameters
+    ----------
+    what : str
+        What fails. All ways and both engines share its start, so that they can be compared run by run.
+    seed : int
+    """
+    scenario = _healthy()
+    tick = np.random.default_rng([zlib.crc32(what.encode()), seed]).integers(scenario.ticks)
+    return round(float(tick) * scenario.controller.period_s, 9)
+
+
+@cache
+def _healthy() -> Scenario:
+    return scenarios.load(SCENARIO, BASE)
+
+
+def _of_coils(groups: Groups, way: Way, mode: str, kind: str) -> Case:
+    faults = [{"target": f"coil.{group:02d}", "mode": mode, **way.of_fault} for group in groups]
+    return Case(
+        name=f"{_named(groups)} {mode}, {way.name}",
+        scenario=SCENARIO,
+        fields={**BASE, **way.fields, **_planned(faults)},
+        told={"kind": kind, "groups": list(groups), "way": way.name},
+        once=kind == "drawn",
+        ends=ENDS,
+        drawn=lambda seed: _starts(len(groups), start_s(_named(groups), seed)),
+    )
+
+
+def _planned(faults: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Fields of faults whose starts are drawn."""
+    return {f"fault.{i}.{name}": value for i, fault in enumerate(faults) for name, value in fault.items()}
+
+
+def _starts(faults: int, time_s: float) -> dict[str, Any]:
+    """Start of each fault of a run."""
+    return {f"fault.{i}.start_s": time_s for i in range(faults)}
 
 
 def _named(groups: Groups) -> str:
