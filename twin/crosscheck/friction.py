@@ -2,7 +2,7 @@
 
 A slow ramp of torque to above the Coulomb level and back tells how each sticks and breaks away; coasting
 tells how each slides and stops. Every bound is what the model itself makes of ideal friction: our stage is
-late by its smoothing and by a step, MuJoCo's by the softness of its constraint.
+late by its smoothing and by its error of second order, MuJoCo's by the softness of its constraint.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ def compare(mjcf: Path, actuator: Actuator) -> HingeFriction:
 
 _HELD: dict[str, Callable[[Hinge, Array], Array]] = {OURS: Hinge.stage_Nm, MUJOCO: Hinge.mujoco_Nm}
 _CREEP = {
-    OURS: "k(v) (v - hT/J) = T of the stage, smoothing T/√(level² - T²) in the limit of a small step",
+    OURS: "T = J/h (P⁻¹(v) - P(v)) with the rate P(v) that half a step leaves, v = smoothing T/√(level² - T²)"
+    " in the limit of a small step",
     MUJOCO: "v = (1 - d) T/(d b J) of its soft constraint (impedance d, reference damping b)",
 }
 
@@ -147,8 +148,9 @@ def _torque_at(rate_rad_s: float, torque_Nm: Array, rates_rad_s: Array) -> float
 
 
 _LATE = {
-    OURS: "late by h/v a unit of rate, as a step is implicit, and by what the level lacks, 1 - v/√(v² +"
-    " smoothing²) of it; both summed up over the motion",
+    OURS: "late by what the level lacks, 1 - v/√(v² + smoothing²) of it, summed up over the motion, and by the"
+    " error of the stage: r² h/2 at most while half a step takes the share r of the rate, which sums up to"
+    " r h/2, and two steps for the rest",
     MUJOCO: "below level/(d b J) its soft constraint no longer brakes by the level, but exponentially at d b",
 }
 
@@ -174,7 +176,8 @@ def _late_s(way: str, hinge: Hinge, to_rad_s: float) -> float:
     """How much later than under ideal friction the hinge has slowed down to a rate."""
     if way == OURS:
         lacking = _lacking_rad_s(hinge, START_rad_s) - _lacking_rad_s(hinge, to_rad_s)
-        return STEP_s * log(START_rad_s / to_rad_s) + hinge.inertia_kgm2 / hinge.coulomb_Nm * lacking
+        error = STEP_s * min(0.5 * hinge.stage_loss_rad_s() / to_rad_s, 2.0)
+        return error + hinge.inertia_kgm2 / hinge.coulomb_Nm * lacking
     grip = max(min(hinge.mujoco_grip_rad_s(), START_rad_s), to_rad_s)
     return log(grip / to_rad_s) / hinge.mujoco_relaxation_1_s() - hinge.ideal_time_s(grip, to_rad_s)
 
@@ -207,7 +210,9 @@ def _far_rad(way: str, hinge: Hinge) -> float:
         v, smoothing = START_rad_s, hinge.smoothing_rad_s
         # The integral of √(v² + smoothing²) - v over the rate.
         lacking = 0.5 * (v * hypot(v, smoothing) + smoothing**2 * asinh(v / smoothing) - v**2)
-        return STEP_s * v + hinge.inertia_kgm2 / hinge.coulomb_Nm * lacking
+        loss = hinge.stage_loss_rad_s()  # the delay at each rate, summed up, and two steps at the loss
+        error = STEP_s * min(loss, v) * (2.0 + 0.5 * log(1 + v / loss))
+        return error + hinge.inertia_kgm2 / hinge.coulomb_Nm * lacking
     grip = min(hinge.mujoco_grip_rad_s(), START_rad_s)
     # The force has a corner within a step, which RK4 does not see.
     corner = STEP_s**2 * (hinge.coulomb_Nm + hinge.viscous_Nm_s * grip) / hinge.inertia_kgm2
@@ -239,12 +244,12 @@ def _viscous(way: str, move: Mover, hinge: Hinge) -> Check:
     steps = np.arange(count + 1, dtype=np.float64)
     exact = START_rad_s * np.exp(-share * steps)
     truncation = {
-        OURS: float(np.max(exact * np.expm1(0.5 * share**2 * steps))),
+        OURS: float(np.max(exact * np.expm1((0.5 * share) ** 3 / 3 * steps))),
         MUJOCO: count * START_rad_s * share**5 / 120,
     }
     why = {
-        OURS: "a step leaves 1/(1 + x) of the rate, x = viscous h/J, which is exp(-x) times exp(x²/2) at"
-        " most; and rounding, 2e-16 a step",
+        OURS: "half a step leaves 1/(1 + x + x²/2) of the rate, x = viscous h/2J, which is exp(-x) times"
+        " exp(x³/6) at most; and rounding, 2e-16 a step",
         MUJOCO: "rounding, 2e-16 a step, and truncation of RK4, x⁵/120 a step at x = viscous h/J",
     }
     return Check(

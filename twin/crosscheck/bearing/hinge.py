@@ -4,7 +4,7 @@ The hinge is γ of the upright rotor, whose inertia is J3 and which no other hin
 Ideal friction opposes a motion by ``coulomb + viscous v`` and holds whatever is pushed by less than the
 Coulomb level. Neither way can: what is to hold at rest has to follow from a rate. Both creep below the level.
 
-Our stage is smooth over a stated rate and taken at the end of each step (`plant.friction`). MuJoCo's friction
+Our stage is smooth over a stated rate and acts by halves around each step (`plant.friction`). MuJoCo's friction
 loss is a soft constraint on the rate, without a position: where its force F is below the level, it is that
 which leaves the acceleration ``a = (1 - d) a0 - d b v``, with a0 that without the constraint, the impedance d
 at no violation and the damping b of its reference, which is ``2 / (dmax timeconst)``. With a0 =
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEP_s = 5e-4  # the default physics step
+BISECTIONS = 100  # a double has 52 bits; the bracket is up to a few thousand rates wide
 
 # What MuJoCo gives a friction loss that says nothing else: time constant and damping ratio of its reference;
 # impedance at no violation and at a large one, and how it rises between.
@@ -62,11 +63,36 @@ class Hinge(NamedTuple):
         """Our stage over the rate, at rest."""
         return self.viscous_Nm_s + self.coulomb_Nm / self.smoothing_rad_s
 
+    def slowed_rad_s(self, rate_rad_s: Array) -> Array:
+        """Rate after half a step of our stage alone."""
+        share = 0.5 * STEP_s / self.inertia_kgm2
+        middle = rate_rad_s / (1 + 0.5 * share * self._factor_Nm_s(rate_rad_s))
+        x = share * self._factor_Nm_s(middle)
+        slowed: Array = rate_rad_s / (1 + x + 0.5 * x**2)
+        return slowed
+
     def stage_Nm(self, rate_rad_s: Array) -> Array:
-        """Torque of our stage over a step that begins at a rate; it is what creeps at that rate."""
-        k = self.viscous_Nm_s + self.coulomb_Nm / np.hypot(rate_rad_s, self.smoothing_rad_s)
-        held: Array = k * rate_rad_s / (1 + STEP_s * k / self.inertia_kgm2)
-        return held
+        """Torque under which our stage creeps at a rate, from the end of one step to that of the next.
+
+        Half a step of friction takes the rate v to P(v), the torque adds h T/J, and the other half takes that
+        back to v. P rises with the rate; bisection inverts it.
+        """
+        x = 0.5 * STEP_s / self.inertia_kgm2 * self.factor_at_rest_Nm_s()
+        low, high = rate_rad_s, rate_rad_s * (1 + x + 0.5 * x**2)
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            too_low = self.slowed_rad_s(middle) < rate_rad_s
+            low, high = np.where(too_low, middle, low), np.where(too_low, high, middle)
+        torque: Array = self.inertia_kgm2 / STEP_s * (high - self.slowed_rad_s(rate_rad_s))
+        return torque
+
+    def _factor_Nm_s(self, rate_rad_s: Array) -> Array:
+        factor: Array = self.viscous_Nm_s + self.coulomb_Nm / np.hypot(rate_rad_s, self.smoothing_rad_s)
+        return factor
+
+    def stage_loss_rad_s(self) -> float:
+        """Rate that Coulomb friction takes in half a step."""
+        return 0.5 * STEP_s * self.coulomb_Nm / self.inertia_kgm2
 
     def mujoco_Nm(self, rate_rad_s: Array) -> Array:
         """Torque that creeps at a rate under MuJoCo's friction loss and damping."""
@@ -94,7 +120,8 @@ class Hinge(NamedTuple):
     def relaxation_s(self) -> float:
         """Time in which a third is left of a motion below the level, either way.
 
-        An implicit step leaves ``1 / (1 + h k / J)`` of a rate, which is the longer time of the two.
+        A step of ours leaves ``1 / (1 + x + x**2 / 2)**2`` of a rate, ``x = h k / 2J``: less than an implicit
+        Euler step, ``1 / (1 + h k / J)``, whose time is J/k + h.
         """
         own = self.inertia_kgm2 / self.factor_at_rest_Nm_s() + STEP_s
         return max(own, 1 / self.mujoco_relaxation_1_s())

@@ -25,7 +25,7 @@ from spheretwin.twin.crosscheck.bearing.hinge import (
     TIME_CONSTANT_s,
 )
 from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.plant.friction import Friction, friction, friction_torque
+from spheretwin.twin.plant.friction import Friction, friction, slow_down
 from spheretwin.twin.plant.lagrangian import LagrangianRotor
 from spheretwin.twin.plant.stepping import step
 
@@ -105,12 +105,15 @@ def _motion(plant: Any, bearing: Friction, torque_Nm: Array) -> Motion:
 
 @compiled
 def _follow(plant: Any, bearing: Friction, torque_Nm: Array, q: Array, qdot: Array) -> None:
-    on_hinges = np.empty(3)
+    on_hinges = np.zeros(3)
     q[0], qdot[0] = plant.q[GAMMA], plant.qdot[GAMMA]
     for row in range(torque_Nm.shape[0]):
-        friction_torque(bearing, plant.q, plant.qdot, on_hinges)
-        plant.torque_q[GAMMA] = torque_Nm[row] + on_hinges[GAMMA]
+        plant.torque_q[GAMMA] = torque_Nm[row]
+        if bearing.acts:
+            slow_down(bearing, plant.q, plant.qdot, on_hinges)
         step(plant)
+        if bearing.acts:
+            slow_down(bearing, plant.q, plant.qdot, on_hinges)
         q[row + 1], qdot[row + 1] = plant.q[GAMMA], plant.qdot[GAMMA]
 
 
