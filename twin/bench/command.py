@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.scenario.explaining import explain
-from spheretwin.twin.scenario.reading import as_plain
+from spheretwin.twin.scenario.reading import as_plain, foreign
 
 _CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -78,9 +78,8 @@ def checked(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
         found = kind.model_validate_json(json.dumps(arguments, default=as_plain))
     except ValidationError as error:
         raise InputError(f"bench: {name}: {explain(error, kind)}") from None
-    except (TypeError, ValueError, RecursionError):
+    except (TypeError, ValueError, RecursionError) as error:
         raise InputError(
-            f"bench: {name}: expected arguments as JSON has them, received a name or a text that is none,"
-            " or digits or levels without end"
+            f"bench: {name}: expected arguments as JSON has them, received {foreign(error)}"
         ) from None
     return {field: getattr(found, field) for field in kind.model_fields}

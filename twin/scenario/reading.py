@@ -234,11 +234,17 @@ def as_json(source: str, fields: Any) -> bytes:
     """
     try:
         return json.dumps(fields, default=as_plain, ensure_ascii=False).encode()
-    except (TypeError, ValueError, RecursionError):  # names or bytes that are no text, endless digits, depth
+    except (TypeError, ValueError, RecursionError) as error:
         raise InputError(
-            f"scenario {source}: expected sections and values as TOML has them,"
-            " received a name or a text that is none, or digits or levels without end"
+            f"scenario {source}: expected sections and values as TOML has them, received {foreign(error)}"
         ) from None
+
+
+def foreign(error: TypeError | ValueError | RecursionError) -> str:
+    """Return what JSON cannot write, by the error of its writer."""
+    if isinstance(error, UnicodeEncodeError):
+        return f"a text with {shown(error.object[error.start])}"
+    return "a name that is no text" if isinstance(error, TypeError) else "digits or levels without end"
 
 
 def check_texts(source: str, scenario: Scenario) -> None:
