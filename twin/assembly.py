@@ -18,7 +18,7 @@ from spheretwin.control.law import Known, Law
 from spheretwin.control.manual import manual
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.wording import shown, without_breaks
+from spheretwin.models.base.wording import exception_text, shown
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, scratch_of, torque_model
 from spheretwin.models.telemetry.signals import (
@@ -54,12 +54,11 @@ def law_of(scenario: Scenario) -> Law:
     section = scenario.controller
     try:
         law = section.build(_known(scenario))
-    except SpheretwinError:
+    except (SpheretwinError, KeyboardInterrupt):
         raise
-    except Exception as error:  # whatever a user's code may raise
-        told = without_breaks(error) or "no word of why"
+    except BaseException as error:  # the user's code may raise anything
         raise InputError(
-            f"law {section.law}: expected build(known) to make a Law, received {type(error).__name__}: {told}"
+            f"law {section.law}: expected build(known) to make a Law, received {exception_text(error)}"
         ) from error
     if not isinstance(law, Law):
         raise InputError(f"law {section.law}: expected build(known) to make a Law, received {shown(law)}")

@@ -14,8 +14,8 @@ from spheretwin.control.controller import Supervision
 from spheretwin.control.law import Law
 from spheretwin.control.supervision import detector, groups, watchdog
 from spheretwin.control.supervision.watchdog import REASONS, Reason
-from spheretwin.models.base.compiled import for_types_of
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.compiled import callback_errors, for_types_of
+from spheretwin.models.base.errors import InputError, LawError
 from spheretwin.models.magnetics import kept_matrix
 from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import assembly
@@ -27,7 +27,7 @@ from spheretwin.twin.scenario.files import Files
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Triple
 from spheretwin.twin.wiring import wires as wiring
-from spheretwin.twin.wiring.matching import matching
+from spheretwin.twin.wiring.matching import is_own, matching
 
 # For their types alone.
 NO_INPUTS = loops.Inputs(
@@ -91,6 +91,8 @@ class Machine:
         Columns of the telemetry.
     columns : int
         Numbers in a row of it.
+    law_error : LawError or None
+        Exception of the law in compiled code; one of a law in plain Python is raised.
 
     Raises
     ------
@@ -103,6 +105,7 @@ class Machine:
         self._moving = moving or _started(scenario, files)
         self._last = Last(np.empty(0), np.empty(0), np.zeros(len(files.actuator.groups)))
         self.law = law
+        self.law_error: LawError | None = None
         self.signals = assembly.signals_of(scenario, files.actuator, self.law)
         self.columns = width(self.signals)
         magnetics = assembly.nominal_magnetics(scenario, files)
@@ -117,8 +120,12 @@ class Machine:
         self._faults = wiring.faults_of(scenario, self._plant, self._sensors, supervision.groups)
         # The loop has bare addresses of its functions: they are held for as long as it is.
         self._functions = matching(
-            self.law, ALLOCATIONS[scenario.allocation], estimator.step if estimator else None
+            self.law,
+            ALLOCATIONS[scenario.allocation],
+            estimator.step if estimator else None,
+            check_bounds=scenario.controller.check_bounds,
         )
+        self._may_raise = is_own(law) or scenario.controller.check_bounds
         self._parts = (
             self._functions.law,
             self._functions.allocate,
@@ -152,7 +159,7 @@ class Machine:
 
     def run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
         """Run a control tick for each row of `log`: rows written, and the code of a status."""
-        ticks, code = self._loop(inputs, *self._parts, log)
+        ticks, code = self._run(inputs, log)
         if ticks:
             row, first = log[ticks - 1], loops.CURRENT_COMMAND
             self._last = Last(
@@ -160,6 +167,24 @@ class Machine:
                 inputs.noise[ticks - 1].copy(),
                 row[first : first + len(self._plant.current)].copy(),
             )
+        return ticks, code
+
+    def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
+        """Run the loop; keep the first exception of a compiled law."""
+        if not self._may_raise:
+            return self._loop(inputs, *self._parts, log)
+        raised: list[BaseException] = []
+
+        def receive(error: BaseException) -> None:
+            raised.append(error)
+            self._controller.torque_q[:] = np.nan  # whatever it wrote before
+
+        with callback_errors(receive):
+            ticks, code = self._loop(inputs, *self._parts, log)
+        if raised and self.law_error is None:
+            # A watchdog lets the currents run down from the tick on.
+            t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.since[0])]
+            self.law_error = LawError.of(self.law.name, t_s, raised[0])
         return ticks, code
 
     def changed(self, scenario: Scenario, files: Files, own_law: Law | None) -> Machine:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
@@ -112,13 +112,23 @@ class Session:
 
     @property
     def status(self) -> Status:
-        """``running``, or why the run can go on no further, as ``left_workspace`` or ``diverged``."""
-        return self._status
+        """Status of the run: ``running``, ``failsafe`` from the tick of a trip on, or how the run ended."""
+        return Status.FAILSAFE if self.reason else self._status
+
+    @property
+    def ended(self) -> bool:
+        """True if no further tick can be run; after a trip the rundown is still to come."""
+        return self._status != Status.RUNNING
 
     @property
     def reason(self) -> Reason:
         """Why the currents were taken away, by a watchdog or a coil that is too hot, if they were."""
         return self._machine.reason
+
+    @property
+    def law_error(self) -> LawError | None:
+        """Exception of a compiled law, which ended the run; one of a law in plain Python is raised."""
+        return self._machine.law_error
 
     @property
     def t_s(self) -> float:
@@ -151,8 +161,8 @@ class Session:
         Parameters
         ----------
         ticks : int
-            How many at most; fewer are run where the status becomes other than ``running``, or where an event
-            of the scenario changes the columns.
+            How many at most; fewer are run where the run ends, or where an event of the scenario changes the
+            columns.
 
         Returns
         -------
@@ -347,9 +357,11 @@ class Session:
         started = time.perf_counter()
         try:
             ticks, code = self._machine.run(inputs, log)
-        except BaseException:  # a law in plain Python: the state is somewhere within a tick
+        except BaseException as error:  # a law in plain Python: the state is somewhere within a tick
             self._status = Status.DIVERGED
-            raise
+            if isinstance(error, Exception | KeyboardInterrupt):
+                raise
+            raise LawError.of(self.law.name, self.t_s, error) from error  # it would end the process
         self.loop_s += time.perf_counter() - started
         self.tick += ticks
         self._status = BY_CODE[code]

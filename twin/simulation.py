@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.errors import LawError
 from spheretwin.models.telemetry.kept import KeptTelemetry
 from spheretwin.models.telemetry.record import Change
 from spheretwin.models.telemetry.signals import width
@@ -56,6 +57,8 @@ class Run:
         Wall time of the simulated loop alone, s.
     actuator : Actuator
         What was simulated.
+    law_error : LawError, optional
+        Exception of a compiled law, which ended the run; one of a law in plain Python is raised.
     """
 
     scenario: Scenario
@@ -63,6 +66,7 @@ class Run:
     telemetry: Table
     wall_s: float
     actuator: Actuator
+    law_error: LawError | None = None
 
 
 def simulate(
@@ -99,7 +103,7 @@ def simulate(
             log = allocated(scenario.ticks, width(session.signals))
             status = follow(session, scenario.ticks, sinks, log=log)
             telemetry = Table(session.signals, log[: session.tick])
-        return Run(session.begun_as, status, telemetry, session.loop_s, session.actuator)
+        return Run(session.begun_as, status, telemetry, session.loop_s, session.actuator, session.law_error)
 
 
 def follow(
@@ -146,7 +150,7 @@ def follow(
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
     noted, told = _note_events(session, 0, sinks), FaultLines()
-    while session.tick < ticks and session.status == Status.RUNNING and not stop_requested():
+    while session.tick < ticks and not session.ended and not stop_requested():
         _make(session, ticks, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
         rows = _advance(session, last, log)

@@ -49,6 +49,11 @@ class ControllerSection(BaseModel):
     period_s: Annotated[float, Field(gt=0, le=10)] = Field(
         1e-3, description="control period, s; a whole number of physics steps"
     )
+    check_bounds: bool = Field(
+        False,
+        description="compile the law with bounds checks: one that reads or writes outside its arrays then"
+        " ends the run with an error; to debug, it is slower",
+    )
     governor: GovernorSection = Field(
         GovernorSection(), description="bounds the acceleration of the reference"
     )

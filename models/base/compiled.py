@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import CellType, FunctionType
 from typing import Any
 
 import numba
@@ -95,7 +101,7 @@ def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
     return plain
 
 
-def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
+def compiled_callback(signature: Any, function: Callable[..., Any], *, check_bounds: bool = False) -> Any:
     """Compile a function behind a fixed signature, so that callers need no compilation of their own.
 
     It is compiled once for a function and a signature, with the values that global variables have then,
@@ -107,25 +113,153 @@ def compiled_callback(signature: Any, function: Callable[..., Any]) -> Any:
         Argument and return types.
     function : callable
         A plain function, or one that numba has already wrapped.
+    check_bounds : bool
+        Raise `IndexError` where the function, or a compiled function that it names, reads or writes outside
+        an array.
     """
     plain = uncompiled(function)
     if not COMPILES:
         return plain
     callbacks = plain.__dict__.setdefault(_CALLBACKS, {})
-    if signature not in callbacks:
-        callbacks[signature] = _callback(signature, plain)
-    return callbacks[signature]
+    key = signature, check_bounds
+    if key not in callbacks:
+        callbacks[key] = _callback(signature, plain, check_bounds)
+    return callbacks[key]
 
 
-def _callback(signature: Any, function: Callable[..., Any]) -> Any:
-    callback: Any = CFunc(
-        function, (signature.args, signature.return_type), {}, {"nopython": True, **_OPTIONS}
-    )
+def _callback(signature: Any, function: Callable[..., Any], check_bounds: bool) -> Any:
+    options = {"nopython": True, **_OPTIONS, "boundscheck": check_bounds}
+    step = _with_bounds_checks(function, {}) if check_bounds else function
+    callback: Any = CFunc(step, (signature.args, signature.return_type), {}, options)
     # Only these sources are watched by the cache; another's would go stale.
-    if function.__module__.startswith("spheretwin."):
+    if function.__module__.startswith("spheretwin.") and not check_bounds:
         callback._cache = MachineCode(function, "callback")
     callback.compile()
     return callback
+
+
+def _with_bounds_checks(function: FunctionType, copies: dict[int, Any]) -> FunctionType:
+    """Copy a plain function so that the compiled functions that it names check bounds.
+
+    Numba checks bounds in the function that it compiles, and in none that this function calls.
+
+    Parameters
+    ----------
+    function : function
+    copies : dict
+        Copies of compiled functions made so far, by the identity of the original.
+    """
+    copy = _copied(function)
+    _name_copies(function, copy, copies)
+    return copy
+
+
+def _dispatcher_with_bounds_checks(value: Any, copies: dict[int, Any]) -> Any:
+    """Copy a compiled function so that it checks bounds; return any other value as it is."""
+    if not isinstance(value, Dispatcher):
+        return value
+    if id(value) not in copies:
+        copy = _copied(value.py_func)
+        options = {**value.targetoptions, "boundscheck": True}
+        copies[id(value)] = type(value)(copy, value.locals, options)
+        _name_copies(value.py_func, copy, copies)  # last: functions may call each other
+    return copies[id(value)]
+
+
+def _copied(function: FunctionType) -> FunctionType:
+    """Copy a function, with global variables of its own and with empty cells."""
+    cells = tuple(CellType() for _ in function.__closure__ or ())
+    copy = FunctionType(
+        function.__code__, dict(function.__globals__), function.__name__, function.__defaults__, cells
+    )
+    copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
+    return copy
+
+
+def _name_copies(function: FunctionType, copy: FunctionType, copies: dict[int, Any]) -> None:
+    """Let the copy of a function name the copies of the compiled functions that the original names."""
+    for name in set(function.__code__.co_names) & function.__globals__.keys():
+        copy.__globals__[name] = _dispatcher_with_bounds_checks(function.__globals__[name], copies)
+    for original, cell in zip(function.__closure__ or (), copy.__closure__ or (), strict=True):
+        cell.cell_contents = _dispatcher_with_bounds_checks(original.cell_contents, copies)
+
+
+class _CallbackErrors(threading.local):
+    """Function of each thread that its compiled callbacks' exceptions are passed to."""
+
+    receiver: Callable[[BaseException], None] | None = None
+
+
+_CALLBACK_ERRORS = _CallbackErrors()
+_HOOK_LOCK = threading.Lock()
+_HOOKS: list[Callable[[Any], object]] = []
+"""The hook that was there before ours, once for each block that runs."""
+
+
+@contextmanager
+def callback_errors(receiver: Callable[[BaseException], None]) -> Iterator[None]:
+    """Pass exceptions of compiled callbacks in this thread to a function, while the block runs.
+
+    A callback cannot raise into the compiled code that calls it. Numba hands its exception to
+    `sys.unraisablehook`, which prints it, and the caller goes on.
+
+    Parameters
+    ----------
+    receiver : callable
+        Called before the callback returns to its caller.
+    """
+    with _HOOK_LOCK:
+        _HOOKS.append(_HOOKS[0] if _HOOKS else sys.unraisablehook)
+        sys.unraisablehook = _receive
+    _CALLBACK_ERRORS.receiver = receiver
+    try:
+        yield
+    finally:
+        _CALLBACK_ERRORS.receiver = None
+        with _HOOK_LOCK:
+            before = _HOOKS.pop()
+            if not _HOOKS:
+                sys.unraisablehook = before
+
+
+def _receive(unraisable: Any) -> None:
+    """Pass on the exception of a callback; leave every other to the hook that was there before."""
+    # Numba names the compiler's context as the place, whatever the callback is.
+    is_callback = "CPUContext" in f"{unraisable.object}"
+    if _CALLBACK_ERRORS.receiver and is_callback:
+        _CALLBACK_ERRORS.receiver(unraisable.exc_value or unraisable.exc_type())
+    else:
+        (_HOOKS[0] if _HOOKS else sys.__unraisablehook__)(unraisable)
+
+
+_HEADINGS = re.compile(r"(\w+Error: )?(Failed in \w+ mode pipeline|During: )")
+_PLACE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+)')
+_NOISE = re.compile(r", defined at (None|.+ \(\d+\))|\. Raised from None$")
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def compile_error(error: Exception, function: Callable[..., Any]) -> str:
+    """Return why a function does not compile, in one line with its line number: numba's reason alone."""
+    lines = [line.strip() for line in _COLOURS.sub("", str(error)).splitlines()]
+    # A function of NumPy that is refused gives its own reason further down, as the last of several.
+    nested = [place for place, line in enumerate(lines) if line.endswith("raised a specific error:")]
+    lines = lines[nested[-1] + 1 :] if nested else lines
+    reasons = [line for line in lines if line and not _HEADINGS.match(line)] or [type(error).__name__]
+    reason = reasons[0]
+    if reason.endswith(":") and len(reasons) > 1:  # as "found for signature:", the signature follows
+        reason = f"{reason} {reasons[1].removeprefix('>>> ')}"
+    line = _line_of(error, uncompiled(function))
+    return f"{_NOISE.sub('', reason).rstrip('.')}{f', in line {line}' if line else ''}"
+
+
+def _line_of(error: Exception, function: Callable[..., Any]) -> int | None:
+    """Line of a function's file that an error of the compiler names first: the innermost of those named."""
+    file = Path(function.__code__.co_filename).name
+    for place in _PLACE.finditer(_COLOURS.sub("", str(error))):
+        if Path(place["file"]).name == file:
+            return int(place["line"])
+    location = getattr(error, "loc", None)
+    return location.line if location and Path(location.filename).name == file else None
 
 
 def compilable(function: Callable[..., Any]) -> Any:

@@ -1,6 +1,8 @@
 """The errors this package raises: one root, so that a caller can catch them all."""
 
-from spheretwin.models.base.wording import one_line
+from __future__ import annotations
+
+from spheretwin.models.base.wording import exception_text, one_line
 
 
 class SpheretwinError(Exception):
@@ -19,6 +21,17 @@ class SpheretwinError(Exception):
 
 class InputError(SpheretwinError):
     """What the user gave (a scenario, a flag, a file, a law) cannot be used as it is."""
+
+
+class LawError(SpheretwinError):
+    """A control law raised an exception instead of writing a torque."""
+
+    @classmethod
+    def of(cls, law: str, t_s: float, error: BaseException) -> LawError:
+        """Error of a law by its name, at a time, s; the exception becomes the cause."""
+        made = cls(f"law {law}: expected a torque at {t_s:g} s, received {exception_text(error)}")
+        made.__cause__ = error
+        return made
 
 
 class EngineError(SpheretwinError):

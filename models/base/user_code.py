@@ -107,7 +107,10 @@ def _module(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
     try:
         with contextlib.redirect_stdout(sys.stderr):  # what it prints is none of the figures on stdout
             exec(compile(source, str(path), "exec"), vars(module))
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        del sys.modules[module.__name__]
+        raise
+    except BaseException as error:  # the user's code may raise anything
         del sys.modules[module.__name__]
         raise InputError(
             f"{what}: expected a file of Python that runs, received {path}: {_told(error, path)}"

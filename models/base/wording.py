@@ -41,6 +41,12 @@ def without_breaks(error: BaseException) -> str:
     return " ".join(str(error).split())
 
 
+def exception_text(error: BaseException) -> str:
+    """Type and message of an exception, as ``ValueError: lost``; the type alone if there is no message."""
+    message = without_breaks(error)
+    return f"{type(error).__name__}: {message}" if message else type(error).__name__
+
+
 def shortened(text: str, longest: int) -> str:
     """A text of at most `longest` characters, its middle left out where it is longer."""
     if len(text) <= longest:
@@ -58,7 +64,9 @@ def shown(value: object) -> str:
         text = _written(value)
     except ValueError:  # an integer of more digits than Python writes
         return "a number of too many digits"
-    except Exception as error:  # an object of the user's, which may raise whatever it will
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # an object of the user's, which may raise anything
         return (
             f"a value of class {type(value).__name__}, which raises {type(error).__name__} when it is written"
         )

@@ -6,8 +6,7 @@ import json
 from typing import Any, NamedTuple
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import without_breaks
-from spheretwin.models.telemetry.status import Status
+from spheretwin.models.base.wording import exception_text
 from spheretwin.models.telemetry.table import Table
 from spheretwin.twin.bench import modes
 from spheretwin.twin.bench.modes import Limits
@@ -88,7 +87,9 @@ class Desk:
         except Exception as error:  # a law of the user's may raise anything: the run ends
             self.fail(error)
             return None
-        if self.session.status != Status.RUNNING:
+        if error := self.session.law_error:
+            self.reason = f"{error}"
+        elif self.session.ended:
             why = f", {self.session.reason.told}" if self.session.reason else ""
             self.reason = f"{self.session.status}: {self.session.status.told}{why}"
         if len(rows):
@@ -97,7 +98,7 @@ class Desk:
 
     def fail(self, error: Exception) -> None:
         """End the run by an error."""
-        self.reason = f"{type(error).__name__}: {without_breaks(error) or 'no word of why'}"
+        self.reason = exception_text(error)
 
     def stop(self) -> None:
         """Take the currents away until the next reset."""

@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
-from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.commands import outputs
@@ -30,6 +29,7 @@ from spheretwin.twin.scenario import flags
 from spheretwin.twin.scenario.reading import shipped
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import Sink, follow
+from spheretwin.twin.wiring.matching import is_own
 from spheretwin.viz.layout.view import OVERVIEW, VIEW_NAMES
 from spheretwin.viz.terminal import tables
 from spheretwin.viz.terminal.progress import Progress
@@ -187,14 +187,12 @@ def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
             yield
     except SpheretwinError:
         raise
-    except Exception as error:  # the law is the user's code, which may raise whatever it will
-        if session.law.step.__module__.startswith("spheretwin."):
+    except Exception as error:  # the user's code may raise anything
+        if not is_own(session.law):
             raise
-        told = without_breaks(error) or "no word of why"
-        raise SpheretwinError(
-            f"law {session.law.name}: expected a torque at {session.t_s:g} s,"
-            f" received {type(error).__name__}: {told}"
-        ) from error
+        raise LawError.of(session.law.name, session.t_s, error) from error
+    if session.law_error:
+        raise session.law_error
 
 
 def _ending(session: Session, status: str, planned_s: float) -> str:

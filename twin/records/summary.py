@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown, without_breaks
+from spheretwin.models.base.wording import exception_text, shown
 from spheretwin.models.telemetry.table import Table
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.metrics.metric import Planned
@@ -113,13 +113,15 @@ def own_value(name: str, metric: OwnMetric, run: Run) -> Any:
     """
     try:
         value = metric(run)
-    except (Exception, SystemExit) as error:  # the user's code, which may raise whatever it will
-        raise InputError(
-            f"metric {name}: expected a figure, it raised {type(error).__name__}: {without_breaks(error)}"
-        ) from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # the user's code may raise anything
+        raise InputError(f"metric {name}: expected a figure, it raised {exception_text(error)}") from error
     try:
         return json.loads(json.dumps(value, default=_as_plain))
-    except Exception:  # beside what is no JSON: objects of the user's that raise while they are looked into
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # not JSON, or an object of the user's that raises when it is read
         raise InputError(f"metric {name}: expected what JSON holds, received {shown(value)}") from None
 
 

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.user_code import is_reference, load_function
-from spheretwin.models.base.wording import did_you_mean, shown, without_breaks
+from spheretwin.models.base.wording import did_you_mean, exception_text, shown
 from spheretwin.models.telemetry.file import TelemetryFile
 from spheretwin.models.telemetry.kept import KeptTelemetry
 from spheretwin.models.telemetry.status import Status
@@ -122,10 +122,12 @@ class Rows:
                 return self._followed(row, scenario, session)
         except InputError as error:
             return Result(REFUSED, None, str(error), {})
+        except LawError as error:
+            return Result(FAILED, None, str(error), {})
         except SpheretwinError:  # no fault of the row's: a full disk
             raise
-        except Exception as error:  # code of the user's, which may raise whatever it will
-            return Result(FAILED, None, f"{type(error).__name__}: {without_breaks(error)}", {})
+        except Exception as error:  # the user's code may raise anything
+            return Result(FAILED, None, exception_text(error), {})
 
     def session(self, scenario: Scenario) -> Session:
         """Session of a row's scenario; its files are read once for a study."""
@@ -207,6 +209,8 @@ class Rows:
         finally:
             if file:
                 file.close(record_of(session).metadata())
+        if session.law_error:
+            raise session.law_error
         figures = {name: metric.value() for name, metric in metrics.items()}
         complaints: list[str] = []
         if kept:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown, without_breaks
+from spheretwin.models.base.wording import exception_text, shown
 from spheretwin.twin.trajectories.approach import Approach
 
 # The file of a shape finds here all that it needs of these.
@@ -156,10 +156,11 @@ class OwnTrajectory:
         """
         try:
             samples = self._own.sample(t.copy())
-        except Exception as error:  # whatever a user's code may raise
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # the user's code may raise anything
             raise InputError(
-                f"trajectory: expected samples from {t[0]:g} to {t[-1]:g} s,"
-                f" received {type(error).__name__}: {without_breaks(error)}"
+                f"trajectory: expected samples from {t[0]:g} to {t[-1]:g} s, received {exception_text(error)}"
             ) from error
         shape = (len(t), 3, 3)
         if (

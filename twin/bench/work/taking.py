@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.wording import one_line, without_breaks
+from spheretwin.models.base.wording import exception_text, one_line
 from spheretwin.twin.bench.command import Command
 from spheretwin.twin.bench.queue import Ticket, Waiting
 from spheretwin.twin.bench.work.works import Works
@@ -113,4 +113,4 @@ class Taking:
 
 def told(error: Exception) -> str:
     """What kind of error it is, and why, in one line."""
-    return one_line(f"{type(error).__name__}: {without_breaks(error) or 'no word of why'}")
+    return one_line(exception_text(error))
