@@ -60,7 +60,10 @@ class Law:
         `state` is the law's memory, changed in place. A plain Python function works; one that numba
         compiles runs at the speed of the shipped laws. It must write all three torques at every call:
         one that is left out, or is no number, ends the run as ``diverged``. So does an exception in
-        compiled code; one in plain Python is raised to the caller.
+        compiled code, which `Session.law_error` and `Run.law_error` hold; an exception in plain Python is
+        raised to the caller, one that would end the process, such as `SystemExit`, as `LawError`.
+        Compiled code is not checked for reads and writes outside the arrays: they change other memory of
+        the process or end it. With ``controller.check_bounds`` they are exceptions.
     parameters : (n,) array
         Numbers handed to every call; copied, so that what becomes of the caller's array is no matter.
     state : (m,) array

@@ -6,9 +6,11 @@ import os
 import secrets
 import shutil
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple, Protocol
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.wording import without_breaks
@@ -66,6 +68,56 @@ class OutputFile:
         """Remove the file, unless it was kept."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
+
+
+class PartialFile(NamedTuple):
+    """What there is of a file that is being written."""
+
+    path: Path
+    """Where it is."""
+    target: Path
+    """Name that the complete file was to have."""
+    rows: int
+    """Rows of telemetry in it."""
+
+
+class FileWriter(Protocol):
+    """Writer of a file that can be recovered when it was not completed."""
+
+    def partial(self) -> PartialFile | None:
+        """Flush the rows that wait in memory; return what can be recovered then, if there are rows.
+
+        It is called in another thread than the writer's, before the process ends.
+        """
+
+
+class OpenFiles:
+    """Files that this process is writing."""
+
+    def __init__(self) -> None:
+        self._writers: list[FileWriter] = []
+        self._lock = threading.Lock()
+
+    def add(self, writer: FileWriter) -> None:
+        """Add the writer of a file that was begun."""
+        with self._lock:
+            self._writers.append(writer)
+
+    def remove(self, writer: FileWriter) -> None:
+        """Remove the writer of a file that is complete, or was given up."""
+        with self._lock, suppress(ValueError):
+            self._writers.remove(writer)
+
+    def partial(self) -> Iterator[PartialFile]:
+        """Flush all files; yield what can be recovered of each."""
+        with self._lock:
+            writers = list(self._writers)
+        for writer in writers:
+            if file := writer.partial():
+                yield file
+
+
+OPEN_FILES = OpenFiles()
 
 
 def check_writable(path: Path) -> None:

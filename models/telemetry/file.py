@@ -6,6 +6,7 @@ process leaves them, any Arrow reader opens them, and `join` makes one file of t
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.files import check_writable, whole_file
+from spheretwin.models.base.files import OPEN_FILES, PartialFile, check_writable, whole_file
 from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.parts import Parts, read_batches, read_schema
 from spheretwin.models.telemetry.signals import Signal, width
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 # Rows of a batch of a part: four seconds at 1 kHz, some 3 MB in memory.
 PART_ROWS = 4096
+
+# How long a process that ends at once waits for a chunk that is being written.
+PATIENCE_s = 2.0
 
 # Batches of a row group of the file. The rows of one group are in memory at a time, and Arrow keeps 15 kB of
 # each until the file is whole: over two hours at 1 kHz, three or four batches need the least memory.
@@ -57,12 +61,18 @@ class TelemetryFile:
         self._waiting: list[Table] = []
         self._parts = Parts(path, facts)
         self._fault: SpheretwinError | None = None
+        self._lock = threading.Lock()
+        OPEN_FILES.add(self)
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, which must not change any more.
 
         What goes wrong is raised by `close`, so that the run itself goes on.
         """
+        with self._lock:
+            self._write(rows)
+
+    def _write(self, rows: Table) -> None:
         if self._fault:
             return
         if rows.signals != self._rows.signals:
@@ -93,7 +103,23 @@ class TelemetryFile:
         SpheretwinError
             It could not be written: what was there before is untouched, and the parts are kept.
         """
-        known = {**self._facts, **facts}
+        with self._lock:
+            try:
+                self._close({**self._facts, **facts})
+            finally:
+                OPEN_FILES.remove(self)
+
+    def partial(self) -> PartialFile | None:
+        """Flush the rows that wait; return the parts, if there are rows. For a process that ends at once."""
+        if self._lock.acquire(timeout=PATIENCE_s):  # who holds it has flushed what there was, or is about to
+            try:
+                if not self._fault:
+                    self._flush()
+            finally:
+                self._lock.release()
+        return PartialFile(self._parts.folder, self._path, self._parts.rows) if self._parts.rows else None
+
+    def _close(self, known: Mapping[str, str]) -> None:
         if self._fault:
             raise self._fault
         if not self._parts.rows:

@@ -1,21 +1,47 @@
-"""Ctrl-C, or the end of the session, as a question that long work asks between two of its parts."""
+"""Ctrl-C and the end of the session: the first signal requests a stop, the second ends the process."""
 
 from __future__ import annotations
 
 import contextlib
+import os
+import shlex
 import signal
-from collections.abc import Callable, Iterator
+import socket
+import threading
+from collections.abc import Callable, Collection, Iterator
+
+from spheretwin.models.base.files import OPEN_FILES, PartialFile
+
+HINT_s = 1.0
+"""Time after the first signal until a line says what a second one does."""
+
+SALVAGE_s = 5.0
+"""Longest time that the second signal waits for files to be flushed."""
+
+SIGNAL_EXIT = 128
+"""Exit code of a process that a signal ended is this and the number of the signal, as shells have it."""
 
 
 @contextlib.contextmanager
-def interruptible() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C, or the end of the session, end work at the next part of it: nothing computed is lost."""
-    asked = []
+def interruptible(remark: str = "") -> Iterator[Callable[[], bool]]:
+    """Yield a function that is True once Ctrl-C, or the end of the session, has requested a stop.
+
+    A second signal ends the process at once, with exit code 130 after Ctrl-C and 143 after SIGTERM, also
+    while compiled code runs: a law may never return. Rows that wait in memory are flushed before, and each
+    partial file is named with the command that recovers it.
+
+    Parameters
+    ----------
+    remark : str
+        What else to say then.
+    """
+    requests: list[int] = []
     # What the parent has it ignore, as nohup a lost terminal, stays ignored.
     heeded = [number for number in _ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda *_: asked.append(True)) for number in heeded}
+    before = {number: signal.signal(number, lambda number, _: requests.append(number)) for number in heeded}
     try:
-        yield lambda: bool(asked)
+        with _watched(heeded, remark):
+            yield lambda: bool(requests)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -24,3 +50,60 @@ def interruptible() -> Iterator[Callable[[], bool]]:
 _ENDINGS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 ]
+
+
+@contextlib.contextmanager
+def _watched(heeded: Collection[int], remark: str) -> Iterator[None]:
+    """Count signals in a thread, as the main thread runs no Python while it is in compiled code."""
+    reading, writing = socket.socketpair()  # on Windows, signals are written to sockets alone
+    writing.setblocking(False)
+    before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+    thread = threading.Thread(target=_watch, args=(reading, heeded, remark), name="signals", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        writing.close()
+        thread.join()
+
+
+def _watch(reading: socket.socket, heeded: Collection[int], remark: str) -> None:
+    """Read the numbers of signals until the other end is closed."""
+    count = 0
+    with reading:
+        while True:
+            try:
+                numbers = reading.recv(64)
+            except TimeoutError:
+                _print("a stop is requested; a second Ctrl-C or SIGTERM ends the process at once")
+                reading.settimeout(None)
+                continue
+            if not numbers:
+                return
+            for number in filter(heeded.__contains__, numbers):
+                count += 1
+                if count == 1:
+                    reading.settimeout(HINT_s)
+                else:
+                    _end(number, remark)
+
+
+def _end(number: int, remark: str) -> None:
+    """End the process at once."""
+    partial: list[PartialFile] = []
+    salvage = threading.Thread(target=lambda: partial.extend(OPEN_FILES.partial()), daemon=True)
+    salvage.start()
+    salvage.join(SALVAGE_s)
+    lines = [f"ended at once by a second signal, {signal.Signals(number).name}"]
+    for file in partial:
+        command = shlex.join(["spheretwin", "recover", str(file.path), "--out", str(file.target)])
+        lines.append(f"not complete: {file.target}; {file.rows} rows can be recovered: {command}")
+    _print(*lines, *filter(None, [remark]))
+    os._exit(SIGNAL_EXIT + number)
+
+
+def _print(*lines: str) -> None:
+    """Write lines to stderr, past the lock of a stream that the main thread may hold."""
+    with contextlib.suppress(OSError):
+        os.write(2, "".join(f"spheretwin: {line}\n" for line in lines).encode(errors="backslashreplace"))

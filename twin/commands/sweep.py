@@ -13,6 +13,7 @@ from typing import Any
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.versions import versions
 from spheretwin.twin.commands.interruption import interruptible
 from spheretwin.twin.commands.reporting import print_json
@@ -33,6 +34,8 @@ from spheretwin.viz.terminal.progress import counted
 
 MOST_THREADS = 1024
 
+GO_ON = "sweep: finished rows are kept; the same command goes on from there"
+
 
 def add_to(verbs: Any) -> None:
     """Add the verb to the command's parser."""
@@ -40,7 +43,8 @@ def add_to(verbs: Any) -> None:
         "sweep",
         help="run a study: many runs, one table",
         description="Run a study over all cores. What its journal has already is not run again: an"
-        " interrupted study goes on where it ended. Exit code 1 when it is not complete.",
+        " interrupted study goes on where it ended. Exit code 1 if it is not complete, or if a row ended as"
+        " failsafe or by an exception of a law or a metric.",
         allow_abbrev=False,
     )
     parser.add_argument("study", metavar="STUDY", help=f"{', '.join(shipped())}, or a .toml file")
@@ -78,7 +82,7 @@ def add_to(verbs: Any) -> None:
 
 
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; True when all rows that were wanted are finished."""
+    """Run the verb; True if all requested rows are finished and none has failed."""
     if rest:
         raise InputError(
             "command line: expected --out, --engine, --address, --threads, --limit, --row, --optimise,"
@@ -95,7 +99,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             raise InputError("command line: expected --row without --out, --threads or --limit")
         return _one(study, options.row, options.json)
     with (
-        interruptible() as stop_requested,
+        interruptible(GO_ON) as stop_requested,
         counted(study.name) as done,
         timers_stopped(),
         contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
@@ -132,7 +136,15 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             " the same command goes on from there",
             file=sys.stderr,
         )
-    return found.rows >= found.of
+    failures = rows.failures
+    if len(failures):
+        first = failures[0]
+        print(
+            f"spheretwin: sweep: {len(failures)} of {found.rows} rows failed, the first with key"
+            f" {rows.keys[first]}: {rows.statuses[first]}, {rows.complaints[first]}",
+            file=sys.stderr,
+        )
+    return found.rows >= found.of and not len(failures)
 
 
 def _optimised(study: Study, options: argparse.Namespace) -> bool:
@@ -142,7 +154,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     objectives = section_of(study).objective
     folder = options.out or Path(f"{study.name}_study")
     with (
-        interruptible() as stop_requested,
+        interruptible(GO_ON) as stop_requested,
         counted(study.name, "trials") as done,
         timers_stopped(),
         contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
@@ -217,7 +229,7 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
         print_json(told)
     else:
         tables.print_rows(f"row {row.number} of {study.name}", ("", "value"), _pairs(told), 2)
-    return result.error is None
+    return result.status == Status.COMPLETED and result.error is None
 
 
 def _pairs(told: dict[str, Any]) -> list[tuple[str, ...]]:

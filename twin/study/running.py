@@ -38,7 +38,7 @@ class Found(NamedTuple):
     study_rows : int
         Of the whole study.
     failed : int
-        Finished rows whose status is other than ``completed``.
+        Finished rows whose status is not ``completed``, or that lack a figure because a metric raised.
     resumed : int
         Rows that were in the journal already.
     torn : bool
@@ -102,7 +102,10 @@ def carried_out(
             rows=kept.done(),
             of=resumed + missing,
             study_rows=len(grid),
-            failed=sum(result.status != Status.COMPLETED for _, result in kept.results()),
+            failed=sum(
+                result.status != Status.COMPLETED or result.error is not None
+                for _, result in kept.results()
+            ),
             resumed=resumed,
             torn=kept.torn,
             damaged=kept.damaged,

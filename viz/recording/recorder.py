@@ -9,7 +9,7 @@ import rerun as rr
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.files import OutputFile
+from spheretwin.models.base.files import OPEN_FILES, OutputFile, PartialFile
 from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.facts import RunFacts
 from spheretwin.models.telemetry.signals import Signal
@@ -21,6 +21,9 @@ from spheretwin.viz.recording.thinning import FirstsAndExtremes, Thinning
 
 # Rerun keeps some bytes of each chunk to the end of a recording. Chunks therefore grow with it, up to this.
 MOST_ROWS = 12_288
+
+# How long a process that ends at once waits for each step of what is being recorded.
+PATIENCE_s = 2.0
 
 
 class Recorder(Stream):
@@ -69,6 +72,18 @@ class Recorder(Stream):
         self._output = OutputFile(path)
         self._pipe = _pipe_to(self._output) if PIPE_PATHS.is_dir() else None
         self.begin()
+        OPEN_FILES.add(self)
+
+    def partial(self) -> PartialFile | None:
+        """Record the rows that wait; return the partial file, if there are rows."""
+        self.flush(PATIENCE_s)
+        if self._pipe:
+            self._pipe.drain(PATIENCE_s)
+        return (
+            PartialFile(self._output.path, self._path, self.rows_handed_over)
+            if self.rows_handed_over
+            else None
+        )
 
     def connect(self) -> None:
         """Open the file."""
@@ -91,6 +106,12 @@ class Recorder(Stream):
         SpheretwinError
             Some of the recording could not be made or written; what there is of it keeps ``.part``.
         """
+        try:
+            self._complete()
+        finally:
+            OPEN_FILES.remove(self)
+
+    def _complete(self) -> None:
         self.recording.disconnect()
         if self._pipe:
             self._pipe.close()

@@ -5,7 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from threading import Semaphore
+from contextlib import suppress
+from threading import Lock, Semaphore
 from types import TracebackType
 from typing import Any
 
@@ -70,6 +71,7 @@ class Stream(ABC):
         self._parts, self._thinning = [part(subject) for part in PARTS], thinning
         self._waiting: list[Table] = []
         self._closed = False
+        self._handing_over = Lock()
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recorder")
         self._room = Semaphore(PENDING_CHUNKS)
 
@@ -146,12 +148,20 @@ class Stream(ABC):
 
     def _hand_over(self) -> None:
         """Give what is waiting to the worker as one chunk."""
-        if not self._waiting:
-            return
-        waiting, self._waiting = self._waiting, []
-        rows = Table(waiting[0].signals, np.concatenate([table.values for table in waiting]))
-        self.rows_handed_over += len(rows)
-        self._submit(self._write, rows)
+        with self._handing_over:
+            if not self._waiting:
+                return
+            waiting, self._waiting = self._waiting, []
+            rows = Table(waiting[0].signals, np.concatenate([table.values for table in waiting]))
+            self.rows_handed_over += len(rows)
+            self._submit(self._write, rows)
+
+    def flush(self, timeout_s: float) -> None:
+        """Record the rows that wait. For a process that ends at once: any thread may call it."""
+        with suppress(RuntimeError, TimeoutError):  # the worker is shut down, as all is recorded, or is slow
+            self._hand_over()
+            self._submit(self._write_rest)
+            self._worker.submit(int).result(timeout_s)
 
     def _submit(self, work: Callable[..., None], *arguments: Any) -> None:
         self._room.acquire()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.metrics.registry import METRICS
+from spheretwin.twin.study.row import FAILED
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -55,6 +56,12 @@ class Rows(NamedTuple):
     def completed(self) -> NDArray[np.bool_]:
         """Which rows came to their end."""
         return self.statuses == str(Status.COMPLETED)
+
+    @property
+    def failures(self) -> NDArray[np.int64]:
+        """Places of rows that a watchdog ended, or in which a law or a metric of the user's raised."""
+        failed = np.isin(self.statuses, [FAILED, str(Status.FAILSAFE)])
+        return np.flatnonzero(failed | (self.completed & (self.complaints != "")))
 
     @property
     def law_names(self) -> list[str]:
