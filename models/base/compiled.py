@@ -138,7 +138,7 @@ def _callback(signature: Any, function: Callable[..., Any], check_bounds: bool) 
     return callback
 
 
-def _with_bounds_checks(function: FunctionType, copies: dict[int, Any]) -> FunctionType:
+def _with_bounds_checks(function: Any, copies: dict[int, Any]) -> FunctionType:
     """Copy a plain function so that the compiled functions that it names check bounds.
 
     Numba checks bounds in the function that it compiles, and in none that this function calls.
@@ -166,7 +166,7 @@ def _dispatcher_with_bounds_checks(value: Any, copies: dict[int, Any]) -> Any:
     return copies[id(value)]
 
 
-def _copied(function: FunctionType) -> FunctionType:
+def _copied(function: Any) -> FunctionType:
     """Copy a function, with global variables of its own and with empty cells."""
     cells = tuple(CellType() for _ in function.__closure__ or ())
     copy = FunctionType(
@@ -176,7 +176,7 @@ def _copied(function: FunctionType) -> FunctionType:
     return copy
 
 
-def _name_copies(function: FunctionType, copy: FunctionType, copies: dict[int, Any]) -> None:
+def _name_copies(function: Any, copy: FunctionType, copies: dict[int, Any]) -> None:
     """Let the copy of a function name the copies of the compiled functions that the original names."""
     for name in set(function.__code__.co_names) & function.__globals__.keys():
         copy.__globals__[name] = _dispatcher_with_bounds_checks(function.__globals__[name], copies)

@@ -87,8 +87,8 @@ class Desk:
         except Exception as error:  # a law of the user's may raise anything: the run ends
             self.fail(error)
             return None
-        if error := self.session.law_error:
-            self.reason = f"{error}"
+        if self.session.law_error:
+            self.reason = f"{self.session.law_error}"
         elif self.session.ended:
             why = f", {self.session.reason.told}" if self.session.reason else ""
             self.reason = f"{self.session.status}: {self.session.status.told}{why}"

@@ -14,7 +14,7 @@ from spheretwin.twin import cli
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.scenario.reading import shipped
 from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.twin.simulation import follow, simulate
 
 RUNDOWN = 30
 WATCHED = {"plant.engine": "lagrangian", "watchdog.on": True, "watchdog.rundown_s": RUNDOWN * 1e-3, "seed": 4}
@@ -258,3 +258,58 @@ def test_power_at_shorted_ends_is_none(actuator):
     )  # fmt: skip
     braking = np.sum(table["torque_Nm"] * rates, axis=1)[110:]
     assert np.mean(braking < 0) > 0.9
+
+
+LATE = {"duration": 0.13, "fault": [fault("pot.alpha", "offset", 0.2)]}  # it trips at tick 100
+
+
+def test_a_trip_within_the_rundown_before_the_end_is_no_completed_run():
+    with Session(scenario(**LATE)) as session:
+        session.advance(100)
+        assert (session.status, session.ended) == ("running", False)
+        session.advance(10)
+        assert (session.status, session.ended) == ("failsafe", False)
+        assert len(session.advance(500)) == 1 + RUNDOWN - 10  # a session has no planned end
+        assert (session.status, session.ended) == ("failsafe", True)
+    run = simulate(scenario(**LATE))
+    assert (run.status, len(run.telemetry)) == ("failsafe", 130)
+
+
+def test_a_trip_in_the_last_tick_counts_and_is_told(capsys):
+    tripped = int(np.flatnonzero(simulate(scenario(**LATE)).telemetry["failsafe_reason"])[0])
+    arguments = ["simulate", "nutation", "--hardware", "prototype", "--plant.engine", "lagrangian"]
+    arguments += ["--fault.0.target", "pot.alpha", "--fault.0.mode", "offset", "--fault.0.start-s", "0.1"]
+    arguments += ["--fault.0.value", "0.2", "--watchdog.on", "true", "--seed", "4"]
+    for ticks, code, status in ((tripped, 0, "completed"), (tripped + 1, 1, "failsafe")):
+        assert cli.main([*arguments, "--duration", f"{ticks * 1e-3:g}"]) == code
+        assert f"nutation under afsm: {status}" in (printed := capsys.readouterr()).out
+        assert (Reason.JUMP.told in printed.out) == (Reason.JUMP.told in printed.err) == bool(code)
+
+
+def test_a_stop_during_the_rundown_is_failsafe_too():
+    with Session(scenario(**LATE)) as session:
+        stop = iter([False, True])
+        session.advance(105)
+        assert follow(session, 130, [], live=True, stop_requested=lambda: next(stop)) == "failsafe"
+
+
+def test_a_study_tells_of_its_failsafe_rows_and_exits_1(tmp_path, capsys):
+    source = tmp_path / "late.toml"
+    source.write_text(
+        'name = "late"\nscenario = "nutation"\n'
+        '[fields]\nhardware = "prototype"\n"plant.engine" = "lagrangian"\n'
+        'fault = [{target = "pot.alpha", mode = "offset", start_s = 0.1, value = 0.2}]\n'
+        '[[axis]]\nfield = "duration"\nkind = "values"\nvalues = [0.05, 0.13]\n'
+    )
+    command = ["sweep", str(source), "--out", str(tmp_path / "out")]
+    assert cli.main([*command, "--json"]) == 1
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert (found["rows"], found["failed"]) == (2, 1)
+    assert found["summary"]["afsm"]["statuses"] == {"completed": 1, "failsafe": 1}
+    assert printed.err.startswith("spheretwin: sweep: 1 of 2 rows failed, the first with key ")
+    assert printed.err.endswith(f": failsafe, {Reason.JUMP.told}\n")
+    assert printed.err.count("\n") == 1
+    assert cli.main([*command, "--json", "--limit", "1"]) == 0
+    key = printed.err.split(" key ")[1].split(":")[0]
+    assert cli.main(["sweep", str(source), "--row", key]) == 1
