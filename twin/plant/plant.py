@@ -106,9 +106,7 @@ def plant_tick(
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
         fill_torque_matrix(middle_q, magnetics, G, scratch)
-        advance_currents(
-            driving, command, substep, middle_q, middle_qdot, G, gain, current, mean_current
-        )
+        advance_currents(driving, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
         for j in range(pulling.shape[0]):
             pulling[j] = gain[j] * mean_current[j]
         rotor_torque(G, pulling, torque_S)

@@ -103,8 +103,7 @@ def carried_out(
             of=resumed + missing,
             study_rows=len(grid),
             failed=sum(
-                result.status != Status.COMPLETED or result.error is not None
-                for _, result in kept.results()
+                result.status != Status.COMPLETED or result.error is not None for _, result in kept.results()
             ),
             resumed=resumed,
             torn=kept.torn,
