@@ -211,11 +211,11 @@ def callback_errors(receiver: Callable[[BaseException], None]) -> Iterator[None]
     with _HOOK_LOCK:
         _HOOKS.append(_HOOKS[0] if _HOOKS else sys.unraisablehook)
         sys.unraisablehook = _receive
-    _CALLBACK_ERRORS.receiver = receiver
+    outer, _CALLBACK_ERRORS.receiver = _CALLBACK_ERRORS.receiver, receiver
     try:
         yield
     finally:
-        _CALLBACK_ERRORS.receiver = None
+        _CALLBACK_ERRORS.receiver = outer
         with _HOOK_LOCK:
             before = _HOOKS.pop()
             if not _HOOKS:

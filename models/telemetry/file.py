@@ -61,7 +61,7 @@ class TelemetryFile:
         self._waiting: list[Table] = []
         self._parts = Parts(path, facts)
         self._fault: SpheretwinError | None = None
-        self._lock = threading.Lock()
+        self._lock, self._closed = threading.Lock(), False
         OPEN_FILES.add(self)
 
     def write(self, rows: Table) -> None:
@@ -107,17 +107,20 @@ class TelemetryFile:
             try:
                 self._close({**self._facts, **facts})
             finally:
+                self._closed = True
                 OPEN_FILES.remove(self)
 
     def partial(self) -> PartialFile | None:
         """Flush the rows that wait; return the parts, if there are rows. For a process that ends at once."""
         if self._lock.acquire(timeout=PATIENCE_s):  # who holds it has flushed what there was, or is about to
             try:
-                if not self._fault:
+                if not (self._fault or self._closed):
                     self._flush()
             finally:
                 self._lock.release()
-        return PartialFile(self._parts.folder, self._path, self._parts.rows) if self._parts.rows else None
+        if self._closed or not self._parts.rows:
+            return None
+        return PartialFile(self._parts.folder, self._path, self._parts.rows)
 
     def _close(self, known: Mapping[str, str]) -> None:
         if self._fault:

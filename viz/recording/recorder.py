@@ -79,11 +79,9 @@ class Recorder(Stream):
         self.flush(PATIENCE_s)
         if self._pipe:
             self._pipe.drain(PATIENCE_s)
-        return (
-            PartialFile(self._output.path, self._path, self.rows_handed_over)
-            if self.rows_handed_over
-            else None
-        )
+        if not (self.rows_handed_over and self._output.path.exists()):
+            return None
+        return PartialFile(self._output.path, self._path, self.rows_handed_over)
 
     def connect(self) -> None:
         """Open the file."""

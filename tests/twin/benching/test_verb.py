@@ -60,8 +60,10 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
         with urllib.request.urlopen(address) as answer:  # it is said once the page answers
             assert answer.status == 200
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (0, "bench: preparing hold\n")
+        out, err = process.communicate(timeout=600)
+    # On a busy machine the end takes a while, and a line says what a second Ctrl-C would do.
+    lines = [line for line in err.splitlines() if "a second Ctrl-C" not in line]
+    assert (process.returncode, lines) == (0, ["bench: preparing hold"])
     assert out.split() == ["written", str(recording)]
     assert recording.stat().st_size > 0
 

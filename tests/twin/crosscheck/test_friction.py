@@ -231,10 +231,18 @@ WRONG_STAGES = {  # fmt: skip
     "level 5 % lower": (0.95, 1, 1, 1, OURS_SLIDES | {"creep, our stage", "breakaway, our stage"}),
     "viscous 0.1 % higher": (1, 1.001, 1, 1, {"creep, our stage", "viscous alone, our stage"}),
     "smoothed over half as much again": (
-        1, 1, 1.5, 1, OURS_SLIDES | {"creep, our stage", "breakaway, our stage"},
+        1,
+        1,
+        1.5,
+        1,
+        OURS_SLIDES | {"creep, our stage", "breakaway, our stage"},
     ),
     "of twice the step": (
-        1, 1, 1, 2, OURS_SLIDES | {"creep, our stage", "breakaway, our stage", "viscous alone, our stage"},
+        1,
+        1,
+        1,
+        2,
+        OURS_SLIDES | {"creep, our stage", "breakaway, our stage", "viscous alone, our stage"},
     ),
 }
 

@@ -170,10 +170,14 @@ def test_under_a_watchdog_the_line_has_the_time_of_the_exception(file, capfd):
     [("leaves", "SystemExit: 0"), ("closes", "GeneratorExit"), ("strange", "Strange: so it is")],
 )
 def test_what_a_metric_raises_is_one_line_and_exit_1(file, metric, received, capfd):
+    line = f"metric metric_{metric}: expected a figure, it raised {received}"
+    code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}")
+    assert (code, err) == (1, "")
+    assert [f"warning  {line}"] == [each for each in out.splitlines() if "raised" in each]
     code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}", "--json")
-    assert code == 1
+    assert (code, err) == (1, "")
     assert json.loads(out)[f"metric_{metric}"] is None
-    assert err == f"spheretwin: metric metric_{metric}: expected a figure, it raised {received}\n"
+    assert line in json.loads(out)["warnings"]
 
 
 @pytest.mark.parametrize("law", RAISED)

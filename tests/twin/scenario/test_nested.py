@@ -40,7 +40,10 @@ def loaded(tmp_path, text):
             "expected one of amplitude_rad, frequency_Hz, phase_rad in trajectory.components.0,"
             " received amplitude; did you mean amplitude_rad?",
         ),
-        (SINES + "amplitude_rad = [0.0, 0.0, 1e9]", "trajectory.components.0.amplitude_rad.2: expected a number less"),
+        (
+            SINES + "amplitude_rad = [0.0, 0.0, 1e9]",
+            "trajectory.components.0.amplitude_rad.2: expected a number less",
+        ),
     ],
 )
 def test_complaints_name_the_entry(tmp_path, text, complaint):

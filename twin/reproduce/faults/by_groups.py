@@ -44,7 +44,9 @@ def section(outcomes: Outcomes) -> Section:
         if (row := _row(outcomes, number, listed, way))
     ]
     title = "Open groups by their number and way"
-    by_start = [row for interval in INTERVALS_s for way in OF_GROUPS if (row := _started(outcomes, interval, way))]
+    by_start = [
+        row for interval in INTERVALS_s for way in OF_GROUPS if (row := _started(outcomes, interval, way))
+    ]
     return Section(
         "Open groups",
         f"{HOW} {_numbers(outcomes)}{_goal(outcomes)}",

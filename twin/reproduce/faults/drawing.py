@@ -60,7 +60,9 @@ def latencies(by_kind: Mapping[str, Sequence[float]]) -> Drawing:
     figure = figures.remaining(
         by_kind, "time since the fault, s", "faults not detected yet, %", "Detection latency"
     )
-    caption = "Share of the faults that are not detected yet. What remains at the right is not detected in the run."
+    caption = (
+        "Share of the faults that are not detected yet. What remains at the right is not detected in the run."
+    )
     return Drawing("faults_latency.png", caption, figure)
 
 

@@ -130,7 +130,9 @@ def _why(by_kind: Mapping[str, Sequence[Detection]]) -> str:
     if not missed:
         return text
     fewer = sum(each.driven_ticks < min(known) for each in missed)
-    return f"{text} Of the {len(missed)} that were not, {fewer} had fewer than {min(known)} until the run ended."
+    return (
+        f"{text} Of the {len(missed)} that were not, {fewer} had fewer than {min(known)} until the run ended."
+    )
 
 
 def _compared(outcomes: Outcomes) -> list[tuple[Outcome, Outcome]]:
@@ -150,7 +152,9 @@ def _intervals() -> list[tuple[float, float]]:
     return [*zip(EDGES_ms, EDGES_ms[1:], strict=False), (inf, inf), (0.0, inf)]
 
 
-def _cost_row(compared: Sequence[tuple[Outcome, Outcome]], first: float, end: float) -> tuple[str, ...] | None:
+def _cost_row(
+    compared: Sequence[tuple[Outcome, Outcome]], first: float, end: float
+) -> tuple[str, ...] | None:
     chosen = [pair for pair in compared if _within(1e3 * _slowest_s(pair[0]), first, end)]
     if not chosen:
         return None
