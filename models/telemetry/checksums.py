@@ -242,13 +242,13 @@ def _first_changed(path: Path, segments: Iterable[Segment]) -> int | None:
     """Place of the first segment that is not what was written; None if all are."""
     with path.open("rb") as file:
         for place, segment in enumerate(segments):
-            if _read_segment(file, segment.size) != segment:
+            if read_segment(file, segment.size) != segment:
                 return place
     return None
 
 
-def _read_segment(file: BinaryIO, size: int) -> Segment:
-    """The next bytes of a file, fewer at its end."""
+def read_segment(file: BinaryIO, size: int) -> Segment:
+    """Return the segment of the next bytes of a file, of fewer at its end."""
     done, crc32 = 0, 0
     while block := file.read(min(size - done, _BLOCK_BYTES)):
         done, crc32 = done + len(block), zlib.crc32(block, crc32)
@@ -271,83 +271,6 @@ def _group(file: pyarrow.parquet.ParquetFile, place: int) -> str:
     return text
 
 
-# --- Arrow streams
-
-# A line of a list: length and checksum of a segment, checksum of the line.
-_LINE_BYTES = len("000000000000 00000000 00000000\n")
-
-
-class SegmentList:
-    """Segments of a file that grows, in a file next to it: a line each, written behind the segment.
-
-    Parameters
-    ----------
-    path : Path
-        The file that grows.
-    """
-
-    def __init__(self, path: Path) -> None:
-        import pyarrow as pa
-
-        self._file = pa.OSFile(str(list_of(path)), "wb")
-
-    def append(self, segment: Segment) -> None:
-        """Add a segment."""
-        self._file.write(_line(segment))
-
-    def close(self) -> None:
-        """Close the list."""
-        self._file.close()
-
-
-def list_of(path: Path) -> Path:
-    """Return the path of the list of a file's segments."""
-    return path.with_name(f"{path.name}.checksums")
-
-
-def checked_bytes(path: Path) -> int | None:
-    """Return how many bytes from the start of a listed file are those that were written; None without a list.
-
-    What a killed process leaves behind its last segment, and a segment that was cut off, are not among them.
-
-    Raises
-    ------
-    InputError
-        A segment is not what was written.
-    """
-    listed = list_of(path)
-    if not listed.is_file():
-        return None
-    lines, done = listed.read_bytes(), 0
-    with path.open("rb") as file:
-        for place in range(len(lines) // _LINE_BYTES):
-            written = _segment(lines[place * _LINE_BYTES : (place + 1) * _LINE_BYTES])
-            if written is None:
-                raise damaged(listed, f"line {place}")
-            received = _read_segment(file, written.size)
-            if received.size < written.size:
-                break
-            if received != written:
-                raise damaged(path, f"batch {place}")
-            done += written.size
-    return done
-
-
-def _line(segment: Segment) -> bytes:
-    text = f"{segment.size:012d} {segment.crc32:08x}"
-    return f"{text} {text_checksum(text)}\n".encode()
-
-
-def _segment(line: bytes) -> Segment | None:
-    """Segment of a line; None if the line is not what was written."""
-    try:
-        size, crc32, _ = line.split()
-        segment = Segment(int(size), int(crc32, 16))
-    except ValueError:
-        return None
-    return segment if _line(segment) == line else None
-
-
 # --- rows and texts
 
 
@@ -366,36 +289,31 @@ def line_checksums(lines: Sequence[tuple[int, str, str]], first: int) -> NDArray
     first : int
         Number of the first line.
     """
-    sums = [zlib.crc32(json.dumps(line).encode()) for line in lines]
-    return _numbered(np.array(sums, dtype=np.uint64), first)
+    sums = np.array([zlib.crc32(json.dumps(line).encode()) for line in lines], dtype=np.uint64)
+    return (np.arange(first, first + len(sums), dtype=np.uint64) << _HALF) | sums
 
 
-def row_checksums(rows: Table, first: int) -> NDArray[np.uint64]:
-    """Return number and checksum of each row: the number in the upper 32 bits, the checksum in the lower.
-
-    The checksum is the upper half of ``Σ a_j y_j`` modulo 2⁶⁴ with odd ``a_j`` that belong to the name of the
-    signal and the place in it, and ``y_j = x_j ^ (x_j >> 32)`` of the bit patterns ``x_j`` of the row. One
-    number that differs always changes the sum, and its upper half but for one case in 2³²; the order of the
-    signals does not matter.
-
-    Parameters
-    ----------
-    rows : Table
-    first : int
-        Number of the first row.
-    """
-    bits = np.ascontiguousarray(rows.values).view(np.uint64)
-    sums = (bits ^ (bits >> _HALF)) @ _multipliers(rows.signals)
-    return _numbered(sums >> _HALF, first)
-
-
-def row_numbers(checksums: NDArray[np.uint64]) -> NDArray[np.int64]:
-    """Return the numbers of rows or lines."""
+def line_numbers(checksums: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Return the numbers of lines."""
     return (checksums >> _HALF).astype(np.int64)
 
 
-def _numbered(sums: NDArray[np.uint64], first: int) -> NDArray[np.uint64]:
-    return (np.arange(first, first + len(sums), dtype=np.uint64) << _HALF) | sums
+def row_checksums(rows: Table) -> NDArray[np.uint32]:
+    """Return the checksum of each row.
+
+    It is the upper half of ``Σ a_j y_j`` modulo 2⁶⁴ with odd ``a_j`` that belong to the name of the signal
+    and the place in it, and ``y_j = x_j ^ (x_j >> 32)`` of the bit patterns ``x_j`` of the row. One number
+    that differs always changes the sum, and its upper half but for one case in 2³²; the order of the signals
+    does not matter.
+    """
+    bits = np.ascontiguousarray(rows.values).view(np.uint64)
+    sums = (bits ^ (bits >> _HALF)) @ _multipliers(rows.signals)
+    return (sums >> _HALF).astype("<u4")
+
+
+def checksum_of(sums: NDArray[np.uint32]) -> int:
+    """Return one checksum of the checksums of some rows."""
+    return zlib.crc32(sums.tobytes())
 
 
 @cache

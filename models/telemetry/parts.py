@@ -20,10 +20,11 @@ import numpy as np
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import shown
 from spheretwin.models.telemetry.checksums import (
+    Segment,
     SegmentedFile,
-    SegmentList,
-    checked_bytes,
-    list_of,
+    damaged,
+    read_segment,
+    text_checksum,
     unreadable,
 )
 from spheretwin.models.telemetry.signals import Signal, width
@@ -217,7 +218,7 @@ def read_batches(part: Path) -> Generator[pa.RecordBatch, None, bool]:
 
 def _checked_bytes(part: Path) -> int | None:
     try:
-        return checked_bytes(part)
+        return _listed_bytes(part)
     except OSError as error:
         raise unreadable(part, error, _STREAM) from None
 
@@ -252,3 +253,80 @@ def _is_signal(field: pa.Field) -> bool:
     return {b"unit", b"meaning", b"labels"} <= set(field.metadata or {}) and pa.types.is_float64(
         field.type.value_type if of_vector else field.type
     )
+
+
+# --- checksums
+
+# A line of a list: length and checksum of a segment, checksum of the line.
+_LINE_BYTES = len("000000000000 00000000 00000000\n")
+
+
+class SegmentList:
+    """Segments of a file that grows, in a file next to it: a line each, written behind the segment.
+
+    Parameters
+    ----------
+    path : Path
+        The file that grows.
+    """
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+
+        self._file = pa.OSFile(str(list_of(path)), "wb")
+
+    def append(self, segment: Segment) -> None:
+        """Add a segment."""
+        self._file.write(_line(segment))
+
+    def close(self) -> None:
+        """Close the list."""
+        self._file.close()
+
+
+def list_of(path: Path) -> Path:
+    """Return the path of the list of a file's segments."""
+    return path.with_name(f"{path.name}.checksums")
+
+
+def _listed_bytes(path: Path) -> int | None:
+    """Return how many bytes from the start of a listed file are those that were written; None without a list.
+
+    What a killed process leaves behind its last segment, and a segment that was cut off, are not among them.
+
+    Raises
+    ------
+    InputError
+        A segment is not what was written.
+    """
+    listed = list_of(path)
+    if not listed.is_file():
+        return None
+    lines, done = listed.read_bytes(), 0
+    with path.open("rb") as file:
+        for place in range(len(lines) // _LINE_BYTES):
+            written = _segment(lines[place * _LINE_BYTES : (place + 1) * _LINE_BYTES])
+            if written is None:
+                raise damaged(listed, f"line {place}")
+            received = read_segment(file, written.size)
+            if received.size < written.size:
+                break
+            if received != written:
+                raise damaged(path, f"batch {place}")
+            done += written.size
+    return done
+
+
+def _line(segment: Segment) -> bytes:
+    text = f"{segment.size:012d} {segment.crc32:08x}"
+    return f"{text} {text_checksum(text)}\n".encode()
+
+
+def _segment(line: bytes) -> Segment | None:
+    """Segment of a line; None if the line is not what was written."""
+    try:
+        size, crc32, _ = line.split()
+        segment = Segment(int(size), int(crc32, 16))
+    except ValueError:
+        return None
+    return segment if _line(segment) == line else None

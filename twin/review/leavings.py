@@ -13,7 +13,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.telemetry.checksums import list_of
 from spheretwin.models.telemetry.file import join
-from spheretwin.models.telemetry.parts import read_schema
+from spheretwin.models.telemetry.parts import list_of, read_schema
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.twin.review.held import held
 

@@ -22,8 +22,10 @@ VALUES, STYLES, DESCRIBED = "values", "styles", "described"
 The first two are structs with a field a signal: each component would cost some bytes more in every row."""
 
 CHECKSUM, TOTAL = "checksum", "total"
-"""Components of `TELEMETRY` and `EVENTS`: number and checksum of each row or line, and how many there are.
+"""Components of `TELEMETRY` and `EVENTS`: checksums, and how many rows or lines there are.
 
+A checksum of the telemetry is of the rows of a chunk: number of the first, count, checksum. One of the events
+is of a line: its number in the upper 32 bits, the checksum in the lower.
 `CHECKSUM` also ends the names of the components that hold the checksum of a text of the same entity."""
 
 

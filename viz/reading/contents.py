@@ -13,9 +13,10 @@ from rerun.chunk import Chunk
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.checksums import (
+    checksum_of,
     line_checksums,
+    line_numbers,
     row_checksums,
-    row_numbers,
     text_checksum,
 )
 from spheretwin.models.telemetry.signals import Signal, offsets, width
@@ -53,11 +54,18 @@ class _Text(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """Rows of one chunk: values by signal, and checksums if there are any."""
+    """Rows of one chunk: values by signal."""
 
     t_ns: NDArray[np.int64]
     values: dict[str, NDArray[np.float64]]
-    checksums: Checksums | None
+
+
+class _Range(NamedTuple):
+    """Checksum of some rows, by their numbers."""
+
+    first: int
+    count: int
+    checksum: int
 
 
 class _Lines(NamedTuple):
@@ -81,6 +89,7 @@ class Contents:
         self._facts: _Text | None = None
         self._described: dict[int, _Text] = {}
         self._rows: list[_Rows] = []
+        self._ranges: list[_Range] = []
         self._lines: list[_Lines] = []
         self._totals: dict[str, int] = {}
 
@@ -105,11 +114,11 @@ class Contents:
     def checked(self) -> bool:
         """True if the recording has checksums."""
         texts = [*([self._facts] if self._facts else []), *self._described.values()]
-        checksums = [*(each.checksums for each in self._rows), *(each.checksums for each in self._lines)]
         return bool(
             self._totals
+            or self._ranges
             or any(each.checksum for each in texts)
-            or any(each is not None for each in checksums)
+            or any(each.checksums is not None for each in self._lines)
         )
 
     @property
@@ -152,15 +161,12 @@ class Contents:
         """
         signals = self._signals()
         if self.checked:
-            chunks = [each.checksums for each in self._rows]
-            self._check_numbers(TELEMETRY, chunks, ended=ended)
+            self._check_ranges(signals, ended=ended)
         ticks = np.unique(np.concatenate([each.t_ns for each in self._rows] or [np.empty(0, np.int64)]))
         values = allocated(len(ticks), width(signals))
         values[:] = np.nan
         first = offsets(signals)
         for rows in self._rows:
-            if self.checked:
-                self._check_rows(rows, signals)
             places = np.searchsorted(ticks, rows.t_ns)
             for name, columns in rows.values.items():
                 values[places, first[name] : first[name] + columns.shape[1]] = columns
@@ -180,10 +186,10 @@ class Contents:
             A line is not what was written, or is missing.
         """
         if self.checked:
-            self._check_numbers(EVENTS, [each.checksums for each in self._lines], ended=ended)
+            self._check_line_numbers(ended=ended)
             for lines, checksums in self._lines:
                 assert checksums is not None  # the numbers were checked
-                first = int(row_numbers(checksums[:1])[0]) if len(checksums) else 0
+                first = int(line_numbers(checksums[:1])[0]) if len(checksums) else 0
                 changed = np.flatnonzero(line_checksums(lines, first) != checksums)
                 if len(changed):
                     raise self._damaged(f"entity {EVENTS}, line {first + changed[0]}")
@@ -205,8 +211,10 @@ class Contents:
                 self._described[int(arrival)] = _Text(_text(batch, name), checksum)
             elif kind == VALUES:
                 values |= _columns(batch.column(name).flatten())
-        if TIMELINE in batch.schema.names:
-            self._rows.append(_Rows(_times(batch), values, _checksums(batch)))
+        if values:
+            self._rows.append(_Rows(_times(batch), values))
+        if CHECKSUM in batch.schema.names:
+            self._ranges += [_Range(*each) for each in batch.column(CHECKSUM).to_pylist() if each]
 
     def _take_events(self, batch: pa.RecordBatch) -> None:
         self._take_total(EVENTS, batch)
@@ -235,34 +243,49 @@ class Contents:
             raise self._damaged(f"entity {entity}, component {name}")
         return text.text
 
-    def _check_numbers(self, entity: str, chunks: list[Checksums | None], *, ended: bool) -> None:
-        """Refuse numbers with a gap, chunks without numbers, and fewer than a closed recording states."""
-        present = [each for each in chunks if each is not None]
-        if len(present) < len(chunks):
-            raise self._damaged(f"entity {entity}, component {CHECKSUM}")
-        numbers = np.sort(row_numbers(np.concatenate(present or [np.empty(0, np.uint64)])))
+    def _check_line_numbers(self, *, ended: bool) -> None:
+        """Refuse numbers with a gap, lines without numbers, and fewer than a closed recording states."""
+        present = [each.checksums for each in self._lines if each.checksums is not None]
+        if len(present) < len(self._lines):
+            raise self._damaged(f"entity {EVENTS}, component {CHECKSUM}")
+        numbers = np.sort(line_numbers(np.concatenate(present or [np.empty(0, np.uint64)])))
         missing = np.flatnonzero(numbers != np.arange(len(numbers)))
         if len(missing):
-            raise self._damaged(f"entity {entity} at number {missing[0]}")
-        if (ended or entity in self._totals) and self._totals.get(entity) != len(numbers):
-            raise self._damaged(f"entity {entity} behind number {len(numbers) - 1}")
+            raise self._damaged(f"entity {EVENTS}, line {missing[0]}")
+        self._check_total(EVENTS, len(numbers), ended=ended)
 
-    def _check_rows(self, rows: _Rows, signals: tuple[Signal, ...]) -> None:
+    def _check_ranges(self, signals: tuple[Signal, ...], *, ended: bool) -> None:
+        """Refuse rows that are not those of their checksums, and fewer than a closed recording states."""
+        sums = [self._row_checksums(rows, signals) for rows in self._rows]
+        together = np.concatenate([*sums, np.empty(0, np.uint32)])
+        done = 0
+        for first, count, checksum in sorted(self._ranges):
+            rows = together[first : first + count]
+            # A process that was killed may leave the checksum of rows that it did not write any more.
+            is_last = not ended and first == len(together)
+            if first != done or (checksum_of(rows) != checksum and not is_last):
+                raise self._damaged(f"entity {TELEMETRY}, rows {done} to {first + count - 1}")
+            done += len(rows)
+        if done < len(together):
+            raise self._damaged(f"entity {TELEMETRY}, rows {done} to {len(together) - 1}")
+        self._check_total(TELEMETRY, done, ended=ended)
+
+    def _check_total(self, entity: str, count: int, *, ended: bool) -> None:
+        if (ended or entity in self._totals) and self._totals.get(entity) != count:
+            raise self._damaged(f"entity {entity}, behind number {count - 1}")
+
+    def _row_checksums(self, rows: _Rows, signals: tuple[Signal, ...]) -> NDArray[np.uint32]:
         present = tuple(signal for signal in signals if signal.name in rows.values)
         values = [rows.values[signal.name] for signal in present]
-        assert rows.checksums is not None  # the numbers were checked
         known = len(present) == len(rows.values) and any(signal.name == "t_s" for signal in present)
         if not known or [each.shape[1] for each in values] != [signal.size for signal in present]:
             raise self._damaged(f"entity {TELEMETRY}, components {DESCRIBED}")
         table = Table(present, np.concatenate(values, axis=1))
-        numbers = row_numbers(rows.checksums)
-        expected = row_checksums(table, int(numbers[0]))
         with np.errstate(invalid="ignore"):  # a damaged time may be no number
-            changed = (expected != rows.checksums) | (nanoseconds(table["t_s"]) != rows.t_ns)
-        if np.any(changed):
-            place = int(np.argmax(changed))
-            t_s = rows.t_ns[place] * 1e-9
-            raise self._damaged(f"entity {TELEMETRY}, row {numbers[place]} at {t_s:.6g} s")
+            moved = np.flatnonzero(nanoseconds(table["t_s"]) != rows.t_ns)
+        if len(moved):
+            raise self._damaged(f"entity {TELEMETRY}, times at {rows.t_ns[moved[0]] * 1e-9:.6g} s")
+        return row_checksums(table)
 
     def _damaged(self, place: str) -> InputError:
         return InputError(

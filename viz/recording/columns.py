@@ -59,8 +59,13 @@ class Numbers:
 
 
 def checksums(values: NDArray[np.uint64]) -> rr.ComponentColumn:
-    """Return the component with number and checksum of each row or line."""
+    """Return the component with number and checksum of each line."""
     return rr.ComponentColumn(CHECKSUM, Numbers(values))
+
+
+def range_checksum(first: int, count: int, checksum: int) -> rr.ComponentColumn:
+    """Return the component with the checksum of some rows, by the number of the first and their count."""
+    return rr.ComponentColumn(CHECKSUM, Numbers([first, count, checksum]), lengths=[3])
 
 
 def total(count: int) -> rr.DescribedComponentBatch:

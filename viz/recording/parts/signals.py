@@ -5,12 +5,12 @@ from __future__ import annotations
 import pyarrow as pa
 import rerun as rr
 
-from spheretwin.models.telemetry.checksums import row_checksums
+from spheretwin.models.telemetry.checksums import checksum_of, row_checksums
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.paths import STYLES, TELEMETRY, VALUES, component
 from spheretwin.viz.layout.styles import LOOKS, signal_style
-from spheretwin.viz.recording.columns import Struct, checksums, no_vectors, time_index, total, vectors
+from spheretwin.viz.recording.columns import Struct, no_vectors, range_checksum, time_index, total, vectors
 from spheretwin.viz.recording.parts.described import signals_as_json
 from spheretwin.viz.recording.parts.part import Part, Rows, Subject
 
@@ -41,13 +41,18 @@ class Signals(Part):
             for arrival, signals in enumerate(self._arrived)
             if any(signal.name in names for signal in signals)
         ]
-        sums = checksums(row_checksums(rows, self._rows))
-        self._rows += len(rows)
-        recording.send_columns(TELEMETRY, time_index(rows["t_s"]), [*columns, sums])
+        self._check(recording, rows)
+        recording.send_columns(TELEMETRY, time_index(rows["t_s"]), columns)
 
     def close(self, recording: rr.RecordingStream) -> None:
         """Log the number of rows."""
         recording.log(TELEMETRY, [total(self._rows)], static=True)
+
+    def _check(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the checksum of the rows of a chunk, before them: none is ever without one."""
+        sums = range_checksum(self._rows, len(rows), checksum_of(row_checksums(rows)))
+        recording.send_columns(TELEMETRY, time_index(rows["t_s"][:1]), [sums])
+        self._rows += len(rows)
 
     def _describe(self, recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
         """Say of signals that come for the first time what they are; a change of law may bring some."""
