@@ -8,7 +8,15 @@ from pathlib import Path
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
-from spheretwin.twin.crosscheck import closed_loop, dynamics, free_rotor, friction, identities, trajectories
+from spheretwin.twin.crosscheck import (
+    closed_loop,
+    coil_driven,
+    dynamics,
+    free_rotor,
+    friction,
+    identities,
+    trajectories,
+)
 from spheretwin.twin.crosscheck.part import STATES, Evidence, Finding, Subject
 
 PARTS = (
@@ -17,6 +25,7 @@ PARTS = (
     trajectories.PART,
     free_rotor.PART,
     friction.PART,
+    coil_driven.PART,
     closed_loop.PART,
 )
 
