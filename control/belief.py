@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.copying import transfer_state
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
 
@@ -43,6 +44,10 @@ class Belief(NamedTuple):
     mean: NDArray[np.float64]  # (groups,) A, over it
     torque_S: NDArray[np.float64]  # (3,) N·m, mean over it, stator frame
     torque_q: NDArray[np.float64]  # (3,) N·m, the same on the hinges; no numbers where nobody asked
+
+    def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
+        """Arrays that it goes on from."""
+        return self.commands, self.current, self.torque_q
 
 
 def belief(asked: bool, groups: int, period_s: float, delay_s: float, time_constant_s: float) -> Belief:
@@ -109,24 +114,8 @@ def carried_on(before: Belief, belief: Belief) -> None:
 
     Nothing is known where nobody asked before: what is believed then begins at rest.
     """
-    if not (before.asked and belief.asked):
-        return
-    belief.current[:], belief.torque_q[:] = before.current, before.torque_q
-    for row in range(len(belief.commands)):
-        belief.commands[row] = before.commands[min(row, len(before.commands) - 1)]
-
-
-def state_of(belief: Belief) -> NDArray[np.float64]:
-    """All that the belief goes on from."""
-    return np.concatenate([belief.commands.ravel(), belief.current, belief.torque_q])
-
-
-def restore(belief: Belief, state: NDArray[np.float64]) -> None:
-    """Go on from a state of a belief of the same size."""
-    first, groups = belief.commands.size, len(belief.current)
-    belief.commands[:] = state[:first].reshape(belief.commands.shape)
-    belief.current[:] = state[first : first + groups]
-    belief.torque_q[:] = state[first + groups :]
+    if before.asked and belief.asked:
+        transfer_state(before, belief)
 
 
 def whole_periods(delay_s: float, period_s: float) -> tuple[int, float]:

@@ -305,23 +305,153 @@ def step(angle, parameters, state, rate):
         ("    | Differentiator,\n", "    | Differentiator\n    | Rough,\n"),
         "from spheretwin.control.estimation.rough import Rough\n",
     ),
+    "sensor stage": Addition(
+        "twin/electronics/sensing/gear.py",
+        '''
+from typing import NamedTuple
+
+from pydantic import Field
+
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line, through
+from spheretwin.twin.electronics.sensing.stage import SensorStage
+from spheretwin.twin.electronics.streams import errors
+
+
+class GearSection(SensorStage):
+    """Gears between the joints and their sensors, of which each has an error of its ratio."""
+
+    ratio_error: float = Field(0.0, description="largest error of a ratio, drawn from the seed")
+
+    @property
+    def ideal(self):
+        return self.ratio_error == 0
+
+    def build(self, setup):
+        ratio = 1 + self.ratio_error * errors(setup.seed, setup.name, 3, 1)[:, 0]
+        return Gear(not self.ideal or setup.faults, tuple(ratio.tolist()), fault_line(3))
+
+    @classmethod
+    def function(cls):
+        return turn
+
+
+class Gear(NamedTuple):
+    on: bool
+    ratio: tuple[float, float, float]
+    line: FaultLine
+
+
+@allocation_free
+def turn(stage, measurement, numbers):
+    for i in range(3):
+        turned = stage.ratio[i] * measurement[0, i]
+        measurement[0, i] = through(stage.line, i, turned, numbers.faults)
+''',
+        "twin/electronics/sensing/sections.py",
+        (
+            "    potentiometer: PotentiometerSection = PotentiometerSection()\n",
+            "    gear: GearSection = GearSection()\n"
+            "    potentiometer: PotentiometerSection = PotentiometerSection()\n",
+        ),
+        "from spheretwin.twin.electronics.sensing.gear import GearSection\n",
+    ),
+    "drive stage": Addition(
+        "twin/electronics/driving/filter.py",
+        '''
+from typing import ClassVar, NamedTuple
+
+from pydantic import Field
+
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.twin.electronics.driving.stage import DriveStage, pass_line
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line
+
+
+class FilterSection(DriveStage):
+    """Filter in front of the converter, which attenuates."""
+
+    stage: ClassVar[str] = "filter"
+    filter_gain: float = Field(1.0, description="gain of the filter")
+
+    @staticmethod
+    def ideal(section):
+        return section.filter_gain == 1
+
+    @staticmethod
+    def build(section, setup):
+        on = section.filter_gain != 1 or setup.faults
+        return Filter(on, section.filter_gain, fault_line(setup.groups * setup.faults, 0.0))
+
+    @staticmethod
+    def advance():
+        return attenuate
+
+
+class Filter(NamedTuple):
+    on: bool
+    gain: float
+    line: FaultLine
+
+
+@part_of_its_caller
+def attenuate(stage, asked, draws):
+    for j in range(asked.shape[0]):
+        asked[j] *= stage.gain
+    pass_line(stage, asked, draws)
+''',
+        "twin/electronics/driving/sections.py",
+        (
+            "class DriveSection(DelaySection, DacSection, ",
+            "class DriveSection(DelaySection, FilterSection, DacSection, ",
+        ),
+        "from spheretwin.twin.electronics.driving.filter import FilterSection\n",
+    ),
     "fault": Addition(
         "twin/faults/targets/fuse.py",
         """
-from spheretwin.twin.electronics.driving.undriven import OPEN
+from spheretwin.twin.electronics.driving.coil import OPEN
 from spheretwin.twin.faults.target import Mode, Target
 
 
-def _blow(effects, strike):
-    effects.drive.acts[0] = True
-    effects.drive.contact[strike.place] = OPEN
+def _blow(effects, fault):
+    effects.drive.coil.contact[fault.place] = OPEN
 
 
 TARGET = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
 """,
         "twin/faults/targets/registry.py",
-        ("        supply.TARGET,\n", "        supply.TARGET,\n        fuse.TARGET,\n"),
+        ("        coil.TARGET,\n", "        fuse.TARGET,\n        coil.TARGET,\n"),
         "from spheretwin.twin.faults.targets import fuse\n",
+    ),
+    "sensor stage's fault": Addition(
+        "twin/faults/targets/gear.py",
+        """
+from spheretwin.twin.faults import line_modes
+from spheretwin.twin.faults.line_modes import Signal
+from spheretwin.twin.faults.target import Target
+
+SIGNAL = Signal(lambda effects: effects.sensors.stage("gear").line, "rad")
+TARGET = Target("gear", line_modes.modes(SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
+""",
+        "twin/faults/targets/registry.py",
+        ("        dac.TARGET,\n", "        dac.TARGET,\n        gear.TARGET,\n"),
+        "from spheretwin.twin.faults.targets import gear\n",
+    ),
+    "drive stage's fault": Addition(
+        "twin/faults/targets/filter.py",
+        """
+from spheretwin.twin.faults import line_modes
+from spheretwin.twin.faults.line_modes import Signal
+from spheretwin.twin.faults.target import Target
+
+SIGNAL = Signal(lambda effects: effects.drive.stage("filter").line, "A")
+MODES = {**line_modes.modes(SIGNAL), **line_modes.silent_modes(SIGNAL)}
+TARGET = Target("filter", MODES, each_group=True)
+""",
+        "twin/faults/targets/registry.py",
+        ("        supply.TARGET,\n", "        supply.TARGET,\n        filter.TARGET,\n"),
+        "from spheretwin.twin.faults.targets import filter\n",
     ),
     "axis": Addition(
         "twin/study/axes/triangular.py",

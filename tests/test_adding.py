@@ -6,11 +6,13 @@ a third place to be told of a new member fails here, be it in a test that every 
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.additions import ADDITIONS
@@ -34,8 +36,41 @@ sys.exit(pytest.main(sys.argv[1:]))
 """
 )
 
+# What parts of the prototype draw and measure, none of which is new.
+DRAWN = """
+import numpy as np
+
+def drawn_numbers():
+    from spheretwin.twin import scenario as scenarios
+    from spheretwin.twin.electronics.driving.chain import drive_chain
+    from spheretwin.twin.electronics.sensing.chain import noise_streams, sense, sensor_chain
+    from spheretwin.twin.electronics.sensing.noise import noise_table
+    from spheretwin.twin.faults.plan import FaultPlan
+    from spheretwin.twin.wiring.wires import fault_streams
+
+    faults = [
+        {"target": "adc", "mode": "noise", "value": 1e-3},
+        {"target": "dac.04", "mode": "noise", "value": 0.1},
+        {"target": "supply", "mode": "intermittent", "value": 2e-3},
+    ]
+    scenario = scenarios.load("hold", {"hardware": "prototype", "seed": 3, "fault": faults})
+    plan = FaultPlan(scenario.fault, 18, 1e-3, 3)
+    sensors = sensor_chain(scenario.sensors, 3)
+    drive = drive_chain(scenario.drive, 5e-4, 2, 18, 3)
+    noise, measurement = noise_table(3, 0, 5, noise_streams(scenario.sensors)), np.empty((3, 3))
+    sense(sensors, np.array([0.1, -0.2, 0.3]), np.zeros(3), noise[0], measurement)
+    return {
+        "tracks": sensors.stage("potentiometer").channels, "converters": sensors.stage("adc").channels,
+        "dac": drive.stage("dac").dac.offset_V.tolist(), "amplifiers": drive.amplifier.offset_A.tolist(),
+        "noise": noise.tolist(), "measured": measurement[0].tolist(),
+        "fault noise": noise_table(3, 0, 5, fault_streams(scenario, 18)).tolist(),
+        "supply": [2 in plan.active(tick) for tick in range(0, 100, 2)],
+    }
+"""
+
 SCRIPT = (
     ALONE
+    + DRAWN
     + """
 import json
 from pathlib import Path
@@ -72,10 +107,25 @@ engine = "uncoupled"
 [[disturbance.terms]]
 kind = "kick"
 torque_Nm = 0.02
+[sensors.gear]
+ratio_error = 0.1
+[drive]
+filter_gain = 0.5
+time_constant_s = 0.0
 [[fault]]
 target = "fuse.03"
 mode = "blown"
 start_s = 0.03
+[[fault]]
+target = "gear.beta"
+mode = "offset"
+value = 0.02
+start_s = 0.04
+[[fault]]
+target = "filter.05"
+mode = "stuck"
+value = 0.25
+start_s = 0.04
 ''')
 parquet = folder / "new.parquet"
 code = cli.main(["simulate", str(folder / "new.toml"), "--telemetry", str(parquet), "--json"])
@@ -107,10 +157,15 @@ from spheretwin.twin.crosscheck.figures.registry import FIGURES
 page.FIGURES = FIGURES[-1:]
 page.write(folder, evidence, {"none": "1"})
 table = read_parquet(parquet)[0]
+from spheretwin.twin.electronics.streams import errors
+
 print("RESULT" + json.dumps({
     "code": code, "helped": helped, "refused": refused, "status": str(Status("bored")),
     "columns": [signal.name for signal in table.signals],
     "blown": table["current_A"][:, 3].tolist(), "marks": sorted(set(table["fault"].ravel().tolist())),
+    "ratio": errors(0, "sensors.gear", 3, 1)[:, 0].tolist(), "q": table["q_rad"].tolist(),
+    "measured": table["q_measured_rad"].tolist(), "asked": table["current_command_A"].tolist(),
+    "carried": table["current_A"].tolist(), "random": drawn_numbers(),
     "largest": table["largest_current_A"].tolist(), "q_ref": table["q_ref_rad"][-1].tolist(),
     "disturbance": table["disturbance_Nm"][:, 1].tolist(), "current": abs(table["current_command_A"]).max(),
     "page": (folder / page.PAGE).read_text(), "figure": (folder / "names.png").stat().st_size,
@@ -194,7 +249,36 @@ def test_an_estimator(grown):
 def test_a_fault(grown):
     assert all(grown["blown"][1:30])
     assert not any(grown["blown"][30:])
-    assert len(grown["marks"]) == 2
+    assert len(grown["marks"]) == 4
+
+
+def test_a_sensor_stage_and_its_fault(grown):
+    """The fault leaves the stage, and all others, as they are."""
+    ratio = 1 + 0.1 * np.array(grown["ratio"])
+    expected = ratio * np.array(grown["q"])
+    expected[40:, 1] += 0.02
+    # Products and sums of a few numbers below 1.
+    np.testing.assert_allclose(grown["measured"], expected, rtol=0, atol=1e-15)
+    assert np.abs(np.array(grown["ratio"])).min() > 1e-3
+    assert grown["helped"]["--sensors.gear.ratio-error"] == "largest error of a ratio, drawn from the seed"
+
+
+def test_a_drive_stage_and_its_fault(grown):
+    asked, carried = np.array(grown["asked"]), np.array(grown["carried"])
+    expected = 0.5 * asked
+    expected[30:, 3], expected[40:, 5] = 0.0, 0.25
+    np.testing.assert_array_equal(carried, expected)
+    assert np.abs(asked).max() > 0.1
+    assert grown["helped"]["--drive.filter-gain"] == "gain of the filter"
+
+
+def test_new_stages_and_faults_move_no_random_number_of_another_part_and_no_bit_while_off(grown):
+    here = {}
+    exec(DRAWN, here)
+    numbers = json.loads(json.dumps(here["drawn_numbers"]()))
+    assert grown["random"] == numbers
+    assert any(numbers["supply"])
+    assert np.unique(numbers["fault noise"]).size > 100
 
 
 def test_an_allocation(grown):
@@ -237,7 +321,7 @@ EVERY = {
     "twin/metrics/test_every_metric.py": "mean_load_Nm",
     "twin/plant/test_every_engine.py": "uncoupled",
     "twin/reproduce/test_every_experiment.py": "holding",
-    "twin/faults/test_every_target.py": "fuse",
+    "twin/faults/test_every_target.py": "gear",
     "twin/study/test_every_axis.py": "triangular",
 }
 
@@ -259,8 +343,8 @@ def test_the_families_tests_run_the_new_members_and_pass(folder, grown):
 def test_contributing_names_the_file_and_the_row_of_each():
     text = (ROOT / "CONTRIBUTING.md").read_text()
     for family, addition in ADDITIONS.items():
-        (row,) = [line for line in text.splitlines() if line.startswith(f"| a {family}") or
-                  line.startswith(f"| an {family}")]  # fmt: skip
+        start = re.compile(rf"\| an? {family}( of [^|]*)? \|")
+        (row,) = [line for line in text.splitlines() if start.match(line)]
         assert f"`{addition.registry}`" in row
         if addition.file:
             assert f"`{Path(addition.file).parent}/" in row

@@ -28,6 +28,7 @@ from spheretwin.models.telemetry.signals import (
     width,
 )
 from spheretwin.twin.columns.registry import ALL
+from spheretwin.twin.electronics.sensing.current import CurrentSensors
 from spheretwin.twin.faults.plan import part_names
 from spheretwin.twin.loop import Places
 from spheretwin.twin.plant.friction import Friction, friction
@@ -187,7 +188,9 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, stepped: Any, wires
         friction_q=np.zeros(3),
         first_friction_q=np.zeros(3),
         draws=wires.draws,
-        current_noise_A=scenario.sensors.current.noise_A,
+        current_sensors=CurrentSensors(
+            scenario.senses_currents, scenario.sensors.current.noise_A, np.zeros(groups)
+        ),
         marks=np.zeros(len(part_names(groups))),
         began_s=np.full(groups, -1.0),
     )

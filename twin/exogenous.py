@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.disturbances.draws import Draws, term_draws
-from spheretwin.twin.electronics.sensing.chain import noise_width
-from spheretwin.twin.electronics.sensing.noise import FAULTS, noise_rows
-from spheretwin.twin.faults.plan import draws_width
+from spheretwin.twin.electronics.sensing.chain import noise_streams
+from spheretwin.twin.electronics.sensing.noise import noise_table
 from spheretwin.twin.loop import Inputs
 from spheretwin.twin.scenario.sections import Scenario
 from spheretwin.twin.trajectories.trajectory import Sampled, checked
+from spheretwin.twin.wiring.wires import fault_streams
 
 BLOCK_TICKS = 1000
 
@@ -152,12 +152,9 @@ class Exogenous:
 
     def _with_noise(self, known: _Known) -> Inputs:
         seed, first, count = self._scenario.seed, self._first, len(known.t)
-        noise = noise_rows(seed, first, count, noise_width(self._scenario.sensors))
-        of_faults = noise_rows(seed, first, count, self._width_of_faults(), FAULTS)
+        noise = noise_table(seed, first, count, noise_streams(self._scenario.sensors))
+        of_faults = noise_table(seed, first, count, fault_streams(self._scenario, self._groups))
         return Inputs(known.t, known.reference, known.disturbance, noise, of_faults)
-
-    def _width_of_faults(self) -> int:
-        return draws_width(self._groups) if self._scenario.draws_for_faults else 0
 
     def _refuse(self, rows: Inputs | _Known, row: int) -> NoReturn:
         name = "disturbance" if np.isfinite(rows.reference[row]).all() else "trajectory"

@@ -97,7 +97,8 @@ def loop(
     reference, measurement = scratch.reference, scratch.measurement
     watchdog, detector = controller.supervision.watchdog, controller.supervision.detector
     groups = plant.current.shape[0]
-    first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 2 * groups
+    first_current, scale = CURRENT_COMMAND + groups, CURRENT_COMMAND + 3 * groups
+    first_mean = first_current + groups
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
         copy_into(plant.draws, 0, inputs.fault_noise[tick], plant.draws.shape[0])
@@ -107,9 +108,10 @@ def loop(
         write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
         if not (measured or mend(watchdog, measurement)):
             return tick, DIVERGED
-        if detector.on:
-            first_draw = plant.draws.shape[0] - groups
-            sense_currents(plant.current_noise_A, plant.current, plant.draws, first_draw, detector.measured_A)
+        if plant.current_sensors.on:
+            sense_currents(plant.current_sensors, plant.current, plant.draws)
+            if detector.on:
+                copy_into(detector.measured_A, 0, plant.current_sensors.measured_A, groups)
         command = row[CURRENT_COMMAND:first_current]
         share = control_tick(controller, law, allocate, estimate, t, reference, measurement, command)
         if share == LOST:
@@ -117,7 +119,7 @@ def loop(
         row[scale] = share
         copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
         copy_into(row, places.of_the_law, controller.memory, controller.logged)
-        delivered = Delivered(row[first_current:scale], row[TORQUE : TORQUE + 3])
+        delivered = Delivered(row[first_current:first_mean], row[first_mean:scale], row[TORQUE : TORQUE + 3])
         status = plant_tick(plant, command, disturbance, delivered)
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)

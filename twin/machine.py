@@ -12,10 +12,11 @@ from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.around import around as arounds
 from spheretwin.control.controller import Supervision
 from spheretwin.control.law import Law
-from spheretwin.control.supervision import detector, groups, watchdog
+from spheretwin.control.supervision import watchdog
 from spheretwin.control.supervision.watchdog import REASONS, Reason
 from spheretwin.models.base.compiled import callback_errors, for_types_of
-from spheretwin.models.base.errors import InputError, LawError
+from spheretwin.models.base.copying import check_length, restore_state, save_state, transfer_state
+from spheretwin.models.base.errors import LawError
 from spheretwin.models.telemetry.signals import width
 from spheretwin.twin import assembly
 from spheretwin.twin import loop as loops
@@ -45,18 +46,8 @@ class State(NamedTuple):
     """All that the parts go on from."""
 
     rotor: NDArray[np.float64]
-    last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
-    current: NDArray[np.float64]
-    driving: NDArray[np.float64]
-    parameters: NDArray[np.float64]
-    memory: NDArray[np.float64]
-    belief: NDArray[np.float64]
-    around: NDArray[np.float64]
-    estimates: NDArray[np.float64]
-    sensing: NDArray[np.float64]
-    groups: NDArray[np.float64]
-    detector: NDArray[np.float64]
-    watchdog: NDArray[np.float64]
+    parts: dict[str, NDArray[np.float64]]
+    """By the names of `Machine.parts`."""
     last: Last
 
 
@@ -150,9 +141,9 @@ class Machine:
         """Why a watchdog has taken the currents away, if one has."""
         return REASONS[int(self._controller.supervision.watchdog.reason[0])]
 
-    def strike(self, tick: int) -> int:
-        """Let the faults act that are due at a control tick; returns the next one at which others may."""
-        return self._faults.strike(tick)
+    def apply_faults(self, tick: int) -> int:
+        """Apply the faults that are due at a control tick; returns the next one at which others may be."""
+        return self._faults.apply(tick)
 
     def run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
         """Run a control tick for each row of `log`: rows written, and the code of a status."""
@@ -199,7 +190,7 @@ class Machine:
         made._plant.last_qdot[:] = self._plant.last_qdot
         made._last = self._last
         drivings.carried_on(self._plant.driving, made._plant.driving, self._last.command)
-        senses.carried_on(self._sensors, made._sensors, self._last.q, self._last.noise)
+        senses.carried_on(self._sensors, made._sensors, scenario.sensors, self._last.q, self._last.noise)
         _supervised_on(self._controller.supervision, made._controller.supervision)
         if scenario.manual.on or not self._scenario.manual.on:
             self._law_carried_on(made, own_law)
@@ -227,23 +218,27 @@ class Machine:
 
     def state(self) -> State:
         """All that it goes on from."""
-        controller = self._controller
-        return State(
-            rotor=self._moving.rotor.state(),
-            last_qdot=self._plant.last_qdot.copy(),
-            current=self._plant.current.copy(),
-            driving=drivings.state_of(self._plant.driving),
-            parameters=controller.parameters.copy(),
-            memory=controller.memory.copy(),
-            belief=beliefs.state_of(controller.belief),
-            around=arounds.state_of(controller.around),
-            estimates=controller.estimates.memory.copy(),
-            sensing=senses.state_of(self._sensors),
-            groups=groups.state_of(controller.supervision.groups),
-            detector=detector.state_of(controller.supervision.detector),
-            watchdog=watchdog.state_of(controller.supervision.watchdog),
-            last=self._last,
-        )
+        parts = {name: save_state(part) for name, part in self.parts.items()}
+        return State(self._moving.rotor.state(), parts, self._last)
+
+    @property
+    def parts(self) -> dict[str, Any]:
+        """Parts that it goes on from, apart from the rotor, by the names that messages use."""
+        controller, supervision = self._controller, self._controller.supervision
+        return {
+            "currents": self._plant.current,
+            "the last rates": self._plant.last_qdot,
+            "the drive's state": self._plant.driving,
+            "the law's parameters": controller.parameters,
+            "the law's memory": controller.memory,
+            "the applied torque": controller.belief,
+            "the governor, the prediction and the feed-forward": controller.around,
+            "the estimator's memory": controller.estimates.memory,
+            "the sensors' state": self._sensors,
+            "the groups' states": supervision.groups,
+            "the detector's state": supervision.detector,
+            "the watchdog's state": supervision.watchdog,
+        }
 
     def restore(self, state: State) -> None:
         """Go on from a state of a machine of the same scenario.
@@ -253,31 +248,17 @@ class Machine:
         InputError
             It is that of another.
         """
-        own = self.state()
-        _check_length("the engine's state", state.rotor, own.rotor)
-        _check_length("currents", state.current, own.current)
-        _check_length("the drive's state", state.driving, own.driving)
-        _check_length("the law's parameters", state.parameters, own.parameters)
-        _check_length("the law's memory", state.memory, own.memory)
-        _check_length("what the controller believes", state.belief, own.belief)
-        _check_length("what stands around the law", state.around, own.around)
-        _check_length("the estimator's memory", state.estimates, own.estimates)
-        _check_length("the sensors' state", state.sensing, own.sensing)
-        _check_length("the groups", state.groups, own.groups)
+        own, last = self.state(), state.last
+        # Everything is checked before anything is written: a snapshot that is refused changes nothing.
+        check_length("the engine's state", state.rotor, len(own.rotor))
+        for name, numbers in own.parts.items():
+            check_length(name, state.parts.get(name, np.empty(0)), len(numbers))
+        check_length("the last command", last.command, len(self._plant.current))
+        check_length("the last pose", last.q, 3 if len(last.q) else 0)
         self._moving.rotor.restore(state.rotor)
-        self._plant.last_qdot[:] = state.last_qdot
-        self._plant.current[:] = state.current
-        drivings.restore(self._plant.driving, state.driving)
-        self._controller.parameters[:] = state.parameters
-        self._controller.memory[:] = state.memory
-        beliefs.restore(self._controller.belief, state.belief)
-        arounds.restore(self._controller.around, state.around)
-        self._controller.estimates.memory[:] = state.estimates
-        senses.restore(self._sensors, state.sensing)
-        groups.restore(self._controller.supervision.groups, state.groups)
-        detector.restore(self._controller.supervision.detector, state.detector)
-        watchdog.restore(self._controller.supervision.watchdog, state.watchdog)
-        self._last = state.last
+        for name, part in self.parts.items():
+            restore_state(part, state.parts[name], name)
+        self._last = last
 
 
 def _started(scenario: ResolvedScenario, files: Files) -> Moving:
@@ -296,14 +277,7 @@ def _carried_on(moving: Moving, scenario: ResolvedScenario, files: Files) -> Mov
 
 def _supervised_on(before: Supervision, after: Supervision) -> None:
     """Go on with what was seen before, under other figures."""
-    groups.restore(after.groups, groups.state_of(before.groups))
+    transfer_state(before.groups, after.groups)
     if before.detector.on:
-        detector.restore(after.detector, detector.state_of(before.detector))
+        transfer_state(before.detector, after.detector)
     watchdog.carried_on(before.watchdog, after.watchdog)
-
-
-def _check_length(what: str, received: NDArray[np.float64], own: NDArray[np.float64]) -> None:
-    if len(received) != len(own):
-        raise InputError(
-            f"session: expected a snapshot with {len(own)} numbers of {what}, received {len(received)}"
-        )

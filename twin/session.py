@@ -314,7 +314,7 @@ class Session:
         done = 0
         while done < len(log) and self._status == Status.RUNNING:
             try:
-                until = self._machine.strike(self.tick)
+                until = self._machine.apply_faults(self.tick)
                 most = min(self._most(len(log) - done), until - self.tick)
                 inputs = self._exogenous.rows(self.tick, most)
             except InputError:

@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.around import feed_forward, governor, prediction
+from spheretwin.control.around import governor
 from spheretwin.control.around.feed_forward import FeedForward, reckon, take_off
 from spheretwin.control.around.governor import Governor, govern
 from spheretwin.control.around.prediction import Prediction, advance, predict
 from spheretwin.control.belief import Belief
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.copying import transfer_state
 from spheretwin.models.magnetics import TorqueModel
 
 Array = NDArray[np.float64]
@@ -62,28 +63,8 @@ def prepare(
     return True
 
 
-def state_of(around: Around) -> Array:
-    """All that it goes on from."""
-    return np.concatenate(
-        [
-            governor.state_of(around.governor),
-            prediction.state_of(around.prediction),
-            feed_forward.state_of(around.feed),
-        ]
-    )
-
-
-def restore(around: Around, state: Array) -> None:
-    """Go on from a state of the same size."""
-    first = len(governor.state_of(around.governor))
-    second = first + len(prediction.state_of(around.prediction))
-    governor.restore(around.governor, state[:first])
-    prediction.restore(around.prediction, state[first:second])
-    feed_forward.restore(around.feed, state[second:])
-
-
 def carried_on(before: Around, after: Around) -> None:
     """Go on with what each part is in the midst of, under other figures."""
     governor.carried_on(before.governor, after.governor)
-    prediction.restore(after.prediction, prediction.state_of(before.prediction))
-    feed_forward.carried_on(before.feed, after.feed)
+    transfer_state(before.prediction, after.prediction)
+    transfer_state(before.feed, after.feed)

@@ -67,6 +67,10 @@ class FeedForward(NamedTuple):
     given: Array  # (n + 2, 3) N·m, what was fed forward, newest first
     torque_q: Array  # (3,) N·m, in this tick
 
+    def state_arrays(self) -> tuple[Array, ...]:
+        """Arrays that it goes on from."""
+        return self.given, self.torque_q
+
 
 class NominalRotor(NamedTuple):
     """What is fed forward is reckoned with."""
@@ -136,21 +140,3 @@ def reckon(feed: FeedForward, reference: Array) -> None:
         for row in range(feed.given.shape[0] - 1, 0, -1):
             feed.given[row, i] = feed.given[row - 1, i]
         feed.given[0, i] = feed.torque_q[i]
-
-
-def state_of(feed: FeedForward) -> Array:
-    """All that it goes on from."""
-    return np.concatenate([feed.given.ravel(), feed.torque_q])
-
-
-def restore(feed: FeedForward, state: Array) -> None:
-    """Go on from a state of the same size."""
-    feed.given[:] = state[:-3].reshape(-1, 3)
-    feed.torque_q[:] = state[-3:]
-
-
-def carried_on(before: FeedForward, after: FeedForward) -> None:
-    """Go on with what was fed forward, under another delay; what is older than any known repeats."""
-    after.torque_q[:] = before.torque_q
-    for row in range(len(after.given)):
-        after.given[row] = before.given[min(row, len(before.given) - 1)]

@@ -32,6 +32,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.numbers import PositiveEach
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.copying import transfer_state
 
 Array = NDArray[np.float64]
 
@@ -64,6 +65,10 @@ class Governor(NamedTuple):
     period_s: float
     motion: Array  # (3, 3) angle, rate, acceleration as rows: where it is, and what it does from there
     begun: Array  # (1,) whether it is anywhere
+
+    def state_arrays(self) -> tuple[Array, ...]:
+        """Arrays that it goes on from."""
+        return self.motion, self.begun
 
 
 def governor(section: GovernorSection, period_s: float) -> Governor:
@@ -129,17 +134,7 @@ def fhan(x: float, v: float, largest: float, h: float) -> float:
     return -largest * min(max(switching / reach, -1.0), 1.0)
 
 
-def state_of(governor: Governor) -> Array:
-    """All that it goes on from."""
-    return np.concatenate([governor.motion.ravel(), governor.begun])
-
-
-def restore(governor: Governor, state: Array) -> None:
-    """Go on from a state."""
-    governor.motion[:], governor.begun[:] = state[:9].reshape(3, 3), state[9:]
-
-
 def carried_on(before: Governor, after: Governor) -> None:
     """Go on from where it was, with other figures; one that was off begins at the next tick."""
     if before.on and after.on:
-        restore(after, state_of(before))
+        transfer_state(before, after)

@@ -71,6 +71,10 @@ class Prediction(NamedTuple):
     torque_q: Array  # (3,) N·m, the same on the hinges
     before_q: Array  # (3,) N·m, over the first step that was made in the last tick
 
+    def state_arrays(self) -> tuple[Array, ...]:
+        """Arrays that it goes on from."""
+        return self.pose, self.rates, self.before_q
+
 
 class Delayed(NamedTuple):
     """What a prediction reckons with."""
@@ -206,13 +210,3 @@ def _matrix_at(prediction: Prediction, magnetics: TorqueModel, pose: Array) -> b
             return False
     keep_torque_matrix(pose, magnetics, prediction.kept)
     return True
-
-
-def state_of(prediction: Prediction) -> Array:
-    """All that it goes on from."""
-    return np.concatenate([prediction.pose, prediction.rates, prediction.before_q])
-
-
-def restore(prediction: Prediction, state: Array) -> None:
-    """Go on from a state."""
-    prediction.pose[:], prediction.rates[:], prediction.before_q[:] = state.reshape(3, 3)

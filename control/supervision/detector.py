@@ -30,7 +30,7 @@ settle. It may look like none for so long. The detector waits for that many tick
 from __future__ import annotations
 
 from math import ceil, exp
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,10 @@ class Detector(NamedTuple):
     open_A2: Array  # (n,) squared differences over these ticks
     shorted_A2: Array  # (n,)
     rate_S: Array  # (3,) rad/s
+
+    def state_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that it goes on from."""
+        return self.shorted_A, self.counted, self.open_A2, self.shorted_A2
 
 
 def derived_threshold_A(followed: Followed) -> float:
@@ -215,17 +219,3 @@ def _name(detector: Detector, group: int, name: int) -> int:
     if abs(closer) <= detector.threshold_A * detector.threshold_A:
         return name
     return FOUND_SHORTED if closer > 0.0 else FOUND_OPEN
-
-
-def state_of(detector: Detector) -> Array:
-    """All that it goes on from."""
-    return np.concatenate(
-        [detector.shorted_A, detector.counted.astype(np.float64), detector.open_A2, detector.shorted_A2]
-    )
-
-
-def restore(detector: Detector, state: Array) -> None:
-    """Go on from a state of one for as many groups."""
-    shorted_A, counted, open_A2, shorted_A2 = state.reshape(4, -1)
-    detector.shorted_A[:], detector.counted[:] = shorted_A, counted.astype(np.int64)
-    detector.open_A2[:], detector.shorted_A2[:] = open_A2, shorted_A2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ class Groups(NamedTuple):
     out: NDArray[np.int64]  # (n,) `IN_USE`, or why it is not
     out_s: NDArray[np.float64]  # (n,) since when, s; without meaning for a group in use
     G: NDArray[np.float64]  # (3, n) N·m/A, torque matrix without the columns of those that are out
+
+    def state_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that it goes on from."""
+        return self.some_out, self.out, self.out_s
 
 
 def groups(count: int) -> Groups:
@@ -50,15 +54,3 @@ def leave_out(groups: Groups, G: NDArray[np.float64]) -> None:
         used = groups.out[j] == IN_USE
         for i in range(3):
             groups.G[i, j] = G[i, j] if used else 0.0
-
-
-def state_of(groups: Groups) -> NDArray[np.float64]:
-    """All that they go on from."""
-    return np.concatenate([groups.out.astype(np.float64), groups.out_s])
-
-
-def restore(groups: Groups, state: NDArray[np.float64]) -> None:
-    """Go on from a state of as many."""
-    count = len(groups.out)
-    groups.out[:], groups.out_s[:] = state[:count].astype(np.int64), state[count:]
-    groups.some_out[0] = np.any(groups.out != IN_USE)

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from enum import IntEnum
 from math import isfinite, sqrt
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.copying import transfer_state
 
 Array = NDArray[np.float64]
 
@@ -105,6 +106,10 @@ class Watchdog(NamedTuple):
     halt: NDArray[np.int64]  # (1,) `GO`, `RELEASE` or `SHORT`: the drive reads it
     reason: NDArray[np.int64]  # (1,)
     since: NDArray[np.int64]  # (1,) ticks since it tripped
+
+    def state_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that it goes on from."""
+        return self.last_rad, self.missing, self.halt, self.reason, self.since
 
 
 class Watched(NamedTuple):
@@ -206,20 +211,8 @@ def over(watchdog: Watchdog) -> bool:
     return watchdog.since[0] > watchdog.rundown_ticks
 
 
-def state_of(watchdog: Watchdog) -> Array:
-    """All that it goes on from."""
-    counts = [watchdog.missing, watchdog.halt, watchdog.reason, watchdog.since]
-    return np.concatenate([watchdog.last_rad, *counts], dtype=np.float64)
-
-
-def restore(watchdog: Watchdog, state: Array) -> None:
-    """Go on from a state."""
-    watchdog.last_rad[:], watchdog.missing[:] = state[:3], state[3:6].astype(np.int64)
-    watchdog.halt[0], watchdog.reason[0], watchdog.since[0] = state[6:].astype(np.int64)
-
-
 def carried_on(before: Watchdog, after: Watchdog) -> None:
     """Go on as before with other figures; what one has seen that was off since is too old to compare with."""
-    restore(after, state_of(before))
+    transfer_state(before, after)
     if not before.on:
         after.last_rad[:], after.missing[:] = np.nan, 0

@@ -105,11 +105,12 @@ MOTION_SIGNALS = (
 def common_signals(groups: int) -> tuple[Signal, ...]:
     """Signals of every run, in this order, for an actuator with a number of coil groups."""
     each = tuple(f"group {j}" for j in range(groups))
-    mean = "group currents, mean over the physics step that begins now"
+    first_step = "group currents, mean over the first physics step of the tick"
     return (
         *MOTION_SIGNALS,
         Signal("current_command_A", "A", groups, "group currents asked of the amplifiers", each),
-        Signal("current_A", "A", groups, mean, each),
+        Signal("current_A", "A", groups, first_step, each),
+        Signal("mean_current_A", "A", groups, "group currents, mean over the tick", each),
         Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
     )
 

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from spheretwin.control.belief import belief, believe, restore, state_of
+from spheretwin.control.belief import belief, believe
 from spheretwin.control.law import Law
+from spheretwin.models.base.copying import restore_state, save_state
 from spheretwin.models.kinematics import generalised_torque, rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import ANGLES, Signal
@@ -68,11 +69,11 @@ def test_its_state_brings_it_back():
     G, pose = generator.normal(size=(3, 4)), np.array([0.1, 0.2, 0.3])
     for _ in range(5):
         believe(one, pose, G, generator.normal(size=4))
-    restore(other, state_of(one))
+    restore_state(other, save_state(one), "belief")
     command = generator.normal(size=4)
     for each in (one, other):
         believe(each, pose, G, command)
-    np.testing.assert_array_equal(state_of(one), state_of(other))
+    np.testing.assert_array_equal(save_state(one), save_state(other))
 
 
 @numba.njit

@@ -1,4 +1,4 @@
-"""What the controller is handed, where that is not the truth."""
+"""Measured angles and estimated rates, if they can differ from the truth."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
 
 
 def _logged(scenario: Scenario) -> bool:
-    return not scenario.sensors.ideal or scenario.estimator.kind != "ideal"
+    return not scenario.measures_truth
 
 
 COLUMNS = Columns(lambda groups: SIGNALS, _logged, write)

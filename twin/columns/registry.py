@@ -5,11 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.twin.columns import drive, faults, fed, friction, governed, measured, predicted, watchdog
+from spheretwin.twin.columns import (
+    current_sensors,
+    drive,
+    faults,
+    fed,
+    friction,
+    governed,
+    measured,
+    predicted,
+    watchdog,
+)
 from spheretwin.twin.columns.column import Columns
 
 ALL: tuple[Columns, ...] = (
     measured.COLUMNS,
+    current_sensors.COLUMNS,
     governed.COLUMNS,
     predicted.COLUMNS,
     fed.COLUMNS,

@@ -1,13 +1,17 @@
 """Random numbers of many parts, each with a stream of its own, made without a generator object for each.
 
-A part of the electronics draws its errors from ``np.random.default_rng([seed, stage, channel])``. There are
-dozens of parts, a generator takes Python ten microseconds to make, and few numbers are taken from each: for
-a short run that would be a tenth of it. Here the same bits come out of compiled code: NumPy's
-``SeedSequence``, which hashes the three numbers, and its ``PCG64``, a congruential generator of 128 bits of
-which each number is a hash of the state. Both are fixed by NumPy for good.
+A stream is keyed by the seed of the run and the name of the part. Neither another part nor its place in a
+list moves a number. A part of the electronics draws its errors from ``np.random.default_rng([seed,
+stream_key(name), channel])``. There are dozens of parts, a generator takes Python ten microseconds to make,
+and few numbers are taken from each: for a short run that would be a tenth of it. Here the same bits come
+out of compiled code: NumPy's ``SeedSequence``, which hashes these numbers, and its ``PCG64``, a
+congruential generator of 128 bits of which each number is a hash of the state. NumPy fixes both for good.
 """
 
 from __future__ import annotations
+
+from functools import cache
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,15 +35,21 @@ NUMBER = 2.0**-53
 """Distance of two numbers that can be drawn."""
 
 
-def uniforms(seed: int, stage: int, channels: int, count: int) -> NDArray[np.float64]:
+@cache
+def stream_key(name: str) -> int:
+    """Return the number that the random streams of a part are keyed by: 64 bits of a digest of its name."""
+    return int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little")
+
+
+def uniforms(seed: int, name: str, channels: int, count: int) -> NDArray[np.float64]:
     """First numbers of the streams of some channels.
 
     Parameters
     ----------
     seed : int
         Of the run; from 0 on.
-    stage : int
-        Of the electronics; below 2³².
+    name : str
+        Of the part.
     channels : int
     count : int
         Numbers of each.
@@ -47,18 +57,18 @@ def uniforms(seed: int, stage: int, channels: int, count: int) -> NDArray[np.flo
     Returns
     -------
     (channels, count) array
-        Row k is ``np.random.default_rng([seed, stage, k]).random(count)``: from 0 to below 1.
+        Row k is ``np.random.default_rng([seed, stream_key(name), k]).random(count)``: from 0 to below 1.
     """
     drawn = np.empty((channels, count))
-    entropy = np.array([*_words(seed), stage, 0], dtype=np.uint64)
+    entropy = np.array([*_words(seed), *_words(stream_key(name)), 0], dtype=np.uint64)
     with np.errstate(over="ignore"):  # uncompiled: a product is meant without what does not fit
         _draw(entropy, np.empty(_POOL, dtype=np.uint64), np.empty(2 * _POOL, dtype=np.uint64), drawn)
     return drawn
 
 
-def errors(seed: int, stage: int, channels: int, count: int) -> NDArray[np.float64]:
-    """As ``default_rng([seed, stage, k]).uniform(-1, 1, count)``: shares of bounds, (channels, count)."""
-    return 2 * uniforms(seed, stage, channels, count) - 1
+def errors(seed: int, name: str, channels: int, count: int) -> NDArray[np.float64]:
+    """Return shares of bounds, (channels, count), from -1 to 1, of the same streams as `uniforms`."""
+    return 2 * uniforms(seed, name, channels, count) - 1
 
 
 def _words(number: int) -> list[int]:

@@ -1,8 +1,9 @@
 """Which faults are at work at a control tick: a function of plan, seed and tick alone.
 
 Neither chunks nor restored snapshots can move a fault. What comes and goes does so by stretches of a stated
-length, counted from the start of the run; for each stretch a coin of its own is tossed, from seed, part and
-number of the stretch.
+length, counted from the start of the run; for each stretch a coin of its own is tossed, from the seed, the
+name of the part and the number of the stretch: ``default_rng([seed, stream_key("NAME intermittent"),
+stretch])``.
 """
 
 from __future__ import annotations
@@ -14,28 +15,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.twin.electronics.sensing.noise import Streams
+from spheretwin.twin.electronics.streams import stream_key
 from spheretwin.twin.faults.fault import MODES, Fault
-from spheretwin.twin.faults.target import Effects, Strike
+from spheretwin.twin.faults.target import ActiveFault, Effects
 from spheretwin.twin.faults.targets.registry import TARGETS
-
-STAGE = 201
-"""Of the coins: ``default_rng([seed, STAGE, part, stretch])``."""
 
 NEVER = 2**62
 
 # Times and periods are decimal fractions: a tick that falls on a start does so to rounding only.
 ROUNDING = 1e-6
 
-_KINDS = tuple(TARGETS)
-
 COLUMNS_A_PART = 2
-"""Random numbers a tick."""
+"""Random numbers a tick of a part with noise: one for each channel that it has."""
 
 
 class Planned(NamedTuple):
     """A fault in control ticks."""
 
     fault: Fault
+    name: str
+    """Of the part, which its random numbers are keyed by."""
     part: int
     """Its place among all parts."""
     first: int
@@ -60,11 +60,12 @@ class FaultPlan:
     def __init__(self, faults: tuple[Fault, ...], groups: int, period_s: float, seed: int) -> None:
         self._groups, self.period_s, self._seed = groups, period_s, seed
         self._planned = tuple(self._in_ticks(fault) for fault in faults)
+        self._columns = {name: COLUMNS_A_PART * i for i, name in enumerate(_noisy(faults, groups))}
 
     def __len__(self) -> int:
         return len(self._planned)
 
-    def at_work(self, tick: int) -> tuple[int, ...]:
+    def active(self, tick: int) -> tuple[int, ...]:
         """Places in the plan of the faults that act at a tick."""
         return tuple(i for i, planned in enumerate(self._planned) if self._acts(planned, tick))
 
@@ -72,28 +73,25 @@ class FaultPlan:
         """First later tick at which others may act; `NEVER` where there is none."""
         return min((self._next(planned, tick) for planned in self._planned), default=NEVER)
 
-    def strike(self, at_work: tuple[int, ...], effects: Effects) -> None:
-        """Let some faults of the plan act: what is further from the coils first, of one kind in its order.
-
-        What is wrong with a converter passes through its amplifier, whatever the order of the two in a plan.
-        """
-        for i in sorted(at_work, key=self._distance_from_the_coils, reverse=True):
+    def apply(self, active: tuple[int, ...], effects: Effects) -> None:
+        """Apply some faults of the plan to the stages, in their order."""
+        for i in active:
             planned = self._planned[i]
-            column = COLUMNS_A_PART * planned.part
-            planned.fault.way.strike(effects, Strike(planned.fault.place, planned.fault.number, column))
+            column = self._columns.get(planned.name, 0)
+            planned.fault.way.apply(effects, ActiveFault(planned.fault.place, planned.fault.number, column))
 
-    def told(self, at_work: tuple[int, ...]) -> NDArray[np.bool_]:
+    def told(self, active: tuple[int, ...]) -> NDArray[np.bool_]:
         """Groups (n,) that the allocation is told to leave out."""
         told = np.zeros(self._groups, dtype=np.bool_)
-        for i in at_work:
+        for i in active:
             if self._planned[i].fault.known:
                 told[self._planned[i].fault.place] = True
         return told
 
-    def marks(self, at_work: tuple[int, ...]) -> NDArray[np.float64]:
+    def marks(self, active: tuple[int, ...]) -> NDArray[np.float64]:
         """For every part the number of its mode, from 1 on, or 0 where it works."""
         marks = np.zeros(len(part_names(self._groups)))
-        for i in at_work:
+        for i in active:
             marks[self._planned[i].part] = 1 + MODES.index(self._planned[i].fault.mode)
         return marks
 
@@ -106,13 +104,11 @@ class FaultPlan:
                 began[place] = max(began[place], planned.first * self.period_s)
         return began
 
-    def _distance_from_the_coils(self, i: int) -> int:
-        return _KINDS.index(self._planned[i].fault.kind.name)
-
     def _in_ticks(self, fault: Fault) -> Planned:
         stretch = max(1, round(fault.number / self.period_s)) if fault.way.intermittent else 0
         end = NEVER if fault.end_s is None else self._tick(fault.end_s)
-        return Planned(fault, part_of(fault, self._groups), self._tick(fault.start_s), end, stretch)
+        name, part = part_name(fault, self._groups), part_of(fault, self._groups)
+        return Planned(fault, name, part, self._tick(fault.start_s), end, stretch)
 
     def _tick(self, t_s: float) -> int:
         periods = t_s / self.period_s
@@ -124,7 +120,8 @@ class FaultPlan:
             return False
         if not planned.stretch:
             return True
-        coin = np.random.default_rng([self._seed, STAGE, planned.part, tick // planned.stretch])
+        key = stream_key(f"{planned.name} intermittent")
+        coin = np.random.default_rng([self._seed, key, tick // planned.stretch])
         return bool(coin.random() < 0.5)
 
     @staticmethod
@@ -137,9 +134,19 @@ class FaultPlan:
         return min(planned.end, stretch)
 
 
-def draws_width(groups: int) -> int:
-    """Random numbers a tick: those of every part, then one for the sensor of each group's current."""
-    return COLUMNS_A_PART * len(part_names(groups)) + groups
+def noise_streams(faults: tuple[Fault, ...], groups: int) -> Streams:
+    """Random streams of the noise that faults bring, a part each."""
+    return tuple((f"{name} noise", COLUMNS_A_PART) for name in _noisy(faults, groups))
+
+
+def _noisy(faults: tuple[Fault, ...], groups: int) -> tuple[str, ...]:
+    """Names of the parts that faults make noisy."""
+    return tuple(dict.fromkeys(part_name(fault, groups) for fault in faults if fault.mode == "noise"))
+
+
+def part_name(fault: Fault, groups: int) -> str:
+    """Name of the part that a fault modifies, in its one spelling."""
+    return fault.kind.names(groups)[fault.place]
 
 
 @cache
@@ -149,7 +156,7 @@ def part_names(groups: int) -> tuple[str, ...]:
 
 
 def part_of(fault: Fault, groups: int) -> int:
-    """Place among all parts of the one that a fault strikes."""
+    """Place among all parts of the one that a fault modifies."""
     before = 0
     for target in TARGETS.values():
         if target is fault.kind:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.twin.electronics.driving.faulty import DriveFaults
-from spheretwin.twin.electronics.sensing.faulty import SensorFaults
+from spheretwin.twin.electronics.driving.chain import DriveChain
+from spheretwin.twin.electronics.sensing.chain import SensorChain
 
 # Far beyond any voltage, current or angle of the electronics; squares of it remain numbers.
 LARGEST = 1e6
@@ -32,31 +32,32 @@ class Value(NamedTuple):
 
 
 class Effects(NamedTuple):
-    """Where a fault acts: arrays that compiled code reads."""
+    """What faults modify: the stages, in arrays that compiled code reads."""
 
-    drive: DriveFaults
-    sensors: SensorFaults
+    drive: DriveChain
+    sensors: SensorChain
     group_gain: NDArray[np.float64]  # (n,) torque and back-EMF an ampere over those of the torque matrix
-    transconductance_A_V: float
-    volts_per_rad: float  # of the potentiometers
-    track_V: float  # across them
     period_s: float
     step_s: float
 
+    def fault_arrays(self) -> tuple[Any, ...]:
+        """Arrays that faults write."""
+        return self.drive, self.sensors, self.group_gain
 
-class Strike(NamedTuple):
-    """One failure at work."""
+
+class ActiveFault(NamedTuple):
+    """One fault that acts now."""
 
     place: int
     value: float
     column: int
-    """First of two columns of random numbers of its own."""
+    """First of two columns of random numbers of its part."""
 
 
 class Mode(NamedTuple):
     """How a part can fail."""
 
-    strike: Callable[[Effects, Strike], None]
+    apply: Callable[[Effects, ActiveFault], None]
     value: Value | None = None
     """None where it has none."""
     intermittent: bool = False
@@ -73,6 +74,8 @@ class Target(NamedTuple):
     each_group: bool = False
     needs_supply: bool = False
     """Whether it is there only where the amplifiers have a supply."""
+    measured: bool = False
+    """True if a fault changes the angles that the controller is handed."""
 
     def names(self, groups: int) -> tuple[str, ...]:
         """Every part of the kind, as a scenario names it."""

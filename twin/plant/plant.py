@@ -11,6 +11,7 @@ from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.copying import copy_into
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.twin.electronics.driving.stages import Stages, advance_currents, begin, end
+from spheretwin.twin.electronics.sensing.current import CurrentSensors
 from spheretwin.twin.plant.friction import Friction, slow_down
 from spheretwin.twin.plant.stepping import step
 
@@ -44,16 +45,17 @@ class Plant(NamedTuple):
     friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, mean over the physics step
     first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
     draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and of sensors of currents
-    current_noise_A: float
+    current_sensors: CurrentSensors
     marks: NDArray[np.float64]  # of every part that may fail: the number of its mode, or 0
     began_s: NDArray[np.float64]  # (n,) when the last fault of each group began, s; below 0 where none has
 
 
 class Delivered(NamedTuple):
-    """What acts over the first physics step of a control period: the plant's part of a telemetry row."""
+    """Currents and torque in a control period: the plant's part of a telemetry row."""
 
-    current: NDArray[np.float64]  # (n,) A
-    torque_S: NDArray[np.float64]  # (3,) N·m
+    current: NDArray[np.float64]  # (n,) A, mean over the first physics step
+    mean_current: NDArray[np.float64]  # (n,) A, mean over all physics steps taken
+    torque_S: NDArray[np.float64]  # (3,) N·m, in the first physics step
 
 
 @part_of_its_caller
@@ -107,6 +109,7 @@ def plant_tick(
             slow_down(friction, q, qdot, friction_q)
         fill_torque_matrix(middle_q, magnetics, G, scratch)
         advance_currents(driving, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
+        log_mean_current(mean_current, substep, delivered.mean_current)
         for j in range(pulling.shape[0]):
             pulling[j] = gain[j] * mean_current[j]
         rotor_torque(G, pulling, torque_S)
@@ -129,3 +132,12 @@ def plant_tick(
         if rotor.warnings[kind] > 0:
             return DIVERGED
     return GOING
+
+
+@part_of_its_caller
+def log_mean_current(current: NDArray[np.float64], substep: int, mean: NDArray[np.float64]) -> None:
+    """Update the mean (n,) over the physics steps of a control period with the one of number `substep`."""
+    share = 1.0 / (substep + 1)
+    for j in range(mean.shape[0]):
+        before = mean[j] if substep else 0.0
+        mean[j] = before + share * (current[j] - before)

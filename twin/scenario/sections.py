@@ -270,10 +270,15 @@ class Scenario(_Section):
         return self.detector.detect or any(fault.detect for fault in self.fault)
 
     @property
-    def draws_for_faults(self) -> bool:
-        """Whether faults, or what looks for them, have noise."""
-        noisy = any(fault.mode == "noise" for fault in self.fault)
-        return noisy or (self.detects and self.sensors.current.noise_A > 0)
+    def senses_currents(self) -> bool:
+        """True if there are sensors of the group currents."""
+        return self.detects or self.sensors.current.noise_A > 0
+
+    @property
+    def measures_truth(self) -> bool:
+        """True if the controller is handed the true angles and rates, whatever fails."""
+        faulty = any(fault.kind.measured for fault in self.fault)
+        return self.sensors.ideal and not faulty and self.estimator.kind == "ideal"
 
     @property
     def supervises_groups(self) -> bool:

@@ -1,4 +1,4 @@
-"""What both sides of a loop touch, and the stages that a fault can strike or that look after it."""
+"""What both sides of a loop touch, and the stages that a fault can modify or that look after it."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from spheretwin.control.supervision.groups import groups as all_in_use
 from spheretwin.control.supervision.watchdog import Watched, watchdog
 from spheretwin.models.actuator import Actuator
 from spheretwin.twin.electronics.driving import stages
-from spheretwin.twin.electronics.driving.faulty import FaultyDriving, drive_faults
+from spheretwin.twin.electronics.driving.chain import DriveChain, DriveFaults
 from spheretwin.twin.electronics.driving.stages import Stages
 from spheretwin.twin.electronics.sensing import stages as senses
-from spheretwin.twin.electronics.sensing.faulty import FaultySensing, sensor_faults
+from spheretwin.twin.electronics.sensing.chain import SensorChain, SensorFaults
+from spheretwin.twin.electronics.sensing.noise import Streams, width_of
 from spheretwin.twin.electronics.sensing.stages import Sensors
-from spheretwin.twin.faults.plan import FaultPlan, draws_width
+from spheretwin.twin.faults.fault_injector import FaultInjector
+from spheretwin.twin.faults.plan import FaultPlan, noise_streams
 from spheretwin.twin.faults.target import Effects
-from spheretwin.twin.faults.work import FaultsAtWork
 from spheretwin.twin.plant.plant import Plant
 from spheretwin.twin.scenario.sections import ResolvedNominal, ResolvedScenario, Scenario
 
@@ -42,8 +43,14 @@ class Wires(NamedTuple):
 
 def wires_of(scenario: Scenario, groups: int) -> Wires:
     """Wires of a scenario's loop."""
-    width = draws_width(groups) if scenario.draws_for_faults else 0
-    return Wires(np.ones(3), np.zeros(1, dtype=np.int64), np.zeros(width))
+    draws = np.zeros(width_of(fault_streams(scenario, groups)))
+    return Wires(np.ones(3), np.zeros(1, dtype=np.int64), draws)
+
+
+def fault_streams(scenario: Scenario, groups: int) -> Streams:
+    """Random streams of the noise of faults, and last, those of the sensors of currents."""
+    sensors = (("sensors.current noise", groups),) if scenario.sensors.current.noise_A > 0 else ()
+    return (*noise_streams(scenario.fault, groups), *sensors)
 
 
 def sensors_of(scenario: Scenario, wires: Wires) -> Sensors:
@@ -51,7 +58,7 @@ def sensors_of(scenario: Scenario, wires: Wires) -> Sensors:
     if not scenario.fault:
         return senses.made(scenario.sensors, scenario.seed)
     most_late = sum(_delays_s(scenario, "adc")) / scenario.controller.period_s
-    faults = sensor_faults(round(most_late), wires.fresh, wires.draws)
+    faults = SensorFaults(round(most_late), wires.fresh, wires.draws)
     return senses.made(scenario.sensors, scenario.seed, faults)
 
 
@@ -65,11 +72,11 @@ def driving_of(scenario: ResolvedScenario, groups: int, wires: Wires) -> Stages:
 
     A watchdog acts on the drive itself: it would else wait for commands that are on their way.
     """
-    step_s, faults, most_late = scenario.plant.step_s, None, 0
+    step_s, faults = scenario.plant.step_s, None
     if scenario.fault or scenario.watchdog.on:
-        faults = drive_faults(groups, wires.halt, wires.draws)
         most_late = round(sum(_delays_s(scenario, "controller")) / step_s)
-    return stages.made(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, most_late)
+        faults = DriveFaults(bool(scenario.fault), most_late, wires.halt, wires.draws)
+    return stages.made(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults)
 
 
 def supervision_of(scenario: ResolvedScenario, actuator: Actuator, wires: Wires) -> Supervision:
@@ -106,21 +113,11 @@ def _followed(nominal: ResolvedNominal, period_s: float) -> Followed:
     )
 
 
-def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: Groups) -> FaultsAtWork:
-    """Faults of a scenario, and the parts of its loop that they strike."""
+def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: Groups) -> FaultInjector:
+    """Faults of a scenario, and the stages of its loop that they modify."""
     period_s, count = scenario.controller.period_s, len(plant.current)
     plan = FaultPlan(scenario.fault, count, period_s, scenario.seed)
     effects = None
-    if isinstance(plant.driving, FaultyDriving) and isinstance(sensors, FaultySensing):
-        track = scenario.sensors.potentiometer
-        effects = Effects(
-            drive=plant.driving.faults,
-            sensors=sensors.faults,
-            group_gain=plant.group_gain,
-            transconductance_A_V=scenario.drive.transconductance_A_V,
-            volts_per_rad=track.volts_per_rad,
-            track_V=track.supply_V,
-            period_s=period_s,
-            step_s=scenario.plant.step_s,
-        )
-    return FaultsAtWork(plan, effects, groups, plant.marks, plant.began_s)
+    if isinstance(plant.driving, DriveChain) and isinstance(sensors, SensorChain):
+        effects = Effects(plant.driving, sensors, plant.group_gain, period_s, scenario.plant.step_s)
+    return FaultInjector(plan, effects, groups, plant.marks, plant.began_s)

@@ -12,10 +12,9 @@ from spheretwin.control.supervision.detector import (
     derived_ticks,
     detector,
     find,
-    restore,
-    state_of,
 )
 from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, groups
+from spheretwin.models.base.copying import restore_state, save_state
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.twin.electronics.data_sheet import drive_sheet
@@ -233,9 +232,9 @@ def test_a_state_is_all_it_goes_on_from(actuator):
             hold(watcher, state, draws.normal(size=COUNT) * 0.3, 1.0, qdot=qdot, actuator=actuator)
 
     ticks(one, first, generator.integers(100), 7)
-    restore(other, state_of(one))
+    restore_state(other, save_state(one), "detector")
     second.out[:], second.out_s[:], second.some_out[:] = first.out, first.out_s, first.some_out
     ticks(one, first, 5, 20)
     ticks(other, second, 5, 20)
-    assert state_of(other).tobytes() == state_of(one).tobytes()
+    assert save_state(other).tobytes() == save_state(one).tobytes()
     assert second.out.tolist() == first.out.tolist()

@@ -14,10 +14,9 @@ from spheretwin.control.supervision.groups import (
     TOLD,
     groups,
     leave_out,
-    restore,
-    state_of,
     tell,
 )
+from spheretwin.models.base.copying import restore_state, save_state
 from spheretwin.models.magnetics import torque_matrix
 
 COUNT, LIMIT_A = 18, 8.0
@@ -103,7 +102,7 @@ def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
 def test_a_state_is_all_there_is(out, t_s):
     made, other = groups(COUNT), groups(COUNT)
     made.out[:], made.out_s[:] = out, t_s
-    restore(other, state_of(made))
+    restore_state(other, save_state(made), "groups")
     assert other.out.tolist() == out
     assert other.out_s.tolist() == [t_s] * COUNT
     assert other.some_out[0] == any(out)

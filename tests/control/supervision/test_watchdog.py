@@ -16,12 +16,11 @@ from spheretwin.control.supervision.watchdog import (
     carried_on,
     mend,
     over,
-    restore,
-    state_of,
     trip,
     watch,
     watchdog,
 )
+from spheretwin.models.base.copying import restore_state, save_state
 
 PERIOD_S, NOISE_RAD, QUANTUM_RAD = 1e-3, np.array([3e-4, 3e-4, 0.0]), np.array([8e-5, 8e-5, 3e-3])
 RANGE_RAD = np.array([[-1.4, 1.4], [-1.4, 1.4], [-np.inf, np.inf]])
@@ -129,13 +128,13 @@ def test_a_state_is_all_it_goes_on_from(samples):
     one, other = made(), made()
     for place, (angle, rate, fresh) in enumerate(samples):
         if place == len(samples) // 2:
-            restore(other, state_of(one))
+            restore_state(other, save_state(one), "watchdog")
         one.fresh[0] = other.fresh[0] = fresh
         for each in (one, other) if place >= len(samples) // 2 else (one,):
             looked(each, [angle, 0, 0], [rate, 0, 0])
             over(each)
     if samples:
-        assert state_of(other).tobytes() == state_of(one).tobytes()
+        assert save_state(other).tobytes() == save_state(one).tobytes()
 
 
 def test_one_that_was_off_begins_anew():

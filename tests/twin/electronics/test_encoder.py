@@ -5,13 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.sensing.encoder import EncoderSection, counted, encoder
+from spheretwin.twin.electronics.sensing.encoder import EncoderSection, counted
+from spheretwin.twin.electronics.sensing.stage import SensorSetup
 
 COUNTS = st.integers(1, 2**20)
 
 
 def made(counts):
-    return encoder(EncoderSection(counts=counts))
+    setup = SensorSetup(None, 0, "encoder", first_draw=0, faults=False, most_late_ticks=0)
+    return EncoderSection(counts=counts).build(setup)
 
 
 @given(st.floats())

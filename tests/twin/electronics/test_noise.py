@@ -7,20 +7,21 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from spheretwin.twin.disturbances.draws import term_draws
-from spheretwin.twin.electronics.sensing.noise import STAGE, noise_rows
+from spheretwin.twin.electronics.sensing.noise import noise_rows, noise_table, width_of
+from spheretwin.twin.electronics.streams import stream_key
 
-SEED, TICKS, WIDTH = 7, 400, 11
+SEED, TICKS, WIDTH, NAME = 7, 400, 11, "adc noise"
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return noise_rows(SEED, 0, TICKS, WIDTH)
+    return noise_rows(SEED, 0, TICKS, WIDTH, NAME)
 
 
 @given(first=st.integers(0, TICKS - 1), ticks=st.integers(0, 40), width=st.integers(0, WIDTH))
 def test_neither_blocks_nor_further_columns_move_a_bit(whole, first, ticks, width):
     ticks = min(ticks, TICKS - first)
-    rows = noise_rows(SEED, first, ticks, width)
+    rows = noise_rows(SEED, first, ticks, width, NAME)
     assert rows.shape == (ticks, width)
     np.testing.assert_array_equal(rows, whole[first : first + ticks, :width])
 
@@ -28,7 +29,7 @@ def test_neither_blocks_nor_further_columns_move_a_bit(whole, first, ticks, widt
 def test_a_number_is_that_of_its_tick_alone(whole):
     for tick, column in ((0, 0), (3, 1), (250, 6), (399, 10)):
         block, place = divmod(column, 4)
-        stream = np.random.Philox(np.random.SeedSequence([SEED, STAGE, block])).advance(tick)
+        stream = np.random.Philox(np.random.SeedSequence([SEED, stream_key(NAME), block])).advance(tick)
         uniform = np.random.Generator(stream).random(4)
         pair = place % 2
         radius = np.sqrt(-2 * np.log(1 - uniform[pair]))
@@ -37,25 +38,37 @@ def test_a_number_is_that_of_its_tick_alone(whole):
 
 
 def test_numbers_are_normal_and_independent():
-    rows = noise_rows(1, 0, 50_000, 8)
+    rows = noise_rows(1, 0, 50_000, 8, NAME)
     for column in rows.T:
         assert kstest(column, "norm").pvalue > 1e-3  # one fixed draw of eight: 0.8 % would fall below
     followed = np.concatenate([rows[1:], rows[:-1], rows[1:] ** 2 - 1], axis=1)
     related = np.corrcoef(followed.T) - np.eye(24)
-    # 276 coefficients, each 1/√n or, among the squares, as small: five of its deviations.
+    for column in range(8):  # a number and its own square: E[x²(x² - 1)²] / 2 = 5 times the variance
+        related[column, 16 + column] /= np.sqrt(5)
+        related[16 + column, column] /= np.sqrt(5)
+    # 276 coefficients of a deviation of 1/√n: five of these.
     assert np.abs(related).max() < 5 / np.sqrt(50_000)
     assert np.abs(rows).max() < 8.6
 
 
 def test_streams_are_those_of_the_seed_and_of_nothing_else(whole):
-    assert not np.any(noise_rows(SEED + 1, 0, TICKS, WIDTH) == whole)
-    uniform = np.random.Generator(np.random.Philox(np.random.SeedSequence([SEED, STAGE, 0]))).random(
-        4 * TICKS
-    )
+    assert not np.any(noise_rows(SEED + 1, 0, TICKS, WIDTH, NAME) == whole)
+    uniform = np.random.Generator(
+        np.random.Philox(np.random.SeedSequence([SEED, stream_key(NAME), 0]))
+    ).random(4 * TICKS)
     for place in range(5):
         assert not np.isin(term_draws(SEED, 0, TICKS, place), uniform).any()
 
 
 @pytest.mark.parametrize("seed", [0, 2**32, 2**64 + 1, 10**40])
 def test_any_seed_will_do(seed):
-    assert np.isfinite(noise_rows(seed, 10**12, 5, 3)).all()
+    assert np.isfinite(noise_rows(seed, 10**12, 5, 3, NAME)).all()
+
+
+def test_streams_of_other_names_move_no_bit(whole):
+    streams = (("pot.alpha noise", 2), (NAME, WIDTH), ("coil.03 noise", 5))
+    table = noise_table(SEED, 30, 50, streams)
+    assert table.shape == (50, width_of(streams))
+    np.testing.assert_array_equal(table[:, 2 : 2 + WIDTH], whole[30:80])
+    assert not np.isin(np.delete(table, slice(2, 2 + WIDTH), axis=1), whole).any()
+    assert noise_table(SEED, 0, 5, ()).shape == (5, 0)

@@ -12,9 +12,10 @@ from scipy.optimize import minimize_scalar
 from spheretwin.models.base.compiled import compiled
 from spheretwin.twin import electronics
 from spheretwin.twin.electronics.hardware import PROTOTYPE_SENSORS
-from spheretwin.twin.electronics.sensing.chain import noise_width, sense, sensing
-from spheretwin.twin.electronics.sensing.noise import noise_rows
+from spheretwin.twin.electronics.sensing.chain import noise_streams, sense, sensor_chain
+from spheretwin.twin.electronics.sensing.noise import noise_rows, noise_table, width_of
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
+from spheretwin.twin.electronics.streams import stream_key
 from spheretwin.twin.scenario.fields import every_field
 
 NO_NOISE = np.empty(0)
@@ -36,7 +37,7 @@ def prototype(**more):
 
 def measured(section, seed, q, first=0):
     """Angles (n, 3) that are handed over at poses q (n, 3) of consecutive ticks."""
-    sensors, noise = sensing(section, seed), noise_rows(seed, first, len(q), noise_width(section))
+    sensors, noise = sensor_chain(section, seed), noise_table(seed, first, len(q), noise_streams(section))
     measurement, angles = np.empty((3, 3)), np.empty_like(q)
     for tick in range(len(q)):
         assert sense(sensors, q[tick], q[tick], noise[tick], measurement)
@@ -62,12 +63,13 @@ def poses(ticks, seed=0):
 @given(q=st.tuples(*[st.floats(allow_nan=False)] * 3), qdot=st.tuples(*[st.floats(allow_nan=False)] * 3))
 def test_an_ideal_chain_hands_over_the_very_bits(section, q, qdot):
     measurement, state = np.full((3, 3), 7.0), np.array([q, qdot])
-    sensors = sensing(section, 0)
+    sensors = sensor_chain(section, 0)
     assert sense(sensors, state[0], state[1], NO_NOISE, measurement) == np.isfinite(state).all()
     assert measurement[:2].tobytes() == state.tobytes()
     np.testing.assert_array_equal(measurement[2], 7.0)  # the torque believed, which is another's
-    assert sensors.ideal
-    assert noise_width(section) == 0
+    assert not sensors.shifts
+    assert not any(stage.on for stage in sensors.stages)
+    assert width_of(noise_streams(section)) == 0
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -82,17 +84,20 @@ def test_a_stage_touches_its_own_angles_alone(stage):
 
 
 def test_one_stage_moves_no_draw_of_another():
-    together, alone = sensing(SensorsSection(**STAGES), 3), {}
+    together, alone = sensor_chain(SensorsSection(**STAGES), 3), {}
     for stage, fields in STAGES.items():
-        alone[stage] = sensing(SensorsSection(**{stage: fields}), 3)
+        alone[stage] = sensor_chain(SensorsSection(**{stage: fields}), 3)
     for channel in range(2):
         for got, expected in zip(
-            alone["potentiometer"].potentiometers[channel], together.potentiometers[channel], strict=True
+            alone["potentiometer"].stage("potentiometer").channels[channel],
+            together.stage("potentiometer").channels[channel],
+            strict=True,
         ):
             np.testing.assert_array_equal(got, expected)
-        assert alone["adc"].adcs[channel] == together.adcs[channel]
-    assert np.all(together.potentiometers[0].cosine_rad != together.potentiometers[1].cosine_rad)
-    assert together.adcs[0].offset_V != together.adcs[1].offset_V
+        assert alone["adc"].stage("adc").channels[channel] == together.stage("adc").channels[channel]
+    tracks, converters = together.stage("potentiometer").channels, together.stage("adc").channels
+    assert np.all(np.array(tracks[0].cosine_rad) != np.array(tracks[1].cosine_rad))
+    assert converters[0].offset_V != converters[1].offset_V
 
 
 def test_a_mounting_error_alone_is_added_to_each_angle():
@@ -103,7 +108,7 @@ def test_a_mounting_error_alone_is_added_to_each_angle():
 
 
 def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
-    sensors, measurement = sensing(prototype(), 0), np.zeros((3, 3))
+    sensors, measurement = sensor_chain(prototype(), 0), np.zeros((3, 3))
     rates = np.array([1.0, -2.0, 3.0])
     sense(sensors, np.array([0.1, 0.2, 0.3]), rates, np.zeros(2), measurement)
     np.testing.assert_array_equal(measurement[1], rates)
@@ -112,7 +117,9 @@ def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
 def slow_residual(fields, seed, channel, angle):
     """The residual as its definition reads, its peak found on a grid and searched for further."""
     order = np.arange(1, 5)
-    phases = np.random.default_rng([seed, 1, channel]).uniform(0, 2 * np.pi, 4)
+    phases = np.random.default_rng([seed, stream_key("sensors.potentiometer"), channel]).uniform(
+        0, 2 * np.pi, 4
+    )
 
     def shape(turn):
         return np.sum(np.cos(np.multiply.outer(turn, order) + phases) / order**2, axis=-1)
@@ -132,7 +139,8 @@ def slow_residual(fields, seed, channel, angle):
 def slow_chain(section, seed, q):
     """The chain of α, β and γ in NumPy, all ticks at once."""
     track, converter = section.potentiometer, section.adc
-    draws = noise_rows(seed, 0, len(q), 2 * converter.oversampling).reshape(len(q), converter.oversampling, 2)
+    draws = noise_rows(seed, 0, len(q), 2 * converter.oversampling, "sensors.adc noise")
+    draws = draws.reshape(len(q), converter.oversampling, 2)
     turned = q + np.array(section.angle_offset_rad)
     angles = np.empty_like(q)
     slope = track.supply_V / track.electrical_angle_rad
@@ -143,7 +151,7 @@ def slow_chain(section, seed, q):
         angle = angle + slow_residual(track, seed, channel, angle)
         volts = np.clip(slope * angle, -track.supply_V / 2, track.supply_V / 2)
         volts = volts[:, None] + noise * draws[:, :, channel]
-        shares = np.random.default_rng([seed, 2, channel]).uniform(-1, 1, 2)
+        shares = np.random.default_rng([seed, stream_key("sensors.adc"), channel]).uniform(-1, 1, 2)
         volts = (1 + converter.gain_error * shares[1]) * volts + converter.offset_V * shares[0]
         if converter.bits:
             step = 2 * converter.range_V / 2**converter.bits
@@ -243,8 +251,8 @@ SECTIONS = st.builds(
 def sensed(section, state, draws):
     """What is returned, and what is handed over, with draws repeated to the width needed."""
     measurement = np.zeros((3, 3))
-    noise = np.resize(np.array(draws), noise_width(section))
-    finite = sense(sensing(section, 0), np.array(state[:3]), np.array(state[3:]), noise, measurement)
+    noise = np.resize(np.array(draws), width_of(noise_streams(section)))
+    finite = sense(sensor_chain(section, 0), np.array(state[:3]), np.array(state[3:]), noise, measurement)
     return finite, measurement[:2]
 
 
@@ -277,12 +285,12 @@ def test_no_stage_makes_a_number_of_none(place):
 
 def test_a_short_row_of_noise_is_no_number_either():
     measurement = np.zeros((3, 3))
-    assert not sense(sensing(prototype(), 0), np.zeros(3), np.zeros(3), NO_NOISE, measurement)
+    assert not sense(sensor_chain(prototype(), 0), np.zeros(3), np.zeros(3), NO_NOISE, measurement)
 
 
 def test_sensing_allocates_nothing():
     section = prototype(**{"sensors.adc.oversampling": 4})
-    arguments = (sensing(section, 0), np.zeros(3), np.zeros(3), np.zeros(8), np.zeros((3, 3)))
+    arguments = (sensor_chain(section, 0), np.zeros(3), np.zeros(3), np.zeros(8), np.zeros((3, 3)))
     _nrt_python.memsys_enable_stats()
 
     def allocations(count):

@@ -8,8 +8,8 @@ from spheretwin.control.estimation.registry import ESTIMATORS
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin import assembly, cli
 from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.electronics.sensing.chain import noise_width, sense, sensing
-from spheretwin.twin.electronics.sensing.noise import noise_rows
+from spheretwin.twin.electronics.sensing.chain import noise_streams, sense, sensor_chain
+from spheretwin.twin.electronics.sensing.noise import noise_table
 from spheretwin.twin.scenario import flags
 from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.session import Session
@@ -29,8 +29,8 @@ def test_the_law_is_handed_what_the_stages_make_of_the_true_state(kind, engine):
     scenario = prototype(**{"estimator.kind": kind, "plant.engine": engine})
     run = simulate(scenario)
     table, resolved = run.telemetry, run.scenario
-    chain = sensing(resolved.sensors, resolved.seed)
-    noise = noise_rows(resolved.seed, 0, len(table), noise_width(resolved.sensors))
+    chain = sensor_chain(resolved.sensors, resolved.seed)
+    noise = noise_table(resolved.seed, 0, len(table), noise_streams(resolved.sensors))
     measurement = np.empty((3, 3))
     angles = np.empty((len(table), 3))
     for tick, (q, qdot) in enumerate(zip(table["q_rad"], table["qdot_rad_s"], strict=True)):

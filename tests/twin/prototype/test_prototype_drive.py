@@ -10,7 +10,7 @@ from spheretwin.models.magnetics import torque_matrix
 from spheretwin.twin import cli
 from spheretwin.twin import scenario as scenarios
 from spheretwin.twin.electronics.driving.amplifier import drive_coils
-from spheretwin.twin.electronics.driving.chain import begin, driving, end
+from spheretwin.twin.electronics.driving.chain import begin, drive_chain, end
 from spheretwin.twin.electronics.driving.coil import back_emf
 from spheretwin.twin.electronics.driving.delay import due
 from spheretwin.twin.electronics.hardware import PROTOTYPE_DRIVE
@@ -31,7 +31,7 @@ def test_currents_are_what_the_stages_make_of_the_commands(engine, delay_s):
     clock = {"plant.engine": engine, "plant.step_s": 1e-3, "drive.delay_s": delay_s}
     with Session(driven(**clock)) as session:
         table, actuator, resolved = session.advance(100), session.actuator, session.scenario
-    stages, groups = driving(resolved.drive, 1e-3, 1, 18, resolved.seed), 18
+    stages, groups = drive_chain(resolved.drive, 1e-3, 1, 18, resolved.seed), 18
     current, emf = np.zeros(groups), np.empty(groups)
     for tick in range(100):
         begin(stages, table["current_command_A"][tick].copy())

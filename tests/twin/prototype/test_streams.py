@@ -1,33 +1,53 @@
 """Numbers of many streams against NumPy's own generators, bit for bit."""
 
+from hashlib import blake2b
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.streams import errors, uniforms
+from spheretwin.twin.electronics import streams
+from spheretwin.twin.electronics.driving.sections import STAGES as DRIVE_STAGES
+from spheretwin.twin.electronics.sensing.sections import STAGES as SENSOR_STAGES
+from spheretwin.twin.electronics.streams import errors, stream_key, uniforms
+from spheretwin.twin.faults.plan import part_names
 
 # One word of entropy for a seed, two, and more than the pool of four words holds.
 SEEDS = [0, 1, 2**32 - 1, 2**32, 2**53 - 1, 2**64, 2**200 + 12345]
 
 
-def theirs(seed, stage, channel):
-    return np.random.default_rng([seed, stage, channel])
+def theirs(seed, name, channel):
+    key = int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little")
+    return np.random.default_rng([seed, key, channel])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_streams_are_those_of_numpy(seed):
-    drawn, shares = uniforms(seed, 101, 18, 5), errors(seed, 101, 18, 5)
+    drawn, shares = uniforms(seed, "dac", 18, 5), errors(seed, "dac", 18, 5)
     for channel in range(18):
-        np.testing.assert_array_equal(drawn[channel], theirs(seed, 101, channel).random(5))
-        np.testing.assert_array_equal(shares[channel], theirs(seed, 101, channel).uniform(-1, 1, 5))
+        np.testing.assert_array_equal(drawn[channel], theirs(seed, "dac", channel).random(5))
+        np.testing.assert_array_equal(shares[channel], theirs(seed, "dac", channel).uniform(-1, 1, 5))
 
 
-@given(st.integers(0, 2**96), st.integers(0, 2**32 - 1), st.integers(1, 4), st.integers(0, 40))
-def test_so_are_those_of_any_seed_and_stage(seed, stage, channels, count):
-    wanted = [theirs(seed, stage, channel).random(count) for channel in range(channels)]
-    np.testing.assert_array_equal(uniforms(seed, stage, channels, count), wanted)
+@given(st.integers(0, 2**96), st.text(), st.integers(1, 4), st.integers(0, 40))
+def test_so_are_those_of_any_seed_and_name(seed, name, channels, count):
+    wanted = [theirs(seed, name, channel).random(count) for channel in range(channels)]
+    np.testing.assert_array_equal(uniforms(seed, name, channels, count), wanted)
+
+
+def test_a_key_with_one_word_is_hashed_as_numpy_does(monkeypatch):
+    """One key in 2³² has no second word, which then is not hashed."""
+    monkeypatch.setattr(streams, "stream_key", lambda name: 101)
+    np.testing.assert_array_equal(uniforms(7, "any", 1, 5)[0], np.random.default_rng([7, 101, 0]).random(5))
+
+
+def test_names_of_parts_are_streams_of_their_own():
+    stages = [f"sensors.{name}" for name in SENSOR_STAGES] + [f"drive.{name}" for name in DRIVE_STAGES]
+    parts = [*part_names(18), *stages, "sensors.current"]
+    names = [f"{part}{kind}" for part in parts for kind in ("", " noise", " intermittent")]
+    assert len({stream_key(name) for name in names}) == len(names)
 
 
 def test_neither_channels_nor_numbers_move_what_others_draw():
-    np.testing.assert_array_equal(uniforms(7, 1, 18, 6)[:3, :2], uniforms(7, 1, 3, 2))
+    np.testing.assert_array_equal(uniforms(7, "adc", 18, 6)[:3, :2], uniforms(7, "adc", 3, 2))

@@ -6,6 +6,7 @@ control period are one, so that the logged mean current is that of the whole per
 """
 
 from functools import cache
+from hashlib import blake2b
 
 import numpy as np
 import pytest
@@ -23,9 +24,7 @@ NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 VOLTS_PER_RAD = 5 / np.radians(300)
 TRANSCONDUCTANCE_A_V = 0.8
 R20_OHM, L_H, RATE_1_S, LIMIT_A = 1.3, 0.9e-3, 2 * np.pi * 2000, 8.0
-ORDER = ("coil", "amplifier", "dac", "pot", "encoder", "adc", "supply", "controller")
 PLACES = {"pot.alpha": 0, "pot.beta": 1}
-FIRST_PART = dict(zip(ORDER, np.cumsum([0, 18, 18, 18, 2, 1, 1, 1]), strict=True))
 
 FAULTS = [
     ("coil.03", "short", 0.05, 0.30, None),
@@ -84,9 +83,20 @@ def as_tables(faults):
     ]
 
 
-def draw(stage, column, tick):
+def key(name):
+    """What the streams of a part are keyed by."""
+    return int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little")
+
+
+def drawn(name, channel):
+    """Generator of the errors of a channel."""
+    return np.random.default_rng([SEED, key(name), channel])
+
+
+def draw(name, column, tick):
     """One number of the documented streams: four of each tick from four uniform ones, by Box and Muller."""
-    counted = np.random.Philox(np.random.SeedSequence([SEED, stage, column // 4])).advance(tick)
+    counted = np.random.Philox(np.random.SeedSequence([SEED, key(f"{name} noise"), column // 4]))
+    counted = counted.advance(tick)
     u, v, phi, psi = np.random.Generator(counted).random(4)
     r, s = np.sqrt(-2 * np.log1p(-u)), np.sqrt(-2 * np.log1p(-v))
     return (
@@ -101,17 +111,18 @@ class Copy:
     def __init__(self, faults, actuator):
         self.faults, self.actuator, self.tick_number = faults, actuator, 0
         self.residuals = [self.residual(channel) for channel in range(2)]
-        self.adc = [np.random.default_rng([SEED, 2, channel]).uniform(-1, 1, 2) for channel in range(2)]
-        dac = np.array([np.random.default_rng([SEED, 101, j]).uniform(-1, 1, 5) for j in range(GROUPS)])
+        self.adc = [drawn("sensors.adc", channel).uniform(-1, 1, 2) for channel in range(2)]
+        dac = np.array([drawn("drive.dac", j).uniform(-1, 1, 5) for j in range(GROUPS)])
         self.dac_offset_V, self.dac_gain = 2e-3 * dac[:, 0], 1 + 1e-3 * dac[:, 1]
         self.inl = 4 * dac[:, 2:] / np.maximum(1, np.abs(dac[:, 2:]).sum(axis=1))[:, None]
         self.amplifier_A = np.array(
-            [8e-4 * np.random.default_rng([SEED, 102, j]).uniform(-1, 1) for j in range(GROUPS)]
+            [8e-4 * drawn("drive.amplifier", j).uniform(-1, 1) for j in range(GROUPS)]
         )
         self.wiper, self.converted, self.handed = np.zeros((3, 3))
         self.voltages, self.sent = [], [np.zeros(GROUPS)]
-        self.asked, self.current, self.temperature = np.zeros(GROUPS), np.zeros(GROUPS), np.full(GROUPS, 20.0)
-        self.state, self.gain = None, self.kalman_gain()
+        self.latched, self.asked, self.current = np.zeros((3, GROUPS))
+        self.temperature = np.full(GROUPS, 20.0)
+        self.state, self.gain, self.last_rate = None, self.kalman_gain(), None
 
     @staticmethod
     def kalman_gain():
@@ -129,7 +140,7 @@ class Copy:
     @staticmethod
     def residual(channel):
         order = np.arange(1, 5)
-        phases = np.random.default_rng([SEED, 1, channel]).uniform(0, 2 * np.pi, 4)
+        phases = drawn("sensors.potentiometer", channel).uniform(0, 2 * np.pi, 4)
 
         def shape(turn):
             return np.sum(np.cos(np.multiply.outer(turn, order) + phases) / order**2, axis=-1)
@@ -145,29 +156,28 @@ class Copy:
         return lambda angle: np.radians(0.02) / -found.fun * shape(angle * 2 * np.pi / np.radians(300))
 
     def acting(self, kind, place=None):
-        """Faults of a kind at this tick, in the order of the plan: mode, value, its first draw's column."""
+        """Faults of a kind at this tick, in the order of the plan: mode, value, name of the part."""
         for target, mode, start, end, value in self.faults:
             name, _, where = target.partition(".")
             number = PLACES.get(target, int(where) if where.isdecimal() else 0)
             first, last = round(start / PERIOD_S), np.inf if end is None else round(end / PERIOD_S)
-            part = FIRST_PART[name] + number
             if name == kind and place in (None, number) and first <= self.tick_number < last:
                 if mode == "intermittent":
                     stretch = self.tick_number // round(value / PERIOD_S)
-                    if np.random.default_rng([SEED, 201, part, stretch]).random() < 0.5:
-                        yield COMES_AND_GOES[name], None, 2 * part
+                    if drawn(f"{target} intermittent", stretch).random() < 0.5:
+                        yield COMES_AND_GOES[name], None, target
                 else:
-                    yield mode, value, 2 * part
+                    yield mode, value, target
 
     def through(self, faults, value, last, unit, channel=0):
         """A value behind what is wrong with a line, fault by fault; `unit` takes what is stated to it."""
-        for mode, stated, column in faults:
+        for mode, stated, part in faults:
             if mode == "offset":
                 value = value + unit * stated
             elif mode == "gain":
                 value = value * stated
             elif mode == "noise":
-                value = value + unit * stated * draw(4, column + channel, self.tick_number)
+                value = value + unit * stated * draw(part, channel, self.tick_number)
             elif mode == "stuck":
                 value = last if stated is None else unit * stated
             elif mode == "dropout":
@@ -188,7 +198,7 @@ class Copy:
             noise = np.hypot(VOLTS_PER_RAD * np.radians(0.02), 5 / 2**16)
             codes = []
             for k in range(CONVERSIONS):
-                seen = volts + noise * draw(3, 2 * k + channel, self.tick_number)
+                seen = volts + noise * draw("sensors.adc", 2 * k + channel, self.tick_number)
                 seen = (1 + 1e-3 * self.adc[channel][1]) * seen + 1e-3 * self.adc[channel][0]
                 codes.append(np.clip(np.round(seen / (5 / 2**16)), -(2**15), 2**15 - 1))
             volts = np.mean(codes) * 5 / 2**16
@@ -235,17 +245,21 @@ class Copy:
         self.sent.append(leaving)
         asked = self.sent[max(len(self.sent) - 1 - late, 0)].copy()
         for j in range(GROUPS):
-            asked[j] = self.through(self.acting("dac", j), asked[j], self.asked[j], TRANSCONDUCTANCE_A_V)
+            asked[j] = self.through(self.acting("dac", j), asked[j], self.latched[j], TRANSCONDUCTANCE_A_V)
+            self.latched[j] = asked[j]
             lines = [fault for fault in self.acting("amplifier", j) if fault[0] != "open"]
             asked[j] = self.through(lines, asked[j], self.asked[j], 1.0)
         self.asked = asked
 
     def drive(self, q, qdot):
         supply = 24.0
-        for mode, value, column in self.acting("supply"):
-            supply = self.through([(mode, value, column)], supply, None, 1.0)
+        for mode, value, part in self.acting("supply"):
+            supply = self.through([(mode, value, part)], supply, None, 1.0)
         supply = max(supply, 0.0)
-        G = torque_matrix(q, self.actuator)
+        # The field is that of the predicted pose in the middle of the step, which is the period.
+        middle_rate = qdot + 0.5 * (qdot - (qdot if self.last_rate is None else self.last_rate))
+        middle, self.last_rate = q + 0.5 * PERIOD_S * qdot, qdot
+        G = torque_matrix(middle, self.actuator)
         turns = np.ones(GROUPS)
         R = R20_OHM * (1 + 0.0039 * (self.temperature - 20))
         mean, copper, drawn = np.zeros((3, GROUPS))
@@ -256,7 +270,7 @@ class Copy:
             wrong |= {mode for mode, *_ in self.acting("amplifier", j)}
             for mode, value, _ in self.acting("coil", j):
                 turns[j] *= value if mode == "gain" else 1.0
-            emf = turns[j] * (G[:, j] @ (rate_jacobian(q) @ qdot))
+            emf = turns[j] * (G[:, j] @ (rate_jacobian(middle) @ middle_rate))
             target = np.clip(self.asked[j] + self.amplifier_A[j], -LIMIT_A, LIMIT_A)
             if "open" in wrong:
                 self.current[j] = 0.0

@@ -201,3 +201,36 @@ def test_a_snapshot_that_does_not_fit_is_refused_and_nothing_changes(sticky):
         with pytest.raises(InputError, match=part):
             other.restore(snapshot)
         assert same_future(other, untouched)
+
+
+def test_every_part_s_numbers_are_counted_before_anything_is_restored():
+    """One number more or fewer anywhere: refused by name, and the session goes on as before."""
+    changes = {
+        "hardware": "prototype", "plant.engine": "lagrangian", "detector.detect": True,
+        "fault": [{"target": "adc", "mode": "delay", "value": 2e-3, "start_s": 1.0}],
+    }  # fmt: skip
+    mine = session(**changes)
+    mine.advance(20)
+    taken = mine.snapshot()
+    expected = rows(mine.advance(20))
+    mine.restore(taken)
+    machine = taken.machine
+    wrong = [
+        (name, machine._replace(parts={**machine.parts, name: numbers}))
+        for name, saved in machine.parts.items()
+        for numbers in (saved[1:], np.append(saved, 0.0))
+        if numbers.size != saved.size
+    ]
+    assert {name for name, _ in wrong} == set(machine.parts)
+    assert len(machine.parts) > 10
+    for name, state in wrong:
+        with pytest.raises(InputError, match=f"expected a snapshot with .* numbers of {name}, received"):
+            mine.restore(dataclasses.replace(taken, machine=state))
+    for part, state in (
+        ("the engine's state", machine._replace(rotor=machine.rotor[1:])),
+        ("the last command", machine._replace(last=machine.last._replace(command=np.zeros(3)))),
+        ("the last pose", machine._replace(last=machine.last._replace(q=np.zeros(2)))),
+    ):
+        with pytest.raises(InputError, match=part):
+            mine.restore(dataclasses.replace(taken, machine=state))
+    assert rows(mine.advance(20)) == expected

@@ -25,29 +25,27 @@ of the offset (20 µV/K).
 from __future__ import annotations
 
 from math import inf, isnan, log1p, nan
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.twin.electronics.driving.coil import Coil
 from spheretwin.twin.electronics.driving.relaxation import Relaxation, relaxation
+from spheretwin.twin.electronics.driving.stage import DriveSetup, DriveStage
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line
 from spheretwin.twin.electronics.streams import errors
-
-# What separates the draws of this stage from those of any other under the same seed.
-STAGE = 102
 
 # No motion of the rotor induces as much: squares of currents remain numbers, whatever comes in.
 LARGEST_EMF_V = 1e9
 
 
-class AmplifierSection(BaseModel):
+class AmplifierSection(DriveStage):
     """Amplifiers of the groups; without a supply, they are none of these."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
+    stage: ClassVar[str] = "amplifier"
     supply_V: Annotated[float, Field(ge=1e-3, le=1e6)] | None = Field(
         None,
         description="supply, plus and minus, V; without one the current follows with time_constant_s alone"
@@ -85,6 +83,23 @@ class AmplifierSection(BaseModel):
             )
         return self
 
+    @staticmethod
+    def ideal(section: Any) -> bool:
+        """Always: what an amplifier is asked for is the target of `drive_coils`."""
+        return True
+
+    @staticmethod
+    def build(section: Any, setup: DriveSetup) -> Any:
+        """Inputs of the amplifiers, which only faults change."""
+        return AmplifierStage(setup.faults, fault_line(setup.groups * setup.faults, 0.0))
+
+
+class AmplifierStage(NamedTuple):
+    """Inputs of the amplifiers as a stage of the drive."""
+
+    on: bool
+    line: FaultLine  # of what the amplifiers are asked for, A
+
 
 class Amplifier(NamedTuple):
     """Amplifiers of all groups as compiled code sees them."""
@@ -116,7 +131,9 @@ def amplifier(
 
     Offsets are drawn uniformly within their bound, each from a stream of its own.
     """
-    drawn = errors(seed, STAGE, groups, 1)[:, 0] if section.amplifier_offset_V else np.zeros(groups)
+    drawn = (
+        errors(seed, "drive.amplifier", groups, 1)[:, 0] if section.amplifier_offset_V else np.zeros(groups)
+    )
     supply_V = inf if section.supply_V is None else section.supply_V
     return Amplifier(
         supplied=section.supply_V is not None,

@@ -1,44 +1,119 @@
-"""From commands to currents: the stages of all groups, one after the other, over a control period."""
+"""From commands to currents: the stages of all groups, one after the other, over a control period.
+
+Once a control tick the stages convert the command, which is then delayed. At each physics step the command
+in force passes the stages again, and is what the amplifiers are asked for. A fault modifies a stage, by its
+fault line or by a field of its own. Faults of converters and amplifiers act behind the delay, where a
+converter latches. Faults of the coils change how they are connected, those of the supply its voltage, those
+of the controller its output.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.copying import transfer_state
 from spheretwin.models.kinematics import angular_velocity
 from spheretwin.twin.electronics.driving.amplifier import Amplifier, Flow, amplifier, clear, drive_coils, flow
-from spheretwin.twin.electronics.driving.coil import Coil, back_emf, coil, overheated, settle_resistance, warm
-from spheretwin.twin.electronics.driving.dac import Dac, convert, dac
-from spheretwin.twin.electronics.driving.delay import Delay, delay, due, latch
+from spheretwin.twin.electronics.driving.coil import (
+    DRIVEN,
+    OPEN,
+    SHORTED,
+    Coil,
+    back_emf,
+    coil,
+    overheated,
+    settle_resistance,
+    warm,
+)
+from spheretwin.twin.electronics.driving.delay import Delay, delay, due, latch, transfer_delay
 from spheretwin.twin.electronics.driving.lag import Drive, drive
 from spheretwin.twin.electronics.driving.lag import advance as follow
-from spheretwin.twin.electronics.driving.sections import ResolvedDrive
+from spheretwin.twin.electronics.driving.sections import STAGES, ResolvedDrive
+from spheretwin.twin.electronics.driving.stage import DriveSetup
+from spheretwin.twin.electronics.driving.undriven import undriven
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line, through
+from spheretwin.twin.electronics.stage_chain import chained
 
 Array = NDArray[np.float64]
 
+GOING, HANGING, SILENT = 0, 1, 2
+"""What leaves the controller: its commands, its last one for ever, or nothing."""
 
-class Driving(NamedTuple):
+RELEASED, BRAKED = 1, 2
+"""What a watchdog may have told: no currents, or shorted coils."""
+
+_NAMES = tuple(STAGES)
+_convert = chained([kind.convert() for kind in STAGES.values()])
+_advance = chained([kind.advance() for kind in STAGES.values()])
+
+
+class Output(NamedTuple):
+    """Output of the controller, which faults and a watchdog act on."""
+
+    leaves: NDArray[np.int64]  # (1,) `GOING`, `HANGING` or `SILENT`
+    late_steps: NDArray[np.int64]  # (1,) physics steps more of delay
+    halt: NDArray[np.int64]  # (1,) a watchdog's
+
+    def fault_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that faults write."""
+        return self.leaves, self.late_steps
+
+
+class DriveChain(NamedTuple):
     """All stages, for compiled code."""
 
     converts: bool  # whether what is asked of the amplifiers is other than the command
     supplied: bool  # whether the amplifiers have a supply, and the coils a voltage
     supply_V: float
     lag: Drive
+    output: Output
+    stages: tuple[Any, ...]  # in the order of `STAGES`
     delay: Delay
-    dac: Dac
+    supply: FaultLine  # of its voltage
     amplifier: Amplifier
     coil: Coil
     flow: Flow
+    draws: Array  # standard normal numbers of this tick, of faults
     asked: Array  # (n,) A of the amplifiers
     emf: Array  # (n,) V
     rate_S: Array  # (3,) rad/s of the rotor, stator frame
-    drawn_As: Array  # (1,) from the supply in this control period
+    period: Array  # (3,) of this control period: charge drawn in As, supply in V, 1 if a group is not driven
+    before: Array  # (5, n) current and sums of undriven groups at the start of a step
+
+    def stage(self, name: str) -> Any:
+        """Stage of a name."""
+        return self.stages[_NAMES.index(name)]
 
 
-def driving(section: ResolvedDrive, step_s: float, substeps: int, groups: int, seed: int) -> Driving:
+DRAWN_As, SUPPLY_V, UNDRIVEN = 0, 1, 2
+"""Places in `DriveChain.period`."""
+
+
+class DriveFaults(NamedTuple):
+    """What a chain needs if faults may come, or a watchdog."""
+
+    planned: bool
+    """True if faults may come, not a watchdog alone."""
+    most_late_steps: int
+    """Physics steps that faults may delay a command by."""
+    halt: NDArray[np.int64]
+    """(1,) a watchdog writes into it."""
+    draws: Array
+    """The loop writes the random numbers of each tick into it."""
+
+
+def drive_chain(
+    section: ResolvedDrive,
+    step_s: float,
+    substeps: int,
+    groups: int,
+    seed: int,
+    faults: DriveFaults | None = None,
+) -> DriveChain:
     """Stages at rest, with errors of their own.
 
     Parameters
@@ -51,43 +126,70 @@ def driving(section: ResolvedDrive, step_s: float, substeps: int, groups: int, s
     groups : int
     seed : int
         Of the run: the same prototype for the same seed.
+    faults : DriveFaults, optional
+        None if nothing can fail.
 
     Raises
     ------
     ValueError
         The delay is no whole number of physics steps.
     """
-    return Driving(
-        converts=section.converts,
+    late, planned = delay(section, step_s, substeps, groups), faults is not None and faults.planned
+    setup = DriveSetup(seed, step_s, groups, planned)
+    if faults:
+        more = -(-faults.most_late_steps // substeps)
+        late = late._replace(ring=np.zeros((len(late.ring) + more, groups)))
+    made = DriveChain(
+        converts=section.converts or faults is not None,
         supplied=section.supply_V is not None,
         supply_V=0.0 if section.supply_V is None else section.supply_V,
         lag=drive(section.lag_s, step_s, section.current_limit_A),
-        delay=delay(section, step_s, substeps, groups),
-        dac=dac(section, section.transconductance_A_V, groups, seed),
+        output=Output(
+            np.full(1, GOING), np.zeros(1, dtype=np.int64), faults.halt if faults else np.full(1, GOING)
+        ),
+        stages=tuple(kind.build(section, setup) for kind in STAGES.values()),
+        delay=late,
+        supply=fault_line(1),
         amplifier=amplifier(section, section.current_limit_A, step_s, groups, seed),
         coil=coil(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
         flow=flow(groups),
+        draws=faults.draws if faults else np.empty(0),
         asked=np.zeros(groups),
         emf=np.zeros(groups),
         rate_S=np.zeros(3),
-        drawn_As=np.zeros(1),
+        period=np.zeros(3),
+        before=np.zeros((5, groups)),
     )
+    made.period[SUPPLY_V] = made.supply_V
+    return made
 
 
 @part_of_its_caller
-def begin(driving: Driving, command: Array) -> None:
-    """Take the commands of a control period, and begin its sums."""
-    if driving.converts:
-        convert(driving.dac, command, driving.asked)
-        latch(driving.delay, driving.asked)
-    if driving.supplied:
-        clear(driving.flow)
-        driving.drawn_As[0] = 0.0
+def begin(chain: DriveChain, command: Array) -> None:
+    """Take the commands of a control period, as far as they leave the controller, and begin its sums."""
+    asked, output, period = chain.asked, chain.output, chain.period
+    if chain.converts:
+        if output.leaves[0] == HANGING:
+            for j in range(asked.shape[0]):
+                asked[j] = chain.delay.ring[chain.delay.newest[0], j]
+        else:
+            for j in range(asked.shape[0]):
+                asked[j] = 0.0 if output.leaves[0] == SILENT else command[j]
+            _convert(chain.stages, asked, chain.draws)
+        latch(chain.delay, asked)
+    clear(chain.flow)
+    period[DRAWN_As] = 0.0
+    if chain.supplied:
+        period[SUPPLY_V] = max(through(chain.supply, 0, chain.supply_V, chain.draws), 0.0)
+    period[UNDRIVEN] = 0.0
+    for j in range(asked.shape[0]):
+        if _contact(chain, j) != DRIVEN:
+            period[UNDRIVEN] = 1.0
 
 
 @part_of_its_caller
 def advance(
-    driving: Driving,
+    chain: DriveChain,
     command: Array,
     substep: int,
     q: Array,
@@ -101,13 +203,13 @@ def advance(
 
     Parameters
     ----------
-    driving : Driving
+    chain : DriveChain
     command : (n,) array, A
         Of this control period.
     substep : int
         Physics step of the period, from 0.
     q, qdot : (3,) arrays, rad and rad/s
-        At the start of the step.
+        That the back-EMF of the step is taken at.
     G : (3, n) array, N·m/A
         True torque matrix there.
     gain : (n,) array
@@ -117,63 +219,139 @@ def advance(
     mean : (n,) array, A
         Result: over the step.
     """
-    asked = driving.asked if driving.converts else command
-    if driving.converts:
-        due(driving.delay, substep, asked)
-    if driving.supplied:
-        angular_velocity(q, qdot, driving.rate_S)
-        back_emf(G, gain, driving.rate_S, driving.emf)
-        drive_coils(driving.amplifier, driving.coil, asked, driving.emf, current, driving.flow)
+    asked, undriven_groups = chain.asked if chain.converts else command, chain.period[UNDRIVEN] != 0.0
+    if chain.converts:
+        ask(chain, substep)
+    if chain.supplied or undriven_groups:
+        angular_velocity(q, qdot, chain.rate_S)
+        back_emf(G, gain, chain.rate_S, chain.emf)
+    if undriven_groups:
+        _keep(chain, current)
+    if chain.supplied:
+        drive_coils(_supplied(chain), chain.coil, asked, chain.emf, current, chain.flow)
         for j in range(mean.shape[0]):
-            mean[j] = driving.flow.mean_current_A[j]
-            driving.drawn_As[0] += abs(mean[j]) * driving.amplifier.step_s
+            mean[j] = chain.flow.mean_current_A[j]
     else:
-        follow(driving.lag, asked, current, mean)
+        follow(chain.lag, asked, current, mean)
+    if undriven_groups:
+        _advance_undriven(chain, current, mean)
+    if chain.supplied:
+        _draw(chain, asked, mean)
 
 
 @part_of_its_caller
-def end(driving: Driving) -> bool:
-    """End a control period: the coils have warmed by what they lost; whether none is too hot."""
-    if driving.supplied:
-        warm(driving.coil, driving.flow.copper_J)
-        return not overheated(driving.coil)
+def ask(chain: DriveChain, substep: int) -> None:
+    """Write what the amplifiers are asked for in a physics step."""
+    asked, late, output = chain.asked, chain.delay, chain.output
+    due(Delay(late.ring, late.newest, late.steps + output.late_steps[0], late.substeps), substep, asked)
+    if output.halt[0] != GOING:
+        for j in range(asked.shape[0]):
+            asked[j] = 0.0
+    _advance(chain.stages, asked, chain.draws)
+
+
+@part_of_its_caller
+def _supplied(chain: DriveChain) -> Amplifier:
+    """Amplifiers on the supply of this period, whose swing is 0 if the drops take all of it."""
+    amplifier, more_V = chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V
+    if more_V == 0.0:
+        return amplifier
+    return Amplifier(
+        amplifier.supplied,
+        max(amplifier.highest_V + more_V, 0.0),
+        min(amplifier.lowest_V - more_V, 0.0),
+        amplifier.bandwidth_rad_s,
+        amplifier.current_limit_A,
+        amplifier.step_s,
+        amplifier.following,
+        amplifier.offset_A,
+    )
+
+
+@part_of_its_caller
+def _draw(chain: DriveChain, asked: Array, mean: Array) -> None:
+    """Add what the amplifiers draw from the supply in a physics step."""
+    amplifier, period = chain.amplifier, chain.period
+    for j in range(mean.shape[0]):
+        drawn = mean[j]
+        if period[UNDRIVEN] != 0.0 and _contact(chain, j) == SHORTED:
+            # What turns in the coil is not the supply's; past it, the amplifier drives what it is asked.
+            limit = amplifier.current_limit_A
+            drawn = min(max(asked[j] + amplifier.offset_A[j], -limit), limit)
+        period[DRAWN_As] += abs(drawn) * amplifier.step_s
+
+
+@part_of_its_caller
+def _keep(chain: DriveChain, current: Array) -> None:
+    """Keep currents and sums of the groups that no amplifier drives, before all are driven."""
+    flow, before = chain.flow, chain.before
+    for j in range(current.shape[0]):
+        if _contact(chain, j) != DRIVEN:
+            before[0, j], before[1, j], before[2, j] = current[j], flow.copper_J[j], flow.work_J[j]
+            before[3, j], before[4, j] = flow.voltage_limited_s[j], flow.current_limited_s[j]
+
+
+@part_of_its_caller
+def _advance_undriven(chain: DriveChain, current: Array, mean: Array) -> None:
+    """Undo what driving has done to the groups that no amplifier drives, and advance them by themselves."""
+    flow, before = chain.flow, chain.before
+    for j in range(current.shape[0]):
+        contact = _contact(chain, j)
+        if contact != DRIVEN:
+            current[j], flow.copper_J[j], flow.work_J[j] = before[0, j], before[1, j], before[2, j]
+            flow.voltage_limited_s[j], flow.current_limited_s[j] = before[3, j], before[4, j]
+            undriven(contact, chain.coil, j, chain.amplifier.step_s, chain.emf[j], current, mean, flow)
+
+
+@part_of_its_caller
+def _contact(chain: DriveChain, group: int) -> int:
+    """How a group is connected: a brake shorts all that are not open."""
+    contact = chain.coil.contact[group]
+    return SHORTED if contact != OPEN and chain.output.halt[0] == BRAKED else contact
+
+
+@part_of_its_caller
+def end(chain: DriveChain) -> bool:
+    """End a control period: the coils have warmed by what they lost; returns whether none is too hot."""
+    if chain.supplied:
+        warm(chain.coil, chain.flow.copper_J)
+        return not overheated(chain.coil)
     return True
 
 
 @part_of_its_caller
-def tell(driving: Driving, row: Array) -> None:
+def tell(chain: DriveChain, row: Array) -> None:
     """Write power, losses, temperatures and limits of the control period into the beginning of `row`."""
-    flow, period_s, groups = driving.flow, driving.coil.period_s, driving.emf.shape[0]
-    row[0] = driving.supply_V * driving.drawn_As[0] / period_s
+    flow, period_s, groups = chain.flow, chain.coil.period_s, chain.emf.shape[0]
+    row[0] = chain.period[SUPPLY_V] * chain.period[DRAWN_As] / period_s
     for j in range(groups):
         row[1 + j] = flow.work_J[j] / period_s
         row[1 + groups + j] = flow.copper_J[j] / period_s
-        row[1 + 2 * groups + j] = driving.coil.temperature_degC[j]
+        row[1 + 2 * groups + j] = chain.coil.temperature_degC[j]
         row[1 + 3 * groups + j] = flow.voltage_limited_s[j] / period_s
         row[1 + 4 * groups + j] = flow.current_limited_s[j] / period_s
 
 
-def state_of(driving: Driving) -> Array:
-    """All that the stages go on from."""
-    late = driving.delay
-    return np.concatenate([late.ring.ravel(), late.newest, driving.coil.temperature_degC])
+def transfer(before: DriveChain | None, after: DriveChain, command: Array) -> None:
+    """Go on as before with other figures.
 
-
-def restore(driving: Driving, state: Array) -> None:
-    """Go on from a state of stages of the same size."""
-    late, first = driving.delay, driving.delay.ring.size
-    late.ring[:] = state[:first].reshape(late.ring.shape)
-    late.newest[:] = state[first : first + 1]
-    driving.coil.temperature_degC[:] = state[first + 1 :]
-    settle_resistance(driving.coil)
-
-
-def carried_on(before: Driving, after: Driving) -> None:
-    """Go on as before with other figures; where more commands are kept now, the oldest repeats."""
-    was, now = before.delay, after.delay
-    rows = len(was.ring)
-    for ago in range(len(now.ring)):
-        now.ring[-1 - ago] = was.ring[(was.newest[0] - min(ago, rows - 1)) % rows]
-    now.newest[0] = len(now.ring) - 1
-    after.coil.temperature_degC[:] = before.coil.temperature_degC
-    settle_resistance(after.coil)
+    Parameters
+    ----------
+    before : DriveChain or None
+        None for amplifiers right behind their commands, of which they kept none.
+    after : DriveChain
+        Without a fault.
+    command : (n,) array, A
+        The last one.
+    """
+    if before is None:
+        after.delay.ring[:] = command
+    else:
+        transfer_delay(before.delay, after.delay)
+        after.coil.temperature_degC[:] = before.coil.temperature_degC
+        settle_resistance(after.coil)
+    if after.converts:  # what is held from now on is what it would have been
+        ask(after, after.delay.substeps - 1)
+    for was, now in zip(before.stages if before else after.stages, after.stages, strict=True):
+        if was.on and now.on:
+            transfer_state(was, now)

@@ -8,7 +8,7 @@ digit. Copper loss heats a group, which passes heat on to what surrounds it: one
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.twin.electronics.driving.relaxation import relaxation
+
+DRIVEN, OPEN, SHORTED = 0, 1, 2
+"""How a group is connected."""
 
 # Temperature at which a resistance is told.
 REFERENCE_degC = 20.0
@@ -65,6 +68,15 @@ class Coil(NamedTuple):
     period_s: float
     temperature_degC: NDArray[np.float64]  # (n,) now
     resistance_ohm: NDArray[np.float64]  # (n,) at that temperature
+    contact: NDArray[np.int64]  # (n,) `DRIVEN`, `OPEN` or `SHORTED`, by faults
+
+    def state_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that it goes on from."""
+        return self.temperature_degC, self.resistance_ohm
+
+    def fault_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that faults write."""
+        return (self.contact,)
 
 
 def coil(
@@ -94,6 +106,7 @@ def coil(
         period_s=period_s,
         temperature_degC=np.full(groups, section.ambient_degC),
         resistance_ohm=np.empty(groups),
+        contact=np.full(groups, DRIVEN, dtype=np.int64),
     )
     settle_resistance(made)
     return made

@@ -16,26 +16,24 @@ Settling (20 µs) and glitches are left out: a few hundredths of a physics step.
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.twin.electronics.driving.stage import DriveSetup, DriveStage
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line
 from spheretwin.twin.electronics.streams import errors
-
-# What separates the draws of this stage from those of any other under the same seed.
-STAGE = 101
 
 HARMONICS = 3
 
 
-class DacSection(BaseModel):
+class DacSection(DriveStage):
     """Converter of the commands, one channel a group; neutral with 0 bits."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
+    stage: ClassVar[str] = "dac"
     dac_bits: Annotated[int, Field(ge=0, le=32)] = Field(
         0,
         description="of a code; with 0 the converter is ideal, without range and errors"
@@ -57,6 +55,36 @@ class DacSection(BaseModel):
         description="largest integral nonlinearity of a channel, a smooth curve drawn from the seed, LSB"
         " (assumed: 4)",
     )
+
+    @staticmethod
+    def ideal(section: Any) -> bool:
+        """True without a converter."""
+        return bool(section.dac_bits == 0)
+
+    @staticmethod
+    def build(section: Any, setup: DriveSetup) -> Any:
+        """Converter in front of amplifiers of the section's transconductance."""
+        made = dac(section, section.transconductance_A_V, setup.groups, setup.seed)
+        return DacStage(made.converts or setup.faults, made, fault_line(setup.groups * setup.faults, 0.0))
+
+    @staticmethod
+    def convert() -> Any:
+        """Compiled conversion of a command."""
+        return convert_command
+
+
+class DacStage(NamedTuple):
+    """Converter as a stage of the drive."""
+
+    on: bool
+    dac: Dac
+    line: FaultLine  # of what the amplifiers are asked for, A
+
+
+@part_of_its_caller
+def convert_command(stage: DacStage, asked: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+    """Convert a command (n,), A, in its place."""
+    convert(stage.dac, asked, asked)
 
 
 class Dac(NamedTuple):
@@ -81,7 +109,7 @@ def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int
     """
     drawn = np.zeros((groups, 2 + HARMONICS))
     if section.dac_bits:  # errors of no converter are not drawn
-        drawn = errors(seed, STAGE, groups, 2 + HARMONICS)
+        drawn = errors(seed, "drive.dac", groups, 2 + HARMONICS)
     harmonics = drawn[:, 2:] / np.maximum(1.0, np.abs(drawn[:, 2:]).sum(axis=1, keepdims=True))
     codes = 2.0**section.dac_bits
     return Dac(

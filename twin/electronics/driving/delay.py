@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,10 @@ class Delay(NamedTuple):
     newest: NDArray[np.int64]  # (1,) row of `ring` with the command computed last
     steps: int  # of physics, from sample to output
     substeps: int  # physics steps in a control period
+
+    def state_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Arrays that it goes on from."""
+        return self.ring, self.newest
 
 
 def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> Delay:
@@ -99,3 +103,11 @@ def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
     row = (delay.newest[0] - ago) % ring.shape[0]
     for j in range(ring.shape[1]):
         out[j] = ring[row, j]
+
+
+def transfer_delay(before: Delay, after: Delay) -> None:
+    """Go on with the commands on their way; where more are kept now, the oldest repeats."""
+    rows = len(before.ring)
+    for ago in range(len(after.ring)):
+        after.ring[-1 - ago] = before.ring[(before.newest[0] - min(ago, rows - 1)) % rows]
+    after.newest[0] = len(after.ring) - 1

@@ -11,10 +11,14 @@ from spheretwin.twin.electronics.driving.amplifier import AmplifierSection
 from spheretwin.twin.electronics.driving.coil import CoilSection
 from spheretwin.twin.electronics.driving.dac import DacSection
 from spheretwin.twin.electronics.driving.delay import DelaySection
+from spheretwin.twin.electronics.driving.stage import DriveStage
 
 
 class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
-    """From commands to currents; each stage is ideal until told otherwise, and the coils are the model's."""
+    """From commands to currents; each stage is ideal until told otherwise, and the coils are the model's.
+
+    Its bases that are a `DriveStage` are the list of the stages, in the order in which commands pass them.
+    """
 
     time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
         None, description="current lag L/R, s; 0 for none; of amplifiers without a supply"
@@ -32,8 +36,14 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
 
     @property
     def converts(self) -> bool:
-        """Whether what is asked of the amplifiers is other than the command."""
-        return self.delay_s > 0 or self.dac_bits > 0
+        """True if what is asked of the amplifiers is other than the command."""
+        return self.delay_s > 0 or not all(kind.ideal(self) for kind in STAGES.values())
+
+
+STAGES: dict[str, type[DriveStage]] = {
+    kind.stage: kind for kind in DriveSection.__bases__ if issubclass(kind, DriveStage)
+}
+"""Kinds of the stages of the commands by their names, in the order in which the commands pass them."""
 
 
 class ResolvedDrive(DriveSection):

@@ -1,6 +1,6 @@
-"""One name for what comes between commands and currents: a plain lag, the whole chain, or it with faults.
+"""One name for what comes between commands and currents: a plain lag, or the chain of the drive's stages.
 
-As `plant.stepping` does for engines: the loop is compiled for one of them, and the others are not compiled.
+As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
 """
 
 from __future__ import annotations
@@ -8,15 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.twin.electronics.driving import chain, faulty
-from spheretwin.twin.electronics.driving.chain import Driving
-from spheretwin.twin.electronics.driving.delay import due
-from spheretwin.twin.electronics.driving.faulty import DriveFaults, FaultyDriving
+from spheretwin.twin.electronics.driving import chain
+from spheretwin.twin.electronics.driving.chain import DriveChain, DriveFaults, drive_chain
 from spheretwin.twin.electronics.driving.lag import Drive, advance, drive
 from spheretwin.twin.electronics.driving.sections import ResolvedDrive
 
@@ -49,12 +46,12 @@ def _lag_tells(driving: Any, row: Any) -> None:
     pass
 
 
-Stages = Lag | Driving | FaultyDriving
+Stages = Lag | DriveChain
 
-_BEGIN: dict[type, Any] = {Lag: _lag_begins, Driving: chain.begin, FaultyDriving: faulty.begin}
-_ADVANCE: dict[type, Any] = {Lag: _lag_advances, Driving: chain.advance, FaultyDriving: faulty.advance}
-_END: dict[type, Any] = {Lag: _lag_ends, Driving: chain.end, FaultyDriving: faulty.end}
-_TELL: dict[type, Any] = {Lag: _lag_tells, Driving: chain.tell, FaultyDriving: faulty.tell}
+_BEGIN: dict[type, Any] = {Lag: _lag_begins, DriveChain: chain.begin}
+_ADVANCE: dict[type, Any] = {Lag: _lag_advances, DriveChain: chain.advance}
+_END: dict[type, Any] = {Lag: _lag_ends, DriveChain: chain.end}
+_TELL: dict[type, Any] = {Lag: _lag_tells, DriveChain: chain.tell}
 
 
 def made(
@@ -64,59 +61,23 @@ def made(
     groups: int,
     seed: int,
     faults: DriveFaults | None = None,
-    most_late_steps: int = 0,
 ) -> Stages:
     """What a resolved section asks for, at rest.
 
     Parameters
     ----------
-    section, step_s, substeps, groups, seed
-        As `chain.driving` has them.
-    faults : DriveFaults, optional
-        Where something may fail.
-    most_late_steps : int
-        Physics steps that a fault may delay a command by.
+    section, step_s, substeps, groups, seed, faults
+        As `chain.drive_chain` has them.
     """
-    if faults is not None:
-        return faulty.faulty_driving(
-            chain.driving(section, step_s, substeps, groups, seed), faults, most_late_steps
-        )
-    if section.supply_V is None and not section.converts:
+    if section.supply_V is None and not section.converts and faults is None:
         return Lag(drive(section.lag_s, step_s, section.current_limit_A))
-    return chain.driving(section, step_s, substeps, groups, seed)
-
-
-def state_of(driving: Stages) -> NDArray:
-    """All that it goes on from, beside the currents."""
-    if isinstance(driving, Lag):
-        return np.empty(0)
-    return faulty.state_of(driving) if isinstance(driving, FaultyDriving) else chain.state_of(driving)
-
-
-def restore(driving: Stages, state: NDArray) -> None:
-    """Go on from a state of one of the same size."""
-    if isinstance(driving, FaultyDriving):
-        faulty.restore(driving, state)
-    elif isinstance(driving, Driving):
-        chain.restore(driving, state)
+    return drive_chain(section, step_s, substeps, groups, seed, faults)
 
 
 def carried_on(before: Stages, after: Stages, command: NDArray) -> None:
     """Go on as before with other figures, from the last commands (n,), A."""
-    healthy, now = _healthy(before), _healthy(after)
-    if isinstance(healthy, Driving) and isinstance(now, Driving):
-        chain.carried_on(healthy, now)
-    if isinstance(after, FaultyDriving):
-        if isinstance(before, FaultyDriving):
-            after.faults.last_A[:] = before.faults.last_A
-        elif isinstance(before, Driving) and before.converts:
-            due(before.delay, before.delay.substeps - 1, after.faults.last_A)
-        else:  # right behind its commands, of which it kept none
-            after.faults.last_A[:] = after.driving.delay.ring[:] = command
-
-
-def _healthy(driving: Stages) -> Lag | Driving:
-    return driving.driving if isinstance(driving, FaultyDriving) else driving
+    if isinstance(after, DriveChain):
+        chain.transfer(before if isinstance(before, DriveChain) else None, after, command)
 
 
 def begin(driving: Stages, command: NDArray) -> None:

@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.twin.electronics.driving.amplifier import LARGEST_EMF_V, Flow
-from spheretwin.twin.electronics.driving.coil import Coil
+from spheretwin.twin.electronics.driving.coil import OPEN, Coil
 from spheretwin.twin.electronics.driving.relaxation import relaxation
 
 Array = NDArray[np.float64]
-
-DRIVEN, OPEN, SHORTED = 0, 1, 2
-"""How a group is connected."""
 
 
 @allocation_free

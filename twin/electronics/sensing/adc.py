@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from math import nan
-from typing import Annotated, NamedTuple
+from math import hypot, isnan, nan
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.trajectories.trajectory import CONFIG
-
-STAGE = 2
-"""Of the streams that the errors of this stage are drawn from: ``default_rng([seed, STAGE, channel])``."""
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line, through
+from spheretwin.twin.electronics.sensing.potentiometer import CHANNELS
+from spheretwin.twin.electronics.sensing.stage import Numbers, SensorSetup, SensorStage
+from spheretwin.twin.electronics.streams import errors
 
 ERRORS = 2
 """Numbers that are drawn for a channel."""
@@ -25,14 +25,12 @@ CONVERSION_s = 4e-6
 MOST_CONVERSIONS = 250
 
 
-class AdcSection(BaseModel):
+class AdcSection(SensorStage):
     """Analogue-to-digital converter of α and β; ideal while bits, offset, gain error and noise are 0.
 
     All channels are held at the control tick, the encoder's count with them, and what they hold is converted
     once or several times within the period.
     """
-
-    model_config = CONFIG
 
     bits: Annotated[int, Field(ge=0, le=32)] = Field(
         0, description="resolution; 0 for neither steps nor ends (ADS8364's sheet: 16)"
@@ -57,13 +55,92 @@ class AdcSection(BaseModel):
 
     @property
     def ideal(self) -> bool:
-        """Whether the voltage comes out as it goes in."""
+        """True if the voltage comes out as it goes in."""
         return self.bits == 0 and self.offset_V == 0 and self.gain_error == 0 and self.noise_V == 0
+
+    def build(self, setup: SensorSetup) -> Adcs:
+        """Channels with errors of their own; they convert if the potentiometers have errors, too."""
+        track, late = setup.sensors.potentiometer, setup.most_late_ticks
+        converts = not (self.ideal and track.ideal)
+        shares = errors(setup.seed, setup.name, CHANNELS, ERRORS)
+        return Adcs(
+            converts or setup.faults,
+            converts,
+            track.volts_per_rad,
+            (adc(self, shares[0]), adc(self, shares[1])),
+            self.input_noise_V(setup.sensors),
+            setup.first_draw,
+            setup.first_draw + self.draws(setup.sensors),
+            fault_line(CHANNELS),
+            np.full((late + 1, CHANNELS), nan),
+            np.zeros(1, dtype=np.int64),
+        )
+
+    @classmethod
+    def function(cls) -> Any:
+        """Compiled function that converts α and β."""
+        return pass_adcs
+
+    def draws(self, sensors: Any) -> int:
+        """One number a conversion and channel; none without noise."""
+        return CHANNELS * self.oversampling if self.input_noise_V(sensors) else 0
+
+    def input_noise_V(self, sensors: Any) -> float:
+        """Noise of one conversion, V rms, of wiper and converter together, which are independent."""
+        track = sensors.potentiometer
+        return hypot(track.volts_per_rad * track.noise_rad, self.noise_V)
 
     @property
     def step_V(self) -> float:
         """Voltage of one code; 0 without steps."""
         return 2 * self.range_V / 2**self.bits if self.bits else 0.0
+
+
+class Adcs(NamedTuple):
+    """The converter, for compiled code."""
+
+    on: bool
+    converts: bool  # whether its codes are more than a line
+    volts_per_rad: float
+    channels: tuple[Adc, Adc]
+    noise_V: float  # of the wiper and of the conversion together, rms, at the input
+    first_draw: int
+    end_draw: int
+    line: FaultLine  # of what is converted, in rad of the nominal slope
+    on_the_way_rad: NDArray[np.float64]  # (m, 2) of the last ticks, newest first; NaN before the first
+    late_ticks: NDArray[np.int64]  # (1,) of a fault
+
+    def state_arrays(self) -> tuple[Any, ...]:
+        """Arrays that it goes on from."""
+        return self.line, self.on_the_way_rad
+
+    def fault_arrays(self) -> tuple[Any, ...]:
+        """Arrays that faults write."""
+        return self.line, self.late_ticks
+
+
+@allocation_free
+def pass_adcs(stage: Adcs, measurement: NDArray[np.float64], numbers: Numbers) -> None:
+    """Replace α and β by the angles, rad, that the controller takes the converted voltages for."""
+    for channel in range(CHANNELS):
+        angle = measurement[0, channel]
+        if stage.converts:
+            held_V, draws = stage.volts_per_rad * angle, numbers.noise[stage.first_draw : stage.end_draw]
+            volts = converted(stage.channels[channel], held_V, stage.noise_V, draws, channel, CHANNELS)
+            angle = volts / stage.volts_per_rad
+        angle = through(stage.line, channel, angle, numbers.faults)
+        measurement[0, channel] = _delayed(stage, channel, angle)
+
+
+@allocation_free
+def _delayed(stage: Adcs, channel: int, angle: float) -> float:
+    """Keep an angle, and return the one of as many ticks ago as a fault delays it, or the first one."""
+    ring = stage.on_the_way_rad
+    first = isnan(ring[0, channel])
+    for row in range(ring.shape[0] - 1, 0, -1):
+        ring[row, channel] = angle if first else ring[row - 1, channel]
+    ring[0, channel] = angle
+    return ring[stage.late_ticks[0], channel]
 
 
 class Adc(NamedTuple):

@@ -1,69 +1,101 @@
-"""From the rotor's state to what the controller is handed: the stages of each angle, one after the other."""
+"""From the rotor's state to what the controller is handed: the stages of the angles, one after the other.
+
+Each stage takes angles to angles: voltages are stated in radians of the nominal slope. A fault modifies a
+stage, by its fault line or by a field of its own. If a converter or a counter is silent, the controller is
+handed the last angle again, and the knowledge that it is not new.
+"""
 
 from __future__ import annotations
 
-from math import hypot, isfinite
-from typing import NamedTuple
+from math import isfinite, isnan, nan
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.electronics.sensing import adc as adcs
-from spheretwin.twin.electronics.sensing import potentiometer as potentiometers
-from spheretwin.twin.electronics.sensing.adc import Adc, adc, converted
-from spheretwin.twin.electronics.sensing.encoder import Encoder, counted, encoder
-from spheretwin.twin.electronics.sensing.potentiometer import Potentiometer, potentiometer, wiper_voltage
-from spheretwin.twin.electronics.sensing.sections import SensorsSection
-from spheretwin.twin.electronics.streams import errors, uniforms
+from spheretwin.models.base.copying import transfer_state
+from spheretwin.twin.electronics.sensing.noise import Streams
+from spheretwin.twin.electronics.sensing.sections import STAGES, SensorsSection
+from spheretwin.twin.electronics.sensing.stage import Numbers, SensorSetup
+from spheretwin.twin.electronics.stage_chain import chained
 from spheretwin.twin.trajectories.trajectory import Triple
 
-CHANNELS = 2
-"""Angles that are voltages on their way: α and β."""
+Array = NDArray[np.float64]
+
+_NAMES = tuple(STAGES)
+_pass_stages = chained([kind.function() for kind in STAGES.values()])
 
 
-class Sensing(NamedTuple):
-    """All sensors, for compiled code."""
+class SensorChain(NamedTuple):
+    """All sensors of the angles, for compiled code."""
 
-    offset_rad: NDArray[np.float64]  # (3,)
-    potentiometers: tuple[Potentiometer, Potentiometer]
-    adcs: tuple[Adc, Adc]
-    noise_V: float  # of the wiper and of the conversion together, rms, at the converter's input
-    encoder: Encoder
+    offset_rad: Array  # (3,)
     shifts: bool  # whether any offset is not 0
-    in_volts: bool  # whether potentiometers or converter are more than a line
-    ideal: bool  # whether all angles are handed over as they are
+    stages: tuple[Any, ...]  # in the order of `STAGES`
+    silent: NDArray[np.bool_]  # (3,) whether no new angle is handed over, by a fault
+    fresh: Array  # (3,) result: 1 where an angle is new, 0 where it is the last one again
+    handed_rad: Array  # (3,) to the controller, at the last tick; NaN before the first
+    draws: Array  # standard normal numbers of this tick, of faults
+
+    def stage(self, name: str) -> Any:
+        """Stage of a name."""
+        return self.stages[_NAMES.index(name)]
+
+    def state_arrays(self) -> tuple[Any, ...]:
+        """Arrays that it goes on from."""
+        return self.stages, self.handed_rad
+
+    def fault_arrays(self) -> tuple[Any, ...]:
+        """Arrays that faults write."""
+        return self.stages, self.silent
 
 
-def sensing(section: SensorsSection, seed: int) -> Sensing:
+class SensorFaults(NamedTuple):
+    """What a chain needs if faults may come."""
+
+    most_late_ticks: int
+    """Longest delay of the converter that they may bring."""
+    fresh: Array
+    """(3,) written at each tick."""
+    draws: Array
+    """The loop writes the random numbers of each tick into it."""
+
+
+def sensor_chain(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> SensorChain:
     """Sensors with errors of their own.
 
-    Each stage and channel draws them from a stream of its own: one that is switched on moves no other's.
+    Each stage and channel draws them from a stream of its own, keyed by its name: no other stage moves one.
 
     Parameters
     ----------
     section : SensorsSection
     seed : int
         Of the run: the same prototype for the same seed.
+    faults : SensorFaults, optional
+        None if no fault can come.
     """
-    track, converter = section.potentiometer, section.adc
-    phases = uniforms(seed, potentiometers.STAGE, CHANNELS, potentiometers.HARMONICS)
-    shares = errors(seed, adcs.STAGE, CHANNELS, adcs.ERRORS)
-    return Sensing(
+    stages, first_draw = [], 0
+    for name in _NAMES:
+        kind, late = getattr(section, name), faults.most_late_ticks if faults else 0
+        setup = SensorSetup(section, seed, f"sensors.{name}", first_draw, faults is not None, late)
+        stages.append(kind.build(setup))
+        first_draw += kind.draws(section)
+    return SensorChain(
         np.array(section.angle_offset_rad, dtype=np.float64),
-        (potentiometer(track, phases[0]), potentiometer(track, phases[1])),
-        (adc(converter, shares[0]), adc(converter, shares[1])),
-        _noise_V(section),
-        encoder(section.encoder),
         any(section.angle_offset_rad),
-        not (track.ideal and converter.ideal),
-        section.ideal,
+        tuple(stages),
+        np.zeros(3, dtype=np.bool_),
+        faults.fresh if faults else np.ones(3),
+        np.full(3, nan),
+        faults.draws if faults else np.empty(0),
     )
 
 
-def noise_width(section: SensorsSection) -> int:
-    """Standard normal numbers that `sense` needs a tick; 0 without noise."""
-    return CHANNELS * section.adc.oversampling if _noise_V(section) else 0
+def noise_streams(section: SensorsSection) -> Streams:
+    """Random streams that `sense` needs the numbers of, and their widths."""
+    widths = ((f"sensors.{name} noise", getattr(section, name).draws(section)) for name in _NAMES)
+    return tuple((name, width) for name, width in widths if width)
 
 
 def accuracy(section: SensorsSection) -> tuple[Triple, Triple]:
@@ -77,7 +109,7 @@ def accuracy(section: SensorsSection) -> tuple[Triple, Triple]:
         Step between two values that each can have; 0 for none.
     """
     track, converter, lines = section.potentiometer, section.adc, section.encoder.counts
-    noise_rad = _noise_V(section) / track.volts_per_rad / converter.oversampling**0.5
+    noise_rad = converter.input_noise_V(section) / track.volts_per_rad / converter.oversampling**0.5
     step_V = 2 * converter.range_V / 2**converter.bits if converter.bits else 0.0
     step_rad = step_V / track.volts_per_rad / converter.oversampling
     count_rad = 2 * np.pi / lines if lines else 0.0
@@ -85,13 +117,7 @@ def accuracy(section: SensorsSection) -> tuple[Triple, Triple]:
 
 
 @allocation_free
-def sense(
-    sensing: Sensing,
-    q: NDArray[np.float64],
-    qdot: NDArray[np.float64],
-    noise: NDArray[np.float64],
-    measurement: NDArray[np.float64],
-) -> bool:
+def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
     """Write measured angles (rad) and true rates (rad/s) into the first rows of `measurement` (3, 3).
 
     What is measured is the pose at the tick, for all conversions of an oversampling converter too. The
@@ -99,11 +125,11 @@ def sense(
 
     Parameters
     ----------
-    sensing : Sensing
+    chain : SensorChain
     q, qdot : (3,) arrays, rad and rad/s
         True.
-    noise : (`noise_width`,) array
-        Standard normal numbers of this tick: α and β by turns, a pair for each conversion.
+    noise : array
+        Standard normal numbers of this tick, of the streams of `noise_streams`.
     measurement : (3, 3) array
         Result.
 
@@ -115,24 +141,23 @@ def sense(
     """
     for i in range(3):
         measurement[0, i], measurement[1, i] = q[i], qdot[i]
-    if not sensing.ideal:
-        if sensing.shifts:
-            for i in range(3):
-                measurement[0, i] += sensing.offset_rad[i]
-        if sensing.in_volts:
-            for channel in range(CHANNELS):
-                potentiometer = sensing.potentiometers[channel]
-                held_V = wiper_voltage(potentiometer, measurement[0, channel])
-                volts = converted(sensing.adcs[channel], held_V, sensing.noise_V, noise, channel, CHANNELS)
-                measurement[0, channel] = volts / potentiometer.volts_per_rad
-        measurement[0, 2] = counted(sensing.encoder, measurement[0, 2])
+        if chain.shifts:
+            measurement[0, i] += chain.offset_rad[i]
+    _pass_stages(chain.stages, measurement, Numbers(noise, chain.draws))
     finite = True
     for i in range(3):
+        repeats = chain.silent[i] and not isnan(chain.handed_rad[i])
+        if repeats:
+            measurement[0, i] = chain.handed_rad[i]
+        chain.fresh[i] = 0.0 if repeats else 1.0
+        chain.handed_rad[i] = measurement[0, i]
         finite = finite and isfinite(measurement[0, i]) and isfinite(measurement[1, i])
     return finite
 
 
-def _noise_V(section: SensorsSection) -> float:
-    """Of one conversion: the sum of two independent normal numbers is one of their root sum of squares."""
-    track = section.potentiometer
-    return hypot(track.volts_per_rad * track.noise_rad, section.adc.noise_V)
+def transfer(before: SensorChain, after: SensorChain) -> None:
+    """Go on as before with other figures; a stage that was off kept nothing."""
+    for was, now in zip(before.stages, after.stages, strict=True):
+        if was.on and now.on:
+            transfer_state(was, now)
+    after.handed_rad[:] = before.handed_rad

@@ -5,7 +5,7 @@ A sensor in the amplifier would not see a shorted coil, which carries what is co
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,10 @@ from spheretwin.twin.trajectories.trajectory import CONFIG
 
 
 class CurrentSection(BaseModel):
-    """Sensors of the group currents; ideal while they have no noise. Nothing but a detector reads them."""
+    """Sensors of the group currents; a detector of faults reads them, and the telemetry has what they say.
+
+    There are such sensors if they have noise, or if a detector needs them.
+    """
 
     model_config = CONFIG
 
@@ -25,29 +28,30 @@ class CurrentSection(BaseModel):
     )
 
 
+class CurrentSensors(NamedTuple):
+    """Sensors of the group currents, for compiled code."""
+
+    on: bool
+    noise_A: float  # standard deviation
+    measured_A: NDArray[np.float64]  # (n,) at the last control tick
+
+
 @allocation_free
-def sense_currents(
-    noise_A: float,
-    current: NDArray[np.float64],
-    draws: NDArray[np.float64],
-    first: int,
-    measured: NDArray[np.float64],
-) -> None:
-    """Write the measured currents of a control tick.
+def sense_currents(sensors: CurrentSensors, current: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+    """Measure the currents at a control tick.
 
     Parameters
     ----------
-    noise_A : float, A
-        Standard deviation.
+    sensors : CurrentSensors
+        The measured currents are written.
     current : (n,) array, A
-        True, at the tick.
+        True.
     draws : array
-        Standard normal numbers; n of them from `first` on are used, and none without noise.
-    first : int
-    measured : (n,) array, A
-        Result.
+        Standard normal numbers, of which the last n are used; none without noise.
     """
-    for j in range(current.shape[0]):
+    groups, measured = current.shape[0], sensors.measured_A
+    first = draws.shape[0] - groups
+    for j in range(groups):
         measured[j] = current[j]
-        if noise_A > 0.0:
-            measured[j] += noise_A * draws[first + j]
+        if sensors.noise_A > 0.0:
+            measured[j] += sensors.noise_A * draws[first + j]

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, Field
+from numpy.typing import NDArray
+from pydantic import Field
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.trajectories.trajectory import CONFIG
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line, through
+from spheretwin.twin.electronics.sensing.stage import Numbers, SensorSetup, SensorStage
 
 
-class EncoderSection(BaseModel):
+class EncoderSection(SensorStage):
     """Incremental encoder of γ; ideal while it has no counts.
 
     Its counter is set from the pose at the start, rounded to the grid of the disc, and no count is ever lost:
@@ -20,8 +22,6 @@ class EncoderSection(BaseModel):
     a turn where γ is a multiple of 2π, lies on that grid. It would find lost counts, and where in a turn a
     rotor of unknown pose stands, neither of which happens here; it could not tell how many turns were missed.
     """
-
-    model_config = CONFIG
 
     counts: Annotated[int, Field(ge=0, le=2**31)] = Field(
         0,
@@ -31,19 +31,32 @@ class EncoderSection(BaseModel):
 
     @property
     def ideal(self) -> bool:
-        """Whether the angle comes out as it goes in."""
+        """True if the angle comes out as it goes in."""
         return self.counts == 0
+
+    def build(self, setup: SensorSetup) -> Encoder:
+        """Encoder without errors of its own: a line is where it should be."""
+        return Encoder(not self.ideal or setup.faults, float(self.counts), fault_line(1))
+
+    @classmethod
+    def function(cls) -> Any:
+        """Compiled function that counts γ."""
+        return pass_encoder
 
 
 class Encoder(NamedTuple):
     """The encoder, for compiled code."""
 
+    on: bool
     counts_per_turn: float  # 0 for none
+    line: FaultLine  # of the angle, rad, before it is counted
 
 
-def encoder(section: EncoderSection) -> Encoder:
-    """Encoder without errors of its own: a line is where it should be."""
-    return Encoder(float(section.counts))
+@allocation_free
+def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], numbers: Numbers) -> None:
+    """Count γ, rad, behind its fault line."""
+    turned = through(encoder.line, 0, measurement[0, 2], numbers.faults)
+    measurement[0, 2] = counted(encoder, turned)
 
 
 @allocation_free

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from math import cos, pi, sin
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field, model_validator
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.trajectories.trajectory import CONFIG
+from spheretwin.twin.electronics.fault_line import FaultLine, fault_line, through
+from spheretwin.twin.electronics.sensing.stage import Numbers, SensorSetup, SensorStage
+from spheretwin.twin.electronics.streams import uniforms
 
-STAGE = 1
-"""Of the streams that the errors of this stage are drawn from: ``default_rng([seed, STAGE, channel])``."""
+CHANNELS = 2
+"""Angles that are voltages on their way: α and β."""
 
 HARMONICS = 4
 
@@ -23,10 +25,8 @@ HARMONICS = 4
 LARGEST_SHARE = 0.06
 
 
-class PotentiometerSection(BaseModel):
+class PotentiometerSection(SensorStage):
     """Potentiometers of α and β; ideal while residual and noise are 0."""
-
-    model_config = CONFIG
 
     electrical_angle_rad: Annotated[float, Field(ge=1e-2, le=100)] = Field(
         5 * pi / 3,
@@ -57,13 +57,50 @@ class PotentiometerSection(BaseModel):
 
     @property
     def ideal(self) -> bool:
-        """Whether the angle comes out as it goes in."""
+        """True if the angle comes out as it goes in."""
         return self.nonlinearity_rad == 0 and self.noise_rad == 0
+
+    def build(self, setup: SensorSetup) -> Potentiometers:
+        """Potentiometers with residuals of their own; with ends, too, if the converter is not ideal."""
+        converts = not (self.ideal and setup.sensors.adc.ideal)
+        phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
+        return Potentiometers(
+            converts or setup.faults,
+            converts,
+            self.volts_per_rad,
+            (potentiometer(self, phases[0]), potentiometer(self, phases[1])),
+            fault_line(CHANNELS),
+        )
+
+    @classmethod
+    def function(cls) -> Any:
+        """Compiled function that takes α and β to the wipers."""
+        return pass_potentiometers
 
     @property
     def volts_per_rad(self) -> float:
         """Slope of the line that the controller takes the track for."""
         return self.supply_V / self.electrical_angle_rad
+
+
+class Potentiometers(NamedTuple):
+    """Both potentiometers, for compiled code."""
+
+    on: bool
+    converts: bool  # whether they are more than a line
+    volts_per_rad: float
+    channels: tuple[Potentiometer, Potentiometer]
+    line: FaultLine  # of the wipers, in rad of the nominal slope
+
+
+@allocation_free
+def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64], numbers: Numbers) -> None:
+    """Replace α and β by the angles, rad, that the voltages of the wipers stand for."""
+    for channel in range(CHANNELS):
+        angle = measurement[0, channel]
+        if stage.converts:
+            angle = wiper_voltage(stage.channels[channel], angle) / stage.volts_per_rad
+        measurement[0, channel] = through(stage.line, channel, angle, numbers.faults)
 
 
 class Potentiometer(NamedTuple):

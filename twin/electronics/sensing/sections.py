@@ -6,11 +6,15 @@ from spheretwin.twin.electronics.sensing.adc import AdcSection
 from spheretwin.twin.electronics.sensing.current import CurrentSection
 from spheretwin.twin.electronics.sensing.encoder import EncoderSection
 from spheretwin.twin.electronics.sensing.potentiometer import PotentiometerSection
+from spheretwin.twin.electronics.sensing.stage import SensorStage
 from spheretwin.twin.trajectories.trajectory import CONFIG, Triple
 
 
 class SensorsSection(BaseModel):
-    """How the controller sees the rotor; each stage is ideal unless told otherwise."""
+    """How the controller sees the rotor; each stage is ideal unless told otherwise.
+
+    Its fields that are a `SensorStage` are the list of the stages, in the order in which angles pass them.
+    """
 
     model_config = CONFIG
 
@@ -24,6 +28,14 @@ class SensorsSection(BaseModel):
 
     @property
     def ideal(self) -> bool:
-        """Whether the controller is handed the true angles."""
-        stages = (self.potentiometer, self.adc, self.encoder)
+        """True if the controller is handed the true angles."""
+        stages = (getattr(self, name) for name in STAGES)
         return not any(self.angle_offset_rad) and all(stage.ideal for stage in stages)
+
+
+STAGES: dict[str, type[SensorStage]] = {
+    name: field.annotation
+    for name, field in SensorsSection.model_fields.items()
+    if isinstance(field.annotation, type) and issubclass(field.annotation, SensorStage)
+}
+"""Kinds of the stages of the angles by their names, in the order in which the angles pass them."""

@@ -1,6 +1,6 @@
-"""One name for what comes between the joints and the controller: nothing, sensors, or sensors with faults.
+"""One name for what comes between the joints and the controller: nothing, or the chain of stages.
 
-As `plant.stepping` does for engines: the loop is compiled for one of them, and the others are not compiled.
+As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.twin.electronics.sensing import chain, faulty
-from spheretwin.twin.electronics.sensing.chain import Sensing
-from spheretwin.twin.electronics.sensing.faulty import FaultySensing, SensorFaults
+from spheretwin.twin.electronics.sensing import chain
+from spheretwin.twin.electronics.sensing.chain import SensorChain, SensorFaults, noise_streams, sensor_chain
+from spheretwin.twin.electronics.sensing.noise import width_of
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
 
 
@@ -35,42 +35,38 @@ def _exactly(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> b
     return finite
 
 
-Sensors = Exact | Sensing | FaultySensing
+Sensors = Exact | SensorChain
 
-_SENSE: dict[type, Any] = {Exact: _exactly, Sensing: chain.sense, FaultySensing: faulty.sense}
+_SENSE: dict[type, Any] = {Exact: _exactly, SensorChain: chain.sense}
 
 
 def made(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> Sensors:
-    """What a section asks for, with the errors that the seed gives it, and the faults that may come."""
-    if faults is not None:
-        return FaultySensing(chain.sensing(section, seed), faults)
-    return Exact(2) if section.ideal else chain.sensing(section, seed)
+    """Sensors of a section, with the errors that the seed gives them, and the faults that may come."""
+    return Exact(2) if section.ideal and faults is None else sensor_chain(section, seed, faults)
 
 
-def state_of(sensing: Sensors) -> NDArray:
-    """All that they go on from."""
-    return faulty.state_of(sensing) if isinstance(sensing, FaultySensing) else np.empty(0)
+def carried_on(before: Sensors, after: Sensors, section: SensorsSection, q: NDArray, noise: NDArray) -> None:
+    """Go on as before with other figures.
 
-
-def restore(sensing: Sensors, state: NDArray) -> None:
-    """Go on from a state of sensors of the same size."""
-    if isinstance(sensing, FaultySensing):
-        faulty.restore(sensing, state)
-
-
-def carried_on(before: Sensors, after: Sensors, q: NDArray, noise: NDArray) -> None:
-    """Go on as before with other figures, from the pose (3,), rad, and the noise of the last tick; none yet.
-
-    What may be held from now on is then what it would have been, had it been kept all the time.
+    Parameters
+    ----------
+    before, after : Sensors
+    section : SensorsSection
+        Of those after.
+    q : (3,) array, rad
+        Pose at the last tick; empty before the first one.
+    noise : array
+        Random numbers of the last tick.
     """
-    if not isinstance(after, FaultySensing):
-        return
-    if isinstance(before, FaultySensing):
-        faulty.carried_on(before, after)
-    elif len(q):
-        measurement = np.empty((3, 3))
-        sense(before, q, np.zeros(3), noise, measurement)
-        faulty.begun(after, q, measurement[0])
+    if isinstance(after, SensorChain):
+        if len(q):  # what is held from now on is what it would have been
+            numbers = width_of(noise_streams(section))
+            last = (
+                noise if len(noise) == numbers else np.zeros(numbers)
+            )  # those of other sensors are not its own
+            chain.sense(after, q, np.zeros(3), last, np.empty((3, 3)))
+        if isinstance(before, SensorChain):
+            chain.transfer(before, after)
 
 
 def sense(sensing: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:

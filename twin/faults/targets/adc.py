@@ -1,25 +1,32 @@
 """The converter of the potentiometers' voltages: held, shifted, scaled, noisy, silent or late."""
 
-from spheretwin.twin.electronics.sensing.faulty import ADC
-from spheretwin.twin.faults import readings
-from spheretwin.twin.faults.target import STRETCH, Effects, Mode, Strike, Target, Value
+from spheretwin.twin.faults import line_modes
+from spheretwin.twin.faults.line_modes import Signal
+from spheretwin.twin.faults.target import STRETCH, ActiveFault, Effects, Mode, Target, Value
 
 
-def _silence(effects: Effects, strike: Strike) -> None:
-    effects.sensors.acts[0] = effects.sensors.silent[0] = True
+def _silence(effects: Effects, fault: ActiveFault) -> None:
+    effects.sensors.silent[:2] = True
 
 
-def _delay(effects: Effects, strike: Strike) -> None:
-    effects.sensors.acts[0] = True
-    effects.sensors.late_ticks[0] += round(strike.value / effects.period_s)
+def _delay(effects: Effects, fault: ActiveFault) -> None:
+    effects.sensors.stage("adc").late_ticks[0] += round(fault.value / effects.period_s)
 
+
+SIGNAL = Signal(
+    lambda effects: effects.sensors.stage("adc").line,
+    "V",
+    lambda effects: 1.0 / effects.sensors.stage("adc").volts_per_rad,
+    every_channel=True,
+)
 
 TARGET = Target(
     "adc",
     {
-        **readings.modes(lambda strike: ADC, "V"),
+        **line_modes.modes(SIGNAL),
         "dropout": Mode(_silence),
         "delay": Mode(_delay, Value("how late it is, s; whole control periods", 0.0, 1.0)),
         "intermittent": Mode(_silence, STRETCH, intermittent=True),
     },
+    measured=True,
 )

@@ -1,23 +1,21 @@
 """The coils of a group: open, shorted at their ends, or with fewer turns than they should have."""
 
-from spheretwin.twin.electronics.driving.undriven import OPEN, SHORTED
-from spheretwin.twin.faults.target import STRETCH, Effects, Mode, Strike, Target, Value
+from spheretwin.twin.electronics.driving.coil import OPEN, SHORTED
+from spheretwin.twin.faults.target import STRETCH, ActiveFault, Effects, Mode, Target, Value
 
 
-def _open(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    effects.drive.contact[strike.place] = OPEN
+def _open(effects: Effects, fault: ActiveFault) -> None:
+    effects.drive.coil.contact[fault.place] = OPEN
 
 
-def _short(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    if effects.drive.contact[strike.place] != OPEN:  # an open lead stays open, whatever lies behind it
-        effects.drive.contact[strike.place] = SHORTED
+def _short(effects: Effects, fault: ActiveFault) -> None:
+    if effects.drive.coil.contact[fault.place] != OPEN:  # an open lead stays open, whatever lies behind it
+        effects.drive.coil.contact[fault.place] = SHORTED
 
 
-def _fewer_turns(effects: Effects, strike: Strike) -> None:
+def _fewer_turns(effects: Effects, fault: ActiveFault) -> None:
     # Resistance and inductance stay: a few turns change them less than the torque of the others matters.
-    effects.group_gain[strike.place] *= strike.value
+    effects.group_gain[fault.place] *= fault.value
 
 
 TARGET = Target(

@@ -1,23 +1,20 @@
 """The controller as seen from its wires: its commands come late, stay what they were, or do not come."""
 
-from spheretwin.twin.electronics.driving.faulty import HANGING, SILENT
-from spheretwin.twin.faults.target import STRETCH, Effects, Mode, Strike, Target, Value
+from spheretwin.twin.electronics.driving.chain import HANGING, SILENT
+from spheretwin.twin.faults.target import STRETCH, ActiveFault, Effects, Mode, Target, Value
 
 
-def _hang(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    if effects.drive.leaves[0] != SILENT:
-        effects.drive.leaves[0] = HANGING
+def _hang(effects: Effects, fault: ActiveFault) -> None:
+    if effects.drive.output.leaves[0] != SILENT:
+        effects.drive.output.leaves[0] = HANGING
 
 
-def _silence(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    effects.drive.leaves[0] = SILENT
+def _silence(effects: Effects, fault: ActiveFault) -> None:
+    effects.drive.output.leaves[0] = SILENT
 
 
-def _delay(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    effects.drive.late_steps[0] += round(strike.value / effects.step_s)
+def _delay(effects: Effects, fault: ActiveFault) -> None:
+    effects.drive.output.late_steps[0] += round(fault.value / effects.step_s)
 
 
 TARGET = Target(

@@ -1,4 +1,4 @@
-"""All kinds of parts that can fail, in the order of the telemetry, and on the way out from the coils on.
+"""All kinds of parts that can fail, in the order of the telemetry.
 
 A new one is a file and a row.
 """

@@ -1,37 +1,20 @@
 """The supply of all amplifiers: gone, low, or with a ripple; what is left of it limits every group."""
 
-from spheretwin.twin.faults.target import GAIN, STRETCH, Effects, Mode, Strike, Target, noise, offset
+from spheretwin.twin.faults import line_modes
+from spheretwin.twin.faults.line_modes import Signal
+from spheretwin.twin.faults.target import GAIN, Target, offset
 
+SIGNAL = Signal(lambda effects: effects.drive.supply, "V")
 
-def _drop(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    effects.drive.supply[:] = 0.0
-
-
-def _shift(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    effects.drive.supply[1] += strike.value
-
-
-def _scale(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    effects.drive.supply[:] *= abs(strike.value)
-
-
-def _noise(effects: Effects, strike: Strike) -> None:
-    effects.drive.acts[0] = True
-    effects.drive.supply[2] = (effects.drive.supply[2] ** 2 + strike.value**2) ** 0.5
-    effects.drive.supply_column[0] = strike.column
-
+_MODES = line_modes.modes(SIGNAL)
 
 TARGET = Target(
     "supply",
     {
-        "offset": Mode(_shift, offset("V of either sign")),
-        "gain": Mode(_scale, GAIN._replace(least=0.0)),
-        "noise": Mode(_noise, noise("V")),
-        "dropout": Mode(_drop),
-        "intermittent": Mode(_drop, STRETCH, intermittent=True),
+        "offset": _MODES["offset"]._replace(value=offset("V of either sign")),
+        "gain": _MODES["gain"]._replace(value=GAIN._replace(least=0.0)),
+        "noise": _MODES["noise"],
+        **line_modes.silent_modes(SIGNAL),
     },
     needs_supply=True,
 )

@@ -68,6 +68,7 @@ _OF_FIXED_RANGE = frozenset(
         "torque_Nm",
         "current_command_A",
         "current_A",
+        "mean_current_A",
         "allocation_scale",
         "coil_power_W",
         "copper_loss_W",
