@@ -29,7 +29,7 @@ from spheretwin.twin.crosscheck.trajectories import ORDER_MARGIN, Convergence
 from spheretwin.twin.in_force import at_start
 from spheretwin.twin.linear.actuation import hinge_matrix
 from spheretwin.twin.linear.knowledge import Magnetics
-from spheretwin.twin.plant.plant import GOING, Delivered, Plant, plant_tick
+from spheretwin.twin.plant.plant import GOING, Delivered, plant_tick
 from spheretwin.twin.wiring.wires import wires_of
 
 Array = NDArray[np.float64]

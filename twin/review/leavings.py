@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.wording import without_breaks
-from spheretwin.models.telemetry.checksums import list_of
 from spheretwin.models.telemetry.file import join
 from spheretwin.models.telemetry.parts import list_of, read_schema
 from spheretwin.models.telemetry.table import read_parquet
