@@ -3,6 +3,7 @@
 import json
 import pickle
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -263,6 +264,17 @@ def test_a_curve_that_was_resolved_does_not_follow_a_later_one(fields, half):
         assert session.scenario.nominal.torque_curve == "shipped"
         assert session._in_force.files.nominal.torque_curve is nominal
         assert session.actuator.torque_curve.peak_Nm_per_A == 0.5 * nominal.peak_Nm_per_A
+
+
+def test_only_the_nominal_curve_has_a_shipped_file_by_name(tmp_path, half):
+    """A file of the user's named so is found beside the scenario that names it."""
+    (tmp_path / "shipped").write_text(Path(half).read_text())
+    text = (tmp_path / "s.toml").write_text
+    text(
+        '[trajectory]\nshape = "hold"\n[plant]\ntorque_curve = "shipped"\n[nominal]\ntorque_curve = "shipped"'
+    )
+    read = scenarios.load(str(tmp_path / "s.toml"))
+    assert (read.plant.torque_curve, read.nominal.torque_curve) == (str(tmp_path / "shipped"), "shipped")
 
 
 # --- older records

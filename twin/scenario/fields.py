@@ -16,7 +16,7 @@ INDEX = "#"
 """In a dotted name: any place of a list."""
 
 SHIPPED = "shipped"
-"""Name of the shipped file in a field that holds a path."""
+"""Name of the shipped file in a field that holds this name or a path; its mark in such a field."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,8 @@ def _names_file(field: FieldInfo, value: Any) -> bool:
     mark = extra.get("path") if isinstance(extra, dict) else None
     if mark == "code":
         return is_reference(value)
-    return bool(mark and isinstance(value, str) and value not in ("", SHIPPED))
+    is_name = mark == SHIPPED and value == SHIPPED
+    return bool(mark and isinstance(value, str) and value and not is_name)
 
 
 def _kind(annotation: Any, told_apart_by: Any) -> Kind | None:

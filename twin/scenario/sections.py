@@ -21,6 +21,7 @@ from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedD
 from spheretwin.twin.electronics.sensing.sections import SensorsSection
 from spheretwin.twin.faults.fault import Fault, check_gains
 from spheretwin.twin.plant.registry import ENGINES
+from spheretwin.twin.scenario.fields import SHIPPED
 from spheretwin.twin.scenario.hardware import HARDWARE
 from spheretwin.twin.trajectories.registry import Trajectory
 from spheretwin.twin.trajectories.trajectory import Bounded, Triple
@@ -145,7 +146,7 @@ class Nominal(_Section):
         None,
         description="torque curve as CSV, or `shipped`; shipped unless given, and with a plant.mjcf, which is"
         " another machine, plant.torque_curve",
-        json_schema_extra={"path": True},
+        json_schema_extra={"path": SHIPPED},
     )
     torque_scale: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
         1.0, description="torque matrix over that of the torque curve; below 0, its sign is wrong"
