@@ -100,8 +100,8 @@ def test_another_seed_draws_other_points(design):
     ("axis", "told"),
     [
         ({"kind": "values", "values": []}, "axis.0.values: expected one value at least"),
-        ({"kind": "linspace", "first": 0, "last": 1, "count": 0}, "axis.0.count: expected greater"),
-        ({"kind": "linspace", "first": 0, "last": 1, "count": 10**9}, "axis.0.count: expected less"),
+        ({"kind": "linspace", "first": 0, "last": 1, "count": 0}, "axis.0.count: expected a number greater"),
+        ({"kind": "linspace", "first": 0, "last": 1, "count": 10**9}, "axis.0.count: expected a number less"),
         (
             {"kind": "linspace", "first": 0, "last": float("inf"), "count": 2},
             "axis.0.last: expected a finite",
