@@ -261,9 +261,10 @@ class Contents:
         done = 0
         for first, count, checksum in sorted(self._ranges):
             rows = together[first : first + count]
-            # A process that was killed may leave the checksum of rows that it did not write any more.
-            is_last = not ended and first == len(together)
-            if first != done or (checksum_of(rows) != checksum and not is_last):
+            # A killed process may leave the checksum of rows that it did not write any more. Rows that a
+            # closed recording has lost are missing in its total.
+            is_left_over = first == len(together)
+            if first != done or (checksum_of(rows) != checksum and not is_left_over):
                 raise self._damaged(f"entity {TELEMETRY}, rows {done} to {first + count - 1}")
             done += len(rows)
         if done < len(together):

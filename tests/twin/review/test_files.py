@@ -178,7 +178,7 @@ def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):
         assert not run.whole
         columns = range(run.table.values.shape[1])
         assert np.array_equal(run.table.values, whole.values[: rows[-1], columns], equal_nan=True)
-        assert leavings.recover(path, out) == (rows[-1], run.simulated_s)
+        assert leavings.recover(path, out) == (rows[-1], run.simulated_s, True)
         again = read(out)
         assert again.whole
         assert again.table.values.tobytes() == run.table.values.tobytes()

@@ -114,7 +114,7 @@ def test_series_have_names_with_units(run):
 
 def texts(path):
     lines = []
-    for chunk in RrdReader(path).stream().filter(content=f"/{EVENTS}"):
+    for chunk in RrdReader(path).stream().filter(content=f"/{EVENTS}", is_static=False):
         lines += [row[0] for row in chunk.to_record_batch().column("TextLog:text").to_pylist()]
     return lines
 
