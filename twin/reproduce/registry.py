@@ -9,6 +9,7 @@ from spheretwin.twin.reproduce.readings import readings
 from spheretwin.twin.reproduce.rivals import rivals
 from spheretwin.twin.reproduce.sinusoid import figures
 from spheretwin.twin.reproduce.stability import stability
+from spheretwin.twin.reproduce.step_size import step_size
 
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
@@ -22,5 +23,6 @@ EXPERIMENTS: dict[str, Experiment] = {
         rivals.EXPERIMENT,
         budget.EXPERIMENT,
         faults.EXPERIMENT,
+        step_size.EXPERIMENT,
     )
 }

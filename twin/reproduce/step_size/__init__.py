@@ -1,0 +1,1 @@
+"""Error that the physics step makes, for every law and scenario."""
