@@ -96,7 +96,7 @@ import sys
 
 
 def talking(t, reference, measurement, parameters, state, torque):
-    torque[:] = 0.0
+    torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
     if t > 0.1 and not TOLD:
         TOLD.append(t)
         print("it runs", file=sys.stderr, flush=True)

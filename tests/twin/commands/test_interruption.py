@@ -15,6 +15,7 @@ COMMAND = [sys.executable, "-m", "spheretwin.twin.cli"]
 # Each law says on stderr that it hangs: tests wait for that line. Only the first chunk of 1 s is finished.
 LAWS = """
 import ctypes
+import sys
 
 import numba
 import numpy as np
@@ -28,7 +29,8 @@ LINE = np.frombuffer(b"it hangs\\n", dtype=np.uint8)
 
 
 def compiled(t, reference, measurement, parameters, state, torque):
-    torque[:] = 0.0
+    for i in range(3):
+        torque[i] = -0.5 * (measurement[0, i] - reference[0, i]) - 0.03 * measurement[1, i]
     if t > 1.5:
         write(2, LINE.ctypes, 9)
         while t > 1.5:
@@ -38,14 +40,14 @@ def compiled(t, reference, measurement, parameters, state, torque):
 def plain(t, reference, measurement, parameters, state, torque):
     torque[:] = 0.0
     if t > 0.005:
-        print("it hangs", flush=True)
+        print("it hangs", file=sys.stderr, flush=True)
         while True:
             pass
 
 
 class Slow(LawParameters):
     def build(self, known):
-        print("it hangs", flush=True)
+        print("it hangs", file=sys.stderr, flush=True)
         while True:
             pass
 
@@ -86,12 +88,16 @@ def line_with(process, text):
 
 def ended(process, number):
     """Send a signal to a process that hangs, and a second one when it has said what that does."""
-    line_with(process, "it hangs")
-    process.send_signal(number)
-    line_with(process, "a second Ctrl-C or SIGTERM ends the process at once")
-    process.send_signal(number)
-    told = process.stderr.read()
-    assert process.wait() == CODES[number]
+    with process:
+        try:
+            line_with(process, "it hangs")
+            process.send_signal(number)
+            line_with(process, "a second Ctrl-C or SIGTERM ends the process at once")
+            process.send_signal(number)
+            told = process.stderr.read()
+        finally:
+            process.kill()
+    assert process.returncode == CODES[number]
     assert told.startswith(f"spheretwin: ended at once by a second signal, {signal.Signals(number).name}\n")
     return told.splitlines()[1:]
 
@@ -114,17 +120,21 @@ def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_p
     assert len(read_parquet(telemetry)[0]) == 1000
 
 
-@pytest.mark.parametrize("law", ["plain", "Slow"])
-@pytest.mark.parametrize("verb", ["simulate", "bench"])
-def test_python_that_never_returns_ends_by_the_second_signal(laws, tmp_path, law, verb):
-    if verb == "bench" and law == "plain":
-        pytest.skip("a bench begins paused")
-    more = {
-        "simulate": ["--telemetry", tmp_path / "x.parquet", "--json"],
-        "bench": ["--no-browser", "--port", "0"],
-    }
-    # What has no rows is not named.
-    assert ended(started(verb, "hold", *ALWAYS, f"{laws}:{law}", *more[verb]), signal.SIGINT) == []
+BENCH = ["bench", "hold", "--no-browser", "--port", "0"]
+
+
+@pytest.mark.parametrize(
+    ("command", "law"),
+    [(["simulate", "hold"], "plain"), (["simulate", "hold"], "Slow"), (BENCH, "Slow")],
+    ids=["law", "build", "bench"],
+)
+def test_python_that_never_returns_ends_by_the_second_signal(laws, command, law):
+    assert ended(started(*command, *ALWAYS, f"{laws}:{law}"), signal.SIGINT) == []
+
+
+def test_what_has_no_rows_is_not_named(laws, tmp_path):
+    outputs = ["--telemetry", tmp_path / "run.parquet", "--record", tmp_path / "run.rrd"]
+    assert ended(started("simulate", "hold", *ALWAYS, f"{laws}:plain", *outputs), signal.SIGTERM) == []
 
 
 def test_rows_that_never_return_end_by_the_second_signal_and_the_study_goes_on(laws, tmp_path):
