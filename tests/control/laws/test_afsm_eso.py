@@ -184,7 +184,7 @@ def test_another_law_in_its_place_starts_with_its_own_gains():
 
 @pytest.mark.parametrize("bad", ["slow", 3, ["fast"], None])
 def test_a_preset_that_is_none_is_refused(bad):
-    with pytest.raises(InputError, match=r"controller\.preset: expected 'ideal', 'fast' or 'prototype'"):
+    with pytest.raises(InputError, match=r"controller\.preset: expected 'ideal', 'fast', 'prototype' or 'robust'"):
         scenarios.load("hold", {"controller.law": "afsm_eso", "controller.preset": bad})
 
 
@@ -222,6 +222,7 @@ def torque_of(law, state):
         ("ideal", (-0.91, 7.9), (-0.92, 7.92)),
         ("fast", (-0.86, 5.2), (-0.87, 5.3)),
         ("prototype", (-0.77, 3.2), (-0.78, 3.3)),
+        ("robust", (-0.76, 4.8), (-0.78, 4.95)),
     ],
 )
 def test_with_another_inertia_the_poles_are_stable_as_far_as_is_said(actuator, preset, stable, unstable):

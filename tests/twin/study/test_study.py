@@ -17,6 +17,7 @@ def test_studies_ship_and_each_has_the_rows_that_it_says():
         "compensators": 720,
         "delays": 320,
         "estimators": 60,
+        "mismatch": 800,
         "paper": 108,
         "robustness": 10_000,
         "sensors": 480,
