@@ -103,7 +103,11 @@ def test_every_part_is_a_flag_and_told():
 @pytest.mark.parametrize(
     ("field", "value", "part"),
     [
-        ("governor.acceleration_rad_s2", 0.0, "governor.acceleration_rad_s2.0: expected a number greater than 0"),
+        (
+            "governor.acceleration_rad_s2",
+            0.0,
+            "governor.acceleration_rad_s2.0: expected a number greater than 0",
+        ),
         ("governor.acceleration", 1.0, "expected one of acceleration_rad_s2 in controller.governor"),
         ("prediction.on", 1, "prediction.on: expected true or false"),
         (

@@ -204,7 +204,9 @@ def test_what_cannot_be_had_is_told_in_one_line(tmp_path, capsys, text, name, pa
 
 
 def test_a_gain_out_of_range_names_its_field(file):
-    with pytest.raises(InputError, match=r"controller\.stiffness\.1: expected a number greater than 0, received -2"):
+    with pytest.raises(
+        InputError, match=r"controller\.stiffness\.1: expected a number greater than 0, received -2"
+    ):
         load(f"{file}:ComputedTorque", "--controller.stiffness", "1", "-2", "3")
 
 

@@ -107,7 +107,10 @@ def test_another_seed_draws_other_points(design):
             "axis.0.last: expected a finite",
         ),
         ({"kind": "linspace", "first": "0", "last": 1, "count": 2}, "axis.0.first: expected a number"),
-        ({"kind": "logspace", "first": 0, "last": 1, "count": 2}, "axis.0.first: expected a number greater than 0"),
+        (
+            {"kind": "logspace", "first": 0, "last": 1, "count": 2},
+            "axis.0.first: expected a number greater than 0",
+        ),
         ({"kind": "uniform", "low": 1, "high": 1}, "expected low below high"),
         ({"kind": "normal", "mean": 0, "deviation": 0}, "axis.0.deviation: expected a number greater than 0"),
         ({"kind": "gauss"}, "axis.0.kind: expected one of values, linspace, logspace, uniform, normal"),
