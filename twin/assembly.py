@@ -185,6 +185,7 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, stepped: Any, wires
         current=np.zeros(groups),
         mean_current=np.zeros(groups),
         pulling=np.zeros(groups),
+        torque_S=np.zeros(3),
         friction_q=np.zeros(3),
         first_friction_q=np.zeros(3),
         draws=wires.draws,

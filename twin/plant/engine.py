@@ -37,7 +37,6 @@ class Engine(NamedTuple):
     data_address: int
     q: NDArray[np.float64]  # (3,) rad
     qdot: NDArray[np.float64]  # (3,) rad/s
-    torque_S: NDArray[np.float64]  # (3,) N·m on the rotor, stator frame
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
     warnings: NDArray[np.int32]  # how often the engine has warned, of each kind
 
@@ -79,8 +78,7 @@ class Rotor:
         if gravity_m_s2 is not None:
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
             self.model.opt.gravity[:] = 0.0, 0.0, -gravity_m_s2
-        self._rotor = self.model.body(ROTOR).id
-        self.model.body_inertia[self._rotor] *= 1 + modelling_error
+        self.model.body_inertia[self.model.body(ROTOR).id] *= 1 + modelling_error
         if payload_kg:
             payload = self.model.body(PAYLOAD).id
             self.model.body_mass[payload] = payload_kg
@@ -105,7 +103,6 @@ class Rotor:
             self.data._address,
             self.data.qpos,
             self.data.qvel,
-            self.data.xfrc_applied[self._rotor, 3:],
             self.data.qfrc_applied,
             self.data.warning.number,
         )

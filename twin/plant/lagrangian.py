@@ -26,14 +26,13 @@ from spheretwin.twin.plant.rotor import EngineKind, Setting
 
 
 class Equations(NamedTuple):
-    """The equations of motion as compiled code sees them; the last four are what the loop reads and sets."""
+    """The equations of motion as compiled code sees them; the last three are what the loop reads and sets."""
 
     step_s: float
     inertia: NDArray[np.float64]  # (3,) kg·m², payload included
     weight_moment: float  # N·m, m g l of the payload
     q: NDArray[np.float64]  # (3,) rad
     qdot: NDArray[np.float64]  # (3,) rad/s
-    torque_S: NDArray[np.float64]  # (3,) N·m on the rotor, stator frame
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
     warnings: NDArray[np.int32]  # none: whatever goes wrong shows in the state
 
@@ -101,7 +100,6 @@ class LagrangianRotor:
             weight_moment=self.weight_moment,
             q=pose,
             qdot=rates,
-            torque_S=np.zeros(3),
             torque_q=np.zeros(3),
             warnings=np.zeros(1, np.int32),
         )
@@ -119,9 +117,8 @@ class LagrangianRotor:
 def step(plant: Equations) -> None:
     """One physics step of the classical Runge-Kutta method of order four.
 
-    Both torques are held over the step, the Cartesian one in the stator frame, as MuJoCo does: its effect
-    on the hinges is evaluated anew at the pose of each stage. The state goes through the stages as tuples:
-    nothing is allocated, and a step takes a tenth of what it takes with arrays of three.
+    The torque on the hinges is held over the step, as MuJoCo does. The state goes through the stages as
+    tuples: nothing is allocated, and a step takes a tenth of what it takes with arrays of three.
     """
     h = plant.step_s
     q1, v1 = triple(plant.q), triple(plant.qdot)
@@ -139,14 +136,8 @@ def step(plant: Equations) -> None:
 
 @allocation_free
 def _acceleration(plant: Equations, q: Triple, qdot: Triple) -> Triple:
-    at = turns(q)
-    S, hinges = plant.torque_S, plant.torque_q
-    torque = (  # torque_q + E^T torque_S; the columns of E are the hinges' axes
-        hinges[0] + S[0],
-        hinges[1] + at.ca * S[1] + at.sa * S[2],
-        hinges[2] + at.sb * S[0] + at.cb * (at.ca * S[2] - at.sa * S[1]),
-    )
-    return acceleration_entries(at, qdot, torque, triple(plant.inertia), plant.weight_moment)
+    torque, inertia = triple(plant.torque_q), triple(plant.inertia)
+    return acceleration_entries(turns(q), qdot, torque, inertia, plant.weight_moment)
 
 
 @allocation_free

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.copying import copy_into
+from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.twin.electronics.driving.stages import Stages, advance_currents, begin, end
 from spheretwin.twin.electronics.sensing.current import CurrentSensors
@@ -42,6 +43,7 @@ class Plant(NamedTuple):
     current: NDArray[np.float64]  # (n,) A, now
     mean_current: NDArray[np.float64]  # (n,) A, over the physics step
     pulling: NDArray[np.float64]  # (n,) A, the same times the gain
+    torque_S: NDArray[np.float64]  # (3,) N·m of the coils, stator frame, in the physics step
     friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, mean over the physics step
     first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
     draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and of sensors of currents
@@ -86,7 +88,7 @@ def plant_tick(
     """
     # Taken out of the tuple once: each time costs a count of references.
     rotor, magnetics, G, scratch = plant.rotor, plant.magnetics, plant.G, plant.scratch
-    q, qdot, torque_S, torque_q = rotor.q, rotor.qdot, rotor.torque_S, rotor.torque_q
+    q, qdot, torque_q, torque_S = rotor.q, rotor.qdot, rotor.torque_q, plant.torque_S
     middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
     hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
     current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
@@ -103,7 +105,6 @@ def plant_tick(
             middle_q[i] = q[i] + half_step_s * qdot[i]
             middle_qdot[i] = qdot[i] + 0.5 * (qdot[i] - last_qdot[i])
             last_qdot[i] = qdot[i]
-            torque_q[i] = -disturbance[i] - unmodelled[i]
             friction_q[i] = 0.0
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
@@ -113,6 +114,9 @@ def plant_tick(
         for j in range(pulling.shape[0]):
             pulling[j] = gain[j] * mean_current[j]
         rotor_torque(G, pulling, torque_S)
+        generalised_torque(middle_q, torque_S, torque_q)
+        for i in range(3):
+            torque_q[i] -= disturbance[i] + unmodelled[i]
         step(rotor)
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)

@@ -42,8 +42,7 @@ class Rotor(Protocol):
         Returns
         -------
         named tuple
-            It has `q`, `qdot` (3,), and takes `torque_S` (3,) on the rotor and `torque_q` (3,) on the
-            hinges; `warnings` (n,) are counts that end a run when one rises.
+            It has `q`, `qdot` (3,), and takes `torque_q` (3,) on the hinges; `warnings` (n,) are counts that end a run when one rises.
         """
         ...
 
