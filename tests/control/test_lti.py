@@ -139,7 +139,7 @@ def test_its_state_is_kept_in_snapshots():
         ahead = session.advance(200).values.tobytes()
         session.restore(before)
         assert session.advance(200).values.tobytes() == ahead
-        assert np.any(before.machine.memory[:3])
+        assert np.any(before.machine.parts["the law's memory"][:3])
 
 
 def test_it_runs_from_a_file_and_keeps_its_period(tmp_path):
@@ -207,8 +207,8 @@ def like(**changes):
     ("system", "part"),
     [
         (signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]), "a discrete system with its dt in s"),
-        (signal.TransferFunction([1.0], [1.0, 1.0]), "received one with dt None; sample it first"),
-        (signal.dlti([1.0], [1.0, 0.5]), "received one with dt True"),
+        (signal.TransferFunction([1.0], [1.0, 1.0]), "received one with dt none; sample it first"),
+        (signal.dlti([1.0], [1.0, 0.5]), "received one with dt true"),
         (like(dt=0), "received one with dt 0; sample it first, as system.to_discrete"),
         (like(dt=np.nan), "received one with dt nan"),
         (like(dt=-1e-3), "received one with dt -0.001"),
@@ -231,7 +231,7 @@ def like(**changes):
         (gain(np.zeros((3, 1))), "received 3 of 1"),
         (gain(np.zeros((3, 9))), "received 3 of 9"),
         (gain(np.zeros((1, 3))), "received 1 of 3"),
-        (np.eye(3), "received one with dt None"),
+        (np.eye(3), "received one with dt none"),
         (
             SimpleNamespace(dt=PERIOD_S),
             "a state space, or a proper transfer function, or zeros, poles and gain, received",

@@ -11,6 +11,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.electronics.fault_line import LAST
 from spheretwin.twin.faults.targets.registry import TARGETS
 from spheretwin.twin.session import Session
 from spheretwin.twin.simulation import simulate
@@ -106,17 +107,17 @@ INPUTS = {
     "angle": lambda machine: machine._moving.stepped.q,
     "rate": lambda machine: machine._moving.stepped.qdot,
     "current": lambda machine: machine._plant.current,
-    "temperature": lambda machine: machine._plant.driving.driving.coil.temperature_degC,
-    "resistance": lambda machine: machine._plant.driving.driving.coil.resistance_ohm,
-    "on their way": lambda machine: machine._plant.driving.driving.delay.ring.ravel(),
-    "held": lambda machine: machine._plant.driving.faults.last_A,
+    "temperature": lambda machine: machine._plant.driving.coil.temperature_degC,
+    "resistance": lambda machine: machine._plant.driving.coil.resistance_ohm,
+    "on their way": lambda machine: machine._plant.driving.delay.ring.ravel(),
+    "held": lambda machine: machine._plant.driving.stage("dac").line.table[:, LAST],
     "group gain": lambda machine: machine._plant.group_gain,
     "estimate": lambda machine: machine._controller.estimates.memory,
     "law": lambda machine: machine._controller.memory,
     "belief": lambda machine: machine._controller.belief.current,
     "detector": lambda machine: machine._controller.supervision.detector.shorted_A,
-    "wiper": lambda machine: machine._sensors.faults.wiper_V,
-    "converted": lambda machine: machine._sensors.faults.on_the_way_V.ravel(),
+    "wiper": lambda machine: machine._sensors.stage("potentiometer").line.table[:, LAST],
+    "converted": lambda machine: machine._sensors.stage("adc").on_the_way_rad.ravel(),
     "seen": lambda machine: machine._controller.supervision.watchdog.last_rad,
 }
 
@@ -153,7 +154,7 @@ def test_any_draw_ends_with_a_status_and_numbers(watching, column, bad, tick):
         inputs = session._exogenous.rows(tick, 1)
         for rows in (inputs.noise, inputs.fault_noise):
             rows[0, column % rows.shape[1]] = bad
-        inputs.fault_noise[0, -18 - 4] = bad  # of the supply
+        inputs.fault_noise[0, 0] = bad  # of the supply, the only fault with noise
         table = session.advance(TICKS)
         assert session.status in {*ENDS, Status.RUNNING}
         if np.isnan(bad):
