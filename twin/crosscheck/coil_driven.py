@@ -232,8 +232,8 @@ def _motion(name: str, measured: Convergence) -> Check:
         value=float(measured.errors_rad[STEPS_s.index(STEP_s)]),
         bound=BOUND_rad,
         why="the pose in the middle of a step is predicted without the acceleration, and torque is held:"
-        " h²/8 times accelerations of up to 100 rad/s² is 3e-6, with a margin of three; a field that lags by a"
-        " microsecond breaks it, one that lags by half a step gives 3.5e-3",
+        " h²/8 times accelerations of up to 100 rad/s² is 3e-6, with a margin of three; a field that lags by"
+        " a microsecond breaks it, one that lags by half a step gives 3.5e-3",
         unit="rad",
     )
 

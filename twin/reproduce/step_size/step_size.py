@@ -32,8 +32,8 @@ ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
 HOW = (
     "Largest difference of any hinge angle, in mrad, between a run and the same run with a physics step of"
     f" {1e3 * FINE_s:g} ms, compared every {1e3 * SAMPLE_s:g} ms; one seed, the law's default gains. A"
-    " physics step cannot be longer than the control period: at 2 ms the control period is 2 ms too, in both runs,"
-    " so that the law is another one there. The last column is the largest tracking error at"
+    " physics step cannot be longer than the control period: at 2 ms the control period is 2 ms too, in both"
+    " runs, so that the law is another one there. The last column is the largest tracking error at"
     f" {1e3 * DEFAULT_s:g} ms, for comparison. *Left at* is the time at which a run left the workspace; the"
     " difference is then taken up to there."
 )
