@@ -32,11 +32,11 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 BOUND_rad = 1e-9
 
 WHY = {
-    "PD": "a smooth law takes both runs to the same motion, so that only rounding and the gimbal rings (1e-12)"
-    " part them; an inertia wrong by 1e-8 of itself moves the trace by 3e-9",
-    "AFSM": "rounding and the gimbal rings (1e-12) as under PD, as long as they decide no sign of s: one flipped"
-    " sign moves the trace by 1e-5. For that |s| must be below 1e-10 at a tick, where it moves by 1e-2 from"
-    " tick to tick: less than once in a thousand runs",
+    "PD": "a smooth law takes both runs to the same motion: only rounding and the gimbal rings (1e-12) part"
+    " them; an inertia wrong by 1e-8 of itself moves the trace by 3e-9",
+    "AFSM": "rounding and the gimbal rings (1e-12) as under PD, as long as they decide no sign of s: one"
+    " flipped sign moves the trace by 1e-5. For that |s| must be below 1e-10 at a tick, where it moves by"
+    " 1e-2 from tick to tick: less than once in a thousand runs",
 }
 
 # What the step size costs: a smooth law, and no random torque, so that the runs differ in nothing else.
@@ -116,8 +116,8 @@ def _step_size(mjcf: Path, name: str) -> Check:
         states=len(coarse),
         value=float(np.max(np.abs(coarse - fine))) if same_end else float("inf"),
         bound=STEP_BOUND_rad,
-        why="a step of second order, with a margin of two; a torque matrix taken at the start of each step gives"
-        " 6e-4",
+        why="a step of second order, with a margin of two; a torque matrix taken at the start of each step"
+        " gives 6e-4",
         unit="rad",
     )
 

@@ -89,7 +89,9 @@ def compare(mjcf: Path, actuator: Actuator) -> CoilDriven:
     }
     complete = {
         name: convergence(
-            partial(by_complete_plant, mjcf, engine), COMPLETE_STEPS_s, by_complete_plant(mjcf, engine, FINE_s)
+            partial(by_complete_plant, mjcf, engine),
+            COMPLETE_STEPS_s,
+            by_complete_plant(mjcf, engine, FINE_s),
         )
         for name, engine in ENGINES.items()
     }
@@ -155,7 +157,9 @@ def by_complete_plant(mjcf: Path, engine: str, step_s: float) -> Array:
     return _driven(mjcf, fields, PERIOD_s, COMPLETE_AMPLITUDE_A, np.array(DISTURBANCE_Nm))
 
 
-def convergence(method: Callable[[float], Array], steps_s: tuple[float, ...], reference: Array) -> Convergence:
+def convergence(
+    method: Callable[[float], Array], steps_s: tuple[float, ...], reference: Array
+) -> Convergence:
     """Largest error of any hinge angle at each step, and its order by regression."""
     errors = np.array([np.max(np.abs((method(step_s) - reference)[:, :3])) for step_s in steps_s])
     order = np.polyfit(np.log(steps_s), np.log(errors), 1)[0] if np.all(np.isfinite(errors)) else np.nan
@@ -186,7 +190,14 @@ def _driven(
     states = np.full((len(_samples_s()), 6), np.nan)
     states[0] = np.concatenate([START_rad, START_rad_s])
     commands = amplitude_A * mean_shares(period_s, groups)
-    _drive(plant, commands, disturbance, Delivered(np.empty(groups), np.empty(3)), every, states)
+    _drive(
+        plant,
+        commands,
+        disturbance,
+        Delivered(np.empty(groups), np.empty(groups), np.empty(3)),
+        every,
+        states,
+    )
     return states
 
 
@@ -220,9 +231,9 @@ def _motion(name: str, measured: Convergence) -> Check:
         states=round(DURATION_s / SAMPLE_s) + 1,
         value=float(measured.errors_rad[STEPS_s.index(STEP_s)]),
         bound=BOUND_rad,
-        why="the pose in the middle of a step is predicted without the acceleration, and the current is held: h²"
-        " times accelerations of 100 rad/s², with a margin of two to the 5e-6 found; a field that lags by a"
-        " microsecond breaks it, one that lags by half a step gives 3.5e-3",
+        why="the pose in the middle of a step is predicted without the acceleration, and torque is held:"
+        " h²/8 times accelerations of up to 100 rad/s² is 3e-6, with a margin of three; a field that lags by"
+        " a microsecond breaks it, one that lags by half a step gives 3.5e-3",
         unit="rad",
     )
 
@@ -235,9 +246,9 @@ def _order(name: str, compares: str, measured: Convergence) -> Check:
         states=len(measured.steps_s),
         value=measured.order,
         bound=ORDER + ORDER_MARGIN,
-        why=f"order {ORDER}: the torque matrix and the back-EMF are those in the middle of a step, friction is"
-        " split around it; taken at the start of a step, any of them makes it order 1. The margin is what the"
-        " next power of the step adds at these steps",
+        why=f"order {ORDER}: the torque matrix and the back-EMF are those in the middle of a step, friction"
+        " is split around it; taken at the start of a step, any of them makes it order 1. The margin is what"
+        " the next power of the step adds at these steps",
         at_least=ORDER - ORDER_MARGIN,
         detail={
             f"error at {1e3 * step_s:g} ms, rad": float(error)

@@ -148,9 +148,9 @@ def _torque_at(rate_rad_s: float, torque_Nm: Array, rates_rad_s: Array) -> float
 
 
 _LATE = {
-    OURS: "late by what the level lacks, 1 - v/√(v² + smoothing²) of it, summed up over the motion, and by the"
-    " error of the stage: r² h/2 at most while half a step takes the share r of the rate, which sums up to"
-    " r h/2, and two steps for the rest",
+    OURS: "late by what the level lacks, 1 - v/√(v² + smoothing²) of it, summed up over the motion, and by"
+    " the error of the stage: r² h/2 at most while half a step takes the share r of the rate, which sums up"
+    " to r h/2, and two steps for the rest",
     MUJOCO: "below level/(d b J) its soft constraint no longer brakes by the level, but exponentially at d b",
 }
 

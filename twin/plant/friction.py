@@ -137,7 +137,7 @@ def _momentum(M: InertiaEntries, v: Triple) -> Triple:
 
 @allocation_free
 def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> InertiaEntries:
-    """Inertia matrix plus a real or complex time over which friction acts, with its factors at given rates."""
+    """Inertia matrix plus a real or complex time of friction, its factors those at given rates."""
     return InertiaEntries(
         alpha=M.alpha + time * _factor(friction, rates[0], 0),
         beta=M.beta + time * _factor(friction, rates[1], 1),

@@ -66,7 +66,7 @@ def plant_tick(
 ) -> int:
     """Advance the plant by one control period.
 
-    Each physics step: half of the friction, coil currents and their torque, rotor, other half of the friction.
+    Each physics step: half of the friction, coil currents and their torque, rotor, other half of friction.
     The torque matrix and the back-EMF are those of the predicted pose and rates in the middle of the step.
     With friction split symmetrically around the rotor's step, the whole step is of second order.
 

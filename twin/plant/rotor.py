@@ -42,7 +42,8 @@ class Rotor(Protocol):
         Returns
         -------
         named tuple
-            It has `q`, `qdot` (3,), and takes `torque_q` (3,) on the hinges; `warnings` (n,) are counts that end a run when one rises.
+            It has `q`, `qdot` (3,), and takes `torque_q` (3,) on the hinges; `warnings` (n,) are
+            counts that end a run when one rises.
         """
         ...
 

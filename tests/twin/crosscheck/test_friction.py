@@ -226,7 +226,7 @@ def test_options_of_a_file_change_nothing(tmp_path, actuator, found):
 
 
 OURS_SLIDES = {"stopping time, our stage", "stopping angle, our stage", "sliding"}
-WRONG_STAGES = {  # fmt: skip
+WRONG_STAGES = {
     "level 0.3 % lower": (0.997, 1, 1, 1, OURS_SLIDES | {"creep, our stage"}),
     "level 5 % lower": (0.95, 1, 1, 1, OURS_SLIDES | {"creep, our stage", "breakaway, our stage"}),
     "viscous 0.1 % higher": (1, 1.001, 1, 1, {"creep, our stage", "viscous alone, our stage"}),

@@ -31,7 +31,7 @@ def test_compiled_step_is_the_binding_s_step():
     one, other = rotor(), rotor()
     engine = one.start(np.array([0.1, 0.2, 0.3]), np.array([1.0, -2.0, 6.0]))
     other.start(np.array([0.1, 0.2, 0.3]), np.array([1.0, -2.0, 6.0]))
-    engine.torque_S[:] = other.data.xfrc_applied[other.model.body("rotor").id, 3:] = [0.01, 0.02, -0.03]
+    engine.torque_q[:] = other.data.qfrc_applied[:] = [0.01, 0.02, -0.03]
     for _ in range(100):
         step(engine)
         mujoco.mj_step(other.model, other.data)

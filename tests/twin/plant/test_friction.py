@@ -200,7 +200,7 @@ DURATION_s = 0.4
 
 
 def by_mujoco(step_s, damping, resistance=None):
-    """State at the end by stock MuJoCo: its own damping of the hinges, or our friction applied to its rates."""
+    """State at the end by stock MuJoCo, under its own damping of the hinges or our friction."""
     model = copy(mjcf.read(actuators.MJCF_PATH).bare)
     model.opt.timestep, model.opt.integrator = step_s, mujoco.mjtIntegrator.mjINT_RK4
     model.dof_damping[:] = damping

@@ -4,10 +4,10 @@ The hinge is γ of the upright rotor, whose inertia is J3 and which no other hin
 Ideal friction opposes a motion by ``coulomb + viscous v`` and holds whatever is pushed by less than the
 Coulomb level. Neither way can: what is to hold at rest has to follow from a rate. Both creep below the level.
 
-Our stage is smooth over a stated rate and acts by halves around each step (`plant.friction`). MuJoCo's friction
-loss is a soft constraint on the rate, without a position: where its force F is below the level, it is that
-which leaves the acceleration ``a = (1 - d) a0 - d b v``, with a0 that without the constraint, the impedance d
-at no violation and the damping b of its reference, which is ``2 / (dmax timeconst)``. With a0 =
+Our stage is smooth over a stated rate and acts by halves around each step (`plant.friction`). MuJoCo's
+friction loss is a soft constraint on the rate, without a position: where its force F is below the level, it
+is that which leaves the acceleration ``a = (1 - d) a0 - d b v``, with a0 that without the constraint, the
+impedance d at no violation and the damping b of its reference, which is ``2 / (dmax timeconst)``. With a0 =
 (T - viscous v) / J the hinge relaxes at the rate ``d b + (1 - d) viscous / J`` to the creep at which
 ``F = d b J v / (1 - d)``.
 """

@@ -14,9 +14,7 @@ def draw(evidence: Evidence) -> Drawing:
     pairs = evidence.of(closed_loop.ClosedLoop).pairs
     longest = max(pairs.values(), key=lambda pair: len(pair.mujoco))
     errors = {law: (pair.mujoco["error_rad"], pair.lagrangian["error_rad"]) for law, pair in pairs.items()}
-    apart = {
-        law: plots.Bounded(pair.difference_rad, closed_loop.BOUND_rad) for law, pair in pairs.items()
-    }
+    apart = {law: plots.Bounded(pair.difference_rad, closed_loop.BOUND_rad) for law, pair in pairs.items()}
     titles = {"PD": "PD, load 0.5", "AFSM": "AFSM, load 2"}
     figure = plots.closed_loops(
         longest.mujoco["t_s"],
