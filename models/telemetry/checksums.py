@@ -1,18 +1,16 @@
-"""Checksums of telemetry: of the bytes of Parquet files and Arrow streams, and of rows and texts.
+"""Checksums (CRC-32) of telemetry: of the bytes of Parquet files and Arrow streams, of rows and texts.
 
-The bytes of a file are checked in segments, each with its length and its CRC-32. In a Parquet file a segment
-is a row group. The footer lists the segments and has a checksum of its own, so that every bit of the file is
-checked. Readers compare before they decode anything.
+The bytes of a file are checked in segments, each with its length and its checksum. In a Parquet file a
+segment is a row group. The footer lists the segments and has a checksum of its own, so that every bit of the
+file is checked. Readers compare before they decode anything.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 import zlib
 from collections.abc import Iterable, Sequence
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
@@ -27,11 +25,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import pyarrow.parquet
 
-    from spheretwin.models.telemetry.signals import Signal
-    from spheretwin.models.telemetry.table import Table
-
 NO_CHECKSUMS = "has no checksums, it was written by an earlier version: damage may be unnoticed"
 """Said of a file that is read without a check."""
+
+Array = NDArray[np.float64]
 
 # Metadata of a Parquet file. Two names: damage to one of them is not taken for a file without checksums.
 _SEGMENTS, _FOOTER = "row_group_checksums", "footer_checksum"
@@ -198,17 +195,17 @@ def has_checksums(path: Path) -> bool:
 
 
 def damaged(path: Path, place: str) -> InputError:
-    """Return the error for a telemetry file that differs from what was written."""
+    """Return the error for a file that differs from what was written."""
     return InputError(
-        f"telemetry {path}: expected the bytes that were written, received others in {place}:"
+        f"file {path}: expected the bytes that were written, received others in {place}:"
         " the file is damaged, or was changed by another program"
     )
 
 
-def unreadable(path: Path, error: BaseException, expected: str = "a Parquet file of a run") -> InputError:
+def unreadable(path: Path, error: BaseException, expected: str) -> InputError:
     """Return the error for a file that another library could not read."""
     told = shortened(without_breaks(error), LONGEST_WORD)
-    return InputError(f"telemetry {path}: expected {expected}, {told}")
+    return InputError(f"file {path}: expected {expected}, {told}")
 
 
 def _sign(path: Path) -> None:
@@ -242,13 +239,13 @@ def _first_changed(path: Path, segments: Iterable[Segment]) -> int | None:
     """Place of the first segment that is not what was written; None if all are."""
     with path.open("rb") as file:
         for place, segment in enumerate(segments):
-            if read_segment(file, segment.size) != segment:
+            if _read_segment(file, segment.size) != segment:
                 return place
     return None
 
 
-def read_segment(file: BinaryIO, size: int) -> Segment:
-    """Return the segment of the next bytes of a file, of fewer at its end."""
+def _read_segment(file: BinaryIO, size: int) -> Segment:
+    """The next bytes of a file, fewer at its end."""
     done, crc32 = 0, 0
     while block := file.read(min(size - done, _BLOCK_BYTES)):
         done, crc32 = done + len(block), zlib.crc32(block, crc32)
@@ -298,27 +295,14 @@ def line_numbers(checksums: NDArray[np.uint64]) -> NDArray[np.int64]:
     return (checksums >> _HALF).astype(np.int64)
 
 
-def row_checksums(rows: Table) -> NDArray[np.uint32]:
-    """Return the checksum of each row.
+def values_checksum(values: Array, before: int = 0) -> int:
+    """Return the checksum of some numbers.
 
-    It is the upper half of ``Σ a_j y_j`` modulo 2⁶⁴ with odd ``a_j`` that belong to the name of the signal
-    and the place in it, and ``y_j = x_j ^ (x_j >> 32)`` of the bit patterns ``x_j`` of the row. One number
-    that differs always changes the sum, and its upper half but for one case in 2³²; the order of the signals
-    does not matter.
+    Parameters
+    ----------
+    values : array
+        The numbers; a copy is made only if they are not contiguous.
+    before : int
+        Checksum of numbers that stand before them; the result is that of all.
     """
-    bits = np.ascontiguousarray(rows.values).view(np.uint64)
-    sums = (bits ^ (bits >> _HALF)) @ _multipliers(rows.signals)
-    return (sums >> _HALF).astype("<u4")
-
-
-def checksum_of(sums: NDArray[np.uint32]) -> int:
-    """Return one checksum of the checksums of some rows."""
-    return zlib.crc32(sums.tobytes())
-
-
-@cache
-def _multipliers(signals: tuple[Signal, ...]) -> NDArray[np.uint64]:
-    """An odd number for each entry of each signal."""
-    names = [f"{signal.name} {place}" for signal in signals for place in range(signal.size)]
-    digests = [hashlib.blake2b(name.encode(), digest_size=8).digest() for name in names]
-    return np.array([int.from_bytes(digest, "little") | 1 for digest in digests], dtype=np.uint64)
+    return zlib.crc32(np.ascontiguousarray(values), before)

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import zlib
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +25,6 @@ from spheretwin.models.telemetry.checksums import (
     Segment,
     SegmentedFile,
     damaged,
-    read_segment,
     text_checksum,
     unreadable,
 )
@@ -167,9 +168,11 @@ def read_schema(part: Path) -> pa.Schema | None:
     """
     import pyarrow as pa
 
-    if _checked_bytes(part) == 0:
-        return None
+    segments = read_list(part)
     with _opened(part) as source:
+        if segments is not None and not (segments and _is_whole(part, source, 0, segments[0], 0)):
+            return None
+        source.seek(0)
         try:
             schema = pa.ipc.open_stream(source).schema
         except (pa.ArrowException, OSError) as error:
@@ -194,33 +197,40 @@ def read_batches(part: Path) -> Generator[pa.RecordBatch, None, bool]:
     """
     import pyarrow as pa
 
-    checked = _checked_bytes(part)
-    if checked == 0:
-        return True
-    try:
+    segments = read_list(part)
+    schema, checked, place = None, 0, 0
+    for number in count():
+        # A mapping for each batch: what was read of a mapped file is the process's memory while it lasts.
         with _opened(part) as source:
-            schema = pa.ipc.open_stream(source).schema
-            place = source.tell()
-        while checked is None or place < checked:
-            # A mapping for each batch: what was read of a mapped file is the process's memory while it lasts.
-            with _opened(part) as source:
+            if segments is not None:
+                if number == len(segments):
+                    return checked < source.size()
+                if not _is_whole(part, source, checked, segments[number], number):
+                    return True
+                checked += segments[number].size
+            try:
                 source.seek(place)
+                schema = schema or pa.ipc.open_stream(source).schema
                 batch = pa.ipc.read_record_batch(pa.ipc.read_message(source), schema)
                 place = source.tell()
-            yield batch
-            del batch
-    except EOFError:
+            except EOFError:
+                return False
+            except (pa.ArrowException, OSError):
+                return True
+        yield batch
+        del batch
+    return False
+
+
+def _is_whole(part: Path, source: pa.MemoryMappedFile, start: int, segment: Segment, number: int) -> bool:
+    """Whether a segment is all there; `InputError` if it is not what was written."""
+    source.seek(start)
+    block = source.read_buffer(segment.size)
+    if len(block) < segment.size:
         return False
-    except (pa.ArrowException, OSError):
-        return True
-    return checked is not None and checked < part.stat().st_size
-
-
-def _checked_bytes(part: Path) -> int | None:
-    try:
-        return _listed_bytes(part)
-    except OSError as error:
-        raise unreadable(part, error, _STREAM) from None
+    if zlib.crc32(block) != segment.crc32:
+        raise damaged(part, f"batch {number}")
+    return True
 
 
 @contextmanager
@@ -289,32 +299,26 @@ def list_of(path: Path) -> Path:
     return path.with_name(f"{path.name}.checksums")
 
 
-def _listed_bytes(path: Path) -> int | None:
-    """Return how many bytes from the start of a listed file are those that were written; None without a list.
-
-    What a killed process leaves behind its last segment, and a segment that was cut off, are not among them.
+def read_list(path: Path) -> list[Segment] | None:
+    """Return the segments of a file that has a list; None without one.
 
     Raises
     ------
     InputError
-        A segment is not what was written.
+        A line of the list is not what was written.
     """
     listed = list_of(path)
     if not listed.is_file():
         return None
-    lines, done = listed.read_bytes(), 0
-    with path.open("rb") as file:
-        for place in range(len(lines) // _LINE_BYTES):
-            written = _segment(lines[place * _LINE_BYTES : (place + 1) * _LINE_BYTES])
-            if written is None:
-                raise damaged(listed, f"line {place}")
-            received = read_segment(file, written.size)
-            if received.size < written.size:
-                break
-            if received != written:
-                raise damaged(path, f"batch {place}")
-            done += written.size
-    return done
+    try:
+        lines = listed.read_bytes()
+    except OSError as error:
+        raise unreadable(listed, error, "the checksums of a run") from None
+    whole = range(0, len(lines) - _LINE_BYTES + 1, _LINE_BYTES)  # the last line may be torn
+    segments = [_segment(lines[first : first + _LINE_BYTES]) for first in whole]
+    if None in segments:
+        raise damaged(listed, f"line {segments.index(None)}")
+    return [segment for segment in segments if segment is not None]
 
 
 def _line(segment: Segment) -> bytes:

@@ -146,7 +146,7 @@ def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str
     except UnicodeDecodeError:
         raise InputError(f"telemetry {path}: expected metadata as text, received other bytes") from None
     except (OSError, pa.ArrowException) as error:
-        raise checksums.unreadable(path, error) from None
+        raise checksums.unreadable(path, error, "a Parquet file of a run") from None
     names = [signal.name for signal in signals]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"telemetry {path}: expected each column once, received {', '.join(twice)} twice")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,11 +14,10 @@ from rerun.chunk import Chunk
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.checksums import (
-    checksum_of,
     line_checksums,
     line_numbers,
-    row_checksums,
     text_checksum,
+    values_checksum,
 )
 from spheretwin.models.telemetry.signals import Signal, offsets, width
 from spheretwin.models.telemetry.table import Table, allocated
@@ -256,37 +256,45 @@ class Contents:
 
     def _check_ranges(self, signals: tuple[Signal, ...], *, ended: bool) -> None:
         """Refuse rows that are not those of their checksums, and fewer than a closed recording states."""
-        sums = [self._row_checksums(rows, signals) for rows in self._rows]
-        together = np.concatenate([*sums, np.empty(0, np.uint32)])
-        done = 0
-        for first, count, checksum in sorted(self._ranges):
-            rows = together[first : first + count]
-            # A killed process may leave the checksum of rows that it did not write any more. Rows that a
-            # closed recording has lost are missing in its total.
-            is_left_over = first == len(together)
-            if first != done or (checksum_of(rows) != checksum and not is_left_over):
-                raise self._damaged(f"entity {TELEMETRY}, rows {done} to {first + count - 1}")
-            done += len(rows)
-        if done < len(together):
-            raise self._damaged(f"entity {TELEMETRY}, rows {done} to {len(together) - 1}")
-        self._check_total(TELEMETRY, done, ended=ended)
+        ranges = sorted(self._ranges)
+        ends = list(accumulate(each.count for each in ranges))
+        if [each.first for each in ranges] != [0, *ends][: len(ranges)]:
+            raise self._damaged(f"entity {TELEMETRY}, component {CHECKSUM}")
+        place = number = checksum = 0
+        for rows in self._rows:
+            values = self._values(rows, signals)
+            while len(values):
+                if place == len(ranges):
+                    raise self._damaged(f"entity {TELEMETRY}, rows from {number} on")
+                piece, values = np.split(values, [min(ends[place] - number, len(values))])
+                number, checksum = number + len(piece), values_checksum(piece, checksum)
+                if number == ends[place]:
+                    first, count, expected = ranges[place]
+                    if checksum != expected:
+                        raise self._damaged(f"entity {TELEMETRY}, rows {first} to {first + count - 1}")
+                    place, checksum = place + 1, 0
+        # A killed process may leave the checksum of rows that it did not write any more. Rows that a closed
+        # recording has lost are missing in its total.
+        if number not in (0, *ends):
+            raise self._damaged(f"entity {TELEMETRY}, rows {ranges[place].first} to {ends[place] - 1}")
+        self._check_total(TELEMETRY, number, ended=ended)
 
     def _check_total(self, entity: str, count: int, *, ended: bool) -> None:
         if (ended or entity in self._totals) and self._totals.get(entity) != count:
             raise self._damaged(f"entity {entity}, behind number {count - 1}")
 
-    def _row_checksums(self, rows: _Rows, signals: tuple[Signal, ...]) -> NDArray[np.uint32]:
+    def _values(self, rows: _Rows, signals: tuple[Signal, ...]) -> NDArray[np.float64]:
+        """Values of a chunk, signals in the order in which they came, as they were summed up."""
         present = tuple(signal for signal in signals if signal.name in rows.values)
         values = [rows.values[signal.name] for signal in present]
-        known = len(present) == len(rows.values) and any(signal.name == "t_s" for signal in present)
+        known = len(present) == len(rows.values) and "t_s" in rows.values
         if not known or [each.shape[1] for each in values] != [signal.size for signal in present]:
             raise self._damaged(f"entity {TELEMETRY}, components {DESCRIBED}")
-        table = Table(present, np.concatenate(values, axis=1))
         with np.errstate(invalid="ignore"):  # a damaged time may be no number
-            moved = np.flatnonzero(nanoseconds(table["t_s"]) != rows.t_ns)
+            moved = np.flatnonzero(nanoseconds(rows.values["t_s"][:, 0]) != rows.t_ns)
         if len(moved):
             raise self._damaged(f"entity {TELEMETRY}, times at {rows.t_ns[moved[0]] * 1e-9:.6g} s")
-        return row_checksums(table)
+        return np.concatenate(values, axis=1)
 
     def _damaged(self, place: str) -> InputError:
         return InputError(

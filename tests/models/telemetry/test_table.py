@@ -5,8 +5,9 @@ import pytest
 
 from spheretwin.models.base import files
 from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.telemetry.checksums import write_parquet
 from spheretwin.models.telemetry.signals import common_signals, offsets, width
-from spheretwin.models.telemetry.table import Table, read_parquet
+from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table, read_parquet
 
 SIGNALS = common_signals(18)
 
@@ -60,6 +61,34 @@ def test_parquet_columns_are_what_pandas_and_polars_expect(table, tmp_path):
     assert schema.names == [signal.name for signal in SIGNALS]
     assert schema.field("current_A").type.list_size == 18
     assert schema.field("current_A").metadata[b"unit"] == b"A"
+
+
+def test_another_reader_can_compare_the_checksums_of_pages(table, tmp_path):
+    """They are Parquet's own. A flipped sign, stored without compression, is valid data without them."""
+    import pyarrow.parquet
+
+    arrow, path = table.arrow({}), tmp_path / "run.parquet"
+    write_parquet(path, arrow.schema, [arrow], **{**PARQUET_FORMAT, "compression": "none"})
+    column = pyarrow.parquet.ParquetFile(path).metadata.row_group(0).column(0)
+    damaged = bytearray(path.read_bytes())
+    damaged[column.data_page_offset + column.total_compressed_size - 1] ^= 0x80
+    path.write_bytes(damaged)
+    assert pyarrow.parquet.ParquetFile(path).read()["t_s"] != arrow["t_s"]
+    with pytest.raises(OSError, match="CRC checksum verification failed"):
+        pyarrow.parquet.ParquetFile(path, page_checksum_verification=True).read()
+
+
+def test_every_byte_of_a_file_is_checked(table, tmp_path):
+    """Magic, pages with their headers, footer, its length and its checksum."""
+    table.write_parquet(path := tmp_path / "run.parquet", {"scenario": "{}"})
+    content = path.read_bytes()
+    for place in [*range(0, len(content) - 600, 7), *range(len(content) - 600, len(content))]:
+        for bit in (0, 5):
+            damaged = bytearray(content)
+            damaged[place] ^= 1 << bit
+            path.write_bytes(damaged)
+            with pytest.raises(InputError, match=r"the file is damaged|expected a Parquet file of a run"):
+                read_parquet(path)
 
 
 def test_failed_write_leaves_nothing(table, tmp_path, monkeypatch):

@@ -82,10 +82,15 @@ def read(table: Path) -> Rows:
     Raises
     ------
     InputError
-        The table is damaged.
+        The table is missing or damaged.
     """
-    with checksums.open_parquet(table) as file:
-        return _rows(file)
+    import pyarrow as pa  # slow to import
+
+    try:
+        with checksums.open_parquet(table) as file:
+            return _rows(file)
+    except (OSError, pa.ArrowException) as error:
+        raise checksums.unreadable(table, error, "the table of a study") from None
 
 
 def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pyarrow as pa
 import rerun as rr
+from numpy.typing import NDArray
 
-from spheretwin.models.telemetry.checksums import checksum_of, row_checksums
+from spheretwin.models.telemetry.checksums import values_checksum
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.paths import STYLES, TELEMETRY, VALUES, component
@@ -50,9 +52,17 @@ class Signals(Part):
 
     def _check(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the checksum of the rows of a chunk, before them: none is ever without one."""
-        sums = range_checksum(self._rows, len(rows), checksum_of(row_checksums(rows)))
+        sums = range_checksum(self._rows, len(rows), values_checksum(self._in_order(rows)))
         recording.send_columns(TELEMETRY, time_index(rows["t_s"][:1]), [sums])
         self._rows += len(rows)
+
+    def _in_order(self, rows: Table) -> NDArray[np.float64]:
+        """Values of a chunk, signals in the order in which they came: a law may bring back earlier ones."""
+        names = {signal.name for signal in rows.signals}
+        order = [signal for arrived in self._arrived for signal in arrived if signal.name in names]
+        if list(rows.signals) == order:
+            return rows.values
+        return np.concatenate([rows[each.name].reshape(len(rows), -1) for each in order], axis=1)
 
     def _describe(self, recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
         """Say of signals that come for the first time what they are; a change of law may bring some."""

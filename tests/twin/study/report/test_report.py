@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from spheretwin.models.base.errors import InputError
 from spheretwin.twin.study.report import page
 from spheretwin.twin.study.report.drawings import drawings
 from spheretwin.twin.study.report.ranking import ranked, strongest
@@ -167,3 +168,18 @@ def test_a_study_of_one_row_has_a_page(tmp_path):
     rows = read(tmp_path / "table.parquet")
     page.write(tmp_path, rows, summary(rows), (1, 1), "short", {})
     assert "Nothing but the seed." in (tmp_path / "report.md").read_text()
+
+
+def test_a_damaged_table_is_refused_with_its_place(tmp_path):
+    found(loads(), tmp_path)
+    path = tmp_path / "table.parquet"
+    content, whole = path.read_bytes(), read(path)
+    assert len(whole.numbers) == 24
+    for bit in np.random.default_rng(0).integers(8 * len(content), size=40).tolist():
+        damaged = bytearray(content)
+        damaged[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        with pytest.raises(
+            InputError, match=r"(row group 0, rows 0 to 23|the footer).*: the file is damaged|magic"
+        ):
+            read(path)
