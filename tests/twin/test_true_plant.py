@@ -27,13 +27,14 @@ GAIN = np.linspace(0.0, 1.7, 18)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_torque_is_that_of_the_currents_times_their_gains(engine, actuator):
     run = table(600, changes={"plant.engine": engine, "plant.group_gain": GAIN.tolist()})
+    middle = run["q_rad"] + 0.25e-3 * run["qdot_rad_s"]  # of the first physics step
     for row in range(0, 600, 7):
-        G = torque_matrix(run["q_rad"][row], actuator)
+        G = torque_matrix(middle[row], actuator)
         # The same 18 products and sums in another order, of torques below 1 N·m.
         np.testing.assert_allclose(
             run["torque_Nm"][row], G @ (GAIN * run["current_A"][row]), rtol=0, atol=1e-14
         )
-    bare = torque_matrix(run["q_rad"][300], actuator) @ run["current_A"][300]
+    bare = torque_matrix(middle[300], actuator) @ run["current_A"][300]
     assert np.abs(bare - run["torque_Nm"][300]).max() > 1e-3
 
 
@@ -100,18 +101,21 @@ def test_a_run_begins_at_the_rates_that_are_given(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_viscous_friction_slows_a_spin_by_one_share_a_step(engine, actuator):
+def test_viscous_friction_slows_a_spin_by_one_share_each_half_step(engine, actuator):
     viscous, step_s = 1e-3, 5e-4
     changes = STILL | {
         "plant.engine": engine, "plant.initial_rad_s": [0.0, 0.0, 20.0],
         "plant.viscous_Nm_s": [0.0, 0.0, viscous], "plant.modelling_error": 0.5,
     }  # fmt: skip
     run = table(400, "hold", changes, FREE)
-    share = 1 / (1 + step_s * viscous / (1.5 * actuator.inertia[2]))
-    exact = 20.0 * share ** (2 * np.arange(400))  # two steps a tick
-    np.testing.assert_allclose(run["qdot_rad_s"][:, 2], exact, rtol=1e-12)  # 800 roundings
-    # Taken at the rate to which the step leads.
-    np.testing.assert_allclose(run["friction_Nm"][:, 2], -viscous * share * exact, rtol=1e-12)
+    inertia = 1.5 * actuator.inertia[2]
+    x = 0.5 * step_s * viscous / inertia
+    share = 1 / (1 + x + x**2 / 2)
+    exact = 20.0 * share ** (4 * np.arange(400))  # two steps a tick
+    np.testing.assert_allclose(run["qdot_rad_s"][:, 2], exact, rtol=1e-12)  # 1600 roundings
+    # The mean over the step; 1e-16 of a rate, of which a step loses 1.5e-4.
+    mean = inertia * exact * (share**2 - 1) / step_s
+    np.testing.assert_allclose(run["friction_Nm"][:, 2], mean, rtol=1e-11)
     np.testing.assert_array_equal(run["friction_Nm"][:, :2], 0)
 
 
@@ -170,47 +174,56 @@ def energy_J(q, qdot, actuator, modelling_error):
     return 0.5 * kinetic + PAYLOAD_KG * 9.81 * arm[2]
 
 
-def turned(q, qdot, step_s):
-    """Integral of the rotor's angular velocity over each step, by Simpson; the middle by Hermite's cubic."""
-    middle = (q[:-1] + q[1:]) / 2 + step_s / 8 * (qdot[:-1] - qdot[1:])
-    rate = 1.5 * np.diff(q, axis=0) / step_s - (qdot[:-1] + qdot[1:]) / 4
-    w = [np.array([rate_jacobian(a) @ b for a, b in zip(q, qdot, strict=True)])]
-    between = np.array([rate_jacobian(a) @ b for a, b in zip(middle, rate, strict=True)])
-    return step_s / 6 * (w[0][:-1] + 4 * between + w[0][1:])
-
-
 def works_J(run, step_s, unmodelled_Nm):
     """Work of coils, friction, disturbance and what is not modelled, each from the rows alone."""
     moved = np.diff(run["q_rad"], axis=0)
+    middle = run["q_rad"] + 0.5 * step_s * run["qdot_rad_s"]
+    coils = np.array([rate_jacobian(q).T @ tau for q, tau in zip(middle, run["torque_Nm"], strict=True)])
     return {
-        "coils": np.sum(run["torque_Nm"][:-1] * turned(run["q_rad"], run["qdot_rad_s"], step_s)),
+        "coils": np.sum(coils[:-1] * moved),
         "friction": np.sum(run["friction_Nm"][:-1] * moved),
         "disturbance": -np.sum(run["disturbance_Nm"][:-1] * moved),
         "unmodelled": -np.sum(moved @ unmodelled_Nm),
     }
 
 
-def unbalanced_J(engine, step_s, actuator):
-    """Energy over 0.4 s that the works do not account for, and the least of the works."""
-    changes = {"plant.engine": engine, "plant.step_s": step_s, "controller.period_s": step_s}
+FRICTIONLESS = {"plant.coulomb_Nm": [0.0] * 3, "plant.viscous_Nm_s": [0.0] * 3}
+
+
+def unbalanced_J(engine, step_s, actuator, changes):
+    """Energy over 0.4 s that the works do not account for, and the works."""
+    changes = changes | {"plant.engine": engine, "plant.step_s": step_s, "controller.period_s": step_s}
     run = table(round(0.4 / step_s) + 1, changes=LOADED | changes | {"plant.modelling_error": 0.2})
     ends = [energy_J(run["q_rad"][i], run["qdot_rad_s"][i], actuator, 0.2) for i in (0, -1)]
     works = works_J(run, step_s, np.array(LOADED["plant.modelling_torque_Nm"]))
-    return abs(ends[1] - ends[0] - sum(works.values())), min(map(abs, works.values()))
+    return abs(ends[1] - ends[0] - sum(works.values())), works
+
+
+def order_of(steps, left_J):
+    return np.polyfit(np.log(steps), np.log(left_J), 1)[0]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_energy_is_kept_by_the_rows_of_the_telemetry_alone(engine, actuator):
-    # A row each physics step: torques are held over it, so that their works are exact but for the turn of a
-    # torque that is fixed in space, which is of fourth order, as the steps themselves are.
+    # A row each physics step. Torques on the hinges are held over it, so that their works are exact; what is
+    # left is the error of the Runge-Kutta steps, of fourth order.
     steps = np.array([8e-3, 4e-3, 2e-3])
-    left_J = [unbalanced_J(engine, step_s, actuator)[0] for step_s in steps]
-    order = np.polyfit(np.log(steps), np.log(left_J), 1)[0]
-    assert 3.7 < order < 4.3, left_J
-    left_J, least_J = unbalanced_J(engine, 5e-4, actuator)
+    left_J = [unbalanced_J(engine, step_s, actuator, FRICTIONLESS)[0] for step_s in steps]
+    assert 3.7 < order_of(steps, left_J) < 4.3, left_J
+    left_J, works = unbalanced_J(engine, 5e-4, actuator, FRICTIONLESS)
     # Measured 1e-14 J of some 20 mJ that go in and out; any of the works left out would be seen.
     assert left_J < 1e-13
-    assert least_J > 1e-5
+    assert min(abs(work) for name, work in works.items() if name != "friction") > 1e-5
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_friction_takes_the_energy_that_its_rows_say_to_second_order(engine, actuator):
+    # The mean of friction over a step times the way: its halves act on rates that differ.
+    steps = np.array([2e-3, 1e-3, 5e-4])
+    left_J = [unbalanced_J(engine, step_s, actuator, {})[0] for step_s in steps]
+    assert 1.8 < order_of(steps, left_J) < 2.2, left_J
+    assert left_J[-1] < 1e-3 * abs(unbalanced_J(engine, 5e-4, actuator, {})[1]["friction"])
+
 
 
 def test_the_payload_s_inertia_is_the_lagrangian_s(actuator):

@@ -23,12 +23,18 @@ def each(mode, kind="coil", **more):
     return [{"target": f"{kind}.{group:02d}", "mode": mode, **more} for group in range(GROUPS)]
 
 
-def emfs(table, actuator):
+def amid(q, qdot, before):
+    """Poses and rates in the middle of each period, as the plant predicts them; `before` are the rates then."""
+    last = np.vstack([before, qdot[:-1]])
+    return q + 0.5 * STEP_S * qdot, qdot + 0.5 * (qdot - last)
+
+
+def emfs(middle_q, middle_qdot, actuator):
     """Back-EMF of a group of full turns, (ticks, n) in V, held over each period."""
     return np.array(
         [
             torque_matrix(q, actuator).T @ rate_jacobian(q) @ qdot
-            for q, qdot in zip(table["q_rad"], table["qdot_rad_s"], strict=True)
+            for q, qdot in zip(middle_q, middle_qdot, strict=True)
         ]
     )
 
@@ -56,7 +62,8 @@ def test_an_open_coil_has_no_current_and_no_torque():
     assert not table["copper_loss_W"][50:, :9].any()
     assert not table["coil_power_W"][50:, :9].any()
     for tick in (60, 100, 149):
-        G = torque_matrix(table["q_rad"][tick], actuator)
+        middle = table["q_rad"][tick] + 0.5 * STEP_S * table["qdot_rad_s"][tick]
+        G = torque_matrix(middle, actuator)
         # Sums of eighteen products, rounded in another order.
         np.testing.assert_allclose(
             table["torque_Nm"][tick], G[:, 9:] @ currents[tick, 9:], rtol=0, atol=1e-14
@@ -71,7 +78,8 @@ def test_a_shorted_coil_carries_what_its_emf_drives():
         start = session._machine._plant.current[4]
         table, actuator = session.advance(200), session.actuator
     assert len(before) == 1
-    emf = emfs(table, actuator)[:, 4]
+    middle = amid(table["q_rad"], table["qdot_rad_s"], before["qdot_rad_s"])
+    emf = emfs(*middle, actuator)[:, 4]
     found = solve_ivp(
         lambda t, i: (-R_OHM * i - emf[min(int(t / STEP_S), 199)]) / L_H,
         (0, 0.2), [start], method="RK45", max_step=STEP_S / 5, rtol=1e-10, atol=1e-12,
@@ -89,13 +97,16 @@ def test_shorted_coils_brake_the_rotor_by_what_heats_them():
     scenario = prototype(*each("short"), **{"plant.initial_rad_s": [2.0, -1.0, 5.0]})
     parts, currents, actuator = stepped(scenario, 150)
     q, qdot = column(parts, "q_rad"), column(parts, "qdot_rad_s")
-    emf = emfs({"q_rad": q, "qdot_rad_s": qdot}, actuator)
+    middle_q, middle_qdot = amid(q, qdot, qdot[:1])
+    emf = emfs(middle_q, middle_qdot, actuator)
     work = -np.sum(emf * column(parts, "current_A"), axis=1) * STEP_S
     heat = np.sum(column(parts, "copper_loss_W"), axis=1) * STEP_S
     field = np.sum(0.5 * L_H * np.diff(currents**2, axis=0), axis=1)
     # Sums of eighteen products each, of 1e-16 of their size.
     np.testing.assert_allclose(work, heat + field, rtol=0, atol=1e-13 * heat.max())
-    rate_S = np.array([rate_jacobian(pose) @ rate for pose, rate in zip(q, qdot, strict=True)])
+    rate_S = np.array(
+        [rate_jacobian(pose) @ rate for pose, rate in zip(middle_q, middle_qdot, strict=True)]
+    )
     braking = np.sum(column(parts, "torque_Nm") * rate_S, axis=1) * STEP_S
     np.testing.assert_allclose(braking, -work, rtol=0, atol=1e-13 * heat.max())
     assert np.all(braking[5:] < 0)
@@ -110,12 +121,15 @@ def test_fewer_turns_scale_torque_and_emf_alike():
     power = np.sum(column(parts, "coil_power_W") - column(parts, "copper_loss_W"), axis=1)
     field = np.sum(0.5 * L_H * np.diff(currents**2, axis=0), axis=1) / STEP_S
     q, qdot = column(parts, "q_rad"), column(parts, "qdot_rad_s")
-    rate_S = np.array([rate_jacobian(pose) @ rate for pose, rate in zip(q, qdot, strict=True)])
+    middle_q, middle_qdot = amid(q, qdot, qdot[:1])
+    rate_S = np.array(
+        [rate_jacobian(pose) @ rate for pose, rate in zip(middle_q, middle_qdot, strict=True)]
+    )
     moving = np.sum(column(parts, "torque_Nm") * rate_S, axis=1)
     # Powers of some 10 W, of 18 groups, whose difference is some mW: 1e-13 of the former.
     np.testing.assert_allclose(power - field, moving, rtol=0, atol=1e-11)
     for tick in (50, 150):
-        G = torque_matrix(q[tick], actuator)
+        G = torque_matrix(middle_q[tick], actuator)
         expected = G @ (gains * column(parts, "current_A")[tick])
         np.testing.assert_allclose(column(parts, "torque_Nm")[tick], expected, rtol=0, atol=1e-14)
 
