@@ -184,7 +184,9 @@ def test_another_law_in_its_place_starts_with_its_own_gains():
 
 @pytest.mark.parametrize("bad", ["slow", 3, ["fast"], None])
 def test_a_preset_that_is_none_is_refused(bad):
-    with pytest.raises(InputError, match=r"controller\.preset: expected 'ideal', 'fast', 'prototype' or 'robust'"):
+    with pytest.raises(
+        InputError, match=r"controller\.preset: expected 'ideal', 'fast', 'prototype' or 'robust'"
+    ):
         scenarios.load("hold", {"controller.law": "afsm_eso", "controller.preset": bad})
 
 
