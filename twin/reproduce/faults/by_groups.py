@@ -18,9 +18,9 @@ HOW = (
     "Coils on ideal hardware, the least-norm allocation with its limit of 8 A unless it says *bounded* (all"
     " that the limit allows). *Not told*: nobody knows. *Told*: the allocation leaves the groups out from the"
     " tick on at which they open. *Detecting*: it leaves out what the detector has found by itself.\n\n"
-    "The fault starts at a control tick drawn from the seed, evenly over the whole run; all ways of a set share"
-    " it. The *error ratio* is the largest error of any hinge from the start of the fault to the end of the"
-    " run, divided by the same error of the healthy run with the same seed, allocation and window. A run"
+    "The fault starts at a control tick drawn from the seed, evenly over the whole run; all ways of a set"
+    " share it. The *error ratio* is the largest error of any hinge from the start of the fault to the end of"
+    " the run, divided by the same error of the healthy run with the same seed, allocation and window. A run"
     f" *tracks* if it completes and its error ratio is at most {TWICE:g}.\n\n"
     f"Every group and every pair runs with every seed; {DRAWN} larger sets, drawn once, run with one each."
 )
@@ -125,8 +125,8 @@ def _goal(outcomes: Outcomes) -> str:
         if runs:
             ratios = [run.kept.ratio for run in runs]
             told.append(
-                f"{way.name}, {sum(map(tracks, runs))} of {len(runs)} runs track, with a median error ratio of"
-                f" {np.median(ratios):.2f} and at most {max(ratios):.2f}"
+                f"{way.name}, {sum(map(tracks, runs))} of {len(runs)} runs track, with a median error ratio"
+                f" of {np.median(ratios):.2f} and at most {max(ratios):.2f}"
             )
     return f" With one or two groups open: {'; '.join(told)}." if told else ""
 

@@ -34,8 +34,8 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 EXPERIMENT = Experiment(
     name="faults",
     title="Parts that fail in mid-flight",
-    shows="The nutation (59) under AFSM with m = 0.2 and L = 1; from a time on that is drawn over the whole run,"
-    " coil groups are open, or a sensor, the supply or the controller fails.",
+    shows="The nutation (59) under AFSM with m = 0.2 and L = 1; from a time on that is drawn over the whole"
+    " run, coil groups are open, or a sensor, the supply or the controller fails.",
     cases=cases,
     tell=tell,
     keep=keep,

@@ -44,7 +44,7 @@ class Found(NamedTuple):
     left: Left | None
     """None where no groups are open."""
     found_s: tuple[float | None, ...]
-    """For each failed group, detection latency: time from the fault to its detection; None if not detected."""
+    """For each failed group, detection latency: time from fault to detection; None if not detected."""
     driven_ticks: tuple[int, ...]
     """For each failed group, control ticks from the fault to its detection, or to the end of the run, at
     which its command is above the threshold of the detector."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from math import inf
 from typing import NamedTuple
 
@@ -18,14 +19,14 @@ from spheretwin.twin.reproduce.faults.conditions.ways import DETECTING, TOLD
 from spheretwin.twin.reproduce.faults.found import tracks
 
 HOW = (
-    "*Latency* is the time from the start of a fault to the tick from which on the allocation leaves the group"
-    " out. Faults that are not detected before the run ends count as infinite in the quantiles. The *driven"
-    " ticks* of an open group are the control ticks after the fault at which its commanded current is above the"
-    " threshold of the detector. At all others it is idle: within the threshold an open group carries what a"
-    " healthy one does, and cannot be told from it. An idle group cannot be observed, so the latency is the wait"
-    " for driven ticks.\n\n"
-    "The *cost* of the delay is the error after the fault (as above) less that of the run that is told, with the"
-    " same groups, seed and start."
+    "*Latency* is the time from the start of a fault to the tick from which on the allocation leaves the"
+    " group out. Faults that are not detected before the run ends count as infinite in the quantiles. The"
+    " *driven ticks* of an open group are the control ticks after the fault at which its commanded current"
+    " is above the threshold of the detector. At all others it is idle: within the threshold an open group"
+    " carries what a healthy one does, and cannot be told from it. An idle group cannot be observed, so"
+    " the latency is the wait for driven ticks.\n\n"
+    "The *cost* of the delay is the error after the fault (as above) less that of the run that is told,"
+    " with the same groups, seed and start."
 )
 HEAD = (
     "groups", "faults", "latency, ms: median", "90 %", "95 %", "99 %", "longest detected", "not detected",
@@ -47,7 +48,6 @@ class Detection(NamedTuple):
     latency_s: float
     """Infinite if it is not detected."""
     driven_ticks: int
-    start_s: float
 
 
 def section(outcomes: Outcomes) -> Section:
@@ -82,10 +82,9 @@ def _detections(outcomes: Outcomes) -> dict[str, list[Detection]]:
 
 
 def _of_run(run: Outcome) -> list[Detection]:
-    kept = run.kept
     return [
-        Detection(inf if latency_s is None else latency_s, ticks, kept.start_s)
-        for latency_s, ticks in zip(kept.found_s, kept.driven_ticks, strict=True)
+        Detection(inf if latency_s is None else latency_s, ticks)
+        for latency_s, ticks in zip(run.kept.found_s, run.kept.driven_ticks, strict=True)
     ]
 
 
@@ -124,8 +123,8 @@ def _why(by_kind: Mapping[str, Sequence[Detection]]) -> str:
     if not known:
         return ""
     text = (
-        f"\n\nThe {len(known)} open groups that were detected had {min(known)} driven ticks at least until then,"
-        f" {np.median(known):.0f} as the median."
+        f"\n\nThe {len(known)} open groups that were detected had {min(known)} driven ticks at least until"
+        f" then, {np.median(known):.0f} as the median."
     )
     if not missed:
         return text
@@ -149,7 +148,7 @@ def _compared(outcomes: Outcomes) -> list[tuple[Outcome, Outcome]]:
 
 def _intervals() -> list[tuple[float, float]]:
     """Intervals of the latency in ms, then not detected, then all."""
-    return [*zip(EDGES_ms, EDGES_ms[1:], strict=False), (inf, inf), (0.0, inf)]
+    return [*pairwise(EDGES_ms), (inf, inf), (0.0, inf)]
 
 
 def _cost_row(
