@@ -305,4 +305,4 @@ def values_checksum(values: Array, before: int = 0) -> int:
     before : int
         Checksum of numbers that stand before them; the result is that of all.
     """
-    return zlib.crc32(np.ascontiguousarray(values), before)
+    return zlib.crc32(np.ascontiguousarray(values).data, before)

@@ -225,7 +225,6 @@ def test_friction_takes_the_energy_that_its_rows_say_to_second_order(engine, act
     assert left_J[-1] < 1e-3 * abs(unbalanced_J(engine, 5e-4, actuator, {})[1]["friction"])
 
 
-
 def test_the_payload_s_inertia_is_the_lagrangian_s(actuator):
     # The same kinetic energy from the inertia that the plant is built with.
     inertia = loaded_inertia(1.2 * actuator.inertia, PAYLOAD_KG, float(actuator.payload_mount_m[2]))

@@ -64,7 +64,7 @@ class _Range(NamedTuple):
     """Checksum of some rows, by their numbers."""
 
     first: int
-    count: int
+    rows: int
     checksum: int
 
 
@@ -257,7 +257,7 @@ class Contents:
     def _check_ranges(self, signals: tuple[Signal, ...], *, ended: bool) -> None:
         """Refuse rows that are not those of their checksums, and fewer than a closed recording states."""
         ranges = sorted(self._ranges)
-        ends = list(accumulate(each.count for each in ranges))
+        ends = list(accumulate(each.rows for each in ranges))
         if [each.first for each in ranges] != [0, *ends][: len(ranges)]:
             raise self._damaged(f"entity {TELEMETRY}, component {CHECKSUM}")
         place = number = checksum = 0

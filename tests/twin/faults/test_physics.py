@@ -24,7 +24,7 @@ def each(mode, kind="coil", **more):
 
 
 def amid(q, qdot, before):
-    """Poses and rates in the middle of each period, as the plant predicts them; `before` are the rates then."""
+    """Poses and rates in the middle of each period, as the plant predicts; `before` are the rates then."""
     last = np.vstack([before, qdot[:-1]])
     return q + 0.5 * STEP_S * qdot, qdot + 0.5 * (qdot - last)
 
@@ -104,9 +104,7 @@ def test_shorted_coils_brake_the_rotor_by_what_heats_them():
     field = np.sum(0.5 * L_H * np.diff(currents**2, axis=0), axis=1)
     # Sums of eighteen products each, of 1e-16 of their size.
     np.testing.assert_allclose(work, heat + field, rtol=0, atol=1e-13 * heat.max())
-    rate_S = np.array(
-        [rate_jacobian(pose) @ rate for pose, rate in zip(middle_q, middle_qdot, strict=True)]
-    )
+    rate_S = np.array([rate_jacobian(pose) @ rate for pose, rate in zip(middle_q, middle_qdot, strict=True)])
     braking = np.sum(column(parts, "torque_Nm") * rate_S, axis=1) * STEP_S
     np.testing.assert_allclose(braking, -work, rtol=0, atol=1e-13 * heat.max())
     assert np.all(braking[5:] < 0)
@@ -122,9 +120,7 @@ def test_fewer_turns_scale_torque_and_emf_alike():
     field = np.sum(0.5 * L_H * np.diff(currents**2, axis=0), axis=1) / STEP_S
     q, qdot = column(parts, "q_rad"), column(parts, "qdot_rad_s")
     middle_q, middle_qdot = amid(q, qdot, qdot[:1])
-    rate_S = np.array(
-        [rate_jacobian(pose) @ rate for pose, rate in zip(middle_q, middle_qdot, strict=True)]
-    )
+    rate_S = np.array([rate_jacobian(pose) @ rate for pose, rate in zip(middle_q, middle_qdot, strict=True)])
     moving = np.sum(column(parts, "torque_Nm") * rate_S, axis=1)
     # Powers of some 10 W, of 18 groups, whose difference is some mW: 1e-13 of the former.
     np.testing.assert_allclose(power - field, moving, rtol=0, atol=1e-11)

@@ -75,7 +75,7 @@ def on_other_engine(groups: Groups, way: Way) -> Case:
 
 def of_part(failure: Failure, way: Way) -> Case:
     """A failure of what all groups share, in one way."""
-    fault = {"target": failure.part, "mode": failure.mode}
+    fault: dict[str, Any] = {"target": failure.part, "mode": failure.mode}
     if failure.value is not None:
         fault["value"] = failure.value
     return Case(
