@@ -7,7 +7,7 @@ BIN := .venv/bin
 WHEEL := .venv-wheel/bin
 SYNC = $(UV) sync --quiet --frozen --no-default-groups --python $(PYTHON)
 
-.PHONY: demo test check format benchmark peers reproduce screenshots setup clean
+.PHONY: demo test check format benchmark peers reproduce tune-rivals screenshots setup clean
 
 demo: .venv/demo ## run the nutation under AFSM and leave a recording and its telemetry
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
@@ -35,6 +35,12 @@ peers: .venv-peers/installed ## hold JAX, MJX, Drake and plain NumPy against our
 reproduce: setup ## run all that the paper shows, over 20 seeds, and leave a page in reproduced/
 	$(BIN)/spheretwin reproduce all --out reproduced
 	@echo "here:      reproduced/reproduce.html"
+
+# A folder of trials that other sources made is refused; remove it first.
+tune-rivals: setup ## search the gains of the compared laws again, and freeze them
+	for study in rivals_ideal rivals_prototype; do \
+		$(BIN)/spheretwin sweep $$study --optimise && cp $${study}_study/gains.json twin/reproduce/rivals/$$study.json || exit 1; \
+	done
 
 screenshots: setup ## take the READMEs' pictures
 	$(BIN)/python -m tests.screenshots.take

@@ -93,7 +93,8 @@ class Grid:
         values |= {axis.field: value for axis, value in drawn}
         ordered = {axis.field: values[axis.field] for axis in self._study.axis}
         key = _key(ordered, self._laws[law], repeat)
-        return Row(number, key, _seed(self._study.seed, key), ordered, self._laws[law], repeat)
+        drawn_from = f"repeat {repeat}" if self._study.common_seeds else key
+        return Row(number, key, _seed(self._study.seed, drawn_from), ordered, self._laws[law], repeat)
 
     def values(self, field: str) -> list[Any] | None:
         """All values of an axis; None of one that is drawn, which has numbers."""
@@ -191,6 +192,6 @@ def _key(values: Mapping[str, Any], law: Mapping[str, Any] | None, repeat: int) 
 
 
 def _seed(study_seed: int, key: str) -> int:
-    """Seed of a row, from the study's and the row's key; below 2**53, so that JSON keeps it whole."""
+    """Seed of a row, from the study's and a key; below 2**53, so that JSON keeps it whole."""
     digest = hashlib.sha256(f"{study_seed} {key}".encode()).digest()
     return int.from_bytes(digest[:8], "big") >> 11

@@ -65,6 +65,9 @@ class Study(BaseModel):
     seeds: Annotated[int, Field(ge=1, le=MOST_VALUES)] = Field(
         1, description="runs of each point, each with a seed of its own"
     )
+    common_seeds: bool = Field(
+        False, description="whether all points and laws run under the same seeds, so that they are paired"
+    )
     metrics: tuple[str, ...] = Field(
         (), description="figures to keep, FILE.py:NAME for one of your own; all unless given"
     )

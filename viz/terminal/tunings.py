@@ -39,7 +39,7 @@ def _print_law(title: str, of_law: dict[str, Any]) -> None:
     table = style.table(title, "trial", *gains, *values, *fresh)
     rows = [("start", of_law["start"])] if of_law["start"] else []
     for label, each in rows + [(str(each["trial"]), each) for each in _some(of_law["best"])]:
-        cells = [f"{each['gains'][gain]:.4g}" for gain in gains]
+        cells = ["off" if value is None else f"{value:.4g}" for value in map(each["gains"].get, gains)]
         cells += _cells(each["values"], values, each["ended"])
         cells += _cells(each["fresh"], values, "lost") if is_fresh else []
         table.add_row(label, *cells)

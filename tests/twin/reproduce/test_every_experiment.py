@@ -29,7 +29,7 @@ def test_every_experiment_can_be_loaded_and_its_cases_told_apart(name):
     assert experiment.shows.endswith(".")
     cases = experiment.cases()
     assert len({case.name for case in cases}) == len(cases) > 0
-    assert len({json.dumps([case.scenario, dict(case.fields)]) for case in cases}) == len(cases)
+    assert len({json.dumps([case.scenario, case.fields_of(0)]) for case in cases}) == len(cases)
     for case in cases:
         scenarios.load(case.scenario, case.fields)
 

@@ -1,94 +1,126 @@
-"""The rivals: fronts against their definition, families about what is shipped, pairs by hand."""
+"""The comparison of laws: frozen gains are those of the search, tables and findings say what ran."""
 
 import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce import page
-from spheretwin.twin.reproduce.laws import BY_LAW as LABELS
+from spheretwin.twin.reproduce.laws import BY_LAW
 from spheretwin.twin.reproduce.page import Chapter
 from spheretwin.twin.reproduce.planning import planned, scenario_of
-from spheretwin.twin.reproduce.rivals import conditions, fronts, paired, told
-from spheretwin.twin.reproduce.rivals.conditions import BARE_TILT, EASY, GOVERNED_TILT, PROTOTYPE, SETTINGS
-from spheretwin.twin.reproduce.rivals.families import BY_LAW, FAMILIES
+from spheretwin.twin.reproduce.rivals import conditions, tables
+from spheretwin.twin.reproduce.rivals.conditions import HARDWARE, IDEAL, PROTOTYPE
+from spheretwin.twin.reproduce.rivals.results import results, start_error, within
 from spheretwin.twin.reproduce.rivals.rivals import EXPERIMENT
+from spheretwin.twin.reproduce.rivals.tuned_gains import FOLDER, tuned_gains
 from spheretwin.twin.reproduce.rows import rows
 from spheretwin.twin.reproduce.running import carried_out, failed
+from spheretwin.twin.study.grid import Grid
+from spheretwin.twin.study.row import Rows
+from spheretwin.twin.study.study import load
+from spheretwin.twin.study.tuning import gains as tuning_gains
+from spheretwin.twin.study.tuning import trial
 from spheretwin.viz.palette import LAW_COLOURS, LAW_MARKS
 
-# Few values, so that coordinates are often the same.
-COORDINATE = st.sampled_from([1.0, 2.0, 3.0, 5.0, 8.0, np.nan])
+
+def frozen(hardware):
+    return json.loads((FOLDER / f"{hardware.study}.json").read_text(encoding="utf-8"))["laws"]
 
 
-def dominates(one, other):
-    return bool(np.all(one <= other) and np.any(one < other))
-
-
-@given(st.lists(st.tuples(COORDINATE, COORDINATE), max_size=12))
-def test_a_front_is_what_nothing_dominates(listed):
-    values = np.array(listed).reshape(-1, 2)
-    whole = ~np.isnan(values).any(axis=1)
-    kept = fronts.front(values)
-    for place, value in enumerate(values):
-        assert kept[place] == (whole[place] and not any(dominates(other, value) for other in values[whole]))
-
-
-def test_every_law_has_one_family_a_label_and_marks_of_its_own():
-    assert sorted(family.law for family in FAMILIES) == sorted(LAWS)
-    assert set(LABELS) == set(LAW_MARKS) == set(LAW_COLOURS) == set(LAWS)
+def test_every_law_has_a_label_and_marks_of_its_own():
+    assert set(BY_LAW) == set(LAW_MARKS) == set(LAW_COLOURS) == set(LAWS)
     assert len({marker for marker, _ in LAW_MARKS.values()}) == len(LAW_MARKS)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_a_family_is_geometric_about_what_is_shipped(law):
-    family = BY_LAW[law]
-    ratios = np.array(family.ratios)
-    assert len(ratios) == 7
-    np.testing.assert_allclose(ratios[1:] / ratios[:-1], 1.5, rtol=1e-12)
-    assert 1.0 in family.ratios
-    shipped = LAWS[law]()
-    assert (
-        scenario_of(conditions.case(EASY, family, 1.0), None).controller
-        == scenario_of(
-            conditions.case(EASY, family, 1.0)._replace(fields={"controller.law": law}), None
-        ).controller
-    )
-    changed = scenario_of(conditions.case(EASY, family, 1.5), None).controller
-    for name in LAWS[law].model_fields:
-        was, now = getattr(shipped, name), getattr(changed, name)
-        power = family.powers.get(name)
-        if power is None:
-            assert now == was
-        else:
-            np.testing.assert_allclose(now, np.array(was) * 1.5**power, rtol=1e-12)
+@pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
+def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardware):
+    study = load(hardware.study)
+    assert [law["law"] for law in study.law] == list(dict.fromkeys(law["law"] for law in study.law))
+    assert {law["law"] for law in study.law} == set(LAWS)
+    assert study.common_seeds
+    searched = Rows(study)
+    for law in study.law:
+        found = tuning_gains.gains_of(study, law, searched)
+        fields = set(tuning_gains.values(found, tuning_gains.middle(found)))
+        named = {field.split(".")[1] for field in fields}
+        base = set(LAWS["pd"].model_fields) - {"stiffness", "damping"}
+        own = set(LAWS[law["law"]].model_fields) - base - {"preset", "coupled"}
+        # The fuzzy approximator of AFSM-ESO is off as shipped: its numbers are no gains then.
+        own = {each for each in own if not (law["law"] == "afsm_eso" and each.startswith("fuzzy"))}
+        assert own <= named
+        assert {"controller.governor.acceleration_rad_s2", "controller.feed_forward.inertia"} <= fields
+        assert ("controller.feed_forward.friction" in fields) == (hardware is PROTOTYPE)
+    assert all(gain.reason for gain in study.optimise.gain)
+    assert {gain.called for gain in study.optimise.gain if not gain.law} == {
+        gain.called for gain in study.optimise.gain if gain.optional
+    }
 
 
-@pytest.mark.parametrize("law", ["pid", "computed_torque"])
-def test_a_triple_pole_stays_one(law):
-    """(s + ω)³ at every setting."""
-    for ratio in BY_LAW[law].ratios:
-        gains = scenario_of(conditions.case(EASY, BY_LAW[law], ratio), None).controller
-        w = 40.0 * ratio
-        found = (gains.damping[0], gains.stiffness[0], gains.integral[0])
-        np.testing.assert_allclose(found, (3 * w, 3 * w**2, w**3), rtol=1e-12)
+@pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
+def test_frozen_gains_are_within_their_ranges_and_limits(hardware):
+    study = load(hardware.study)
+    ranges = {(gain.law, gain.called): gain for gain in study.optimise.gain}
+    assert set(frozen(hardware)) == set(LAWS)
+    for law, found in frozen(hardware).items():
+        for each in found:
+            assert each["limit"] in hardware.limits_A_s
+            assert list(each["values"].values())[1] <= each["limit"]
+            for name, value in each["gains"].items():
+                gain = ranges.get((law, name)) or ranges["", name]
+                assert (value is None and gain.optional) or gain.low <= value <= gain.high
+        errors = [next(iter(each["values"].values())) for each in found]
+        assert errors == sorted(errors, reverse=True)
 
 
-def test_all_on_the_prototype_say_what_stands_around_them():
-    for setting in PROTOTYPE:
-        for family in setting.families:
-            controller = scenario_of(conditions.case(setting, family, 1.0), None).controller
-            governed = setting is GOVERNED_TILT
-            assert controller.governor.on == governed
-            assert controller.feed_forward.friction == ((0.8 if governed else 0.0),) * 3
-            inertia = 1.0 if governed and family.law == "pid" else 0.0
-            assert controller.feed_forward.inertia == (inertia,) * 3
-            assert getattr(controller, "preset", "prototype") == "prototype"
+@pytest.mark.parametrize("law", ["adrc", "afsm_eso", "lqi", "pd"])
+@pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
+def test_frozen_gains_give_what_the_search_recorded(hardware, law):
+    """A spot check: rows of the search run again with the gains of the file."""
+    study = load(hardware.study)
+    searched = Rows(tuning_gains.judged(study))
+    rows_of_law = [row for row in Grid(searched.study) if row.law == {"law": law}]
+    assert frozen(hardware)[law]
+    for each in frozen(hardware)[law]:
+        tried = trial.carried_out(
+            searched, rows_of_law, each["fields"], study.optimise.objective, lambda _: False, lambda: False
+        )
+        # The same scenario and seed; another processor rounds otherwise, which a loop of high gain amplifies.
+        assert tried.values == pytest.approx(list(each["values"].values()), rel=1e-3)
+
+
+def test_seeds_of_the_search_are_none_of_the_page():
+    for hardware in HARDWARE:
+        assert min(row.seed for row in Grid(load(hardware.study))) > 1000
+
+
+def test_conditions_state_what_the_controller_knows():
+    by_name = {
+        (hardware.name, condition.name): {**hardware.fields, **condition.fields}
+        for hardware in HARDWARE
+        for condition in hardware.conditions
+    }
+    for hardware in HARDWARE:
+        friction = by_name[hardware.name, "friction 5 mN·m, nominal 2 mN·m"]
+        assert friction["plant.coulomb_Nm"] == [5e-3] * 3
+        assert friction["nominal.coulomb_Nm"] == [2e-3] * 3
+        delay = by_name[hardware.name, "1 ms of unknown delay"]
+        assert delay["drive.delay_s"] - delay["nominal.delay_s"] == pytest.approx(1e-3)
+
+
+def test_group_gains_are_drawn_from_the_seed_of_each_run():
+    condition = next(each for each in IDEAL.conditions if each.name.startswith("group gains"))
+    case = conditions.tuned_case(IDEAL, condition, tuned_gains(IDEAL.study)[0])
+    first, again, other = (case.fields_of(seed)["plant.group_gain"] for seed in (0, 0, 1))
+    assert first == again != other
+    drawn = np.array([case.fields_of(seed)["plant.group_gain"] for seed in range(200)])
+    assert drawn.shape == (200, 18)
+    assert 0.97 <= drawn.min() < 0.9701
+    assert 1.0299 < drawn.max() <= 1.03
+    assert scenario_of(case, None, 1).plant.group_gain == tuple(other)
 
 
 def outcome(error, variation, status=Status.COMPLETED):
@@ -98,58 +130,67 @@ def outcome(error, variation, status=Status.COMPLETED):
         figures={"current_variation_A_s": variation},
         max_abs_error=np.full(3, error),
         tail_rms_error=np.full(3, error / 10),
+        kept=np.full(3, error / 20),
     )
 
 
-def made_up(setting, by_law):
-    """Outcomes of laws by (ratio, errors of two seeds, variation)."""
+def made_up(limit, by_law, condition=IDEAL.conditions[0]):
+    """Outcomes of laws by the errors of their seeds."""
+    chosen = {each.law: each for each in tuned_gains(IDEAL.study) if each.limit_A_s == limit}
     return {
-        conditions.case(setting, BY_LAW[law], ratio).name: [outcome(each, variation) for each in errors]
-        for law, settings in by_law.items()
-        for ratio, errors, variation in settings
+        conditions.tuned_case(IDEAL, condition, chosen[law]).name: [outcome(each, limit) for each in errors]
+        for law, errors in by_law.items()
     }
 
 
-def test_points_are_medians_and_no_numbers_where_a_run_was_lost():
-    outcomes = made_up(EASY, {"pid": [(1.0, (2.0, 4.0), 5.0), (1.5, (1.0, 1.0), 9.0)]})
-    lost = conditions.case(EASY, BY_LAW["pid"], 1.5).name
-    outcomes[lost][1] = outcome(1.0, 9.0, Status.FAILSAFE)
-    first, second = fronts.points(EASY, outcomes)
-    assert (first.largest_rad, first.variation_A_s, first.shipped) == (3.0, 5.0, True)
-    assert np.isnan(second.largest_rad)
-    assert fronts.on_front([first, second], fronts.LARGEST) == [first]
-    assert fronts.best([first, second]) == first
-    assert fronts.best([first, second], 4.9) is None
+def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
+    outcomes = made_up(30.0, {"pid": (2e-3, 4e-3, 9e-3), "adrc": (1e-3, 1e-3, 1e-3)})
+    lost = next(name for name in outcomes if "adrc" in name)
+    outcomes[lost][1] = outcome(1e-3, 30.0, Status.FAILSAFE)
+    first, second = within(results(IDEAL, IDEAL.conditions[0], outcomes), 30.0)
+    assert (first.law, first.largest_rad, first.tail_rad) == ("pid", 4e-3, 4e-4)
+    assert second.is_lost
 
 
-def test_findings_say_who_is_on_the_front_and_how_far_the_paper_s_laws_are_behind():
-    settings = {"afsm": [(1.0, (8.0, 8.0), 20.0)], "adaptive_fuzzy": [(1.0, (6.0, 6.0), 15.0)]}
-    outcomes = made_up(EASY, {**settings, "afsm_eso": [(1.0, (2.0, 2.0), 4.0)]})
-    (found,) = told.findings(outcomes)
-    assert "points of AFSM-ESO 1;" in found.text
-    assert "adaptive fuzzy 3.0, AFSM 4.0 times" in found.text
-    assert "less of both than 1 of the 1 points" in found.text
-    assert told.findings({}) == []
+@pytest.mark.parametrize(
+    ("errors", "expected"),
+    [
+        ({"afsm_eso": (1e-3,), "adrc": (2e-3,)}, "AFSM-ESO (1.00 mrad) is best, before ADRC (2.00 mrad)"),
+        ({"afsm_eso": (1e-3,), "adrc": (1.04e-3,)}, "is not alone; level: ADRC (1.04 mrad)"),
+        ({"afsm_eso": (1e-3,), "adrc": (0.9e-3,)}, "is not alone; better: ADRC (0.90 mrad)"),
+        ({"adrc": (0.9e-3,)}, "ADRC (0.90 mrad) is best, and AFSM-ESO lost the rotor or is beyond the limit"),
+    ],
+)
+def test_findings_say_where_rivals_are_level_or_better(errors, expected):
+    (finding,) = tables.findings(made_up(30.0, errors))
+    assert expected in finding.text
+    assert "tuned within 30 A/s" in finding.text
 
 
-def test_pairs_count_seeds():
-    outcomes = made_up(BARE_TILT, {"afsm_eso": [(1.0, (2.0, 2.0), 4.0)], "pid": [(1.0, (1.0, 5.0), 9.0)]})
-    (pair,) = paired.pairs(BARE_TILT, outcomes)
-    assert (pair.less_error, pair.less_variation, pair.both) == ((False, True), (True, True), 1)
-    (found,) = paired.findings(outcomes)
-    assert "less error under 1 and less variation under 2 of 2 seeds" in found.text
+def test_nothing_is_found_where_nothing_ran():
+    assert tables.findings({}) == []
+    assert EXPERIMENT.tell({}) == []
+
+
+def test_the_error_at_the_start_is_the_largest_until_the_rates_agree():
+    rate_error = np.array([[-1.0, -2.0, 1.0], [-0.5, 1.0, 0.5], [0.2, -1.0, 0.1]])
+    error = np.array([[0.1, 0.3, 0.1], [0.2, 0.4, 0.2], [0.3, 0.9, 0.3]])
+    table = {"error_rad": error, "qdot_rad_s": rate_error, "qdot_ref_rad_s": np.zeros((3, 3))}
+    # α agrees at the third tick, β at the second, γ not at all.
+    np.testing.assert_array_equal(start_error(SimpleNamespace(telemetry=table)), [0.3, 0.4, 0.3])
 
 
 @pytest.fixture(scope="module")
 def short():
-    """One seed of two settings of three laws everywhere, a tenth as long."""
+    """One seed of two laws, presets and full current under every condition; a tenth as long."""
     chosen = [
-        conditions.case(setting, BY_LAW[law], ratio)
-        for setting in SETTINGS
-        for law in conditions.PAIRED
-        for ratio in (1.0, 1.5)
+        case
+        for case in EXPERIMENT.cases()
+        if "limit_A_s" not in case.told or case.fields["controller.law"] in ("afsm_eso", "pid")
     ]
-    cases = [case._replace(fields={**case.fields, "duration": 0.6}) for case in chosen]
+    cases = [
+        case._replace(fields={**case.fields, "duration": case.fields.get("duration", 0.6)}) for case in chosen
+    ]
     plan = planned(EXPERIMENT._replace(cases=lambda: cases), seeds=1)
     return plan, carried_out(plan)
 
@@ -157,26 +198,44 @@ def short():
 def test_rows_and_page_have_what_ran(short, tmp_path):
     plan, outcomes = short
     assert failed(plan, outcomes) == []
-    listed = rows(plan, outcomes)
-    json.dumps(listed, allow_nan=False)
-    assert [(row["setting"], row["ratio"]) for row in listed[:2]] == [
-        ("m 0.2, L 1", 1.0),
-        ("m 0.2, L 1", 1.5),
-    ]
+    json.dumps(rows(plan, outcomes), allow_nan=False)
     chapter = Chapter(plan.experiment, EXPERIMENT.tell(outcomes), EXPERIMENT.findings(outcomes))
     written = page.write(tmp_path, [chapter], "", {})[0].read_text(encoding="utf-8")
-    for figure in ("rivals_ideal.png", "rivals_prototype.png"):
+    for hardware in HARDWARE:
+        figure = f"rivals_{hardware.name}.png"
         assert (tmp_path / figure).stat().st_size > 0
         assert f"({figure})" in written
-    assert "Paired on the prototype" in written
-    assert written.count("| rivals | ") == len(SETTINGS) + len(PROTOTYPE)
+        for each in load(hardware.study).optimise.gain:
+            assert each.reason in written
+    assert written.count("| rivals | ") == len(IDEAL.conditions) + len(PROTOTYPE.conditions)
+    assert "full current, bounded allocation" in written
+    assert "make tune-rivals" in written
 
 
-def test_the_drawn_front_is_the_front(short):
+def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation(short):
+    """Within the same ±8 A: least norm gives away some of the torque, so that a law may share it better."""
+    _, outcomes = short
+    for condition in IDEAL.conditions:
+        if condition.perturbed:
+            continue
+        limits = {
+            allocation: np.max(outcomes[conditions.limit_case(condition, allocation).name][0].kept)
+            for allocation in conditions.ALLOCATIONS
+        }
+        assert limits["bounded"] < limits["least_norm"]
+        reached = [each.largest_rad for each in results(IDEAL, condition, outcomes)]
+        assert min(reached) > limits["bounded"]
+        # Least norm along one direction of torque: other directions are some percent better.
+        assert min(reached) > 0.9 * limits["least_norm"]
+
+
+def test_a_figure_has_a_line_a_law_and_the_floors(short):
     from spheretwin.twin.reproduce.rivals import drawing
 
     _, outcomes = short
-    axes = drawing.ideal(outcomes).figure.axes[0]
-    common = axes.lines[0].get_xydata()
-    of = fronts.on_front(fronts.points(EASY, outcomes), fronts.LARGEST)
-    np.testing.assert_allclose(common, fronts.plane(of, fronts.LARGEST) * [1.0, 1e3])
+    axes = drawing.figure(IDEAL, outcomes).figure.axes[0]
+    lines = [np.asarray(line.get_xydata()) for line in axes.lines]
+    found = [each for each in results(IDEAL, IDEAL.conditions[0], outcomes) if each.limit_A_s is not None]
+    for law in ("afsm_eso", "pid"):
+        points = sorted((each.variation_A_s, 1e3 * each.largest_rad) for each in found if each.law == law)
+        assert any(np.shape(line) == np.shape(points) and np.allclose(line, points) for line in lines)

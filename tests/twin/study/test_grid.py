@@ -43,6 +43,14 @@ def test_keys_and_seeds_are_of_a_row_alone():
     assert {(row.key, row.seed) for row in fewer} < {(row.key, row.seed) for row in rows}
 
 
+def test_common_seeds_are_those_of_the_repeat_alone():
+    rows = list(Grid(loads(seeds=3, common_seeds=True)))
+    assert len({row.key for row in rows}) == len(rows) == 72
+    by_repeat = {repeat: {row.seed for row in rows if row.repeat == repeat} for repeat in range(3)}
+    assert all(len(seeds) == 1 for seeds in by_repeat.values())
+    assert len(set.union(*by_repeat.values())) == 3
+
+
 def test_another_seed_of_the_study_is_another_seed_of_each_row():
     first, second = (Grid(study(values("disturbance.load", 1.0, 2.0), seed=seed)) for seed in (0, 1))
     assert [row.key for row in first] == [row.key for row in second]

@@ -1,1 +1,1 @@
-"""The laws as fronts: error against variation of the currents, each over a family of its own gains."""
+"""Comparison of the laws: gains of one search with the same budget for all, results under other seeds."""

@@ -1,129 +1,185 @@
-"""Where the laws are compared, and the case of every setting of each."""
+"""Conditions under which the tuned laws are compared, and their cases."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from spheretwin.control.laws.afsm_eso import PRESETS
+from spheretwin.models import actuator
 from spheretwin.models.telemetry.status import Status
 from spheretwin.twin.reproduce.experiment import Case
-from spheretwin.twin.reproduce.rivals.families import BY_LAW, MARKED, PRESET, Family
+from spheretwin.twin.reproduce.rivals.tuned_gains import TunedGains, study, tuned_gains
 
-# The ends of a family may be beyond what the rotor bears: that is seen, and no failure.
+# A law that loses the rotor under a condition that it was not tuned for is reported, and no failure.
 ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAILSAFE)
 
-GOVERNED_rad_s2, FRICTION = 40.0, 0.8
+GROUP_GAIN = 0.03
+"""Largest deviation of the torque of a group from its nominal value."""
 
-# Said in full, whatever a preset brings along.
-BARE: dict[str, Any] = {
-    "controller.governor.acceleration_rad_s2": None,
-    "controller.feed_forward.friction": 0.0,
-    "controller.feed_forward.inertia": 0.0,
-}
-AROUND: dict[str, Any] = {
-    **BARE,
-    "controller.governor.acceleration_rad_s2": GOVERNED_rad_s2,
-    "controller.feed_forward.friction": FRICTION,
-}
-
-FED = ("pid",)
-"""Laws that leave out the reference's acceleration: behind a governor its torque is fed forward to them."""
-
-PAIRED = ("afsm_eso", "pid", "adrc")
-"""The law that is held against others, and these."""
+STAGE = 977  # of the random stream of the group gains
 
 
-class Setting(NamedTuple):
-    """Hardware, motion and load on which fronts are drawn."""
+class Condition(NamedTuple):
+    """What a run differs in from the others of its hardware."""
+
+    name: str
+    fields: Mapping[str, Any]
+    drawn: Callable[[int], Mapping[str, Any]] = lambda seed: {}
+    """Fields that depend on the seed."""
+    perturbed: bool = False
+    """Whether the nominal model is wrong: a column of robustness."""
+
+
+class Hardware(NamedTuple):
+    """Hardware and motion for which the laws were tuned."""
 
     name: str
     title: str
-    scenario: str
-    fields: Mapping[str, Any]
+    study: str
+    """Name of the study that searched the gains."""
     hinges: tuple[int, ...]
     """Of which the worst one counts."""
-    bounds_A_s: tuple[float, float]
-    """Variations within which each law's best is told."""
-    prototype: bool = False
-    laws: tuple[str, ...] = tuple(BY_LAW)
+    in_degrees: bool
+    conditions: tuple[Condition, ...]
+    presets: tuple[str, ...]
+    """Of AFSM-ESO, reported as shipped."""
 
     @property
-    def families(self) -> list[Family]:
-        """Of its laws."""
-        return [BY_LAW[law] for law in self.laws]
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return study(self.study).scenario
+
+    @property
+    def fields(self) -> Mapping[str, Any]:
+        """Fields of every run."""
+        return study(self.study).fields
+
+    @property
+    def limits_A_s(self) -> tuple[float, ...]:
+        """Limits on the variation of the currents."""
+        optimise = study(self.study).optimise
+        return optimise.limits if optimise else ()
 
 
-def _sinusoid(m: float, L: float) -> Setting:
-    return Setting(
-        f"m {m:g}, L {L:g}",
-        f"sinusoid, ideal hardware, m = {m:g}, L = {L:g}",
-        "sinusoid",
-        {"plant.modelling_error": m, "disturbance.load": L},
-        (0, 1, 2),
-        (10.0, 30.0),
-    )
+def group_gains(seed: int) -> dict[str, Any]:
+    """Torque of every group over its nominal value, drawn evenly from 0.97 to 1.03."""
+    groups = len(actuator.load().groups)
+    drawn = np.random.default_rng([seed, STAGE]).uniform(-GROUP_GAIN, GROUP_GAIN, groups)
+    return {"plant.group_gain": (1.0 + drawn).tolist()}
 
 
-# γ's encoder counts in steps that no law sees within.
-_TILT = Setting(
-    "prototype", "tilt, prototype", "tilt", {"hardware": "prototype", **BARE}, (0, 1), (25.0, 100.0), True
+def _load(m: float, L: float) -> dict[str, Any]:
+    return {"plant.modelling_error": m, "disturbance.load": L}
+
+
+def _friction(m: float) -> dict[str, Any]:
+    return {"plant.coulomb_Nm": [5e-3] * 3, "nominal.coulomb_Nm": [2e-3] * 3, "plant.modelling_error": m}
+
+
+def _delay(delay_s: float) -> dict[str, Any]:
+    return {"drive.delay_s": delay_s + 1e-3, "nominal.delay_s": delay_s}
+
+
+LIGHT = _load(0.2, 1.0)
+IDEAL = Hardware(
+    "ideal",
+    "sinusoid, ideal hardware",
+    "rivals_ideal",
+    (0, 1, 2),
+    False,
+    (
+        Condition("m 0.2, L 1", LIGHT),
+        Condition("m 0.5, L 5", _load(0.5, 5.0)),
+        Condition("m 0, L 0", _load(0.0, 0.0)),
+        Condition("friction 5 mN·m, nominal 2 mN·m", {**LIGHT, **_friction(0.2)}, perturbed=True),
+        Condition("m 0.5", _load(0.5, 1.0), perturbed=True),
+        Condition("1 ms of unknown delay", {**LIGHT, **_delay(0.0)}, perturbed=True),
+        Condition("group gains ±3 %", LIGHT, group_gains, perturbed=True),
+    ),
+    ("ideal", "fast"),
 )
-EASY, HARD, BARE_TILT = _sinusoid(0.2, 1.0), _sinusoid(0.5, 5.0), _TILT
-GOVERNED_TILT = _TILT._replace(
-    name="prototype, governed",
-    title="tilt, prototype, governor and feed-forward",
-    fields={"hardware": "prototype", **AROUND},
-    laws=PAIRED,
+
+OFFSETS = ("sensors.adc.offset_V", "sensors.adc.gain_error")
+PROTOTYPE = Hardware(
+    "prototype",
+    "tilt, prototype",
+    "rivals_prototype",
+    # The encoder of γ counts in steps that no law sees within.
+    (0, 1),
+    True,
+    (
+        Condition("without offset and gain errors", {}),
+        Condition("with them", {"sensors.adc.offset_V": 1e-3, "sensors.adc.gain_error": 1e-3}),
+        Condition("friction 5 mN·m, nominal 2 mN·m", _friction(0.0), perturbed=True),
+        Condition("m 0.5", {"plant.modelling_error": 0.5}, perturbed=True),
+        Condition("1 ms of unknown delay", _delay(1e-3), perturbed=True),
+        Condition("group gains ±3 %", {}, group_gains, perturbed=True),
+    ),
+    tuple(preset for preset in PRESETS if preset not in ("ideal", "fast")),
 )
-IDEAL, PROTOTYPE = (EASY, HARD), (BARE_TILT, GOVERNED_TILT)
-SETTINGS = (*IDEAL, *PROTOTYPE)
+HARDWARE = (IDEAL, PROTOTYPE)
+
+# All that the currents give against the error of the rate, from the first tick on: a rate feedback whose
+# torque is far beyond the limit.
+FULL_CURRENT: dict[str, Any] = {
+    "controller.law": "pd",
+    "controller.stiffness": 1e-6,
+    "controller.damping": 2e4,
+    "duration": 0.02,
+}
+ALLOCATIONS = ("least_norm", "bounded")
 
 
 def cases() -> list[Case]:
-    """Every setting of every law, then the presets, one kind of hardware after the other."""
-    return [each for setting in SETTINGS for each in (*_of_families(setting), *_of_presets(setting))]
+    """Every tuned law under every condition, then presets, and the limit that the currents set."""
+    return [
+        case
+        for hardware in HARDWARE
+        for condition in hardware.conditions
+        for case in (
+            *(tuned_case(hardware, condition, each) for each in tuned_gains(hardware.study)),
+            *(preset_case(hardware, condition, preset) for preset in hardware.presets),
+            *(limit_case(condition, allocation) for allocation in _allocations(hardware, condition)),
+        )
+    ]
 
 
-def case(setting: Setting, family: Family, ratio: float) -> Case:
-    """A law at one of its settings."""
-    fields = family.fields(ratio, setting.prototype)
-    if setting is GOVERNED_TILT and family.law in FED:
-        fields["controller.feed_forward.inertia"] = 1.0
-    # Beyond what is shipped a loop may hunt, and then amplifies what rounding leaves.
-    told = {"gain": family.label(ratio), "ratio": ratio}
-    return _case(setting, family.law, family.label(ratio), fields, told, ratio <= 1)
+def tuned_case(hardware: Hardware, condition: Condition, gains: TunedGains) -> Case:
+    """A law with the gains of one limit under one condition."""
+    fields = {"controller.law": gains.law, **gains.fields}
+    reported = {"limit_A_s": gains.limit_A_s, "gains": dict(gains.gains)}
+    return _case(hardware, condition, gains.label, fields, reported)
 
 
-def marked(setting: Setting, preset: str) -> Case:
-    """AFSM-ESO with a preset that its family does not begin at."""
+def preset_case(hardware: Hardware, condition: Condition, preset: str) -> Case:
+    """AFSM-ESO with a preset, as shipped."""
     fields = {"controller.law": "afsm_eso", "controller.preset": preset}
-    return _case(setting, "afsm_eso", f"preset {preset}", fields, {"gain": f"preset {preset}"}, False)
+    return _case(hardware, condition, f"preset {preset}", fields, {"preset": preset})
 
 
-def presets(setting: Setting) -> list[str]:
-    """Presets that are points of their own; without what stands around a law alone."""
-    if setting is GOVERNED_TILT:
-        return []
-    begun = PRESET if setting.prototype else "ideal"
-    return [preset for preset in MARKED if preset != begun]
+def limit_case(condition: Condition, allocation: str) -> Case:
+    """All that the currents give at the start of the sinusoid."""
+    fields = {**FULL_CURRENT, "allocation": allocation}
+    return _case(IDEAL, condition, f"full current, {allocation}", fields, {"limit": allocation})
 
 
-def _of_families(setting: Setting) -> list[Case]:
-    return [case(setting, family, ratio) for family in setting.families for ratio in family.ratios]
-
-
-def _of_presets(setting: Setting) -> list[Case]:
-    return [marked(setting, preset) for preset in presets(setting)]
+def _allocations(hardware: Hardware, condition: Condition) -> tuple[str, ...]:
+    return ALLOCATIONS if hardware is IDEAL and not condition.perturbed else ()
 
 
 def _case(
-    setting: Setting, law: str, gain: str, fields: dict[str, Any], told: dict[str, Any], compared: bool
+    hardware: Hardware, condition: Condition, name: str, fields: dict[str, Any], reported: dict[str, Any]
 ) -> Case:
     return Case(
-        name=f"{law}, {gain}: {setting.name}",
-        scenario=setting.scenario,
-        fields={**setting.fields, **fields},
-        told={"setting": setting.name, **told},
+        name=f"{hardware.name}, {condition.name}: {name}",
+        scenario=hardware.scenario,
+        fields={**hardware.fields, **condition.fields, **fields},
+        told={"setting": hardware.name, "condition": condition.name, **reported},
         ends=ENDS,
-        compared=compared,
+        # Beyond its nominal model a loop of high gain may hunt, and then amplifies what rounding leaves.
+        compared=not condition.perturbed,
+        drawn=condition.drawn,
     )

@@ -1,85 +1,60 @@
-"""Figures of the fronts."""
+"""Figures of the comparison: the error of every law over the variation of the currents."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from spheretwin.twin.reproduce.experiment import Outcomes
 from spheretwin.twin.reproduce.laws import BY_LAW
-from spheretwin.twin.reproduce.rivals.conditions import IDEAL, PROTOTYPE, Setting
-from spheretwin.twin.reproduce.rivals.fronts import LARGEST, TAIL, Point, front, on_front, plane, points
+from spheretwin.twin.reproduce.rivals.conditions import Condition, Hardware
+from spheretwin.twin.reproduce.rivals.results import current_limits_rad, results
 from spheretwin.viz.figures.drawing import Drawing
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures.tracking.fronts import Panel
 
-TITLES = {LARGEST: "largest |error|", TAIL: "RMS error, second half"}
-VARIATION = "variation of the commands, A/s"
-
-READ = (
-    "Each marker is a law at one setting, median over the seeds; a line joins a law's front, and faint"
-    " markers are not on it. A ring is where its family begins; the grey band is the common front of all."
+CAPTION = (
+    "A marker is a law with the gains that the search found within one limit on the variation, median over"
+    " the seeds; a line joins the limits. Hollow: presets as shipped."
 )
+FULL_CURRENT = " Grey lines: full current at the start, least norm (upper) and bounded (lower)."
 
 
-def ideal(outcomes: Outcomes) -> Drawing:
-    """Both errors under both conditions of the sinusoid."""
-    from spheretwin.viz.figures.tracking import fronts as figures
-
-    ran = [setting for setting in IDEAL if points(setting, outcomes)]
-    panels = [
-        _panel(setting, points(setting, outcomes), error, 1e3, "mrad", 60.0)
-        for error in TITLES
-        for setting in ran
-    ]
-    figure = figures.fronts(panels, _labels(IDEAL), VARIATION, len(ran))
-    return Drawing("rivals_ideal.png", f"The sinusoid on ideal hardware, worst hinge. {READ}", figure)
-
-
-def prototype(outcomes: Outcomes) -> Drawing:
-    """The tilt, with what stands around a law and without."""
-    from spheretwin.viz.figures.tracking import fronts as figures
+def figure(hardware: Hardware, outcomes: Outcomes) -> Drawing:
+    """Error over variation under the conditions with a right nominal model."""
+    from spheretwin.viz.figures.tracking import fronts
 
     panels = [
-        _panel(setting, of, LARGEST, np.degrees(1.0), "degrees", 12.0)
-        for setting in PROTOTYPE
-        if (of := points(setting, outcomes))
+        _panel(hardware, condition, outcomes)
+        for condition in hardware.conditions
+        if not condition.perturbed and results(hardware, condition, outcomes)
     ]
-    bare = panels[0].by_law
-    for place, panel in enumerate(panels[1:], start=1):
-        beside = {law: bare[law].values[bare[law].front] for law in panel.by_law if law in bare}
-        panels[place] = panel._replace(title=f"{panel.title} (hollow: without)", beside=beside)
-    figure = figures.fronts(panels, _labels(PROTOTYPE), VARIATION, len(panels))
-    caption = (
-        f"The tilt on the prototype, true error of the worse of α and β. {READ} Hollow,"
-        " beside those governed: the fronts without governor and feed-forward."
+    drawn = fronts.fronts(
+        panels, {law: compared.label for law, compared in BY_LAW.items()}, "variation of the commands, A/s"
     )
-    return Drawing("rivals_prototype.png", caption, figure)
+    caption = f"{hardware.title}. {CAPTION}{'' if hardware.in_degrees else FULL_CURRENT}"
+    return Drawing(f"rivals_{hardware.name}.png", caption, drawn)
 
 
-def _labels(settings: Sequence[Setting]) -> dict[str, str]:
-    return {law: BY_LAW[law].label for setting in settings for law in setting.laws}
+def _panel(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> Panel:
+    from spheretwin.viz.figures.tracking import fronts
 
-
-def _panel(setting: Setting, of: Sequence[Point], error: str, scale: float, unit: str, most: float) -> Panel:
-    from spheretwin.viz.figures.tracking import fronts as figures
-
-    to = np.array([1.0, scale])
-    clouds = {}
-    for law in setting.laws:
-        own = [each for each in of if each.law == law and not each.preset]
-        if own:
-            values = plane(own, error)
-            begins = np.array([each.shipped for each in own])
-            clouds[law] = figures.Cloud(to * values, front(values), begins)
-    return figures.Panel(
-        setting.title,
-        f"{TITLES[error]}, {unit}",
-        clouds,
-        to * plane(on_front(of, error), error),
-        {each.preset: (each.law, *(to * plane([each], error))[0]) for each in of if each.preset},
-        most,
+    scale = np.degrees(1.0) if hardware.in_degrees else 1e3
+    found = [each for each in results(hardware, condition, outcomes) if not each.is_lost]
+    tuned = [each for each in found if each.limit_A_s is not None]
+    points = {
+        law: np.array([(each.variation_A_s, scale * each.largest_rad) for each in tuned if each.law == law])
+        for law in dict.fromkeys(each.law for each in tuned)
+    }
+    marked = {
+        each.label.rpartition(" ")[2].strip("`"): (each.law, each.variation_A_s, scale * each.largest_rad)
+        for each in found
+        if each.limit_A_s is None
+    }
+    floors = () if hardware.in_degrees else current_limits_rad(condition, outcomes).values()
+    unit = "degrees" if hardware.in_degrees else "mrad"
+    return fronts.Panel(
+        condition.name, f"largest |error|, {unit}", points, marked, [scale * each for each in floors]
     )

@@ -14,7 +14,7 @@ from spheretwin.twin.metrics.registry import METRICS
 from spheretwin.twin.study.grid import Row
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
-from spheretwin.twin.study.tuning.section import Gain, Optimise
+from spheretwin.twin.study.tuning.section import ON, Gain, Optimise
 from spheretwin.twin.study.tuning.trial import with_fields
 
 
@@ -100,10 +100,18 @@ def values(gains: Sequence[Gain], chosen: Mapping[str, float]) -> dict[str, floa
     """
     found: dict[str, float] = {}
     for gain in gains:
+        if chosen.get(gain.switch, ON) < ON:
+            continue
         for setting in gain.settings:
             value = setting.factor * chosen[gain.called] ** setting.power
             found[setting.field] = found.get(setting.field, 1.0) * value
     return found
+
+
+def numbers(gains: Sequence[Gain]) -> dict[str, tuple[float, float, bool]]:
+    """Numbers that a trial chooses: lowest, highest and whether on a logarithmic scale, by name."""
+    ranges = {each.called: (each.low, each.high, each.log) for each in gains}
+    return ranges | {each.switch: (0.0, 1.0, False) for each in gains if each.optional}
 
 
 def start_of(gains: Sequence[Gain]) -> dict[str, float] | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from spheretwin.twin.study.tuning.section import Objective
@@ -40,8 +40,18 @@ def of_rows(objective: Objective, known: Sequence[float], rows: int) -> float:
     rows : int
         Of the trial.
     """
+    if objective.over == "first":
+        return known[0] if known else BEST
+    if objective.over == "geometric_mean":
+        return statistics.geometric_mean(known) if len(known) == rows and min(known) > 0 else 0.0
     whole = [*known, *[BEST] * (rows - len(known))]
     return max(whole) if objective.over == "worst" else statistics.median(whole)
+
+
+def best_within(values: Mapping[int, Sequence[float]], limit: float) -> int | None:
+    """Trial with the least first objective among those whose second is within a limit; None without any."""
+    within = [number for number, each in values.items() if each[1] <= limit]
+    return min(within, key=lambda number: (*values[number], number), default=None)
 
 
 def dominates(one: Sequence[float], other: Sequence[float]) -> bool:

@@ -8,15 +8,16 @@ neither threads nor an interruption change it, a SIGKILL in the middle of a prop
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.study.tuning import objectives
-from spheretwin.twin.study.tuning.gains import start_of
+from spheretwin.twin.study.tuning.gains import numbers, start_of
+from spheretwin.twin.study.tuning.local_search import proposed
 from spheretwin.twin.study.tuning.section import Gain, Optimise
 from spheretwin.twin.study.tuning.storage import optuna
-from spheretwin.twin.study.tuning.trial import Ended, Tried
+from spheretwin.twin.study.tuning.trial import Ended, Kept, Tried
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -28,15 +29,6 @@ if TYPE_CHECKING:
 POPULATION = 20
 
 DIGEST, EACH, REASON = "digest", "each", "reason"
-
-
-class Kept(NamedTuple):
-    """A finished trial."""
-
-    number: int
-    chosen: Mapping[str, float]
-    """Values of its gains by their names."""
-    tried: Tried
 
 
 class Proposer:
@@ -102,10 +94,13 @@ class Proposer:
 
     @property
     def best(self) -> list[int]:
-        """Numbers of the best trial, or of those on the front, the best of the first objective first."""
+        """Numbers of the best trial, of the best within each limit, or of the front."""
         kept = {each.number: each.tried.values for each in self.kept if each.tried.ended == Ended.COMPLETED}
         if len(self._optimise.objective) == 1:
             return sorted(kept, key=lambda number: (kept[number], number))[:1]
+        if limits := self._optimise.limits:
+            within = [objectives.best_within(kept, limit) for limit in limits]
+            return list(dict.fromkeys(each for each in within if each is not None))
         front: list[int] = []
         for number in sorted(kept, key=lambda number: (kept[number], number)):
             if not front or kept[number][1] < kept[front[-1]][1]:  # none before it is worse in the first
@@ -122,11 +117,13 @@ class Proposer:
             trial_id = self._storage.get_trial_id_from_study_id_trial_number(study_id, number)
             trial = self._optuna.trial.Trial(self._study, trial_id)
         else:
+            if self._optimise.sampler == "local" and number >= len(trials):
+                self._study.enqueue_trial(self._local(number))
             trial = self._study.ask()
-        for gain in self._gains:
+        for name, (low, high, is_log) in numbers(self._gains).items():
             # Of its own for each gain: those that a killed process had drawn already are not drawn again.
-            self._study.sampler = self._sampler(number, gain.called)
-            trial.suggest_float(gain.called, gain.low, gain.high, log=gain.log)
+            self._study.sampler = self._sampler(number, name)
+            trial.suggest_float(name, low, high, log=is_log)
         return trial
 
     def tell(self, trial: Trial, tried: Tried) -> None:
@@ -146,6 +143,11 @@ class Proposer:
             self._study.tell(trial, self._signed(tried.values))
         else:
             self._study.tell(trial, state=state.PRUNED)
+
+    def _local(self, number: int) -> dict[str, float]:
+        first = number - number % self._optimise.together
+        earlier = [each for each in self.kept if each.number < first]
+        return proposed(self._gains, self._optimise, f"{self._seed} {self._law}", number, earlier)
 
     def _signed(self, values: Sequence[float]) -> list[float]:
         return [each.sign * value for each, value in zip(self._optimise.objective, values, strict=True)]
@@ -168,6 +170,6 @@ class Proposer:
         samplers = self._optuna.samplers
         if self._optimise.sampler == "nsga2":
             return samplers.NSGAIISampler(population_size=POPULATION, seed=seed)
-        if self._optimise.sampler == "random":
+        if self._optimise.sampler in ("random", "local"):
             return samplers.RandomSampler(seed=seed)
         return samplers.TPESampler(seed=seed)

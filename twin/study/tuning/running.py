@@ -19,9 +19,9 @@ from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.tuning import gains, objectives, storage, table, trial
 from spheretwin.twin.study.tuning.fresh import Fresh, fresh
-from spheretwin.twin.study.tuning.proposing import Kept, Proposer
+from spheretwin.twin.study.tuning.proposing import Proposer
 from spheretwin.twin.study.tuning.section import Gain, Optimise
-from spheretwin.twin.study.tuning.trial import Ended
+from spheretwin.twin.study.tuning.trial import Ended, Kept
 
 Stop = Callable[[], bool]
 
@@ -113,7 +113,7 @@ def tuned(
     laws = [_Law(study, rows, law) for law in study.law or (None,)]
     gains.check(study, rows, [(each.gains, each.conditions[0]) for each in laws])
     make_folder(folder)
-    wanted = trials or optimise.trials
+    wanted = trials or optimise.planned
     with storage.opened(folder / storage.NAME) as kept:
         digest = _digest(rows, optimise)
         for law in laws:
@@ -170,7 +170,10 @@ class _Law:
         ]
 
         def has_lost(values: Sequence[float]) -> bool:
-            return self._optimise.prune and any(objectives.dominates(each, values) for each in before)
+            if not self._optimise.prune:
+                return False
+            beyond = bool(self._optimise.limits) and values[1] > self._optimise.limits[-1]
+            return beyond or any(objectives.dominates(each, values) for each in before)
 
         proposed = [self.proposer.propose(number) for number in batch if number not in finished]
         flying = {

@@ -15,6 +15,9 @@ MOST_FRESH = 1000
 
 HINGES = ("alpha", "beta", "gamma")
 
+SWITCH, ON = ", on", 0.5
+"""What the name of a switch ends in, and the value from which its gain is on: half of its range."""
+
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 
 
@@ -43,6 +46,10 @@ class Gain(BaseModel):
     start: float | None = Field(
         None, description="value in the first trial, which all others are held against"
     )
+    optional: bool = Field(
+        False, description="whether a trial may leave it off: the fields that it sets keep their values then"
+    )
+    reason: str = Field("", max_length=200, description="why the range is as it is, for the report")
 
     @model_validator(mode="after")
     def _fits(self) -> Gain:
@@ -66,6 +73,11 @@ class Gain(BaseModel):
         return self.name or self.field
 
     @property
+    def switch(self) -> str:
+        """Name of the number that says whether an optional gain is on: from `ON` to 1; off below."""
+        return f"{self.called}{SWITCH}"
+
+    @property
     def settings(self) -> tuple[Setting, ...]:
         """Fields that it sets."""
         return self.sets or (Setting(field=self.field),)
@@ -81,7 +93,14 @@ class Objective(BaseModel):
         (), description="entries whose worst is taken, of a figure of each hinge; all unless given"
     )
     direction: Literal["minimise", "maximise"] = Field("minimise", description="which way is better")
-    over: Literal["worst", "median"] = Field("worst", description="what is taken over the rows of a trial")
+    over: Literal["worst", "median", "geometric_mean", "first"] = Field(
+        "worst", description="statistic over the rows of a trial; first is the first row alone"
+    )
+    limits: Annotated[tuple[Annotated[float, Field(gt=0)], ...], Field(max_length=20)] = Field(
+        (),
+        description="limits on the second objective; the best of the first objective within each is reported"
+        " instead of the front",
+    )
 
     @model_validator(mode="after")
     def _fits(self) -> Objective:
@@ -89,6 +108,12 @@ class Objective(BaseModel):
             raise ValueError(f"expected no entries of {self.metric}, which is one number")
         if len(set(self.of)) < len(self.of):
             raise ValueError(f"expected each entry once, received {', '.join(self.of)}")
+        if list(self.limits) != sorted(set(self.limits)):
+            raise ValueError(f"expected ascending limits, received {', '.join(map(str, self.limits))}")
+        if self.direction == "maximise" and (self.limits or self.over == "geometric_mean"):
+            raise ValueError(
+                f"expected minimise with {'limits' if self.limits else 'geometric_mean'}, received maximise"
+            )
         return self
 
     @property
@@ -120,8 +145,20 @@ class Optimise(BaseModel):
     objective: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=2)] = Field(
         description="[[optimise.objective]] each; of two, the front is found"
     )
-    trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)] = Field(100, description="of each law")
-    sampler: Literal["tpe", "nsga2", "random"] = Field("tpe", description="what proposes the next trial")
+    trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)] = Field(
+        100, description="of each law; of the sampler local, draws and perturbations"
+    )
+    sampler: Literal["tpe", "nsga2", "random", "local"] = Field(
+        "tpe",
+        description="what proposes the next trial; local: points of a Sobol sequence, then perturbations of"
+        " the best trial within each limit in turn",
+    )
+    draws: Annotated[int, Field(ge=1, le=MOST_TRIALS)] = Field(
+        70, description="points of the Sobol sequence that local begins with"
+    )
+    perturbations: Annotated[int, Field(ge=1, le=MOST_TRIALS)] = Field(
+        35, description="perturbations by local of the best trial within each limit"
+    )
     together: Annotated[int, Field(ge=1, le=1000)] = Field(
         4,
         description="trials that are proposed before the first of them is known: they run side by side, and"
@@ -137,4 +174,24 @@ class Optimise(BaseModel):
         objectives = [(each.metric, tuple(sorted(each.of)), each.over) for each in self.objective]
         if len(set(objectives)) < len(objectives):
             raise ValueError(f"expected different objectives, received {self.objective[0].called} twice")
+        fields = type(self).model_fields
+        changed = {name for name, field in fields.items() if getattr(self, name) != field.default}
+        if self.sampler == "local" and "trials" in changed:
+            raise ValueError("expected draws and perturbations of the sampler local, received trials")
+        if self.sampler != "local" and (wrong := sorted({"draws", "perturbations"} & changed)):
+            raise ValueError(f"expected {wrong[0]} with the sampler local alone, received {self.sampler}")
+        if self.objective[0].limits:
+            raise ValueError("expected limits on the second of two objectives, received them on the first")
         return self
+
+    @property
+    def planned(self) -> int:
+        """Trials of each law."""
+        if self.sampler == "local":
+            return self.draws + self.perturbations * max(len(self.limits), 1)
+        return self.trials
+
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """Limits on the second objective; empty if there are none."""
+        return self.objective[-1].limits

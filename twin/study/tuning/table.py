@@ -10,9 +10,8 @@ from spheretwin.models.telemetry import checksums
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.tuning import gains
-from spheretwin.twin.study.tuning.proposing import Kept
 from spheretwin.twin.study.tuning.section import Gain, Objective
-from spheretwin.twin.study.tuning.trial import Ended
+from spheretwin.twin.study.tuning.trial import Ended, Kept
 
 NAME = "trials.parquet"
 
@@ -35,7 +34,7 @@ def write(path: Path, study: Study, rows: Rows, laws: Sequence[OfLaw]) -> None:
 
     optimise = gains.section_of(study)
     objectives = optimise.objective
-    names = dict.fromkeys(each.called for _, of_law, _, _ in laws for each in of_law)
+    names = dict.fromkeys(each for _, of_law, _, _ in laws for each in gains.numbers(of_law))
     settings = dict.fromkeys(
         each.field for _, of_law, _, _ in laws for gain in of_law for each in gain.settings
     )

@@ -43,6 +43,15 @@ class Tried(NamedTuple):
     each: list[list[float]]
 
 
+class Kept(NamedTuple):
+    """A finished trial."""
+
+    number: int
+    chosen: Mapping[str, float]
+    """Values of its gains by their names."""
+    tried: Tried
+
+
 def carried_out(
     rows: Rows,
     conditions: Sequence[Row],

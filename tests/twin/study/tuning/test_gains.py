@@ -7,8 +7,9 @@ from spheretwin.control.laws.registry import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.twin.study.row import Rows
 from spheretwin.twin.study.study import load, made
-from spheretwin.twin.study.tuning.gains import gains_of, middle, values
+from spheretwin.twin.study.tuning.gains import gains_of, middle, numbers, values
 from spheretwin.twin.study.tuning.running import tuned
+from spheretwin.twin.study.tuning.section import Gain
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 SHIPPED = load("tuning")
@@ -57,6 +58,15 @@ def test_without_a_start_gains_are_tried_in_the_middle_of_their_ranges(tmp_path)
     assert middle(gains) == pytest.approx({"controller.stiffness": 300.0, "controller.damping": 20.0})
 
 
+def test_an_optional_gain_that_is_off_leaves_its_fields_alone():
+    gains = [Gain.model_validate(gain(optional=True)), Gain.model_validate(gain("damping", 5.0, 500.0))]
+    assert list(numbers(gains)) == ["controller.stiffness", "controller.damping", gains[0].switch]
+    chosen = {"controller.stiffness": 300.0, "controller.damping": 20.0}
+    both = dict(chosen)
+    assert values(gains, {**chosen, gains[0].switch: 0.5}) == values(gains, chosen) == both
+    assert values(gains, {**chosen, gains[0].switch: 0.49}) == {"controller.damping": 20.0}
+
+
 BAD_GAINS = {
     "nothing": ({"low": 1.0, "high": 2.0}, "expected field or sets of a gain, received neither"),
     "both": (gain(sets=[{"field": "a.b"}]), "expected field or sets of a gain, received both"),
@@ -83,6 +93,19 @@ BAD_OBJECTIVES = {
     "twice": (["exact", "exact"], "expected different objectives"),
     "three": (["exact", "miss", "slowness"], "objective"),
     "none": ([], "objective"),
+    "limits of the first": ([{"metric": "exact", "limits": [1.0]}, "miss"], "expected limits on the second"),
+    "limits without order": (
+        ["exact", {"metric": "miss", "limits": [2.0, 1.0]}],
+        "expected ascending limits",
+    ),
+    "limits from below": (
+        ["exact", {"metric": "miss", "limits": [1.0], "direction": "maximise"}],
+        "expected minimise with limits, received maximise",
+    ),
+    "a mean to be large": (
+        [{"metric": "exact", "over": "geometric_mean", "direction": "maximise"}],
+        "expected minimise with geometric_mean, received maximise",
+    ),
     "no direction": ([{"metric": "exact", "direction": "down"}], "direction"),
 }
 
@@ -143,6 +166,14 @@ BAD_STUDIES = {
     "no such figure": (
         lambda folder: with_optimise(folder, objective=[{"metric": "rms_error"}]),
         "received 'rms_error'; did you mean rms_error_rad?",
+    ),
+    "trials of local": (
+        lambda folder: study(folder, **TWO, sampler="local", trials=20),
+        "expected draws and perturbations of the sampler local, received trials",
+    ),
+    "draws of another": (
+        lambda folder: study(folder, **TWO, draws=20),
+        "expected draws with the sampler local alone, received tpe",
     ),
     "no scenario": (lambda folder: with_optimise(folder, gain=[gain(low=1e12, high=1e13)]), "stiffness"),
 }

@@ -9,13 +9,13 @@ from spheretwin.twin.study.tuning import objectives
 from spheretwin.twin.study.tuning.section import Objective
 
 VALUES = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=9)
-OVER = st.sampled_from(["worst", "median"])
+OVER = st.sampled_from(["worst", "median", "first"])
 
 
 @given(VALUES, OVER)
 def test_an_objective_over_all_rows_is_what_its_name_says(values, over):
     objective = Objective(metric="copper_loss_J", over=over)
-    slow = np.max(values) if over == "worst" else np.median(values)
+    slow = {"worst": np.max, "median": np.median, "first": lambda each: each[0]}[over](values)
     # A median of an even number is a mean of two, which NumPy rounds otherwise: by some units of 1e6 · 2⁻⁵³.
     assert objectives.of_rows(objective, values, len(values)) == pytest.approx(slow, rel=1e-12, abs=1e-9)
 
@@ -27,6 +27,21 @@ def test_what_is_certain_is_never_above_what_comes(values, over, data):
     whole = objectives.of_rows(objective, values, len(values))
     bounds = [objectives.of_rows(objective, values[:k], len(values)) for k in range(known, len(values))]
     assert [*bounds, whole] == sorted([*bounds, whole])
+
+
+@given(st.lists(st.floats(1e-6, 1e6), min_size=1, max_size=9))
+def test_a_geometric_mean_is_that_of_all_rows_and_certain_of_nothing_before(values):
+    objective = Objective(metric="copper_loss_J", over="geometric_mean")
+    whole = objectives.of_rows(objective, values, len(values))
+    # Logarithms up to 14 in magnitude: their sum and its exponential round by some units of 1e-15.
+    assert whole == pytest.approx(np.exp(np.mean(np.log(values))), rel=1e-12)
+    assert all(objectives.of_rows(objective, values[:k], len(values)) == 0 for k in range(len(values)))
+
+
+def test_within_a_limit_the_least_first_objective_is_best():
+    values = {0: (3.0, 1.0), 1: (1.0, 9.0), 2: (2.0, 4.0), 3: (2.0, 5.0)}
+    best = {limit: objectives.best_within(values, limit) for limit in (0.5, 1.0, 5.0, 20.0)}
+    assert best == {0.5: None, 1.0: 0, 5.0: 2, 20.0: 1}
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3)), min_size=2, max_size=2))

@@ -24,9 +24,12 @@ def lines(folder):
     return (folder / storage.NAME).read_bytes().splitlines(keepends=True)
 
 
-@pytest.mark.parametrize("sampler", ["tpe", "nsga2"])
+LOCAL = {"sampler": "local", "draws": 10, "perturbations": 14}
+
+
+@pytest.mark.parametrize("sampler", [{"sampler": "tpe"}, {"sampler": "nsga2"}, LOCAL], ids=str)
 def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_path, sampler):
-    noisy = study(tmp_path, **TWO, sampler=sampler)
+    noisy = study(tmp_path, **TWO, **sampler)
     tuned(noisy, tmp_path, trials=TRIALS, threads=1)
     whole, kept = table(tmp_path), b"".join(lines(tmp_path))
     # Between two lines, within one, and behind one but for its end.

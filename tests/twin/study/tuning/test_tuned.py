@@ -15,7 +15,7 @@ from spheretwin.twin.study.tuning.running import tuned
 from spheretwin.twin.study.tuning.trial import Ended
 from tests.twin.study.tuning.cases import TWO, gain, study
 
-SAMPLERS = ("tpe", "nsga2", "random")
+SAMPLERS = ("tpe", "nsga2", "random", "local")
 
 
 def dominated(values, others):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,20 +10,24 @@ from typing import Any
 
 from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.tuning.gains import section_of
-from spheretwin.twin.study.tuning.report.telling import told
+from spheretwin.twin.study.tuning.report.telling import best, told
 from spheretwin.twin.study.tuning.running import Found
+from spheretwin.twin.study.tuning.section import Gain
 from spheretwin.viz.figures.drawing import Drawing
 from spheretwin.viz.page import html
 from spheretwin.viz.page import markdown as pieces
 from spheretwin.viz.page.folder import save_drawings, save_text
 
-MARKDOWN, HTML = "tuning.md", "tuning.html"
+MARKDOWN, HTML, GAINS = "tuning.md", "tuning.html", "gains.json"
 
 HOW = {
     "tpe": "proposed by a tree-structured Parzen estimator",
     "nsga2": "proposed by NSGA-II",
     "random": "drawn at random",
+    "local": "points of a Sobol sequence, then perturbations of the best within each limit",
 }
+ALIGNED = [False, False, True, True, False, False]
+"""Whether the columns of the ranges are numbers."""
 
 
 def write(folder: Path, study: Study, found: Found, command: str, versions: Mapping[str, str]) -> list[Path]:
@@ -51,7 +56,12 @@ def write(folder: Path, study: Study, found: Found, command: str, versions: Mapp
         drawn = drawing.drawings(study.name, found, section_of(study).objective)
         save_drawings(folder, drawn)
     text = markdown(study, found, drawn, command, versions)
-    return [save_text(folder / MARKDOWN, text), save_text(folder / HTML, html.page(study.name, text))]
+    gains = json.dumps(best(found, section_of(study).objective), indent=1, ensure_ascii=False)
+    return [
+        save_text(folder / MARKDOWN, text),
+        save_text(folder / HTML, html.page(study.name, text)),
+        save_text(folder / GAINS, f"{gains}\n"),
+    ]
 
 
 def markdown(
@@ -73,7 +83,7 @@ def _what(study: Study) -> list[str]:
     """What was looked for, and how."""
     optimise = section_of(study)
     ranges = [
-        [each.called, each.law or "all", f"{each.low:g}", f"{each.high:g}", _sets(each.settings)]
+        [each.called, each.law or "all", *_range(each), _sets(each.settings), each.reason]
         for each in optimise.gain
     ]
     objectives = " and ".join(f"*{each.called}*, to {each.direction}" for each in optimise.objective)
@@ -88,8 +98,12 @@ def _what(study: Study) -> list[str]:
         + (" One that can no longer be among the best is pruned." if optimise.prune else "")
         + fresh,
         "",
-        *pieces.table(["gain", "law", "from", "to", "sets"], ranges, [False, False, True, True, False]),
+        *pieces.table(["gain", "law", "from", "to", "sets", "why"], ranges, ALIGNED),
     ]
+
+
+def _range(gain: Gain) -> list[str]:
+    return [f"{gain.low:g}", f"{gain.high:g}{', or off' if gain.optional else ''}"]
 
 
 def _sets(settings: Sequence[Any]) -> str:
@@ -114,14 +128,16 @@ def _chosen(of_law: Mapping[str, Any]) -> list[str]:
     values = next((list(each["values"]) for _, each in labelled if each["values"]), None)
     if values is None:
         return ["No trial completed."]
-    first = labelled[0][1]
-    columns = dict.fromkeys([*first["gains"], *first["fields"]])
+    columns = dict.fromkeys(
+        [*labelled[0][1]["gains"], *(field for _, each in labelled for field in each["fields"])]
+    )
     is_fresh = any(each["fresh"] or each["fresh_reason"] for _, each in labelled)
     head = ["trial", *columns, *values, *(f"{each}, fresh" for each in values if is_fresh)]
     body = []
     for label, each in labelled:
         numbers = {**each["gains"], **each["fields"]}
-        cells = [f"{numbers[name]:.4g}" for name in columns]
+        values_of = map(numbers.get, columns)
+        cells = ["off" if value is None else f"{value:.4g}" for value in values_of]
         for told_of in [each["values"], *([each["fresh"]] if is_fresh else [])]:
             cells += [f"{told_of[name]:.4g}" if told_of else "lost" for name in values]
         body.append([label, *cells])

@@ -1,0 +1,120 @@
+"""Local search: points of a Sobol sequence, then perturbations of the best trial within each limit in turn.
+
+The budget of a law is that of every other: as many points, as many perturbations, whatever its gains are.
+Every number of a trial is a coordinate from 0 to 1 over its range, on a logarithmic scale where its gain is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.twin.study.tuning import objectives
+from spheretwin.twin.study.tuning.gains import numbers
+from spheretwin.twin.study.tuning.section import Gain, Optimise
+from spheretwin.twin.study.tuning.trial import Ended, Kept
+
+Array = NDArray[np.float64]
+
+MOVED = 0.5
+"""Probability that a perturbation moves a coordinate; one is always moved."""
+
+SWITCHED = 0.1
+"""Probability that it turns an optional gain on or off."""
+
+WIDEST, NARROWEST = 0.2, 0.02
+"""Standard deviation of the first and of the last perturbations, as a share of the range."""
+
+
+def proposed(
+    gains: Sequence[Gain],
+    optimise: Optimise,
+    key: str,
+    number: int,
+    earlier: Sequence[Kept],
+) -> dict[str, float]:
+    """Values of a trial by name.
+
+    Parameters
+    ----------
+    gains : sequence of Gain
+    optimise : Optimise
+    key : str
+        Seed and law: what the random numbers follow from, together with the number of the trial.
+    number : int
+        Of the trial, from 0 on.
+    earlier : sequence of Kept
+        Trials of earlier batches.
+    """
+    ranges = numbers(gains)
+    if number < optimise.draws:
+        point = _sobol(len(ranges), optimise.draws, _generator(key))[number]
+    else:
+        start = _start(optimise, number, earlier)
+        generator = _generator(f"{key} {number}")
+        if start is None:
+            point = generator.random(len(ranges))
+        else:
+            progress = min((number - optimise.draws) / (optimise.planned - optimise.draws), 1)
+            step = WIDEST * (NARROWEST / WIDEST) ** progress
+            switches = np.array([name not in {each.called for each in gains} for name in ranges])
+            point = _perturbed(_point(ranges, start.chosen), switches, step, generator)
+    return {
+        name: _value(place, *of) for (name, of), place in zip(ranges.items(), point.tolist(), strict=True)
+    }
+
+
+def _start(optimise: Optimise, number: int, earlier: Sequence[Kept]) -> Kept | None:
+    """Trial that is perturbed: the best within the limit whose turn it is, or the nearest to that limit."""
+    by_number = {each.number: each for each in earlier}
+    completed = {each.number: each.tried.values for each in earlier if each.tried.ended == Ended.COMPLETED}
+    if not optimise.limits:
+        best = min(completed, key=lambda each: (completed[each], each), default=None)
+    else:
+        turn = (number - optimise.draws) % len(optimise.limits)
+        best = objectives.best_within(completed, optimise.limits[turn])
+        if best is None:
+            near = [each for each in earlier if each.tried.ended != Ended.LOST]
+            best = min((each.tried.values[1], each.number) for each in near)[1] if near else None
+    return None if best is None else by_number[best]
+
+
+def _perturbed(
+    point: Array, switches: NDArray[np.bool_], step: float, generator: np.random.Generator
+) -> Array:
+    moved = generator.random(len(point)) < MOVED
+    moved[generator.integers(len(point))] = True
+    # Reflected at the ends of the range, so that no more trials are at an end than elsewhere.
+    changed = np.abs(point + moved * step * generator.standard_normal(len(point)))
+    changed = 1 - np.abs(1 - changed % 2)
+    redrawn = generator.random(len(point)) < SWITCHED
+    return np.where(switches, np.where(redrawn, 1 - point, point), changed)
+
+
+def _point(ranges: Mapping[str, tuple[float, float, bool]], chosen: Mapping[str, float]) -> Array:
+    return np.array([_place(chosen[name], *of) for name, of in ranges.items()])
+
+
+def _place(value: float, low: float, high: float, is_log: bool) -> float:
+    if is_log:
+        return float(np.log(value / low) / np.log(high / low))
+    return (value - low) / (high - low)
+
+
+def _value(place: float, low: float, high: float, is_log: bool) -> float:
+    value = low * (high / low) ** place if is_log else low + (high - low) * place
+    return min(max(value, low), high)
+
+
+def _sobol(dimensions: int, points: int, generator: np.random.Generator) -> Array:
+    from scipy.stats import qmc  # slow to import
+
+    # A whole power of two is drawn, and as many used as are wanted.
+    return qmc.Sobol(dimensions, rng=generator).random_base2((points - 1).bit_length())[:points]
+
+
+def _generator(key: str) -> np.random.Generator:
+    return np.random.default_rng(int.from_bytes(hashlib.sha256(key.encode()).digest()[:8], "big"))
