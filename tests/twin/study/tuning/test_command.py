@@ -82,7 +82,7 @@ def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
     assert (told["trials"], told["of"], told["resumed"]) == (16, 16, 0)
     assert list(told["laws"]) == ["pd", "pid"]
     files = {path.name for path in (tmp_path / "out").iterdir()}
-    pages = {"tuning.md", "tuning.html"}
+    pages = {"tuning.md", "tuning.html", "gains.json"}
     assert files == {"trials.jsonl", "trials.parquet", "trials.png", "front.png"} | pages
     table = parquet.read_table(told["table"]).to_pylist()
     for law, of_law in told["laws"].items():
@@ -97,8 +97,66 @@ def test_json_stands_alone_and_files_are_written(small, tmp_path, capsys):
             assert each["gains"][f"damping of {law}"] == each["fields"]["controller.damping"]
             assert row["controller.damping"] == row[f"damping of {law}"]
             assert set(each["fresh"]) == set(each["values"])
+        listed = json.loads((tmp_path / "out" / "gains.json").read_text())["laws"][law]
+        names = ("trial", "gains", "fields", "values")
+        assert listed == [{"limit": None, **{name: each[name] for name in names}} for each in of_law["best"]]
     other = {"pd": "pid", "pid": "pd"}
     assert all(row[f"damping of {other[row['law']]}"] is None for row in table)
+
+
+LIMITED = """
+name = "limited"
+scenario = "hold"
+metrics = ["figures.py:miss", "figures.py:slowness"]
+
+[fields]
+duration = 0.005
+"controller.law" = "pd"
+
+[optimise]
+sampler = "local"
+draws = 12
+perturbations = 4
+gain = [
+    { field = "controller.stiffness", low = 30.0, high = 3000.0, log = true, reason = "about 300" },
+    { field = "controller.damping", low = 5.0, high = 500.0, log = true, optional = true },
+]
+
+[[optimise.objective]]
+metric = "miss"
+
+[[optimise.objective]]
+metric = "slowness"
+limits = [0.01, 0.7, 9.0]
+"""
+
+
+def test_the_best_within_each_limit_is_written_and_printed(tmp_path, capsys):
+    (tmp_path / "figures.py").write_text(FIGURES)
+    path = tmp_path / "limited.toml"
+    path.write_text(LIMITED)
+    arguments = ["sweep", str(path), "--optimise", "--out", str(tmp_path / "out"), "--threads", "2"]
+    assert cli.main(arguments) == cli.DONE
+    printed = capsys.readouterr().out
+    found = json.loads((tmp_path / "out" / "gains.json").read_text())["laws"]["pd"]
+    # No damping within the range is as little as 0.01 of slowness.
+    assert [each["limit"] for each in found] == [0.7, 9.0]
+    table = parquet.read_table(tmp_path / "out" / "trials.parquet").to_pylist()
+    assert len(table) == 12 + 3 * 4
+    for each in found:
+        completed = [row for row in table if row["ended"] == "completed"]
+        within = [row for row in completed if row["worst slowness"] <= each["limit"]]
+        best = min(within, key=lambda row: row["worst miss"])
+        assert each["trial"] == best["trial"]
+        is_on = best["controller.damping, on"] >= 0.5
+        assert ("controller.damping" in each["fields"]) == is_on
+        assert (each["gains"]["controller.damping"] is None) == (not is_on)
+    text = (tmp_path / "out" / "tuning.md").read_text(encoding="utf-8")
+    assert "chosen: 0.01, 0.7, 9." in text
+    assert "about 300" in text
+    assert "500, or off" in text
+    some_off = any(each["gains"]["controller.damping"] is None for each in found)
+    assert some_off == ("off" in printed)
 
 
 def test_the_page_has_every_law_its_front_and_its_figures(small, tmp_path, capsys):

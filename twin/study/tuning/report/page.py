@@ -12,7 +12,7 @@ from spheretwin.twin.study.study import Study
 from spheretwin.twin.study.tuning.gains import section_of
 from spheretwin.twin.study.tuning.report.telling import best, told
 from spheretwin.twin.study.tuning.running import Found
-from spheretwin.twin.study.tuning.section import Gain
+from spheretwin.twin.study.tuning.section import Gain, Optimise
 from spheretwin.viz.figures.drawing import Drawing
 from spheretwin.viz.page import html
 from spheretwin.viz.page import markdown as pieces
@@ -96,10 +96,18 @@ def _what(study: Study) -> list[str]:
         f"Objectives: {objectives}, over {study.seeds} seeds of each point."
         f" Trials are {HOW[optimise.sampler]}, {optimise.together} at a time."
         + (" One that can no longer be among the best is pruned." if optimise.prune else "")
+        + _limits(optimise)
         + fresh,
         "",
         *pieces.table(["gain", "law", "from", "to", "sets", "why"], ranges, ALIGNED),
     ]
+
+
+def _limits(optimise: Optimise) -> str:
+    if not optimise.limits:
+        return ""
+    listed = ", ".join(f"{limit:g}" for limit in optimise.limits)
+    return f" The best trial within each limit on *{optimise.objective[1].called}* is chosen: {listed}."
 
 
 def _range(gain: Gain) -> list[str]:
