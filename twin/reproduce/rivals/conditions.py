@@ -102,7 +102,6 @@ IDEAL = Hardware(
     ("ideal", "fast"),
 )
 
-OFFSETS = ("sensors.adc.offset_V", "sensors.adc.gain_error")
 PROTOTYPE = Hardware(
     "prototype",
     "tilt, prototype",
