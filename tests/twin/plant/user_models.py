@@ -157,7 +157,7 @@ CASES = {
     "contact": Case(
         CONTACTS
         + after(TIP, ARM.format(COLLIDING + ' mass="0.02"'))
-        + after(STATOR, POST.format(0.05, COLLIDING)),
+        + after(STATOR, POST.format(0.04, COLLIDING)),
         "contact",
     ),
     "contact on the mount": Case(
@@ -166,7 +166,7 @@ CASES = {
     "pair of what is only drawn": Case(
         CONTACTS
         + after(TIP, ARM.format(""))
-        + after(STATOR, POST.format(0.05, ""))
+        + after(STATOR, POST.format(0.04, ""))
         + at_the_end('<contact><pair geom1="arm" geom2="post"/></contact>'),
         "contact",
     ),
