@@ -211,7 +211,7 @@ def test_what_moves_nothing_costs_nothing():
 @pytest.mark.parametrize(("frictionloss", "angle"), [("0.2", 0.0229), ("0", 5.54)])
 def test_friction_of_a_hinge_holds_what_pushes_less(written, frictionloss, angle):
     path = written(models.hinge(f'frictionloss="{frictionloss}"'))
-    push = np.tile([0, 0, 0.1, 0, 0, 0], (1000, 1))
+    push = np.tile([0, 0, 0.1], (1000, 1))
     turned = ours(path, push, np.zeros(3), np.zeros(3))[-1, 2]
     # Without friction t²/2 of 0.1 N·m over 2.256e-3 kg·m²; with it, the creep of a soft constraint: by the
     # engine alone, to the digits given.
