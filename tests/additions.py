@@ -133,7 +133,6 @@ class Integrators(NamedTuple):
     inertia: np.ndarray
     q: np.ndarray
     qdot: np.ndarray
-    torque_S: np.ndarray
     torque_q: np.ndarray
     warnings: np.ndarray
 
@@ -147,7 +146,7 @@ class Uncoupled:
         inertia = self.setting.actuator.inertia
         none = np.zeros(1, np.int32)
         return Integrators(
-            self.setting.step_s, inertia, self.q, self.qdot, np.zeros(3), np.zeros(3), none
+            self.setting.step_s, inertia, self.q, self.qdot, np.zeros(3), none
         )
 
     def state(self):
@@ -160,7 +159,7 @@ class Uncoupled:
 @allocation_free
 def step(rotor):
     for i in range(3):
-        rotor.qdot[i] += rotor.step_s * (rotor.torque_S[i] + rotor.torque_q[i]) / rotor.inertia[i]
+        rotor.qdot[i] += rotor.step_s * rotor.torque_q[i] / rotor.inertia[i]
         rotor.q[i] += rotor.step_s * rotor.qdot[i]
 
 

@@ -287,7 +287,7 @@ def test_a_law_whose_parts_do_not_fit_is_bad_input(changes, part):
 
 def test_a_law_of_another_signature_is_bad_input():
     law = Law("mine", numba.njit(lambda t, torque: None), np.zeros(0), np.zeros(0))
-    with pytest.raises(InputError, match="expected a function that compiles") as caught:
+    with pytest.raises(InputError, match="that numba compiles") as caught:
         simulate(scenarios.load("hold"), law)
     assert "\n" not in str(caught.value)
 

@@ -222,7 +222,7 @@ def torque_of(law, state):
     ("preset", "stable", "unstable"),
     [
         ("ideal", (-0.91, 7.9), (-0.92, 7.92)),
-        ("fast", (-0.86, 5.2), (-0.87, 5.3)),
+        ("fast", (-0.87, 8.2), (-0.88, 8.3)),
         ("prototype", (-0.77, 3.2), (-0.78, 3.3)),
         ("robust", (-0.76, 4.8), (-0.78, 4.95)),
     ],
@@ -277,6 +277,7 @@ def test_in_a_run_the_error_of_the_observed_disturbance_stays_within_its_bound(a
                 "plant.engine": "lagrangian",
                 "plant.gravity_m_s2": 0.0,
                 "drive.time_constant_s": 0.0,
+                "nominal.time_constant_s": 0.0,
                 "trajectory.angle_rad": [0.0, 0.0, 0.0],
                 "disturbance.load": 0.0,
                 "disturbance.random_bound_Nm": 0.0,

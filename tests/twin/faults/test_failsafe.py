@@ -310,6 +310,7 @@ def test_a_study_tells_of_its_failsafe_rows_and_exits_1(tmp_path, capsys):
     assert printed.err.startswith("spheretwin: sweep: 1 of 2 rows failed, the first with key ")
     assert printed.err.endswith(f": failsafe, {Reason.JUMP.told}\n")
     assert printed.err.count("\n") == 1
-    assert cli.main([*command, "--json", "--limit", "1"]) == 0
+    # Finished rows stay in the table, whatever the limit.
+    assert cli.main([*command, "--json", "--limit", "1"]) == 1
     key = printed.err.split(" key ")[1].split(":")[0]
     assert cli.main(["sweep", str(source), "--row", key]) == 1
