@@ -115,7 +115,9 @@ def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
     monkeypatch.setattr(
         machines,
         "matching",
-        lambda law, allocate, estimate: Functions(loops.loop.py_func, law.step, allocate, estimate, ()),
+        lambda law, allocate, estimate, **options: Functions(
+            loops.loop.py_func, law.step, allocate, estimate, ()
+        ),
     )
     plain = run("nutation", **overrides)
     # Fused multiply-adds round once where Python rounds twice. Where sgn(s) first flips, a rounding may

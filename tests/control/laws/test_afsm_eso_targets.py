@@ -115,16 +115,18 @@ def test_nothing_drifts_in_ten_minutes(preset):
     np.testing.assert_allclose(last, second, rtol=0.05)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_on_the_prototype_it_is_more_exact_than_pid_with_a_fifth_of_its_chatter(seed):
+def test_on_the_prototype_it_is_more_exact_than_pid_with_a_fifth_of_its_chatter():
+    """Medians of ten seeds: one seed alone decides by the noise at the largest error."""
+
     def tilted(**law):
-        run = simulate(scenarios.load("tilt", {**PROTOTYPE, "seed": seed, **law}))
-        figures = figures_of(run)
-        return max(figures["max_abs_error_rad"][:2]), figures["current_variation_A_s"]
+        runs = (simulate(scenarios.load("tilt", {**PROTOTYPE, "seed": seed, **law})) for seed in range(10))
+        figures = [figures_of(run) for run in runs]
+        errors = [max(each["max_abs_error_rad"][:2]) for each in figures]
+        return np.median(errors), np.median([each["current_variation_A_s"] for each in figures])
 
     error, variation = tilted(**{"controller.law": "afsm_eso", "controller.preset": "prototype"})
     of_pid, its_variation = tilted(**{"controller.law": "pid"})
-    assert error <= min(np.radians(0.04), 0.9 * of_pid)
+    assert error <= min(np.radians(0.035), 0.75 * of_pid)
     assert variation <= its_variation / 5
 
 
