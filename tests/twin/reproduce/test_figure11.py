@@ -78,7 +78,8 @@ def test_order_of_the_paper_is_kept_and_the_tuned_laws_are_ahead(found):
     errors = [
         [each.measured_max_abs_error[0] for each in outcomes[printed(compared).name]] for compared in COMPARED
     ]
-    assert np.all(np.diff(errors, axis=0) < 0)
+    assert np.all(np.diff(errors[:3], axis=0) < 0)
+    assert np.all(np.max(errors[3:], axis=0) < errors[2])
     section = as_printed.section(outcomes)
     assert "holds for α under 2 of 2 seeds" in section.text
     assert [row[0] for row in section.tables[0].rows] == [compared.label for compared in COMPARED]
