@@ -179,9 +179,10 @@ def works_J(run, step_s, unmodelled_Nm):
     moved = np.diff(run["q_rad"], axis=0)
     middle = run["q_rad"] + 0.5 * step_s * run["qdot_rad_s"]
     coils = np.array([rate_jacobian(q).T @ tau for q, tau in zip(middle, run["torque_Nm"], strict=True)])
+    has_friction = any(signal.name == "friction_Nm" for signal in run.signals)
     return {
         "coils": np.sum(coils[:-1] * moved),
-        "friction": np.sum(run["friction_Nm"][:-1] * moved),
+        "friction": np.sum(run["friction_Nm"][:-1] * moved) if has_friction else 0.0,
         "disturbance": -np.sum(run["disturbance_Nm"][:-1] * moved),
         "unmodelled": -np.sum(moved @ unmodelled_Nm),
     }
