@@ -106,9 +106,9 @@ def test_a_function_that_fails_costs_neither_figures_nor_files(file, tmp_path, c
         ("leaving", "it raised SystemExit: 0"),
         ("a_set", "expected what JSON holds, received {1, 2}"),
         ("endless", "expected what JSON holds, received [[...]]"),
-        ("too_long", "expected what JSON holds, received int of too many digits"),
-        ("unwritable", "received Unwritable, which raises KeyError when it is written"),
-        ("sly", "expected what JSON holds, received {'a': 1}"),
+        ("too_long", "received a number of too many digits"),
+        ("unwritable", "received a value of class Unwritable, which raises KeyError when it is written"),
+        ("sly", "received a value of class Sly, which raises LookupError when it is written"),
     ],
 )
 def test_whatever_a_function_does_the_run_ends_as_it_would(file, name, told, capsys):

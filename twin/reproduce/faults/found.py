@@ -60,20 +60,21 @@ class Found(NamedTuple):
 def keep(run: Run) -> Found:
     """Reduce a run."""
     base, first, table = healthy(run.scenario), start_tick(run.scenario), run.telemetry
+    healthy_error_rad = reference(base).error_rad
     failed = tuple(fault.place for fault in run.scenario.fault if fault.kind.each_group)
     detected = _detected_s(table)
     stopped, stopped_s = _stopped(table)
     return Found(
         start_s=first * run.scenario.controller.period_s,
         after_rad=largest(table["error_rad"][first:]),
-        healthy_rad=largest(reference(base).error_rad[first : len(table)]),
+        healthy_rad=largest(healthy_error_rad[first : len(table)]),
         ended_s=len(table) * run.scenario.controller.period_s,
         numbers=bool(np.isfinite(table.values).all()),
         stopped=stopped,
         stopped_s=stopped_s,
         told=run.scenario.detects or any(fault.known for fault in run.scenario.fault),
         least_norm=run.scenario.allocation == "least_norm",
-        left=left_by(base, failed, first) if failed else None,
+        left=left_by(base, failed, first) if failed and first < len(healthy_error_rad) else None,
         found_s=tuple(detected.get(group) for group in failed),
         driven_ticks=tuple(_driven_ticks(run, group, first, detected.get(group)) for group in failed),
         wrongly_found=len(set(detected) - set(failed)),
