@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.electronics.fault_line import NOISE
 from spheretwin.twin.faults.plan import FaultPlan
 from spheretwin.twin.session import Session
 
@@ -166,7 +167,7 @@ def test_a_low_supply_limits_the_ramp(share):
         row, actuator = session.advance(1), session.actuator
         ends = session._machine._plant.current.copy()
     up, down, stiffness = 24 * share - 4.8, 4.6 - 24 * share, L_H * 2 * np.pi * 2000
-    emf = emfs(row, actuator)[0]
+    emf = emfs(row["q_rad"], row["qdot_rad_s"], actuator)[0]  # at rest: none
     limited = 0
     for group in range(GROUPS):
         target, e = np.clip(row["current_command_A"][0, group], -8, 8), emf[group]
@@ -230,7 +231,7 @@ def test_several_noises_of_one_source_are_one_of_their_root_sum_of_squares():
     faults = each("noise", "amplifier", value=0.3) + each("noise", "amplifier", value=0.4)
     with Session(prototype(*faults)) as session:
         session.advance(1)
-        drive = session._machine._plant.driving.faults
-    np.testing.assert_allclose(drive.noise_A[:, 1], 0.5, rtol=1e-15)
-    assert not drive.noise_A[:, 0].any()
+        drive = session._machine._plant.driving
+    np.testing.assert_allclose(drive.stage("amplifier").line.table[:, NOISE], 0.5, rtol=1e-15)
+    assert not drive.stage("dac").line.table[:, NOISE].any()
     assert len(FaultPlan(session.scenario.fault, GROUPS, STEP_S, 0)) == 36

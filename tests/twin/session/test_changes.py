@@ -104,7 +104,9 @@ def test_a_law_whose_step_is_made_by_its_build_goes_on_through_other_changes(fil
         after = session.advance(1)["integral"][0]
         # One more tick of an error of at most 0.3 rad over 1 ms.
         np.testing.assert_allclose(after, before, rtol=0, atol=3.1e-4)
-        assert session.snapshot().machine.parts["the law's parameters"][0] == 51.0  # what it made of its parameters stays
+        assert (
+            session.snapshot().machine.parts["the law's parameters"][0] == 51.0
+        )  # what it made of its parameters stays
 
 
 def test_with_other_gains_it_keeps_its_memory_and_takes_the_gains(file):
