@@ -46,6 +46,7 @@ def drawn_numbers():
     from spheretwin.twin.electronics.sensing.chain import noise_streams, sense, sensor_chain
     from spheretwin.twin.electronics.sensing.noise import noise_table
     from spheretwin.twin.faults.plan import FaultPlan
+    from spheretwin.twin.session import Session
     from spheretwin.twin.wiring.wires import fault_streams
 
     faults = [
@@ -54,6 +55,8 @@ def drawn_numbers():
         {"target": "supply", "mode": "intermittent", "value": 2e-3},
     ]
     scenario = scenarios.load("hold", {"hardware": "prototype", "seed": 3, "fault": faults})
+    with Session(scenario) as session:
+        scenario = session.scenario
     plan = FaultPlan(scenario.fault, 18, 1e-3, 3)
     sensors = sensor_chain(scenario.sensors, 3)
     drive = drive_chain(scenario.drive, 5e-4, 2, 18, 3)

@@ -101,7 +101,7 @@ def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
 @given(st.lists(st.integers(0, 3), min_size=COUNT, max_size=COUNT), st.floats(0, 1e9))
 def test_a_state_is_all_there_is(out, t_s):
     made, other = groups(COUNT), groups(COUNT)
-    made.out[:], made.out_s[:] = out, t_s
+    made.out[:], made.out_s[:], made.some_out[:] = out, t_s, any(out)
     restore_state(other, save_state(made), "groups")
     assert other.out.tolist() == out
     assert other.out_s.tolist() == [t_s] * COUNT
