@@ -260,9 +260,9 @@ class Session:
             It is no snapshot, or was taken under a law of the user's that this session does not have, or on
             another model.
         """
-        if not isinstance(snapshot, Snapshot):
-            raise InputError(f"session: expected a snapshot of a session, received {shown(snapshot)}")
         with self._alone(), self._all_or_nothing():
+            if not isinstance(snapshot, Snapshot):
+                raise InputError(f"session: expected a snapshot of a session, received {shown(snapshot)}")
             own_law = self._own_laws.under(snapshot.own_law)
             if isinstance(snapshot.scenario.trajectory, OwnPath) != bool(self._in_force.own_trajectory):
                 raise InputError(

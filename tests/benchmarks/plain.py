@@ -71,7 +71,6 @@ def allocated(G, E, torque_q, limit):
 
 def run(model, data, actuator, scenario, law, reference, disturbance, ticks):
     """Run the first control ticks; returns the telemetry rows as a list."""
-    rotor = model.body("rotor").id
     steps = scenario.plant.step_s * actuator.group.resistance_ohm / actuator.group.inductance_H
     decay, mean_share = np.exp(-steps), (1 - np.exp(-steps)) / steps
     current, limit = np.zeros(18), actuator.group.current_limit_A
@@ -84,13 +83,12 @@ def run(model, data, actuator, scenario, law, reference, disturbance, ticks):
         G = torque_matrix(R_SR, actuator)
         command = allocated(G, E, torque_q, limit)
         for substep in range(scenario.substeps):
-            if substep:
-                G = torque_matrix(rotation(data.qpos)[0], actuator)
+            middle_R, middle_E = rotation(data.qpos + 0.5 * model.opt.timestep * data.qvel)
+            G = torque_matrix(middle_R, actuator)
             mean = command + mean_share * (current - command)
             current = command + decay * (current - command)
             torque = G @ mean
-            data.xfrc_applied[rotor, 3:] = torque
-            data.qfrc_applied[:] = -disturbance[tick] - unknown
+            data.qfrc_applied[:] = middle_E.T @ torque - disturbance[tick] - unknown
             if substep == 0:
                 rows.append((q, qdot, q - reference[tick][0], torque_q, torque, command, mean))
             mujoco.mj_step(model, data)
