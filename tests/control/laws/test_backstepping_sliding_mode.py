@@ -61,6 +61,7 @@ def course(period_s, actuator):
                 "disturbance.load": 1.0,
                 "disturbance.random_bound_Nm": 0.0,
                 "drive.time_constant_s": 0.0,
+                "nominal.equals_truth": True,
                 "controller.law": "backstepping_sliding_mode",
                 "controller.period_s": period_s,
                 "duration": 0.3,

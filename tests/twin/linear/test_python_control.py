@@ -65,7 +65,7 @@ np.testing.assert_allclose(torques(Law.from_lti(polynomials)), by_entry, rtol=0,
 for system, part in [
     (control.tf([1.0], [1.0, 1.0]), "received one with dt 0"),
     (control.tf([1.0], [1.0, 0.1], True), "received one with dt true"),
-    (control.ss([], [], [], np.eye(3)), "received one with dt None"),
+    (control.ss([], [], [], np.eye(3)), "received one with dt none"),
     (control.tf([1.0, 0.0, 0.0], [1.0, 0.1], 1e-3), "a proper transfer function"),
     (control.frd([1.0], [1.0], dt=1e-3), "a state space, or a proper transfer function"),
 ]:

@@ -12,7 +12,7 @@ def sticky(tmp_path_factory):
     for before, after in [
         ('<option integrator="RK4"', '<option integrator="RK4" solver="Newton" iterations="1"'),
         *[
-            (f'<joint name="{hinge}"', f'<joint frictionloss="0.2" name="{hinge}"')
+            (f'<joint name="{hinge}"', f'<joint frictionloss="0.5" name="{hinge}"')
             for hinge in ("alpha", "beta", "gamma")
         ],
     ]:

@@ -47,11 +47,12 @@ class Failure(NamedTuple):
 
 
 def failures() -> list[Failure]:
-    """Every mode of every part that is not of a group."""
+    """Every mode of every part that is not of a group, but modes that need a value and have none in `VALUES`."""
     return [
         Failure(part, mode, *VALUES.get((target.name, mode), (None, "")))
         for target in TARGETS.values()
         if not target.each_group
         for part in target.names(0)
-        for mode in target.modes
+        for mode, what in target.modes.items()
+        if (target.name, mode) in VALUES or what.value is None or what.value.default is not None
     ]
