@@ -7,18 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.control import allocation as allocations
 from spheretwin.control import law as laws
-from spheretwin.control.allocation import registry as allocations
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
-from spheretwin.control.around.around import Around, prepare
-from spheretwin.control.belief import Belief, believe
-from spheretwin.control.estimation.estimator import Estimator, estimator_at
-from spheretwin.control.manual import Manual, ask_by_hand
-from spheretwin.control.supervision.detector import Detector, find
-from spheretwin.control.supervision.groups import Groups, leave_out
+from spheretwin.control.applied_torque import Belief, believe
+from spheretwin.control.compensators import Around, prepare
+from spheretwin.control.estimators.estimator import Estimator, estimator_at
+from spheretwin.control.manual_currents import Manual, ask_by_hand
+from spheretwin.control.supervision.enabled_groups import Groups, leave_out
+from spheretwin.control.supervision.fault_detector import Detector, find
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
-from spheretwin.models.base.callbacks import function_at
 from spheretwin.models.base.compiled import compilable
+from spheretwin.models.base.numba_internals import function_at
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, kept_matrix
 

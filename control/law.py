@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, Field
 
 from spheretwin.control import lti
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import is_plain, shown, told_apart
+from spheretwin.models.base.errors import InputError, is_plain, shown, told_apart
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, width
 
 _vector = types.float64[::1]
@@ -193,3 +193,21 @@ def _signals(law: str, given: Iterable[Signal]) -> tuple[Signal, ...]:
         if not isinstance(signal, Signal):
             raise InputError(f"law {law}: expected signals of type Signal, received {shown(signal)}")
     return signals
+
+
+# Gains and times beyond this are slips of the pen; their products would overflow.
+LARGEST = 1e9
+
+NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+
+
+def each(value: Any) -> Any:
+    """One number for each of (alpha, beta, gamma) where only one is given for all."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return (value,) * 3
+    return tuple(value) if isinstance(value, list) else value
+
+
+NonNegativeEach = Annotated[tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(each)]
+PositiveEach = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(each)]

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown, without_breaks
+from spheretwin.models.base.errors import InputError, shown, without_breaks
 
 Array = NDArray[np.float64]
 

@@ -12,11 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import told_apart
+from spheretwin.models.base.errors import InputError, told_apart
 from spheretwin.models.mjcf import Mjcf, read
-from spheretwin.models.model_file.joint import check_bounded, check_joint, hinge_range
-from spheretwin.models.model_file.lookup import LARGEST_LENGTH_M, body, number, shared, site, sites
+from spheretwin.models.mjcf_reader import (
+    LARGEST_LENGTH_M,
+    body,
+    check_bounded,
+    check_joint,
+    hinge_range,
+    number,
+    shared,
+    site,
+    sites,
+)
 from spheretwin.models.torque_curve import TorqueCurve
 
 FOLDER = Path(__file__).resolve().parent

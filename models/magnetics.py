@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator, Coil, Magnet
 from spheretwin.models.base.cache import kept_array
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import one_line, told_apart
+from spheretwin.models.base.errors import InputError, one_line, told_apart
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
 

@@ -22,9 +22,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.mujoco_library import compiler_warnings, silence_warnings
-from spheretwin.models.base.wording import without_breaks
 
 PAYLOAD = "payload"
 ROTOR = "rotor"

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown, told_apart, without_breaks
+from spheretwin.models.base.errors import InputError, shown, told_apart, without_breaks
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

@@ -41,7 +41,7 @@ def step(t, reference, measurement, parameters, state, torque):
         torque[axis] = -parameters[axis] * (measurement[0, axis] - reference[0, axis])
         torque[axis] -= 0.05 * (measurement[1, axis] - reference[1, axis])
 ''',
-        "control/laws/registry.py",
+        "control/laws/__init__.py",
         ("    | AFSMWithObserver,\n", "    | AFSMWithObserver\n    | Lazy,\n"),
         "from spheretwin.control.laws.lazy import Lazy\n",
     ),
@@ -67,9 +67,9 @@ class Ramp(Shape):
         rows = [np.outer(t, rate), np.tile(rate, (len(t), 1)), np.zeros((len(t), 3))]
         return np.stack(rows, axis=1)
 ''',
-        "twin/trajectories/registry.py",
+        "twin/trajectories/__init__.py",
         ("    | Waypoints,\n", "    | Waypoints\n    | Ramp,\n"),
-        "from spheretwin.twin.trajectories.shapes.ramp import Ramp\n",
+        "from spheretwin.trajectories.shapes.ramp import Ramp\n",
     ),
     "disturbance": Addition(
         "twin/disturbances/kick.py",
@@ -91,9 +91,9 @@ class Kick(Term):
     def sample(self, t, draws):
         return np.outer((t >= 0.01) & (t < 0.02), [0.0, self.torque_Nm, 0.0])
 ''',
-        "twin/disturbances/registry.py",
+        "twin/disturbances.py",
         ("    | Random,\n", "    | Random\n    | Kick,\n"),
-        "from spheretwin.twin.disturbances.kick import Kick\n",
+        "from spheretwin.disturbances.kick import Kick\n",
     ),
     "telemetry column": Addition(
         "twin/columns/largest.py",
@@ -113,9 +113,9 @@ def write(row, controller, sensors, plant):
 SIGNALS = (Signal("largest_current_A", "A", 1, "largest group current at the end of the tick"),)
 COLUMNS = Columns(lambda groups: SIGNALS, lambda scenario: True, write)
 """,
-        "twin/columns/registry.py",
+        "twin/channels.py",
         ("    drive.COLUMNS,\n", "    drive.COLUMNS,\n    largest.COLUMNS,\n"),
-        "from spheretwin.twin.columns import largest\n",
+        "from spheretwin.channels import largest\n",
     ),
     "plant": Addition(
         "twin/plant/stiff.py",
@@ -165,9 +165,9 @@ def step(rotor):
 
 UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
 """,
-        "twin/plant/registry.py",
+        "twin/plant/step.py",
         ("        lagrangian.LAGRANGIAN,\n", "        lagrangian.LAGRANGIAN,\n        stiff.UNCOUPLED,\n"),
-        "from spheretwin.twin.plant import stiff\n",
+        "from spheretwin.plant import stiff\n",
     ),
     "metric": Addition(
         "twin/metrics/effort/mean_load.py",
@@ -193,12 +193,12 @@ class MeanLoad(Metric):
         """[3] in N·m; None without a row."""
         return (self.total / self.rows).tolist() if self.rows else None
 ''',
-        "twin/metrics/registry.py",
+        "twin/metrics.py",
         (
             '    "copper_loss_J": CopperLoss,\n',
             '    "copper_loss_J": CopperLoss,\n    "mean_load_Nm": MeanLoad,\n',
         ),
-        "from spheretwin.twin.metrics.effort.mean_load import MeanLoad\n",
+        "from spheretwin.metrics.mean_load import MeanLoad\n",
     ),
     "check": Addition(
         "twin/crosscheck/units.py",
@@ -222,7 +222,7 @@ PART = Part("units", examine)
 """,
         "twin/crosscheck/suite.py",
         ("    closed_loop.PART,\n", "    closed_loop.PART,\n    units.PART,\n"),
-        "from spheretwin.twin.crosscheck import units\n",
+        "from spheretwin.crosscheck import units\n",
     ),
     "figure": Addition(
         "twin/crosscheck/figures/names.py",
@@ -237,9 +237,9 @@ def draw(evidence):
     figure.text(0.1, 0.5, ", ".join(check.name for check in evidence.checks))
     return Drawing("names.png", "Names of the checks.", figure)
 """,
-        "twin/crosscheck/figures/registry.py",
+        "twin/crosscheck/suite.py",
         ("    closed_loop.draw,\n", "    closed_loop.draw,\n    names.draw,\n"),
-        "from spheretwin.twin.crosscheck.figures import names\n",
+        "from spheretwin.crosscheck.suite import names\n",
     ),
     "experiment": Addition(
         "twin/reproduce/holding.py",
@@ -259,9 +259,9 @@ def tell(outcomes):
 
 EXPERIMENT = Experiment("holding", "Holding on", "Laws that hold on.", cases, tell)
 """,
-        "twin/reproduce/registry.py",
+        "twin/paper/__init__.py",
         ("        budget.EXPERIMENT,\n", "        budget.EXPERIMENT,\n        holding.EXPERIMENT,\n"),
-        "from spheretwin.twin.reproduce import holding\n",
+        "from spheretwin.paper import holding\n",
     ),
     "status": Addition(
         "",
@@ -300,9 +300,9 @@ def step(angle, parameters, state, rate):
         rate[axis] = (angle[axis] - state[axis]) / parameters[0] if state[axis] == state[axis] else 0.0
         state[axis] = angle[axis]
 ''',
-        "control/estimation/registry.py",
+        "control/estimators/__init__.py",
         ("    | Differentiator,\n", "    | Differentiator\n    | Rough,\n"),
-        "from spheretwin.control.estimation.rough import Rough\n",
+        "from spheretwin.control.estimators.rough import Rough\n",
     ),
     "sensor stage": Addition(
         "twin/electronics/sensing/gear.py",
@@ -347,13 +347,13 @@ def turn(stage, measurement, numbers):
         turned = stage.ratio[i] * measurement[0, i]
         measurement[0, i] = through(stage.line, i, turned, numbers.faults)
 ''',
-        "twin/electronics/sensing/sections.py",
+        "twin/electronics/sensor_chain.py",
         (
             "    potentiometer: PotentiometerSection = PotentiometerSection()\n",
             "    gear: GearSection = GearSection()\n"
             "    potentiometer: PotentiometerSection = PotentiometerSection()\n",
         ),
-        "from spheretwin.twin.electronics.sensing.gear import GearSection\n",
+        "from spheretwin.electronics.gear import GearSection\n",
     ),
     "drive stage": Addition(
         "twin/electronics/driving/filter.py",
@@ -399,12 +399,12 @@ def attenuate(stage, asked, draws):
         asked[j] *= stage.gain
     pass_line(stage, asked, draws)
 ''',
-        "twin/electronics/driving/sections.py",
+        "twin/electronics/drive_chain.py",
         (
             "class DriveSection(DelaySection, DacSection, ",
             "class DriveSection(DelaySection, FilterSection, DacSection, ",
         ),
-        "from spheretwin.twin.electronics.driving.filter import FilterSection\n",
+        "from spheretwin.electronics.filter import FilterSection\n",
     ),
     "fault": Addition(
         "twin/faults/targets/fuse.py",
@@ -419,9 +419,9 @@ def _blow(effects, fault):
 
 TARGET = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
 """,
-        "twin/faults/targets/registry.py",
+        "twin/faults/targets.py",
         ("        coil.TARGET,\n", "        fuse.TARGET,\n        coil.TARGET,\n"),
-        "from spheretwin.twin.faults.targets import fuse\n",
+        "from spheretwin.faults.targets import fuse\n",
     ),
     "sensor stage's fault": Addition(
         "twin/faults/targets/gear.py",
@@ -433,9 +433,9 @@ from spheretwin.twin.faults.target import Target
 SIGNAL = Signal(lambda effects: effects.sensors.stage("gear").line, "rad")
 TARGET = Target("gear", line_modes.modes(SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
 """,
-        "twin/faults/targets/registry.py",
+        "twin/faults/targets.py",
         ("        dac.TARGET,\n", "        dac.TARGET,\n        gear.TARGET,\n"),
-        "from spheretwin.twin.faults.targets import gear\n",
+        "from spheretwin.faults.targets import gear\n",
     ),
     "drive stage's fault": Addition(
         "twin/faults/targets/filter.py",
@@ -448,9 +448,9 @@ SIGNAL = Signal(lambda effects: effects.drive.stage("filter").line, "A")
 MODES = {**line_modes.modes(SIGNAL), **line_modes.silent_modes(SIGNAL)}
 TARGET = Target("filter", MODES, each_group=True)
 """,
-        "twin/faults/targets/registry.py",
+        "twin/faults/targets.py",
         ("        supply.TARGET,\n", "        supply.TARGET,\n        filter.TARGET,\n"),
-        "from spheretwin.twin.faults.targets import filter\n",
+        "from spheretwin.faults.targets import filter\n",
     ),
     "axis": Addition(
         "twin/study/axes/triangular.py",
@@ -473,9 +473,9 @@ class Triangular(DrawnAxis):
     def drawn(self, uniform):
         return self.low + self.width * (1 - np.sqrt(1 - uniform))
 ''',
-        "twin/study/axes/registry.py",
+        "twin/study/axes.py",
         ("    | Normal,\n", "    | Normal\n    | Triangular,\n"),
-        "from spheretwin.twin.study.axes.triangular import Triangular\n",
+        "from spheretwin.study.axes.triangular import Triangular\n",
     ),
     "allocation": Addition(
         "control/allocation/halved.py",
@@ -488,7 +488,7 @@ def halved(G, torque_S, limit, current, scratch):
     share = allocate(G, torque_S, 0.5 * limit, current)
     return share
 ''',
-        "control/allocation/registry.py",
+        "control/allocation/__init__.py",
         ('    "bounded": bounded,\n', '    "bounded": bounded,\n    "halved": halved,\n'),
         "from spheretwin.control.allocation.halved import halved\n",
     ),

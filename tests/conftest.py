@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
 
 # Whatever the width of the terminal, and whether or not the tests run in the background of a shell,
 # which ignores interruptions there: what they start has neither from them.

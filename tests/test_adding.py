@@ -320,10 +320,10 @@ EVERY = {
     "control/allocation/test_every_allocation.py": "halved",
     "twin/trajectories/shapes/test_every_shape.py": "ramp",
     "twin/disturbances/test_every_kind.py": "kick",
-    "twin/columns/test_every_column.py": "largest_current_A",
+    "twin/channels/test_every_column.py": "largest_current_A",
     "twin/metrics/test_every_metric.py": "mean_load_Nm",
     "twin/plant/test_every_engine.py": "uncoupled",
-    "twin/reproduce/test_every_experiment.py": "holding",
+    "twin/paper/test_every_experiment.py": "holding",
     "twin/faults/test_every_target.py": "gear",
     "twin/study/test_every_axis.py": "triangular",
 }

@@ -40,7 +40,7 @@ def test_data_files_come_along(names):
     for name in (
         "models/actuator.xml", "models/scene.xml", "models/torque_curve.csv", "models/README.md",
         "models/assets/coil.obj", "models/py.typed", "twin/scenario/shipped/nutation.toml",
-        "twin/plant/engine.py", "twin/commands/simulate.py",
+        "twin/plant/mujoco_rotor.py", "twin/cli/simulate.py",
     ):  # fmt: skip
         assert f"spheretwin/{name}" in names
 

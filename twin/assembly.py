@@ -7,37 +7,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.around.around import Around
-from spheretwin.control.around.feed_forward import NominalRotor, feed_forward
-from spheretwin.control.around.governor import governor
-from spheretwin.control.around.prediction import Delayed, prediction
-from spheretwin.control.belief import belief
+from spheretwin.channels import CHANNELS
+from spheretwin.control.applied_torque import belief
+from spheretwin.control.compensators import Around
+from spheretwin.control.compensators.feed_forward import NominalRotor, feed_forward
+from spheretwin.control.compensators.prediction import Delayed, prediction
+from spheretwin.control.compensators.reference_governor import governor
 from spheretwin.control.controller import Controller, Supervision, controller
-from spheretwin.control.estimation.estimator import Estimator, Sampling
+from spheretwin.control.estimators.estimator import Estimator, Sampling
 from spheretwin.control.law import Known, Law
-from spheretwin.control.manual import manual
+from spheretwin.control.manual_currents import manual
+from spheretwin.electronics.transducers import CurrentSensors
+from spheretwin.faults.schedule import part_names
+from spheretwin.loop import Places
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.wording import exception_text, shown
+from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
-from spheretwin.models.telemetry.signals import (
-    Signal,
-    common_signals,
-    offsets,
-    width,
-)
-from spheretwin.twin.columns.registry import ALL
-from spheretwin.twin.electronics.sensing.current import CurrentSensors
-from spheretwin.twin.faults.plan import part_names
-from spheretwin.twin.loop import Places
-from spheretwin.twin.plant.friction import Friction, friction
-from spheretwin.twin.plant.plant import Plant
-from spheretwin.twin.plant.registry import ENGINES
-from spheretwin.twin.plant.rotor import Rotor, Setting
-from spheretwin.twin.scenario.files import Files
-from spheretwin.twin.scenario.sections import ResolvedPlant, ResolvedScenario
-from spheretwin.twin.wiring.wires import Wires, driving_of
+from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
+from spheretwin.plant.friction import Friction, friction
+from spheretwin.plant.rotor import Rotor, Setting
+from spheretwin.plant.step import ENGINES, Plant
+from spheretwin.scenario.files import Files
+from spheretwin.scenario.sections import ResolvedPlant, ResolvedScenario
+from spheretwin.shared_buffers import Wires, driving_of
 
 Array = NDArray[np.float64]
 
@@ -89,11 +82,11 @@ def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tupl
         The law has a signal under the name of a stage's.
     """
     groups = len(actuator.groups)
-    taken = {signal.name for columns in ALL for signal in columns.signals(groups)}
+    taken = {signal.name for columns in CHANNELS for signal in columns.signals(groups)}
     if twice := sorted(taken & {signal.name for signal in law.signals}):
         raise InputError(f"law {law.name}: expected new names of signals, received {', '.join(twice)}")
     found = common_signals(groups)
-    for columns in ALL:
+    for columns in CHANNELS:
         if columns.logged(scenario):
             found += columns.signals(groups)
     return found + law.signals
@@ -102,7 +95,7 @@ def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tupl
 def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
     """Where the loop finds the columns that not every run has."""
     first = offsets(signals)
-    of_stages = tuple(first.get(columns.signals(1)[0].name, -1) for columns in ALL)
+    of_stages = tuple(first.get(columns.signals(1)[0].name, -1) for columns in CHANNELS)
     return Places(of_stages, width(signals) - width(law.signals))
 
 

@@ -1,28 +1,36 @@
 """The closed loop, tick by tick: measure, control, move the plant, keep a row. Compiled, or in Python."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
+from spheretwin.channels import write_channels
+from spheretwin.control import allocation as allocations
+from spheretwin.control import law as laws
 from spheretwin.control.controller import LOST, Controller, control_tick
+from spheretwin.control.estimators import estimator as estimators
+from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import GO, Reason, mend, over, trip
-from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.copying import copy_into, copy_rows
-from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
-from spheretwin.twin.columns.registry import write_columns
-from spheretwin.twin.electronics.sensing.current import sense_currents
-from spheretwin.twin.electronics.sensing.stages import Sensors, sense
-from spheretwin.twin.plant.plant import (
-    DIVERGED,
-    FAILSAFE,
-    GOING,
-    LEFT_WORKSPACE,
-    Delivered,
-    Plant,
-    plant_tick,
+from spheretwin.electronics.sensors import Sensors, sense
+from spheretwin.electronics.transducers import sense_currents
+from spheretwin.models.base.compiled import (
+    COMPILES,
+    allocation_free,
+    compile_error,
+    compiled_callback,
+    copy_into,
+    copy_rows,
+    uncompiled,
 )
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
+from spheretwin.plant.step import DIVERGED, FAILSAFE, GOING, LEFT_WORKSPACE, Delivered, Plant, plant_tick
 
 Array = NDArray[np.float64]
 
@@ -123,7 +131,7 @@ def loop(
         status = plant_tick(plant, command, disturbance, delivered)
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)
-        write_columns(row, places.of_stages, controller, sensors, plant)
+        write_channels(row, places.of_stages, controller, sensors, plant)
         if not all_finite(row):  # nor is there a state to go on from
             return tick, DIVERGED
         if status == FAILSAFE and watchdog.on:
@@ -152,3 +160,62 @@ def write_motion(row: Array, t: float, reference: Array, q: Array, qdot: Array, 
         row[ANGLE + i], row[RATE + i] = q[i], qdot[i]
         row[ANGLE_REF + i], row[RATE_REF + i] = reference[0, i], reference[1, i]
         row[ERROR + i], row[DISTURBANCE + i] = q[i] - reference[0, i], disturbance[i]
+
+
+class Functions(NamedTuple):
+    """The loop, and the functions of its users as it takes them."""
+
+    loop: Callable[..., tuple[int, int]]
+    law: Any
+    allocate: Any
+    estimate: Any
+    """0 where nothing is estimated."""
+    alive: tuple[Any, ...]
+    """Compiled code holds bare addresses: what they belong to must not go."""
+
+
+def matching(
+    law: Law,
+    allocate: Callable[..., float],
+    estimate: Callable[..., None] | None = None,
+    *,
+    check_bounds: bool = False,
+) -> Functions:
+    """Loop and callbacks for a law, an allocation and an estimator of rates.
+
+    Parameters
+    ----------
+    law : Law
+    allocate, estimate : callable
+    check_bounds : bool
+        Compile the law with bounds checks; in Python, NumPy checks them.
+
+    Raises
+    ------
+    InputError
+        The law is to be compiled, and cannot be.
+    """
+    own = is_own(law)
+    if not COMPILES or (own and not isinstance(law.step, Dispatcher)):
+        return Functions(
+            uncompiled(loop), uncompiled(law.step), allocate, estimate and uncompiled(estimate), ()
+        )
+    try:
+        stepping = compiled_callback(laws.SIGNATURE, law.step, check_bounds=check_bounds)
+    except Exception as error:  # numba lets errors of other kinds pass, as AttributeError
+        if not own:
+            raise
+        raise InputError(
+            f"law {law.name}: expected a function of (t, reference, measurement, parameters, state,"
+            f" torque) that numba compiles, received {compile_error(error, law.step)}"
+        ) from error
+    alive = [stepping, compiled_callback(allocations.SIGNATURE, allocate)]
+    if estimate:
+        alive.append(compiled_callback(estimators.SIGNATURE, estimate))
+    addresses = [each.address for each in alive]
+    return Functions(loop, addresses[0], addresses[1], addresses[2] if estimate else 0, tuple(alive))
+
+
+def is_own(law: Law) -> bool:
+    """True if a law is the user's, not one of this package."""
+    return not (law.step.__module__ or "").startswith("spheretwin.")

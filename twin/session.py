@@ -13,28 +13,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin import active_config
+from spheretwin import loop as loops
+from spheretwin.active_config import at_start
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.inputs import Exogenous
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
-from spheretwin.models.base.wording import shown
-from spheretwin.models.telemetry.record import Change
+from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
+from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated, check_rows
-from spheretwin.twin import loop as loops
-from spheretwin.twin import resolving
-from spheretwin.twin.exogenous import Exogenous
-from spheretwin.twin.in_force import at_start
-from spheretwin.twin.machine import Machine
-from spheretwin.twin.scenario import files as scenario_files
-from spheretwin.twin.scenario.changing import from_now_on, is_fixed
-from spheretwin.twin.scenario.files import Files
-from spheretwin.twin.scenario.planned import planned
-from spheretwin.twin.scenario.reading import as_plain, is_dotted
-from spheretwin.twin.scenario.sections import OwnPath, ResolvedScenario, Scenario
-from spheretwin.twin.snapshot import OwnLaws, Snapshot
-from spheretwin.twin.trajectories.trajectory import Sampled
+from spheretwin.runtime import Machine
+from spheretwin.scenario import files as scenario_files
+from spheretwin.scenario.changes import from_now_on, is_fixed, planned
+from spheretwin.scenario.files import Files
+from spheretwin.scenario.reading import as_plain, is_dotted
+from spheretwin.scenario.sections import OwnPath, ResolvedScenario, Scenario
+from spheretwin.snapshot import OwnLaws, Snapshot
+from spheretwin.trajectories.trajectory import Sampled
 
 
 class Session:
@@ -285,7 +283,7 @@ class Session:
 
     def warnings(self) -> list[str]:
         """What a user should know of model and scenario before believing the figures; one line each."""
-        return resolving.warnings_of(self.scenario, self._in_force.files)
+        return active_config.warnings_of(self.scenario, self._in_force.files)
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -412,5 +410,5 @@ class Session:
 def _recorded(value: Any) -> Any:
     """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
     if isinstance(value, Law):
-        return resolving.name_of_own(value.name)
+        return active_config.name_of_own(value.name)
     return json.loads(json.dumps(value, default=as_plain))

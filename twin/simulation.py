@@ -11,17 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
+from spheretwin.faults.fault_injector import FaultLines
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import LawError
-from spheretwin.models.telemetry.kept import KeptTelemetry
-from spheretwin.models.telemetry.record import Change
+from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import Table, allocated
-from spheretwin.twin.faults.told import FaultLines
-from spheretwin.twin.scenario.sections import ResolvedScenario, Scenario
-from spheretwin.twin.session import Session
-from spheretwin.twin.trajectories.trajectory import Sampled
+from spheretwin.models.telemetry.table import KeptTelemetry, Table, allocated
+from spheretwin.scenario.sections import ResolvedScenario, Scenario
+from spheretwin.session import Session
+from spheretwin.trajectories.trajectory import Sampled
 
 # Long enough to make the calls between chunks cheap, short enough for a progress bar and for Ctrl-C.
 CHUNK_STEPS = 2000

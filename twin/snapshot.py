@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from spheretwin.control.law import Law
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.record import Change
+from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin.machine import State
-from spheretwin.twin.scenario.files import Files, digest
-from spheretwin.twin.scenario.sections import ResolvedScenario
+from spheretwin.runtime import State
+from spheretwin.scenario.files import Files, digest
+from spheretwin.scenario.sections import ResolvedScenario
 
 
 class OwnLaws:

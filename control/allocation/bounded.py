@@ -26,8 +26,20 @@ several answers. A torque some hundredths short of the largest has one answer, a
 from math import copysign, inf, isfinite
 
 from spheretwin.control.allocation.least_norm import allocate
-from spheretwin.control.allocation.simplex import NOISE, TIE, climb
-from spheretwin.control.allocation.vectors import NONE, Array, Vector, column, dot, length, off, plus, unit
+from spheretwin.control.allocation.simplex import (
+    NOISE,
+    NONE,
+    TIE,
+    Array,
+    Vector,
+    climb,
+    column,
+    dot,
+    length,
+    off,
+    plus,
+    unit,
+)
 from spheretwin.models.base.compiled import compiled
 
 # Demands (currents wanted of each group, in limits; past ±1 where it is held at its limit), their rates along

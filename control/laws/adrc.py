@@ -30,8 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each, named
+from spheretwin.control.law import Known, Law, PositiveEach, each
+from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 Array = NDArray[np.float64]

@@ -14,18 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.fuzzy import CONSEQUENTS, approximate_and_adapt
-from spheretwin.control.parts.parameters import (
-    LawParameters,
-    Level,
-    NonNegativeEach,
-    PositiveEach,
-    each,
-    named,
-    torque_factor,
-)
-from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
+from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
+from spheretwin.control.law_components.fuzzy import CONSEQUENTS, approximate_and_adapt
+from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 Array = NDArray[np.float64]

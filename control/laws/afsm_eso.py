@@ -66,22 +66,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.asked import asked_before, lateness, remember
-from spheretwin.control.parts.bounded_fuzzy import Restraint, approximate_within_bounds
-from spheretwin.control.parts.extended_state_observer import Gains, Observed, observe, observer_gains
-from spheretwin.control.parts.fuzzy import CONSEQUENTS
-from spheretwin.control.parts.nominal_motion import Motion, Nominal, moved_on, torque_for
-from spheretwin.control.parts.parameters import (
-    LawParameters,
-    NonNegative,
-    NonNegativeEach,
-    Positive,
-    PositiveEach,
-    each,
-    named,
+from spheretwin.control.law import Known, Law, NonNegative, NonNegativeEach, Positive, PositiveEach, each
+from spheretwin.control.law_components.extended_state_observer import (
+    Gains,
+    Observed,
+    asked_before,
+    lateness,
+    observe,
+    observer_gains,
+    remember,
 )
-from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
+from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
+from spheretwin.control.law_components.fuzzy import CONSEQUENTS, Restraint, approximate_within_bounds
+from spheretwin.control.law_components.nominal_motion import Motion, Nominal, moved_on, torque_for
+from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.lagrangian import Triple
 from spheretwin.models.telemetry.signals import ANGLES, Signal

@@ -32,12 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.asked import asked_before, lateness, remember
-from spheretwin.control.parts.model import model_torque
-from spheretwin.control.parts.parameters import LawParameters, NonNegativeEach, PositiveEach, each, named
-from spheretwin.control.parts.sliding import SLIDING_SIGNAL, sliding_surface
-from spheretwin.control.parts.windup import tracking_rate
+from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.extended_state_observer import asked_before, lateness, remember
+from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface, tracking_rate
+from spheretwin.control.law_components.nominal_motion import model_torque
+from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 Array = NDArray[np.float64]

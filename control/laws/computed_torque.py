@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.asked import asked_before, lateness, remember
-from spheretwin.control.parts.integral_feedback import INTEGRAL_SIGNAL, tracking, triple_pole
-from spheretwin.control.parts.model import model_torque
-from spheretwin.control.parts.parameters import LawParameters, NonNegativeEach, PositiveEach, each, named
+from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.extended_state_observer import asked_before, lateness, remember
+from spheretwin.control.law_components.feedback import INTEGRAL_SIGNAL, tracking, triple_pole
+from spheretwin.control.law_components.nominal_motion import model_torque
+from spheretwin.control.law_components.parameters import LawParameters, named
 
 Array = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.integral_feedback import feedback
-from spheretwin.control.parts.parameters import LawParameters, NonNegativeEach, PositiveEach, each, named
+from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.feedback import feedback
+from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.base.errors import InputError
 
 BANDWIDTH_rad_s = 60.0

@@ -10,16 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.parameters import (
-    LawParameters,
-    Level,
-    NonNegativeEach,
-    PositiveEach,
-    each,
-    named,
-    torque_factor,
-)
+from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
 
 Array = NDArray[np.float64]
 

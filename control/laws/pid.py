@@ -16,9 +16,9 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.integral_feedback import feedback, triple_pole
-from spheretwin.control.parts.parameters import LawParameters, NonNegativeEach, PositiveEach, each, named
+from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.feedback import feedback, triple_pole
+from spheretwin.control.law_components.parameters import LawParameters, named
 
 BANDWIDTH_rad_s = 40.0
 _STIFFNESS, _DAMPING, _INTEGRAL = triple_pole(BANDWIDTH_rad_s)

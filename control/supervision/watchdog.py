@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free
-from spheretwin.models.base.copying import transfer_state
+from spheretwin.models.base.compiled import allocation_free, transfer_state
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.files import whole_file
 
-COMPILED_PACKAGES = ("spheretwin.models", "spheretwin.control", "spheretwin.twin")
+COMPILED_PACKAGES = ("spheretwin.models", "spheretwin.control", "spheretwin")
 
 
 def cache_folder() -> Path | None:

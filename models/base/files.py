@@ -12,8 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 
 
 class OutputFile:

@@ -14,8 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import did_you_mean, shown, without_breaks
+from spheretwin.models.base.errors import InputError, did_you_mean, shown, without_breaks
 
 _REFERENCE = re.compile(r"(?P<file>.+\.py):(?P<name>[^\W\d]\w*)", re.DOTALL)
 

@@ -1,280 +1,165 @@
-"""The torque matrix by direct summation: the field of the pole magnets on the current of all windings.
-
-It shares nothing with the torque curve but the geometry: no angle between axes, no curve, no look-up. The
-field of each magnet (magpylib) acts on every conductor of every coil, ``I dl x B``, and the rotor turns by
-the reaction. A flat magnet's field is exact; one that is ground to a sphere is a stack of cylinders of the
-same volume, whose field tends to its own with the square of their number.
-
-What the paper does instead, adding one curve's value for each pair of pole and coil (13), is exact for
-magnets and coils of revolution in air: fields add, and the torque of such a pair is normal to its two axes
-and depends on their angle alone. So the two must agree but for arithmetic. Neither knows the iron hoop
-behind the poles: that is a question to finite elements or to a bench.
-"""
+"""Whether the torque matrix is what the field of all poles on all windings gives, in random poses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil, Magnet
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.design.workspace import pose
-from spheretwin.models.kinematics import rotation
-from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.checks import Check
+from spheretwin.models.design import curve_check, direct_summation, geometry_check
+from spheretwin.models.design.direct_summation import Comparison, Errors
+from spheretwin.models.design.pole_torque import compute_curve
 
-Array = NDArray[np.float64]
+# The last is the largest tilt of the paper's nutation.
+BANDS_DEG = (0.0, 12.0, 24.0, 36.0, 48.0, 57.0)
 
-# Beyond the angle at which a magnet's rim leaves the winding's edge the integrand is smooth.
-RIM_MARGIN = np.radians(2.0)
+TORQUE_BOUND = 0.01
+QUADRATURE_BOUND = 5e-3
 
-# Conductor elements evaluated at once: three times as fast as all at once.
-BLOCK = 8192
-
-
-class Rule(NamedTuple):
-    """Numbers of quadrature points in one winding, and of the pieces of a magnet."""
-
-    across: int
-    """Gauss points from the bore to the outer radius."""
-    along: int
-    """Gauss points along the axis, crowded towards the face at the air gap."""
-    around: int
-    """Equal steps around the axis."""
-    stacked: int = 8
-    """Cylinders that stand for a ground magnet; a flat one is one cylinder."""
-
-    def halved(self) -> Rule:
-        """Half the points in each direction, and half the cylinders."""
-        return Rule(*(number // 2 for number in self))
+# Halfway between samples of the shipped curve, where its spline is least sure, and where f_t is large.
+BETWEEN_SAMPLES_DEG = np.arange(0.125, 30.0, 1.25)
 
 
-class Quadrature(NamedTuple):
-    """Rule for a coil that a magnet's rim passes close by, or through, and for all others."""
+class Band(NamedTuple):
+    """Errors of the poses within a band of tilt, over all their currents."""
 
-    near: Rule
-    far: Rule
-
-    def halved(self) -> Quadrature:
-        """Half the points in each direction."""
-        return Quadrature(self.near.halved(), self.far.halved())
-
-
-# For ground magnets. Of the curve's peak, for one pair: near within 2e-4, all but 1e-5 of it the steps of the
-# stack, which fall with the square of their number; far within 3e-5.
-STANDARD = Quadrature(near=Rule(8, 8, 32, 24), far=Rule(8, 8, 32, 4))
-
-# A flat magnet's sharp rim may stand within the winding. B has a logarithm at the rim: the sum over points
-# converges, but slowly. Near within 3e-4, far within 1e-6.
-FLAT = Quadrature(near=Rule(24, 24, 96), far=Rule(8, 8, 32))
+    tilt_deg: tuple[float, float]
+    poses: int
+    median_relative_error: float
+    largest_relative_error: float
+    largest_error_of_largest_torque: float
+    quadrature_of_largest_torque: float
 
 
-class Comparison(NamedTuple):
-    """Torque matrices of the same n poses, three ways."""
+class Sources(NamedTuple):
+    """Where the errors come from."""
 
-    tilt_rad: Array  # (n,)
-    q: Array  # (n, 3), rad
-    model: Array  # (n, 3, groups), N·m/A, by the torque curve
-    direct: Array  # (n, 3, groups), by direct summation
-    coarse: Array  # (n, 3, groups), the same with half the points in each direction
-
-
-class Errors(NamedTuple):
-    """Torques of random currents compared, n poses times m currents."""
-
-    torque_Nm: Array  # (n, m), magnitude by direct summation
-    model_Nm: Array  # (n, m), distance from there to the model's torque
-    quadrature_Nm: Array  # (n, m), distance to the coarser sum's
+    quadrature_of_largest_torque: float
+    """What half the points in each direction change, of the direct sum that judges."""
+    curve_between_samples_of_peak: float
+    """Distance of the curve's spline from the geometry's own f_t."""
+    lookup_of_peak: float
+    """Distance of the compiled table from that spline."""
 
 
-def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | None = None) -> Array:
-    """Torque matrix G_t(q) by direct summation over all poles and all conductors.
+class FieldVerdict(NamedTuple):
+    """The torque matrix judged by direct sums."""
+
+    largest_torque_Nm: float
+    """Of all poses and currents."""
+    by_tilt: list[Band]
+    sources: Sources
+    checks: list[Check]
+    warnings: list[str]
+
+    @property
+    def curve_is_of_another_geometry(self) -> bool:
+        """Whether the torque breaks its bound and the curve alone is as far from the model's geometry."""
+        torque, _ = self.checks
+        return not torque.ok and self.sources.curve_between_samples_of_peak > TORQUE_BOUND
+
+
+def judge(
+    actuator: Actuator,
+    poses: int = 15,
+    seed: int = 0,
+    track: Callable[[range], Iterable[int]] = iter,
+) -> FieldVerdict:
+    """Hold G_t(q)·I against the exact field of every magnet on every winding.
 
     Parameters
     ----------
-    q : (3,) array, rad
-        Pose.
     actuator : Actuator
-        Its geometry; its torque curve is not used.
-    quadrature : Quadrature
-        Points in the windings; unless given, what suits flat or ground magnets.
-
-    Returns
-    -------
-    (3, n) array, N·m/A
-        Torque on the rotor about the joint centre, stator frame, of one ampere in each of n groups.
+        With the torque curve that is judged.
+    poses : int
+        Random poses, from each of `BANDS_DEG` in turn; some seconds each.
+    seed : int
+        Of poses and currents.
+    track : callable
+        Passes on the numbers of the poses, and may show progress.
 
     Raises
     ------
     InputError
         magpylib is not installed.
     """
-    quadrature = quadrature or _standard(actuator.magnet)
-    near_angle = _rim_reaches_winding(actuator)
-    poles = actuator.pole_axes @ rotation(np.asarray(q, dtype=np.float64)).T  # (p, 3), stator frame
-    torque = np.zeros((len(actuator.coil_axes), 3))
-    for pole, polarity in zip(poles, actuator.pole_polarity, strict=True):
-        near = np.arccos(np.clip(actuator.coil_axes @ pole, -1.0, 1.0)) < near_angle
-        for coils, rule in ((near, quadrature.near), (~near, quadrature.far)):
-            magnet = _magnet(actuator, pole, float(polarity), rule.stacked)
-            torque[coils] -= _torque_on_coils(magnet, actuator.coil_axes[coils], actuator.coil, rule)
-    return torque[actuator.groups].sum(axis=1).T
-
-
-def compare(
-    actuator: Actuator,
-    tilt_rad: Array,
-    seed: int = 0,
-    quadrature: Quadrature | None = None,
-    track: Callable[[range], Iterable[int]] = iter,
-) -> Comparison:
-    """Compute the torque matrix by the curve and by direct summation, in random poses.
-
-    Parameters
-    ----------
-    actuator : Actuator
-        The actuator.
-    tilt_rad : (n,) array, rad
-        Tilt of the shaft of each pose; its direction and the spin are random.
-    seed : int
-        Of the random poses.
-    quadrature : Quadrature
-        The finer of the two sums.
-    track : callable
-        Passes on the numbers of the poses, and may show progress.
-    """
-    quadrature = quadrature or _standard(actuator.magnet)
-    azimuth, spin = np.random.default_rng(seed).uniform(-np.pi, np.pi, (2, len(tilt_rad)))
-    q = pose(tilt_rad, azimuth, spin)
-    direct, coarse = np.empty((2, len(q), 3, len(actuator.groups)))
-    for i in track(range(len(q))):
-        direct[i] = direct_torque_matrix(q[i], actuator, quadrature)
-        coarse[i] = direct_torque_matrix(q[i], actuator, quadrature.halved())
-    return Comparison(tilt_rad, q, np.array([torque_matrix(each, actuator) for each in q]), direct, coarse)
-
-
-def errors(compared: Comparison, limit_A: float, currents: int = 200, seed: int = 0) -> Errors:
-    """Torques of random currents, evenly distributed within the limit.
-
-    Parameters
-    ----------
-    compared : Comparison
-        Matrices of some poses.
-    limit_A : float, A
-        Largest magnitude of a current.
-    currents : int
-        Current vectors for each pose.
-    seed : int
-        Of the random currents.
-    """
-    n, _, groups = compared.direct.shape
-    current = np.random.default_rng([seed, 1]).uniform(-limit_A, limit_A, (n, groups, currents))
-
-    def magnitude(G: Array) -> Array:
-        return np.asarray(np.linalg.norm(G @ current, axis=1))
-
-    return Errors(
-        torque_Nm=magnitude(compared.direct),
-        model_Nm=magnitude(compared.model - compared.direct),
-        quadrature_Nm=magnitude(compared.coarse - compared.direct),
+    tilt_rad = np.radians(_tilts_deg(poses, seed))
+    compared = direct_summation.compare(actuator, tilt_rad, seed, track=track)
+    errors = direct_summation.errors(compared, actuator.group.current_limit_A, seed=seed)
+    torque, quadrature = _torque(errors), _quadrature(errors)
+    return FieldVerdict(
+        largest_torque_Nm=float(errors.torque_Nm.max()),
+        by_tilt=_by_tilt(compared, errors),
+        sources=Sources(
+            quadrature_of_largest_torque=_of_largest(errors.quadrature_Nm, errors),
+            curve_between_samples_of_peak=_curve_error(actuator),
+            lookup_of_peak=curve_check.largest_lookup_error(actuator.torque_curve),
+        ),
+        checks=[torque, quadrature],
+        warnings=geometry_check.of_geometry(actuator),
     )
 
 
-def _standard(magnet: Magnet) -> Quadrature:
-    return STANDARD if magnet.front_radius_m else FLAT
+def _tilts_deg(poses: int, seed: int) -> NDArray[np.float64]:
+    """One random tilt after the other from each band in turn, so that few poses cover all bands."""
+    band = np.arange(poses) % (len(BANDS_DEG) - 1)
+    low, high = np.array(BANDS_DEG)[band], np.array(BANDS_DEG)[band + 1]
+    return np.asarray(np.random.default_rng([seed, 2]).uniform(low, high))
 
 
-def _magnet(actuator: Actuator, axis: Array, polarity: float, stacked: int) -> Any:
-    """One pole as magpylib's homogeneously magnetised cylinders, in the stator frame."""
-    try:
-        from magpylib import Collection
-        from magpylib.magnet import Cylinder
-    except ImportError:
-        raise InputError(
-            "magnetics: expected the extra `spheretwin[magnetics]` to compute fields,"
-            " received an installation without magpylib"
-        ) from None
-    from scipy.spatial.transform import Rotation
+def _curve_error(actuator: Actuator) -> float:
+    """Distance of the curve's spline from the geometry's f_t, between samples, over the curve's peak."""
+    phi = np.radians(BETWEEN_SAMPLES_DEG)
+    exact = compute_curve(actuator.magnet, actuator.coil, phi).torque_Nm_per_A
+    curve = actuator.torque_curve
+    return float(np.max(np.abs(curve.spline(phi) - exact)) / curve.peak_Nm_per_A)
 
-    cylinders = [
-        Cylinder(
-            polarization=(0.0, 0.0, polarity * actuator.magnet.remanence_T),
-            dimension=(2 * radius, top - bottom),
-            position=0.5 * (top + bottom) * axis,
-            orientation=Rotation.from_matrix(_frame(axis)),
+
+def _by_tilt(compared: Comparison, errors: Errors) -> list[Band]:
+    band = np.digitize(np.degrees(compared.tilt_rad), BANDS_DEG[1:-1])
+    rows = []
+    for i in np.unique(band):
+        here = Errors(*(each[band == i] for each in errors))
+        relative = here.model_Nm / here.torque_Nm
+        rows.append(
+            Band(
+                tilt_deg=(BANDS_DEG[i], BANDS_DEG[i + 1]),
+                poses=len(here.torque_Nm),
+                median_relative_error=float(np.median(relative)),
+                largest_relative_error=float(np.max(relative)),
+                largest_error_of_largest_torque=_of_largest(here.model_Nm, errors),
+                quadrature_of_largest_torque=_of_largest(here.quadrature_Nm, errors),
+            )
         )
-        for radius, bottom, top in _cylinders(actuator.magnet, stacked)
-    ]
-    return Collection(cylinders)
+    return rows
 
 
-@lru_cache(maxsize=8)
-def _cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]:
-    """Radius, lower and upper end of cylinders that stand for a magnet, m from the joint centre.
-
-    A ground front becomes steps: rings of equal width, each at the mean height of the front over it. So the
-    charge on the front moves up or down by a little and by nothing on the whole, and the volume stays.
-    """
-    if not magnet.front_radius_m:
-        return [(magnet.radius_m, magnet.back_m, magnet.front_m)]
-    edges = magnet.radius_m * np.arange(stacked + 1) / stacked
-    under = [magnet.volume_within_m3(edge) for edge in edges]
-    heights = magnet.back_m + np.diff(under) / (np.pi * np.diff(edges**2))  # (stacked,), falling outward
-    lower = [*heights[1:], magnet.back_m]
-    return [(float(r), float(b), float(t)) for r, b, t in zip(edges[1:], lower, heights, strict=True)]
+def _of_largest(distance_Nm: NDArray[np.float64], errors: Errors) -> float:
+    return float(distance_Nm.max() / errors.torque_Nm.max())
 
 
-def _torque_on_coils(magnet: Any, axes: Array, coil: Coil, rule: Rule) -> Array:
-    """Torque of the magnet's field on one ampere in each of k coils, about the joint centre: (k, 3), N·m."""
-    turned = np.array([_frame(axis).T for axis in axes]).reshape(-1, 3, 3)
-    position, element = ((vectors @ turned).reshape(-1, 3) for vectors in _conductors(coil, rule))
-    torque = np.empty_like(position)
-    for start in range(0, len(position), BLOCK):
-        block = slice(start, start + BLOCK)
-        force = np.cross(element[block], magnet.getB(position[block]))
-        torque[block] = np.cross(position[block], force)
-    return torque.reshape(len(axes), len(_conductors(coil, rule)[0]), 3).sum(axis=1)
+def _torque(errors: Errors) -> Check:
+    return Check(
+        name="torque",
+        compares="torque by the curve against the direct sum, over the largest torque",
+        states=errors.torque_Nm.size,
+        value=_of_largest(errors.model_Nm, errors),
+        bound=TORQUE_BOUND,
+        why="superposition is exact here, so only arithmetic is left: far less than the percent to which"
+        " a magnet's remanence and a coil's turns are known",
+    )
 
 
-@lru_cache(maxsize=8)
-def _conductors(coil: Coil, rule: Rule) -> tuple[Array, Array]:
-    """Elements of one coil whose axis is z.
-
-    Returns
-    -------
-    (n, 3) array, m
-        Positions.
-    (n, 3) array, m
-        Length of conductor, times the turns it stands for, along a positive current.
-    """
-    u, share_u = np.polynomial.legendre.leggauss(rule.across)
-    v, share_v = np.polynomial.legendre.leggauss(rule.along)
-    t = 0.5 + 0.5 * v
-    radius = coil.inner_radius_m + (coil.outer_radius_m - coil.inner_radius_m) * (0.5 + 0.5 * u)
-    height = coil.distance_m + coil.length_m * (t**2 - 0.5)  # t**2: crowded towards the inner face
-    psi = (np.arange(rule.around) + 0.5) * 2 * np.pi / rule.around
-    rho, z, angle = (grid.ravel() for grid in np.meshgrid(radius, height, psi, indexing="ij"))
-    turns = coil.turns * np.outer(0.5 * share_u, share_v * t)
-    length = np.repeat(turns.ravel(), rule.around) * 2 * np.pi / rule.around * rho
-    cosine, sine, zero = np.cos(angle), np.sin(angle), np.zeros(len(angle))
-    position = np.column_stack([rho * cosine, rho * sine, z])
-    return position, length[:, None] * np.column_stack([-sine, cosine, zero])
-
-
-def _rim_reaches_winding(actuator: Actuator) -> float:
-    """Angle between two axes below which the magnet's rim and the coil's edge are next to each other."""
-    magnet, coil = actuator.magnet, actuator.coil
-    rim = np.arctan2(magnet.radius_m, magnet.rim_m)
-    edge = np.arctan2(coil.outer_radius_m, coil.distance_m - coil.length_m / 2)
-    return float(rim + edge + RIM_MARGIN)
-
-
-def _frame(axis: Array) -> Array:
-    """Rotation matrix (3, 3) whose third column is the axis."""
-    least = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(least, axis)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(axis, first), axis])
+def _quadrature(errors: Errors) -> Check:
+    return Check(
+        name="quadrature",
+        compares="direct sum with half the points in each direction, over the largest torque",
+        states=errors.torque_Nm.size,
+        value=_of_largest(errors.quadrature_Nm, errors),
+        bound=QUADRATURE_BOUND,
+        why="half the bound above: the sum that judges must be surer than what it judges",
+    )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import itertools
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.design.capability import Capability, capability
 
 Array = NDArray[np.float64]
 
@@ -91,3 +94,130 @@ def grid(
     spin = np.linspace(-np.pi, np.pi, spins, endpoint=False)
     q = pose(tilt[:, None, None], azimuth[:, None], spin)
     return Workspace(tilt, azimuth, spin, q, reachable(q, actuator))
+
+
+# Each round halves the steps of a pose that has found no better neighbour: 18 halvings of a 5 degree step
+# leave 0.07 arc seconds, and six rounds are left to walk.
+ROUNDS = 24
+
+# The grid's worst pose need not lie in the deepest valley: one start in each sector of azimuth.
+SECTORS = 6
+
+# Two poses are one where symmetry maps one onto the other: told by tilt and figure alone.
+SAME_TILT_RAD = np.radians(0.5)
+SAME_FIGURE = 0.01
+
+# What is to be made as small as possible, of each pose.
+Figure = Callable[[Capability], Array]
+
+FIGURES: dict[str, Figure] = {
+    "least_norm": lambda found: found.least_norm_Nm,
+    "best": lambda found: found.best_Nm,
+    "singular_value": lambda found: found.singular_value_Nm_per_A,
+    "condition": lambda found: -found.condition,
+}
+
+
+class Found(NamedTuple):
+    """Poses, and what the actuator can do there."""
+
+    tilt_azimuth_spin_rad: Array  # (n, 3)
+    q: Array  # (n, 3), rad
+    capability: Capability
+
+    def at(self, index: Any) -> Found:
+        """Some of the poses."""
+        return Found(self.tilt_azimuth_spin_rad[index], self.q[index], self.capability.at(index))
+
+
+def worst_by_tilt(workspace: Workspace, on_grid: Capability, figure: Figure, actuator: Actuator) -> Found:
+    """Worst pose at each tilt of the grid, over all azimuths and spins.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        The grid.
+    on_grid : Capability
+        Of its poses, in the grid's shape.
+    figure : callable
+        One of `FIGURES`.
+    actuator : Actuator
+        For the poses between the grid's.
+    """
+    start = _starts(workspace, on_grid, figure)
+    found = _downhill(start, _steps(workspace) * [0, 1, 1], figure, actuator, workspace.tilt_rad[-1])
+    order = np.lexsort((figure(found.capability), start[:, 0]))
+    _, first = np.unique(start[order, 0], return_index=True)
+    return found.at(order[first])
+
+
+def local_minima(workspace: Workspace, by_tilt: Found, figure: Figure, actuator: Actuator) -> Found:
+    """Worst poses of the whole workspace, the worst first; those that symmetry makes alike only once.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        The grid.
+    by_tilt : Found
+        What `worst_by_tilt` found for the same figure.
+    figure, actuator
+        As there.
+    """
+    start = by_tilt.tilt_azimuth_spin_rad
+    found = _downhill(start, _steps(workspace), figure, actuator, workspace.tilt_rad[-1])
+    value, tilt = figure(found.capability), found.tilt_azimuth_spin_rad[:, 0]
+    kept: list[int] = []
+    for i in np.argsort(value, kind="stable"):
+        near = [
+            k
+            for k in kept
+            if abs(tilt[i] - tilt[k]) < SAME_TILT_RAD and _alike(float(value[i]), float(value[k]))
+        ]
+        if not near:
+            kept.append(int(i))
+    return found.at(kept)
+
+
+def _alike(a: float, b: float) -> bool:
+    return a == b or abs(a - b) <= SAME_FIGURE * max(abs(a), abs(b))
+
+
+def _steps(workspace: Workspace) -> Array:
+    """Half the grid's steps."""
+    return 0.5 * np.array(
+        [_spacing(axis) for axis in (workspace.tilt_rad, workspace.azimuth_rad, workspace.spin_rad)]
+    )
+
+
+def _spacing(axis: Array) -> float:
+    return float(axis[1] - axis[0]) if len(axis) > 1 else 0.0
+
+
+def _starts(workspace: Workspace, on_grid: Capability, figure: Figure) -> Array:
+    """(n, 3) array, rad: tilt, azimuth and spin of the worst pose at each tilt, in each sector of azimuth."""
+    value = np.where(workspace.reachable, figure(on_grid), np.inf)
+    sectors = np.array_split(np.arange(len(workspace.azimuth_rad)), min(SECTORS, len(workspace.azimuth_rad)))
+    starts = []
+    for tilt, at_tilt in zip(workspace.tilt_rad, value, strict=True):
+        for sector in sectors:
+            azimuth, spin = np.unravel_index(at_tilt[sector].argmin(), at_tilt[sector].shape)
+            if at_tilt[sector][azimuth, spin] < np.inf:  # else the whole sector is out of reach
+                starts.append((tilt, workspace.azimuth_rad[sector[azimuth]], workspace.spin_rad[spin]))
+    return np.array(starts)
+
+
+def _downhill(start: Array, steps: Array, figure: Figure, actuator: Actuator, largest_tilt: float) -> Found:
+    """Pattern search from each start: go to the best neighbour, or halve the steps where there is none."""
+    offsets = np.array(list(itertools.product(*((-1, 0, 1) if step else (0,) for step in steps))))
+    offsets = offsets[np.argsort(np.any(offsets, axis=1), kind="stable")]  # staying comes first and wins ties
+    at, scale = start.copy(), np.ones(len(start))
+    for _ in range(ROUNDS):
+        around = at[:, None] + scale[:, None, None] * (offsets * steps)  # (n, offsets, 3)
+        around[..., 0] = np.clip(around[..., 0], 0.0, largest_tilt)
+        q = pose(*np.moveaxis(around, -1, 0)).reshape(-1, 3)
+        value = np.where(reachable(q, actuator), figure(capability(q, actuator)), np.inf)
+        best = value.reshape(around.shape[:2]).argmin(axis=1)
+        at = around[np.arange(len(at)), best]
+        scale = np.where(best == 0, scale / 2, scale)
+    q = pose(*at.T)
+    return Found(at, q, capability(q, actuator))

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.errors import LONGEST_WORD, InputError, shortened, without_breaks
 from spheretwin.models.base.files import whole_file
-from spheretwin.models.base.wording import LONGEST_WORD, shortened, without_breaks
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown
+from spheretwin.models.base.errors import InputError, shown
 
 
 @dataclass(frozen=True)

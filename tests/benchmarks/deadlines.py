@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.bench import Bench
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
 
 TWINS = {
     "lagrangian": {"plant.engine": "lagrangian"},

@@ -20,20 +20,19 @@ import numpy as np
 import plain
 from measuring import fastest, ratio, seconds_of, tell
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
+from spheretwin.disturbances import Draws
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.models.telemetry.signals import width
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.disturbances.draws import Draws
-from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.scenario.hardware import HARDWARE
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow, simulate
+from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.run import facts_of
+from spheretwin.scenario.sections import HARDWARE, Scenario
+from spheretwin.session import Session
+from spheretwin.simulation import follow, simulate
 from spheretwin.viz.recording.recorder import Recorder
 
 SCENARIO = "nutation"

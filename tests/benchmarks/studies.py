@@ -21,10 +21,10 @@ from typing import Any
 from measuring import fastest, ratio, seconds_of, tell, tell_value
 
 from spheretwin.models.base.mujoco_library import timers_stopped
-from spheretwin.twin.study.engines import local
-from spheretwin.twin.study.grid import Grid
-from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import Study, load, made
+from spheretwin.study.engines import threads as local
+from spheretwin.study.grid import Grid
+from spheretwin.study.row import Rows
+from spheretwin.study.study import Study, load, made
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.simulation import simulate
+from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.simulation import simulate
 
 TICKS = 30
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from spheretwin import scenario as scenarios
 from spheretwin.control import lti
 from spheretwin.control.law import Law
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 PERIOD_S, TICKS = 1e-3, 60
 generator = np.random.default_rng(5)

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 
 TEXT = actuators.MJCF_PATH.read_text()
 GAMMA = '<joint name="gamma" axis="0 0 1"/>'

@@ -7,12 +7,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.simulation import simulate
+from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.simulation import simulate
 
 TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
 INERTIAL = '<inertial pos="0 0 0" mass="1.6" diaginertia="2.219e-3 2.176e-3 2.256e-3"/>'

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
+from spheretwin.cli.bench import choices_of
 from spheretwin.models.kinematics import rotation
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.bench import Bench
-from spheretwin.twin.commands.benching.choices import choices_of
-from spheretwin.twin.scenario import flags
-from spheretwin.viz.bench import front
+from spheretwin.scenario import reading
+from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
 from tests.browser import Browser
 from tests.viz.bench.on_page import on_screen, opened
@@ -34,8 +34,8 @@ def drawn(
 ) -> Image.Image:
     """A page whose tip has been dragged to some poses, and is on its way to the last one."""
     ended = threading.Event()
-    scenario = scenarios.load(run[0], flags.overrides(run[1:]))
-    with Bench(scenario) as bench, Page(bench, choices_of(bench), front.listen(0)) as page:
+    scenario = scenarios.load(run[0], reading.overrides(run[1:]))
+    with Bench(scenario) as bench, Page(bench, choices_of(bench), server.listen(0)) as page:
         bench.begin()
         following = threading.Thread(target=page.show, args=(ended.is_set,))
         following.start()

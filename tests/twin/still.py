@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 
 ENGINES = ("mujoco", "lagrangian")
 PAYLOAD_KG = 0.05

@@ -8,20 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.allocation.least_norm import allocate
-from spheretwin.control.allocation.registry import ALLOCATIONS
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models.lagrangian import loaded_inertia
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario.fields import every_field, kind_of
-from spheretwin.twin.scenario.sections import ResolvedScenario, Scenario
-from spheretwin.twin.scenario.writing import as_command, as_toml
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
-from spheretwin.twin.study.grid import Grid
-from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import load
+from spheretwin.scenario.fields import every_field, kind_of
+from spheretwin.scenario.sections import ResolvedScenario, Scenario
+from spheretwin.scenario.writing import as_command, as_toml
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+from spheretwin.study.grid import Grid
+from spheretwin.study.row import Rows
+from spheretwin.study.study import load
 
 # Every part of a controller is at work: estimator, governor, prediction, feed-forward, detector, watchdog.
 WHOLE = {

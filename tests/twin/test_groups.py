@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 
 MIDDLE_RING = re.compile(
     r'(?s)<replicate count="12" euler="0 0 30">\s*<site name="coil_middle".*?</replicate>'

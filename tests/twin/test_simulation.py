@@ -4,18 +4,18 @@ import numba
 import numpy as np
 import pytest
 
+from spheretwin import loop as loops
+from spheretwin import runtime as machines
+from spheretwin import scenario as scenarios
+from spheretwin import simulation as simulations
 from spheretwin.control.law import Known, Law
+from spheretwin.loop import Functions
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.twin import loop as loops
-from spheretwin.twin import machine as machines
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin import simulation as simulations
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow, simulate
-from spheretwin.twin.wiring.matching import Functions
+from spheretwin.session import Session
+from spheretwin.simulation import follow, simulate
 
 
 def run(name, law=None, **overrides):

@@ -5,13 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.metrics import METRICS, Planned
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.metrics.metric import Planned
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.records.summary import BESIDE, Figures, figures_of, summary
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow, simulate
+from spheretwin.run import BESIDE, Figures, figures_of, summary
+from spheretwin.session import Session
+from spheretwin.simulation import follow, simulate
 
 
 @pytest.fixture(scope="module")

@@ -8,21 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.bench.bench_state import Works
+from spheretwin.bench.command_queue import By, Command, Ticket, checked, settled
+from spheretwin.bench.commands import named
+from spheretwin.bench.cycle import Taking, Thread, Turning
+from spheretwin.bench.operators import Operators
+from spheretwin.bench.status import State, picture
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.twin.bench.command import By, Command, checked
-from spheretwin.twin.bench.commands.registry import named
-from spheretwin.twin.bench.operators import Operators
-from spheretwin.twin.bench.queue import Ticket, settled
-from spheretwin.twin.bench.state import State
-from spheretwin.twin.bench.work.picture import picture
-from spheretwin.twin.bench.work.taking import Taking
-from spheretwin.twin.bench.work.thread import Thread
-from spheretwin.twin.bench.work.turning import Turning
-from spheretwin.twin.bench.work.works import Works
-from spheretwin.twin.scenario.fields import fields_of
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.scenario.writing import as_command, as_toml
+from spheretwin.scenario.fields import fields_of
+from spheretwin.scenario.sections import Scenario
+from spheretwin.scenario.writing import as_command, as_toml
 
 
 class Bench:

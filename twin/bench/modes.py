@@ -11,15 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import told_apart
+from spheretwin.models.base.errors import InputError, told_apart
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.twin.session import Session
-from spheretwin.twin.trajectories.approach import Approach, faded
-from spheretwin.twin.trajectories.numbers import LARGEST
-from spheretwin.twin.trajectories.shapes.hold import Hold
-from spheretwin.twin.trajectories.shapes.jog import Jog
-from spheretwin.twin.trajectories.trajectory import Shape
+from spheretwin.session import Session
+from spheretwin.trajectories.rounding import LARGEST, Approach, faded
+from spheretwin.trajectories.shapes import Hold, Jog
+from spheretwin.trajectories.trajectory import Shape
 
 Array = NDArray[np.float64]
 

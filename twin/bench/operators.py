@@ -6,8 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown
+from spheretwin.models.base.errors import InputError, shown
 
 GONE_s = 2.0
 """How long a twin may be without its operator until it holds."""

@@ -17,20 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from spheretwin import assembly
+from spheretwin import scenario as scenarios
+from spheretwin.active_config import at_start
+from spheretwin.crosscheck.part import Part
+from spheretwin.crosscheck.trajectories import ORDER_MARGIN, Convergence
+from spheretwin.linear import Magnetics, hinge_matrix
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.check import Check
+from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration
-from spheretwin.twin import assembly
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.crosscheck.part import Part
-from spheretwin.twin.crosscheck.trajectories import ORDER_MARGIN, Convergence
-from spheretwin.twin.in_force import at_start
-from spheretwin.twin.linear.actuation import hinge_matrix
-from spheretwin.twin.linear.knowledge import Magnetics
-from spheretwin.twin.plant.plant import GOING, Delivered, plant_tick
-from spheretwin.twin.wiring.wires import wires_of
+from spheretwin.plant.step import GOING, Delivered, plant_tick
+from spheretwin.shared_buffers import wires_of
 
 Array = NDArray[np.float64]
 

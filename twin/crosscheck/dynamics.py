@@ -17,16 +17,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.check import Check
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import without_breaks
+from spheretwin.models.base.checks import Check
+from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf import PAYLOAD, gravity, read
-from spheretwin.twin.crosscheck.part import Part
-from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.plant.lagrangian import LagrangianRotor
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mujoco_rotor import Rotor
 
 Array = NDArray[np.float64]
 

@@ -16,24 +16,27 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.check import Check
-from spheretwin.twin.crosscheck.bearing.hinge import Hinge, STEP_s
-from spheretwin.twin.crosscheck.bearing.moving import GAMMA, Mover, by_mujoco, by_stage
-from spheretwin.twin.crosscheck.bearing.runs import (
+from spheretwin.crosscheck.hinge import (
+    GAMMA,
     PUSH,
     Bearing,
+    Hinge,
+    Mover,
     RAMP_s,
     START_rad_s,
+    STEP_s,
     breakaway_rate_rad_s,
+    by_mujoco,
+    by_stage,
     inertia_torque_Nm,
     latest_breakaway_Nm,
     run,
     slope_Nm_s,
 )
-from spheretwin.twin.crosscheck.part import Part
-from spheretwin.twin.scenario.hardware import PROTOTYPE_BEARINGS
-from spheretwin.twin.scenario.sections import Plant
+from spheretwin.crosscheck.part import Part
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.checks import Check
+from spheretwin.scenario.sections import PROTOTYPE_BEARINGS, Plant
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.check import Check
+from spheretwin.models.base.checks import Check
 
 F = TypeVar("F", bound="Finding")
 

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import numpy as np
+
+from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, trajectories
+from spheretwin.crosscheck import identities as free_rotor
+from spheretwin.crosscheck import trajectories as closed_loop
+from spheretwin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
+from spheretwin.crosscheck.hinge import PUSH, Bearing, START_rad_s
+from spheretwin.crosscheck.part import STATES, Evidence, Finding, Subject
+from spheretwin.crosscheck.trajectories import Trajectories
 from spheretwin.models import actuator as actuators
+from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
-from spheretwin.twin.crosscheck import (
-    closed_loop,
-    coil_driven,
-    dynamics,
-    free_rotor,
-    friction,
-    identities,
-    trajectories,
-)
-from spheretwin.twin.crosscheck.part import STATES, Evidence, Finding, Subject
+from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages import markdown as pieces
+from spheretwin.viz.pages.markdown import save_drawings, save_text
 
 PARTS = (
     dynamics.PART,
-    identities.PART,
-    trajectories.PART,
-    free_rotor.PART,
+    identities.IDENTITIES,
+    trajectories.TRAJECTORIES,
+    free_rotor.FREE_ROTOR,
     friction.PART,
     coil_driven.PART,
-    closed_loop.PART,
+    closed_loop.CLOSED_LOOP,
 )
 
 
@@ -62,3 +65,199 @@ def run(
         begun(part.name)
         findings[part.name] = part.examine(subject)
     return Evidence(findings)
+
+
+def draw_closed_loop(evidence: Evidence) -> Drawing:
+    """The same run on two plants."""
+    from spheretwin.viz.figures import crosscheck
+
+    pairs = evidence.of(closed_loop.ClosedLoop).pairs
+    longest = max(pairs.values(), key=lambda pair: len(pair.mujoco))
+    errors = {law: (pair.mujoco["error_rad"], pair.lagrangian["error_rad"]) for law, pair in pairs.items()}
+    apart = {
+        law: crosscheck.Bounded(pair.difference_rad, closed_loop.STEP_BOUND_rad)
+        for law, pair in pairs.items()
+    }
+    titles = {"PD": "PD, load 0.5", "AFSM": "AFSM, load 2"}
+    figure = crosscheck.closed_loops(
+        longest.mujoco["t_s"],
+        {titles[law]: pair for law, pair in errors.items()},
+        {titles[law]: series for law, series in apart.items()},
+        ("MuJoCo", "Lagrangian"),
+        "The nutation in closed loop on two plants",
+    )
+    return Drawing(
+        "closed_loop.png", "The same run on MuJoCo and on the Lagrangian under our own RK4.", figure
+    )
+
+
+def draw_convergence(evidence: Evidence) -> Drawing:
+    """Orders of convergence."""
+    from spheretwin.viz.figures import crosscheck
+
+    slopes = {
+        name: crosscheck.Slope(*measured) for name, measured in evidence.of(Trajectories).convergence.items()
+    }
+    figure = crosscheck.convergence(slopes, "Order of convergence against DOP853")
+    return Drawing("convergence.png", "Largest error over 5 s at five steps, with the fitted slopes.", figure)
+
+
+def draw_differences(evidence: Evidence) -> Drawing:
+    """Differences of engines and Lagrangian at random states."""
+    from spheretwin.viz.figures import crosscheck
+
+    bounds = {quantity.name: quantity.bound for quantity in dynamics.QUANTITIES}
+    figure = crosscheck.spreads(
+        evidence.of(dynamics.Dynamics).differences, bounds, "Engines against the Lagrangian at random states"
+    )
+    caption = "Relative differences at random states of all three plants; 1e-18 stands for none at all."
+    return Drawing("dynamics.png", caption, figure)
+
+
+def draw_friction(evidence: Evidence) -> Drawing:
+    """Friction of a hinge: ours and MuJoCo's."""
+    from spheretwin.viz.figures import crosscheck
+
+    def drawn(bearing: Bearing) -> tuple[crosscheck.Ramped, crosscheck.Resting]:
+        hinge, ramp, coast = bearing.hinge, bearing.ramp, bearing.coast
+        level = hinge.coulomb_Nm
+        rates = {way: motion.qdot_rad_s for way, motion in coast.motions.items()}
+        return (
+            crosscheck.Ramped(
+                ramp.torque_Nm, ramp.rates_rad_s, ramp.ideal_rad_s, level, PUSH * level, bearing.creep_rad_s
+            ),
+            crosscheck.Resting(coast.t_s, rates, coast.ideal_rad_s, hinge.ideal_time_s(START_rad_s)),
+        )
+
+    bearings = evidence.of(HingeFriction).bearings
+    figure = crosscheck.hinge_friction(
+        {
+            f"Coulomb {name}, viscous {1e3 * VISCOUS_Nm_s:g} mN·m·s": drawn(bearing)
+            for name, bearing in bearings.items()
+        },
+        "Friction of one hinge: our stage, and MuJoCo's friction loss and damping",
+    )
+    caption = (
+        "Sticking, breakaway, sliding and coming to rest of hinge γ under our stage of friction and under"
+        " MuJoCo's own, and under ideal friction; dots: settled under half of the level."
+    )
+    return Drawing("friction.png", caption, figure)
+
+
+def draw_margins(evidence: Evidence) -> Drawing:
+    """How much of its bound each figure takes up."""
+    from spheretwin.viz.figures import crosscheck
+
+    shares = {
+        check.name: check.value / check.bound if np.isfinite(check.value) else np.inf
+        for check in evidence.checks
+        if check.value is not None and check.bound is not None and check.at_least is None
+    }
+    figure = crosscheck.margins(shares, "How much of its bound each figure takes up")
+    caption = "Value over bound; orders of convergence and breakaway torques, which have two, are below."
+    return Drawing("margins.png", caption, figure)
+
+
+def draw_torque_free(evidence: Evidence) -> Drawing:
+    """Drift of what a torque-free rotor keeps."""
+    from spheretwin.viz.figures import crosscheck
+
+    found = evidence.of(free_rotor.FreeRotor)
+    axis = {
+        "energy": "energy, relative",
+        "angular momentum": "angular momentum,\nrelative",
+        "attitude": "attitude, rad",
+    }
+    panels = {
+        axis[quantity]: {
+            f"{spin} rad/s": crosscheck.Bounded(drift.values, drift.bound) for spin, drift in by_spin.items()
+        }
+        for quantity, by_spin in found.drifts.items()
+    }
+    title = f"Torque-free rotor over {free_rotor.DURATION_s:g} s, by spin rate"
+    figure = crosscheck.drifts(found.t_s, panels, title)
+    caption = "Drift of energy and angular momentum, and attitude against Euler's exact solution at J1 = J2."
+    return Drawing("torque_free.png", caption, figure)
+
+
+def draw_trajectory(evidence: Evidence) -> Drawing:
+    """A motion by given torques, and how far engine and reference part."""
+    from spheretwin.viz.figures import crosscheck
+
+    followed = evidence.of(trajectories.Trajectories)
+    figure = crosscheck.motion(
+        followed.t_s,
+        followed.q_rad,
+        followed.difference_rad,
+        trajectories.BOUND_rad,
+        "MuJoCo RK4 against DOP853 on the Lagrangian, torques held over 10 ms",
+    )
+    return Drawing(
+        "trajectory.png", "Nutation by given torques, and how far engine and reference part.", figure
+    )
+
+
+FIGURES: tuple[Callable[[Evidence], Drawing], ...] = (
+    draw_margins,
+    draw_differences,
+    draw_trajectory,
+    draw_convergence,
+    draw_torque_free,
+    draw_friction,
+    draw_closed_loop,
+)
+
+
+PAGE = "crosscheck.md"
+
+HEAD = ("check", "what is compared", "states", "value", "bound", "kept", "why the bound")
+NUMBERS = (False, False, True, True, True, False, False)
+
+
+def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path:
+    """Write the page and its figures into a folder; returns the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    evidence : Evidence
+        What the suite left.
+    versions : mapping
+        Version by package, for the foot of the page.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written there.
+    """
+    drawings = [draw(evidence) for draw in FIGURES]
+    save_drawings(folder, drawings)
+    return save_text(folder / PAGE, markdown(evidence.checks, drawings, versions))
+
+
+def markdown(checks: list[Check], drawings: list[Drawing], versions: Mapping[str, str]) -> str:
+    """Text of the page."""
+    names = broken(checks)
+    verdict = f"**Broken: {'; '.join(names)}.**" if names else "Every bound is kept."
+    used = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return "\n".join(
+        [
+            "# Cross-check",
+            "",
+            "The engine (MuJoCo) against the Lagrangian model, which knows nothing of it, and against"
+            f" Pinocchio. {verdict}",
+            "",
+            *pieces.table(HEAD, [_row(check) for check in checks], NUMBERS),
+            "",
+            *map(pieces.figure, drawings),
+            f"Made by `spheretwin crosscheck` with {used}.",
+            "",
+        ]
+    )
+
+
+def _row(check: Check) -> tuple[str, ...]:
+    kept = "yes" if check.ok else "**no**"
+    figures = f"{check.states:,}", check.value_text(), check.bound_text()
+    return check.name, check.compares, *figures, kept, check.why

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedDrive
-from spheretwin.twin.electronics.sensing.chain import accuracy
-from spheretwin.twin.electronics.sensing.sections import SensorsSection
+from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
+from spheretwin.electronics.sensor_chain import SensorsSection, accuracy
 
 
 def drive_sheet(drive: ResolvedDrive) -> dict[str, Any]:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from spheretwin.models.base.wording import did_you_mean, shown
-from spheretwin.models.telemetry.series import LONGEST_s
-from spheretwin.twin.faults.target import LARGEST, Mode, Target
-from spheretwin.twin.faults.targets.registry import TARGETS
+from spheretwin.faults.effects import LARGEST, Mode, Target
+from spheretwin.faults.targets import TARGETS
+from spheretwin.models.base.errors import did_you_mean, shown
+from spheretwin.models.telemetry.csv_series import LONGEST_s
 
 MODES = tuple(dict.fromkeys(mode for target in TARGETS.values() for mode in target.modes))
 """Names of all ways in which something can fail; the telemetry counts them from 1."""

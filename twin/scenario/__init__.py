@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.twin.scenario.changing import check_events, fields_with
-from spheretwin.twin.scenario.hardware import left_open
-from spheretwin.twin.scenario.reading import beside, override, validated
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.trajectories.registry import SHAPES
+from spheretwin.scenario.changes import check_events, fields_with
+from spheretwin.scenario.reading import beside, override, validated
+from spheretwin.scenario.sections import Scenario, left_open
+from spheretwin.trajectories import SHAPES
 
 
 def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:

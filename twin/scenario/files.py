@@ -13,8 +13,8 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf, torque_curve
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.mjcf import Mjcf
-from spheretwin.twin.scenario.fields import SHIPPED
-from spheretwin.twin.scenario.sections import ResolvedScenario, Scenario
+from spheretwin.scenario.fields import SHIPPED
+from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
 
 class Files(NamedTuple):

@@ -2,29 +2,113 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializeAsAny, field_validator, model_validator
 
-from spheretwin.control.allocation.registry import ALLOCATIONS
-from spheretwin.control.estimation.ideal import Ideal
-from spheretwin.control.estimation.registry import AnyEstimator
+from spheretwin.control.allocation import ALLOCATIONS
+from spheretwin.control.estimators import AnyEstimator
+from spheretwin.control.estimators.estimator import Ideal
+from spheretwin.control.law import LARGEST, NonNegative, Positive
+from spheretwin.control.law_components.parameters import ControllerSection, LawParameters
+from spheretwin.control.laws import AnyLaw
 from spheretwin.control.laws.afsm import AFSM
-from spheretwin.control.laws.registry import AnyLaw
-from spheretwin.control.manual import ManualSection
-from spheretwin.control.parts.parameters import LARGEST, ControllerSection, NonNegative, Positive
-from spheretwin.control.supervision.detector import DetectorSection
+from spheretwin.control.manual_currents import ManualSection
+from spheretwin.control.supervision.fault_detector import DetectorSection
 from spheretwin.control.supervision.watchdog import WatchdogSection
-from spheretwin.twin.disturbances.disturbance import Disturbance
-from spheretwin.twin.electronics.driving.delay import delay
-from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedDrive
-from spheretwin.twin.electronics.sensing.sections import SensorsSection
-from spheretwin.twin.faults.fault import Fault, check_gains
-from spheretwin.twin.plant.registry import ENGINES
-from spheretwin.twin.scenario.fields import SHIPPED
-from spheretwin.twin.scenario.hardware import HARDWARE
-from spheretwin.twin.trajectories.registry import Trajectory
-from spheretwin.twin.trajectories.trajectory import Bounded, Triple
+from spheretwin.control.user_law import parameters_of
+from spheretwin.disturbances import Disturbance
+from spheretwin.electronics.data_sheet import drive_sheet, sensor_sheet
+from spheretwin.electronics.delay import delay
+from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
+from spheretwin.electronics.prototype import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
+from spheretwin.electronics.sensor_chain import SensorsSection
+from spheretwin.faults.fault import Fault, check_gains
+from spheretwin.models.base.user_code import is_reference
+from spheretwin.plant.step import ENGINES
+from spheretwin.scenario.fields import SHIPPED
+from spheretwin.trajectories import Trajectory
+from spheretwin.trajectories.rounding import Bounded, Triple
+
+NOMINAL = "nominal"
+
+# Joint bearings: assumed, as no sheet is at hand (2 mN·m is the lighter of two guesses, 5 the heavier).
+PROTOTYPE_BEARINGS: dict[str, Any] = {
+    "plant.coulomb_Nm": (2e-3, 2e-3, 2e-3),
+    "plant.viscous_Nm_s": (1e-4, 1e-4, 1e-4),
+}
+
+# The prototype's software is not described: rates are estimated by the filter of least noise for its lag.
+PROTOTYPE_ESTIMATOR: dict[str, Any] = {"estimator.kind": "kalman"}
+
+# Assumed: a laboratory does not run such a machine without one.
+PROTOTYPE_WATCHDOG: dict[str, Any] = {"watchdog.on": True}
+
+
+def _section(fields: dict[str, Any]) -> dict[str, Any]:
+    """Fields of one section by name, those of the sections in it as well, from fields by dotted name."""
+    section: dict[str, Any] = {}
+    for dotted, value in fields.items():
+        _, *above, name = dotted.split(".")
+        inside = section
+        for part in above:
+            inside = inside.setdefault(part, {})
+        inside[name] = value
+    return section
+
+
+# The controller is built by the sheets of its own machine.
+PROTOTYPE_NOMINAL: dict[str, Any] = {
+    f"{NOMINAL}.{name}": value
+    for name, value in {
+        **_section(PROTOTYPE_BEARINGS),
+        **drive_sheet(ResolvedDrive.model_validate(_section(PROTOTYPE_DRIVE))),
+        **sensor_sheet(SensorsSection.model_validate(_section(PROTOTYPE_SENSORS))),
+    }.items()
+}
+
+HARDWARE: dict[str, dict[str, Any]] = {
+    "ideal": {},
+    "prototype": {
+        **PROTOTYPE_SENSORS,
+        **PROTOTYPE_DRIVE,
+        **PROTOTYPE_BEARINGS,
+        **PROTOTYPE_ESTIMATOR,
+        **PROTOTYPE_WATCHDOG,
+        **PROTOTYPE_NOMINAL,
+    },
+}
+"""Fields by dotted name that a set gives a value to; each of them can be set alone as well."""
+
+
+def left_open(fields: dict[str, Any], name: Any) -> dict[str, Any]:
+    """Return the fields of a set that given fields by section do not state."""
+    nominal = fields.get(NOMINAL)
+    knows_truth = isinstance(nominal, dict) and nominal.get("equals_truth") is True
+    return {
+        dotted: value
+        for dotted, value in fields_of_set(name, knows_truth).items()
+        if not _said(fields, dotted)
+    }
+
+
+def fields_of_set(name: str, knows_truth: bool) -> dict[str, Any]:
+    """Return the fields of a set; a nominal model that equals the truth takes none of its own from it."""
+    return {
+        dotted: value
+        for dotted, value in HARDWARE.get(name, {}).items()
+        if not (knows_truth and dotted.startswith(f"{NOMINAL}."))
+    }
+
+
+def _said(fields: Any, dotted: str) -> bool:
+    for part in dotted.split("."):
+        if not isinstance(fields, dict) or part not in fields:
+            return False
+        fields = fields[part]
+    return True
+
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 
@@ -339,3 +423,42 @@ def _check_late(name: str, delay_s: float, step_s: float, period_s: float) -> No
             f"expected {name} a whole multiple of {step_s!r} s, at most {MOST_DELAY} control periods,"
             f" received {delay_s!r} s"
         )
+
+
+def scenario_with(law: Any) -> type[Scenario]:
+    """Class of scenarios with a law: the common one, or one whose laws are those shipped and a user's.
+
+    Raises
+    ------
+    InputError
+        The law is one in a file, and cannot be had.
+    """
+    return _extended(parameters_of(law)) if is_reference(law) else Scenario
+
+
+def kind_of_scenario(scenario: Scenario) -> type[Scenario]:
+    """Class of the scenarios with the law of a scenario, as it was read."""
+    controller = scenario.controller
+    if is_reference(controller.law) and isinstance(controller, LawParameters):
+        return _extended(type(controller))
+    return Scenario
+
+
+@lru_cache(maxsize=32)
+def _extended(own: type[LawParameters]) -> type[Scenario]:
+    laws: Any = Annotated[get_args(AnyLaw)[0] | own, Field(discriminator="law")]
+
+    class Extended(Scenario):
+        controller: SerializeAsAny[laws] = Scenario.model_fields["controller"].default
+
+        def __reduce__(self) -> tuple[Any, ...]:
+            """A class made for a file is made anew where it is unpickled; what the scenario holds stays."""
+            return _blank, (own.model_fields["law"].default,), self.__getstate__()
+
+    Extended.__name__ = Extended.__qualname__ = Scenario.__name__
+    return Extended
+
+
+def _blank(law: str) -> Scenario:
+    kind = scenario_with(law)
+    return kind.__new__(kind)

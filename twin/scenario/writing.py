@@ -10,10 +10,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from spheretwin.twin.scenario.changing import fields_with
-from spheretwin.twin.scenario.hardware import left_open
-from spheretwin.twin.scenario.reading import override, read, shipped, validated
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.scenario.changes import fields_with
+from spheretwin.scenario.reading import override, read, shipped, validated
+from spheretwin.scenario.sections import Scenario, left_open
 
 # A shipped scenario that sets little: one that is not shipped is told by how it differs from it.
 PLAIN = "tilt"

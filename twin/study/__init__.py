@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from spheretwin.twin.study.running import Found, carried_out
-from spheretwin.twin.study.study import Study, load
+from spheretwin.study.runner import Found, carried_out
+from spheretwin.study.study import Study, load
 
 
 def run(

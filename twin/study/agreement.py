@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from spheretwin.metrics import Planned, RmsError
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin.metrics.metric import Planned
-from spheretwin.twin.metrics.tracking.rms_error import RmsError
-from spheretwin.twin.simulation import follow
-from spheretwin.twin.study.grid import Row
-from spheretwin.twin.study.plants import FAST, FULL
-from spheretwin.twin.study.row import Rows, follower
+from spheretwin.simulation import follow
+from spheretwin.study.grid import Row
+from spheretwin.study.row import Rows, follower
+from spheretwin.study.study import FAST, FULL
 
 EVERY = 100
 

@@ -10,30 +10,30 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
+from spheretwin.metrics import METRICS, Metric, Planned
+from spheretwin.models.base.errors import (
+    InputError,
+    LawError,
+    SpheretwinError,
+    did_you_mean,
+    exception_text,
+    shown,
+)
 from spheretwin.models.base.user_code import is_reference, load_function
-from spheretwin.models.base.wording import did_you_mean, exception_text, shown
-from spheretwin.models.telemetry.file import TelemetryFile
-from spheretwin.models.telemetry.kept import KeptTelemetry
+from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin.metrics.metric import Metric, Planned
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.records.facts import record_of
-from spheretwin.twin.records.summary import OwnMetric, check_names, own_value
-from spheretwin.twin.scenario import reading
-from spheretwin.twin.scenario.changing import check_events, fields_with, is_tag
-from spheretwin.twin.scenario.fields import INDEX, every_field
-from spheretwin.twin.scenario.files import Files, files_of, named_files
-from spheretwin.twin.scenario.hardware import left_open
-from spheretwin.twin.scenario.own_law import scenario_with
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import Run, Sink, follow
-from spheretwin.twin.study.axes.axis import Axis
-from spheretwin.twin.study.grid import Row
-from spheretwin.twin.study.plants import fast_engine
-from spheretwin.twin.study.study import Study
-from spheretwin.twin.study.template import Template, are_numbers, template_of
+from spheretwin.models.telemetry.table import KeptTelemetry
+from spheretwin.run import OwnMetric, check_names, own_value, record_of
+from spheretwin.scenario import reading
+from spheretwin.scenario.changes import check_events, fields_with, is_tag
+from spheretwin.scenario.fields import INDEX, every_field
+from spheretwin.scenario.files import Files, files_of, named_files
+from spheretwin.scenario.sections import Scenario, left_open, scenario_with
+from spheretwin.session import Session
+from spheretwin.simulation import Run, Sink, follow
+from spheretwin.study.axes import Axis
+from spheretwin.study.grid import Row, Template, are_numbers, template_of
+from spheretwin.study.study import Study, fast_engine
 
 ENGINE = "plant.engine"
 

@@ -8,6 +8,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -22,16 +23,16 @@ from pydantic import (
     model_validator,
 )
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.metrics import METRICS
+from spheretwin.models import mjcf
+from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.base.errors import InputError, did_you_mean, is_plain, shown, without_breaks
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.models.base.wording import did_you_mean, is_plain, shown, without_breaks
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.scenario.explaining import explain
-from spheretwin.twin.study.axes.axis import MOST_VALUES, Axis
-from spheretwin.twin.study.axes.registry import AnyAxis
-from spheretwin.twin.study.tuning.section import Optimise
+from spheretwin.scenario.fields import explain
+from spheretwin.study.axes import MOST_VALUES, AnyAxis, Axis
+from spheretwin.study.optimise import Optimise
 
-FOLDER = resources.files("spheretwin.twin.study") / "shipped"
+FOLDER = resources.files("spheretwin.study") / "shipped"
 
 
 class Study(BaseModel):
@@ -227,3 +228,29 @@ def made(fields: dict[str, Any], source: str) -> Study:
         return Study.model_validate_json(json.dumps(fields, default=str))
     except ValidationError as error:
         raise InputError(f"study {source}: {explain(error, Study)}") from None
+
+
+FAST, FULL = "lagrangian", "mujoco"
+
+
+def fast_engine(named: str | None, integrator: str) -> str:
+    """Fastest plant that a scenario allows.
+
+    Parameters
+    ----------
+    named : str, optional
+        Its model file; the shipped one unless given.
+    integrator : str
+        Its integrator: the equations of motion have one.
+    """
+    path = Path(named) if named else MJCF_PATH
+    return FAST if integrator == "RK4" and _is_free_rotor(path) else FULL
+
+
+@lru_cache(maxsize=8)
+def _is_free_rotor(path: Path) -> bool:
+    """Whether a model holds no more than the Lagrangian knows; one that cannot be read will say so itself."""
+    try:
+        return not mjcf.read(path).unknown_to_the_lagrangian
+    except InputError:
+        return False

@@ -9,13 +9,13 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from spheretwin.metrics import METRICS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry import checksums
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.scenario import reading
-from spheretwin.twin.study.grid import Grid, Row
-from spheretwin.twin.study.kept.journal import Journal
-from spheretwin.twin.study.row import Result, Rows
+from spheretwin.scenario import reading
+from spheretwin.study.grid import Grid, Row
+from spheretwin.study.journal import Journal
+from spheretwin.study.row import Result, Rows
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -7,18 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import exception_text, shown
-from spheretwin.twin.trajectories.approach import Approach
+from spheretwin.models.base.errors import InputError, exception_text, shown
+from spheretwin.trajectories.rounding import CONFIG as CONFIG
+from spheretwin.trajectories.rounding import LARGEST as LARGEST
+from spheretwin.trajectories.rounding import ZERO as ZERO
+from spheretwin.trajectories.rounding import Approach, Corners, least_acceleration, no_corners, rounded, told
+from spheretwin.trajectories.rounding import Bounded as Bounded
+from spheretwin.trajectories.rounding import Time as Time
+from spheretwin.trajectories.rounding import Triple as Triple
 
 # The file of a shape finds here all that it needs of these.
-from spheretwin.twin.trajectories.numbers import CONFIG as CONFIG
-from spheretwin.twin.trajectories.numbers import LARGEST as LARGEST
-from spheretwin.twin.trajectories.numbers import ZERO as ZERO
-from spheretwin.twin.trajectories.numbers import Bounded as Bounded
-from spheretwin.twin.trajectories.numbers import Time as Time
-from spheretwin.twin.trajectories.numbers import Triple as Triple
-from spheretwin.twin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded, told
 
 Samples = NDArray[np.float64]
 

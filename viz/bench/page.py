@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 import viser
 
-from spheretwin.viz.bench import front
-from spheretwin.viz.bench.drawing.scene import Scene
-from spheretwin.viz.bench.faults import Faults
-from spheretwin.viz.bench.hand import Event, Hand, client_name, on_press
-from spheretwin.viz.bench.keeping import Keeping
-from spheretwin.viz.bench.machine import Bench, Choices
-from spheretwin.viz.bench.modes import Modes
-from spheretwin.viz.bench.plots import Plots
-from spheretwin.viz.bench.settings import Settings
-from spheretwin.viz.bench.status import TAKE_OVER, currents_html, scale_html, status_html
+from spheretwin.viz.bench import server as front
+from spheretwin.viz.bench.event_handlers import Event, Hand, client_name, on_press
+from spheretwin.viz.bench.modes_tab import Modes
+from spheretwin.viz.bench.protocols import Bench, Choices
+from spheretwin.viz.bench.scene import Scene
+from spheretwin.viz.bench.settings_tab import Settings
+from spheretwin.viz.bench.status_panel import TAKE_OVER, currents_html, scale_html, status_html
+from spheretwin.viz.bench.tabs import Faults, Keeping, Plots
 
 FRAME_S = 1 / 30
 """The picture moves this often; words and curves every so many frames, the fields' values rarely."""

@@ -7,12 +7,11 @@ from functools import lru_cache
 import rerun as rr
 import rerun.blueprint as rrb
 
-from spheretwin.viz.layout import panels
-from spheretwin.viz.layout.paths import TIMELINE
+from spheretwin.viz.layout import views
+from spheretwin.viz.layout.extents import Seen
 from spheretwin.viz.layout.plots import Plots
-from spheretwin.viz.layout.seen import Seen
-from spheretwin.viz.layout.view import View
-from spheretwin.viz.layout.views.registry import VIEWS
+from spheretwin.viz.layout.view import TIMELINE, View
+from spheretwin.viz.layout.views import VIEWS
 
 # The run in a line takes two lines of text.
 ROW_SHARES = (1, 10)
@@ -53,7 +52,7 @@ class _Small(rrb.Blueprint):
 
 def _blueprint(below: rrb.Container | rrb.View, view: View) -> rrb.Blueprint:
     return _Small(
-        rrb.Vertical(panels.run_line(), below, row_shares=ROW_SHARES),
+        rrb.Vertical(views.run_line(), below, row_shares=ROW_SHARES),
         rrb.TimePanel(
             state="collapsed",
             timeline=TIMELINE,

@@ -8,16 +8,15 @@ import rerun as rr
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.models.telemetry.facts import RunFacts
+from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
+from spheretwin.viz.decimation import Firsts
 from spheretwin.viz.layout.layout import opening_layout
 from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.parts.part import Subject
+from spheretwin.viz.recording.part import Subject
 from spheretwin.viz.recording.stream import Stream
-from spheretwin.viz.recording.thinning import Firsts
-from spheretwin.viz.recording.viewer.broadcast import Broadcast
-from spheretwin.viz.recording.viewer.framing import HEADER_BYTES, messages
-from spheretwin.viz.recording.viewer.server import ViewerServer
+from spheretwin.viz.recording.viewer_server import Broadcast, ViewerServer
+from spheretwin.viz.rerun_internals import HEADER_BYTES, messages
 
 # More than a plot has pixels for; few enough for a viewer that draws in software.
 LIVE_RATE_Hz = 100.0

@@ -8,16 +8,15 @@ from uuid import uuid4
 import rerun as rr
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 from spheretwin.models.base.files import OPEN_FILES, OutputFile, PartialFile
-from spheretwin.models.base.wording import without_breaks
-from spheretwin.models.telemetry.facts import RunFacts
+from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
+from spheretwin.viz.decimation import FirstsAndExtremes, Thinning
 from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
-from spheretwin.viz.recording.parts.part import Subject
+from spheretwin.viz.recording.part import Subject
 from spheretwin.viz.recording.stream import Stream
-from spheretwin.viz.recording.thinning import FirstsAndExtremes, Thinning
+from spheretwin.viz.rerun_internals import PIPE_PATHS, FilePipe
 
 # Rerun keeps some bytes of each chunk to the end of a recording. Chunks therefore grow with it, up to this.
 MOST_ROWS = 12_288

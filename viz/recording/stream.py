@@ -13,15 +13,33 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from spheretwin.models.base.wording import without_breaks
-from spheretwin.models.telemetry.status import Level, Status, named
+from spheretwin.models.base.errors import without_breaks
+from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.decimation import Thinning
 from spheretwin.viz.layout.view import application
-from spheretwin.viz.recording.parts.events import Event
-from spheretwin.viz.recording.parts.part import Rows, Subject
-from spheretwin.viz.recording.parts.registry import PARTS
-from spheretwin.viz.recording.thinning import Thinning
+from spheretwin.viz.recording.part import Part, Rows, Subject
+from spheretwin.viz.recording.plots import Currents, PhasePlane, Quantities
+from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
+from spheretwin.viz.recording.signals import ScenarioText, Signals
+from spheretwin.viz.recording.status import Limits, Log, States
 from spheretwin.viz.scene.meshes import read_meshes
+
+PARTS: tuple[type[Part], ...] = (
+    ScenarioText,
+    Signals,
+    MovingActuator,
+    Traces,
+    Torques,
+    Ending,
+    States,
+    Limits,
+    Log,
+    Currents,
+    PhasePlane,
+    Quantities,  # the last: when a run has ended it sends the layout
+)
+
 
 # Chunks handed over and not yet recorded; beyond these a run waits for its recorder, so that a long one
 # does not gather in memory.

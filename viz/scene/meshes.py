@@ -2,29 +2,153 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from collections import defaultdict
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import read_magnet_and_coil
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.actuator import Coil, read_magnet_and_coil
+from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.mujoco_library import compiler_warnings
-from spheretwin.models.base.wording import without_breaks
 from spheretwin.models.mjcf import fingerprint
-from spheretwin.viz import palette
-from spheretwin.viz.scene import gltf
-from spheretwin.viz.scene.coils import coil_mesh
-from spheretwin.viz.scene.paths import WORLD
+from spheretwin.viz import theme
+from spheretwin.viz.scene.solids import merged_surface, revolved_surface
+
+MEDIA_TYPE = "model/gltf-binary"
+
+# Of the format: what its numbers mean.
+_FLOAT, _SHORT, _INT = 5126, 5123, 5125
+_MAGIC, _VERSION = b"glTF", 2
+_JSON, _BINARY = b"JSON", b"BIN\0"
+_HEADER_BYTES = 12
+
+
+def binary(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> bytes:
+    """One mesh without normals, as glTF has it: the viewer shades each triangle by its own.
+
+    Parameters
+    ----------
+    positions : (n, 3) array, m
+    triangles : (m, 3) array
+        Corners of each, counter-clockwise from outside.
+    """
+    corner, kind = ("<u2", _SHORT) if len(positions) <= 0xFFFF else ("<u4", _INT)
+    points, corners = positions.astype("<f4"), triangles.astype(corner).ravel()
+    parts = [_padded(array.tobytes()) for array in (points, corners)]
+    bounds = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
+    described = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": _FLOAT, "count": len(points), "type": "VEC3", **bounds},
+            {"bufferView": 1, "componentType": kind, "count": len(corners), "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": points.nbytes},
+            {"buffer": 0, "byteOffset": len(parts[0]), "byteLength": corners.nbytes},
+        ],
+        "buffers": [{"byteLength": sum(map(len, parts))}],
+    }
+    return _file(described, b"".join(parts))
+
+
+def _file(described: dict[str, Any], contents: bytes) -> bytes:
+    text = _padded(json.dumps(described, separators=(",", ":")).encode(), b" ")
+    chunks = _chunk(_JSON, text) + _chunk(_BINARY, contents)
+    return struct.pack("<4sII", _MAGIC, _VERSION, _HEADER_BYTES + len(chunks)) + chunks
+
+
+def _chunk(kind: bytes, contents: bytes) -> bytes:
+    return struct.pack("<I4s", len(contents), kind) + contents
+
+
+def _padded(contents: bytes, filling: bytes = b"\0") -> bytes:
+    """To whole words of four bytes."""
+    return contents + filling * (-len(contents) % 4)
+
+
+# What a coil looks like beside its numbers: a winding between two flanges.
+SECTIONS = 14
+FLANGE_SHARE = 0.07  # of the length
+RECESS_SHARE = 0.12  # of the winding's depth
+
+
+def coil_mesh(coil: Coil, centres: Array, axes: Array, places: list[int], count: int) -> rr.Mesh3D:
+    """All coils as one mesh; each looks up its own pixel of a texture, whose bytes then change over time.
+
+    Of the ways to colour dozens of coils at 60 Hz this is the cheapest that keeps their shape: a mesh entity
+    for each costs the viewer three times as long a frame.
+
+    Parameters
+    ----------
+    coil : Coil
+        Its radii and its length.
+    centres : (n, 3) array, m
+        Where coils are drawn.
+    axes : (n, 3) array
+        Unit vectors along them.
+    places : list of int
+        Each one's place among the actuator's coils.
+    count : int
+        How many the actuator has.
+    """
+    one = revolved_surface(_outline(coil), SECTIONS)
+    drawn = [one.placed(_turned_to(axis), centre) for axis, centre in zip(axes, centres, strict=True)]
+    pixel = np.repeat((np.array(places) + 0.5) / count, len(one.positions))
+    whole = merged_surface(drawn)
+    return rr.Mesh3D.from_fields(
+        vertex_positions=whole.positions,
+        vertex_normals=whole.normals,
+        triangle_indices=whole.triangles,
+        vertex_texcoords=np.stack([pixel, np.full_like(pixel, 0.5)], axis=1),
+        albedo_texture_format=rr.components.ImageFormat(
+            width=count, height=1, color_model="RGB", channel_datatype="U8"
+        ),
+    )
+
+
+def _outline(coil: Coil) -> list[tuple[float, float]]:
+    """Corners of a coil's outline, each distance from the axis and height along it, m."""
+    bore, radius, half = coil.inner_radius_m, coil.outer_radius_m, coil.length_m / 2
+    flange = FLANGE_SHARE * coil.length_m
+    winding, edge = radius - RECESS_SHARE * (radius - bore), half - flange
+    above = [(winding, edge), (radius, edge), (radius, half), (bore, half)]
+    below = [(distance, -height) for distance, height in reversed(above)]
+    return [*below, *above, below[0]]
+
+
+def _turned_to(axis: Array) -> Array:
+    """A rotation that takes z to a unit vector: its columns."""
+    aside = np.eye(3)[np.argmin(np.abs(axis))]
+    x = np.cross(aside, axis)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)
+
+
+WORLD = "world"
+COILS = f"{WORLD}/coils"
+TORQUES = f"{WORLD}/torques"
+FAILURE = f"{WORLD}/failure"
+FAILURE_TEXT = f"{FAILURE}/text"
+AXES = f"{WORLD}/axes"
+ROTOR_AXES = f"{WORLD}/rotor/axes"
+PAYLOAD = f"{WORLD}/rotor/payload"
+CURRENT_SCALE = f"{WORLD}/current_scale"
+
 
 Array = NDArray[np.float64]
 
-POLES = {1: ("poles_north", palette.NORTH), -1: ("poles_south", palette.SOUTH)}
+POLES = {1: ("poles_north", theme.NORTH), -1: ("poles_south", theme.SOUTH)}
 """Name and colour of poles by their polarity."""
 
 FRAME = "frame"
@@ -43,14 +167,14 @@ class Piece(NamedTuple):
 
     positions: Array  # (n, 3) m, as in the mesh's file
     triangles: NDArray[np.int64]  # (m, 3), counter-clockwise from outside
-    colour: palette.Colour
+    colour: theme.Colour
     rotations: Array  # (copies, 3, 3), into the frame of the body that carries them
     translations: Array  # (copies, 3) m
 
     def archetypes(self) -> list[rr.Asset3D | rr.InstancePoses3D]:
         """In the form in which a recording takes it: without poses where its body carries one as it is."""
-        contents = gltf.binary(self.positions, self.triangles)
-        asset = rr.Asset3D(contents=contents, media_type=gltf.MEDIA_TYPE, albedo_factor=self.colour)
+        contents = binary(self.positions, self.triangles)
+        asset = rr.Asset3D(contents=contents, media_type=MEDIA_TYPE, albedo_factor=self.colour)
         if self._lies_as_in_its_file():
             return [asset]
         return [asset, rr.InstancePoses3D(translations=self.translations, mat3x3=self.rotations)]
@@ -75,7 +199,7 @@ class Look(NamedTuple):
     body: int
     mesh: int
     name: str
-    colour: palette.Colour
+    colour: theme.Colour
 
 
 def read_meshes(mjcf: Path) -> Meshes:

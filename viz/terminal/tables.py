@@ -1,137 +1,91 @@
-"""For people, on stdout: what a run found, where files are, and what a scenario's fields are."""
+"""How every table looks, and how wide it may be."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any
+import os
+from collections.abc import Sequence
 
+from rich import box
+from rich.cells import cell_len
+from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
 
-from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.models.telemetry.status import Level, Status, named
-from spheretwin.viz.terminal import style
-from spheretwin.viz.terminal.style import three_digits
+from spheretwin.models.base.checks import Check, broken
 
-ERRORS = {
-    "largest": "max_abs_error_rad",
-    "rms": "rms_error_rad",
-    "rms, second half": "tail_rms_error_rad",
-}
-
-COLOURS = {Level.INFO: "italic", Level.WARN: "bold yellow", Level.ERROR: "bold red"}
+WIDTH_WITHOUT_TERMINAL = 100
+LEAST = 1e-3
+"""Smaller figures are written as less than this: all that they say is that they do not matter."""
 
 
-def print_run(law: str, planned_s: float, summary: dict[str, Any], own: Sequence[str] = ()) -> None:
-    """Print the figures of one run: errors per axis, currents and speed, then those of the user's own."""
-    console, status = style.console(), named(summary["status"])
-    title = f"{summary['scenario']['name']} under {law}: {_ending(status, planned_s, summary)}"
-    errors = style.table(title, "tracking error, mrad (degrees)", *ANGLES)
-    errors.title_style = COLOURS[status.level]
-    for label, key in ERRORS.items():
-        errors.add_row(label, *(angle(value) for value in summary[key] or ()))
-    settled = summary["settling_time_s"] or ()
-    errors.add_row("settled after", *("never" if t is None else f"{three_digits(t)} s" for t in settled))
-    console.print(errors)
-    if summary["max_abs_current_A"] is not None:
-        console.print(
-            f"largest current {summary['max_abs_current_A']:.2f} A,"
-            f" the limit cut the torque at {100 * summary['saturated_fraction']:.1f} % of the ticks"
-        )
-    if summary["rms_torque_Nm"] is not None:
-        console.print(
-            f"rms torque {summary['rms_torque_Nm']:.4f} N·m, copper {summary['copper_loss_J']:.2f} J"
-        )
-    if summary["current_variation_A_s"] is not None:
-        console.print(f"commands vary by {summary['current_variation_A_s']:.1f} A/s a group")
-    for name in own:
-        console.print(f"{name} {escape(str(summary[name]))}", soft_wrap=True)
-    if summary["realtime_factor"] is not None:
-        console.print(
-            f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.3f} s:"
-            f" {summary['realtime_factor']:.0f} times real time"
-        )
-    for note in summary["notes"]:
-        console.print(escape(note), soft_wrap=True)
-    for warning in summary["warnings"]:
-        console.print(f"[yellow]warning[/yellow]  {escape(warning)}", soft_wrap=True)
+def terminal_console() -> Console:
+    """What is written to stdout: as wide as the terminal; in a pipe or a file as wide as one is read."""
+    told = Console()
+    if told.is_terminal or "COLUMNS" in os.environ:
+        return told
+    return Console(width=WIDTH_WITHOUT_TERMINAL)
 
 
-def _ending(status: Status, planned_s: float, summary: dict[str, Any]) -> str:
-    """How a run ended; where it did not complete, also when, and why."""
-    if status == Status.COMPLETED:
-        return status
-    why = f", {summary['reason']}" if summary["reason"] else ""
-    return f"{status} at {summary['simulated_s']:.3f} s of {planned_s:g} s{why}"
+def new_table(title: str, first: str, *others: str, lines: bool = False) -> Table:
+    """A table under its title: what a row is about at the left, figures at the right.
+
+    Where no terminal is, it is Markdown.
+
+    Parameters
+    ----------
+    title, first, others : str
+        As they are, without markup; headings of the columns.
+    lines : bool
+        Whether to part the rows, where they have several lines each.
+    """
+    told = terminal_console()
+    made = Table(
+        title=escape(title),
+        title_justify="left",
+        box=box.HORIZONTALS if told.is_terminal else box.MARKDOWN,
+        pad_edge=not told.is_terminal,
+        show_lines=lines and told.is_terminal,
+        min_width=min(cell_len(title), told.width),  # a title is wrapped to its table
+    )
+    made.add_column(escape(first), overflow="fold")
+    for heading in others:
+        made.add_column(escape(heading), justify="right")
+    return made
 
 
-def angle(value_rad: float) -> str:
-    """An angle in mrad, and in degrees behind it."""
-    return f"{three_digits(1e3 * value_rad)} ({three_digits(math.degrees(value_rad))}°)"
-
-
-def print_scenarios(descriptions: Mapping[str, str]) -> None:
-    """Print what scenarios there are, a line each."""
-    width = max(map(len, descriptions))
-    for name, description in descriptions.items():
-        style.console().print(f"{name:{width}}  {escape(description)}", soft_wrap=True)
-
-
-def print_files(record: Path | None, telemetry: Path | None) -> None:
-    """Print where a run's files are and how to open them."""
-    console = style.console()
-    if telemetry:
-        console.print(f"telemetry  {escape(str(telemetry))}", soft_wrap=True)
-    if record:
-        console.print(f"recording  {escape(str(record))}", soft_wrap=True)
-        console.print(f"open it:   rerun {escape(str(record))}", soft_wrap=True)
-
-
-def print_study(name: str, found: dict[str, Any], summary: dict[str, Any]) -> None:
-    """Print what a study found: rows by status, then each figure's median and 95 % range, a column a law."""
-    figures = [figure for figure in next(iter(summary.values()), {}) if figure != "statuses"]
-    table = style.table(f"{name}: {found['rows']} of {found['of']} rows", "median (95 % range)", *summary)
-    for figure in figures:
-        table.add_row(figure, *(_spread(of_law[figure]) for of_law in summary.values()))
-    counts = [of_law["statuses"] for of_law in summary.values()]
-    for status in sorted({status for each in counts for status in each}):
-        table.add_row(status, *(str(each.get(status, 0)) for each in counts))
-    style.console().print(table)
-    if found["startup_s"] is not None:
-        style.console().print(f"took   {found['wall_s']:.1f} s, {found['startup_s']:.1f} s of it to start")
-    style.console().print(f"table  {escape(found['table'])}", soft_wrap=True)
-
-
-def _spread(figure: dict[str, Any]) -> str:
-    if figure["median"] is None:
+def three_digits(value: float) -> str:
+    """A figure with three significant digits, without a power of ten."""
+    if not math.isfinite(value):
         return "–"
-    low, high = figure["range_95"]
-    return f"{figure['median']:.4g} ({low:.4g} to {high:.4g})"
+    if abs(value) < LEAST:
+        return "0" if value == 0 else f"< {LEAST:g}"
+    places = 2 - math.floor(math.log10(abs(value)))
+    return f"{round(value, places):.{max(places, 0)}f}"
 
 
-def print_written(paths: Sequence[Path]) -> None:
-    """Print where other files were written."""
-    for path in paths:
-        style.console().print(f"written  {escape(str(path))}", soft_wrap=True)
+def print_checks(title: str, checks: Sequence[Check], verbose: bool = False) -> None:
+    """Print a line a check: whether it holds, figure and bound; at length also what each means."""
+    console = terminal_console()
+    table = new_table(title, "", "value", "bound")
+    table.add_column("check")
+    for column in table.columns[:3]:
+        column.no_wrap = True
+    for check in checks:
+        look = "" if check.ok else "bold red"
+        table.add_row(_verdict(check), check.value_text(), check.bound_text(), escape(check.name), style=look)
+    console.print(table)
+    if verbose:
+        for check in checks:
+            console.print(f"\n[bold]{escape(check.name)}[/bold], {check.states} states")
+            console.print(f"compares: {escape(check.compares)}")
+            console.print(f"bound {check.bound_text()}: {escape(check.why)}")
+    console.print(f"{len(checks) - len(broken(checks))} of {len(checks)} checks hold")
+    if not verbose:
+        console.print("What each compares, and why its bound: --verbose.")
 
 
-def print_rows(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], texts: int) -> None:
-    """Print a table whose first `texts` columns are words."""
-    table = style.table(title, head[0], *head[1:])
-    for column in table.columns[1:texts]:
-        column.justify = "left"
-    for row in rows:
-        table.add_row(*(escape(cell) for cell in row))
-    style.console().print(table)
-
-
-def print_fields(scenario: str, rows: Sequence[tuple[str, str, str]]) -> None:
-    """Print every field of a scenario with its value and meaning."""
-    table = style.table(f"fields of {scenario}", "flag")
-    table.columns[0].no_wrap = True
-    table.add_column("value", overflow="fold", max_width=24)
-    table.add_column("meaning", overflow="fold")
-    for row in rows:
-        table.add_row(*map(escape, row))
-    style.console().print(table)
+def _verdict(check: Check) -> str:
+    if not check.ok:
+        return "BROKEN"
+    return "" if check.value is None or check.bound is None else "holds"

@@ -16,15 +16,15 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 import ours
 from problem import problem
 from ratios import fastest, seconds_of
 from telling import Taken, Told
 
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 
 # Ours over the best of JAX, a row.
 AT_MOST = 0.7

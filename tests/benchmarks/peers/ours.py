@@ -9,14 +9,13 @@ import numpy as np
 import pyarrow.parquet as parquet
 from problem import Problem, problem
 
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin import study as studies
-from spheretwin.twin.metrics.metric import Planned
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.session import Session
-from spheretwin.twin.study import grid, row
-from spheretwin.twin.study.study import Study, made
+from spheretwin import scenario as scenarios
+from spheretwin import study as studies
+from spheretwin.metrics import METRICS, Planned
+from spheretwin.scenario.sections import Scenario
+from spheretwin.session import Session
+from spheretwin.study import grid, row
+from spheretwin.study.study import Study, made
 
 SCENARIO = "nutation"
 ROW_s = 1.0

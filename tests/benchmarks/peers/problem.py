@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from spheretwin.disturbances import Draws
+from spheretwin.electronics.drive_chain import Drive, drive
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.magnetics import TorqueModel, torque_model
-from spheretwin.twin.disturbances.draws import Draws
-from spheretwin.twin.electronics.driving.lag import Drive, drive
-from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.scenario.sections import Scenario
 
 
 class Problem(NamedTuple):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spheretwin.control.allocation.registry import ALLOCATIONS, SIGNATURE
+from spheretwin import scenario as scenarios
+from spheretwin.control.allocation import ALLOCATIONS, SIGNATURE
 from spheretwin.models.base.compiled import compiled_callback
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 
 LIMIT_A = 8.0
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.laws.adrc import ADRC, observer_gains
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 from tests.control.laws.cases import PERIOD, follows, known
 
 

@@ -4,15 +4,15 @@ import numba
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.controller import law_at
 from spheretwin.control.law import SIGNATURE, Known
 from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver, boosted
 from spheretwin.models.base.compiled import compiled_callback
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario.changing import changed
-from spheretwin.twin.simulation import simulate
+from spheretwin.scenario.changes import changed
+from spheretwin.simulation import simulate
 
 PERIOD = 1e-3
 CENTRES = np.array([-3, -1.5, 0, 1.5, 3])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.summary import figures_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin import scenario as scenarios
+from spheretwin.run import figures_of
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 SEEDS = range(2)
 CONDITIONS = [(0.0, 0.0), (0.2, 1.0), (0.5, 0.0), (0.5, 5.0)]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.laws.backstepping_sliding_mode import BacksteppingSlidingMode
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 from tests.control.laws.cases import PERIOD, Asked, follows, known
 
 

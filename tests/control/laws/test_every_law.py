@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.control import laws
 from spheretwin.control.law import Known
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -36,7 +36,7 @@ def test_every_law_s_parameters(name, check_parameters):
 # What README and `control.law` tell whoever writes a law, and what laws are made of.
 OPEN_TO_ALL = (
     "spheretwin.control.law",
-    "spheretwin.control.parts",
+    "spheretwin.control.law_components",
     "spheretwin.models.base",
     "spheretwin.models.kinematics",
     "spheretwin.models.lagrangian",

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
+from spheretwin.control.law_components.feedback import triple_pole
 from spheretwin.control.laws.lqi import LQI, regulator
-from spheretwin.control.laws.pid import PID, triple_pole
+from spheretwin.control.laws.pid import PID
 from spheretwin.models.base.errors import InputError
 from tests.control.laws.cases import PERIOD, known
 

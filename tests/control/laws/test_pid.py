@@ -6,12 +6,13 @@ import numba
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.controller import law_at
 from spheretwin.control.law import SIGNATURE, Known
-from spheretwin.control.laws.pid import PID, triple_pole
+from spheretwin.control.law_components.feedback import triple_pole
+from spheretwin.control.laws.pid import PID
 from spheretwin.models.base.compiled import compiled_callback
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 
 PERIOD = 1e-3
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.laws.super_twisting import SuperTwisting
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 from tests.control.laws.cases import PERIOD, Asked, follows, known, on_an_axis
 
 

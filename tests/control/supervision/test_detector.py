@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spheretwin.control.supervision.detector import (
+from spheretwin.control.supervision.enabled_groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, groups
+from spheretwin.control.supervision.fault_detector import (
     DetectorSection,
     Followed,
     derived_threshold_A,
@@ -13,16 +14,15 @@ from spheretwin.control.supervision.detector import (
     detector,
     find,
 )
-from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, groups
-from spheretwin.models.base.copying import restore_state, save_state
+from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, flow
+from spheretwin.electronics.coil import CoilSection, coil
+from spheretwin.electronics.converters import convert, dac
+from spheretwin.electronics.data_sheet import drive_sheet
+from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
+from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
+from spheretwin.models.base.compiled import restore_state, save_state
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.twin.electronics.data_sheet import drive_sheet
-from spheretwin.twin.electronics.driving.amplifier import AmplifierSection, amplifier, drive_coils, flow
-from spheretwin.twin.electronics.driving.coil import CoilSection, coil
-from spheretwin.twin.electronics.driving.dac import convert, dac
-from spheretwin.twin.electronics.driving.sections import DriveSection, ResolvedDrive
-from spheretwin.twin.electronics.hardware import PROTOTYPE_DRIVE
 
 COUNT, R_OHM, L_H, PERIOD_S = 18, 1.3, 0.9e-3, 1e-3
 PROTOTYPE = Followed(

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
-from spheretwin.control.allocation.registry import ALLOCATIONS
-from spheretwin.control.supervision.groups import (
+from spheretwin.control.supervision.enabled_groups import (
     FOUND_OPEN,
     FOUND_SHORTED,
     IN_USE,
@@ -16,7 +16,7 @@ from spheretwin.control.supervision.groups import (
     leave_out,
     tell,
 )
-from spheretwin.models.base.copying import restore_state, save_state
+from spheretwin.models.base.compiled import restore_state, save_state
 from spheretwin.models.magnetics import torque_matrix
 
 COUNT, LIMIT_A = 18, 8.0

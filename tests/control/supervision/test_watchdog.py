@@ -20,7 +20,7 @@ from spheretwin.control.supervision.watchdog import (
     watch,
     watchdog,
 )
-from spheretwin.models.base.copying import restore_state, save_state
+from spheretwin.models.base.compiled import restore_state, save_state
 
 PERIOD_S, NOISE_RAD, QUANTUM_RAD = 1e-3, np.array([3e-4, 3e-4, 0.0]), np.array([8e-5, 8e-5, 3e-3])
 RANGE_RAD = np.array([[-1.4, 1.4], [-1.4, 1.4], [-np.inf, np.inf]])

@@ -194,7 +194,7 @@ def test_no_folder_at_all_is_done_without(package):
 def test_run_without_compilation(tmp_path):
     """Everything a run calls works as plain Python, and to rounding says the same."""
     code = (
-        "from spheretwin.twin import scenario; from spheretwin.twin.simulation import simulate\n"
+        "from spheretwin import scenario; from spheretwin.simulation import simulate\n"
         "run = simulate(scenario.load('hold', {'duration': 0.02}))\n"
         "print(*run.telemetry['q_rad'][-1], run.status)"
     )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from spheretwin.models.base.copying import arrays_of, restore_state, save_state, transfer_state
+from spheretwin.models.base.compiled import arrays_of, restore_state, save_state, transfer_state
 from spheretwin.models.base.errors import InputError
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.base.files import OutputFile, check_writable, whole_file
-from spheretwin.models.telemetry.file import PART_ROWS, TelemetryFile
+from spheretwin.models.telemetry.parquet import PART_ROWS, TelemetryFile
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.base.wording import (
+from spheretwin.models.base.errors import (
     LONGEST_LINE,
     LONGEST_VALUE,
     LONGEST_WORD,
+    InputError,
+    SpheretwinError,
     did_you_mean,
     is_plain,
     one_line,

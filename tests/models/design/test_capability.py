@@ -10,8 +10,7 @@ from scipy.optimize import linprog
 from spheretwin.control.allocation.least_norm import allocate
 from spheretwin.models.design import capability as capabilities
 from spheretwin.models.design.capability import capability, torque_matrices
-from spheretwin.models.design.weakest import FIGURES, local_minima, worst_by_tilt
-from spheretwin.models.design.workspace import grid, pose
+from spheretwin.models.design.workspace import FIGURES, grid, local_minima, pose, worst_by_tilt
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
 

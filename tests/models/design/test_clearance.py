@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from spheretwin.models.design.clearance import air_gap_m, clearance, overlaps
+from spheretwin.models.design.geometry_check import air_gap_m, clearance, overlaps
 
 RADIUS, LENGTH, DISTANCE = 0.011, 0.025, 0.063
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from spheretwin.models.design import curve_fit
+from spheretwin.models.design import curve_check
 from spheretwin.models.design.pole_torque import Mesh
 from spheretwin.models.torque_curve import TorqueCurve
 
@@ -18,7 +18,7 @@ def shaped(step_deg, scale=1.0, noise=0.0):
 
 
 def test_left_out_samples_of_a_smooth_curve_are_found_again():
-    fine, coarse = (curve_fit.leave_one_out(shaped(step)) for step in (1.0, 4.0))
+    fine, coarse = (curve_check.leave_one_out(shaped(step)) for step in (1.0, 4.0))
     # The error of a cubic falls with the fourth power of the gap: 256.
     assert 100 < coarse.rms / fine.rms < 400
     assert fine.worst < 1e-5
@@ -29,31 +29,31 @@ def test_noise_shows():
     curve = shaped(1.0, noise=1e-5)
     relative = 1e-5 / curve.peak_Nm_per_A
     # The point's own noise, and that of the neighbours it is compared with.
-    assert_allclose(curve_fit.leave_one_out(curve).rms, 1.4 * relative, rtol=0.2)
+    assert_allclose(curve_check.leave_one_out(curve).rms, 1.4 * relative, rtol=0.2)
 
 
 def test_a_single_bad_sample_is_pointed_at():
     curve = shaped(2.0)
     curve.torque_Nm_per_A[20] *= 1.1
-    assert curve_fit.leave_one_out(curve).worst_deg == pytest.approx(40.0)
+    assert curve_check.leave_one_out(curve).worst_deg == pytest.approx(40.0)
 
 
 def test_lookup_of_the_shipped_curve(actuator):
     # A tenth of the curve's own error: what its table was laid out for. Measured: 2e-7.
-    assert curve_fit.lookup_error(actuator.torque_curve) < 1e-6
+    assert curve_check.largest_lookup_error(actuator.torque_curve) < 1e-6
 
 
 def test_lookup_of_a_coarse_curve_is_worse(actuator):
     kept = actuator.torque_curve
     coarse = TorqueCurve(kept.phi_rad[::8], kept.torque_Nm_per_A[::8])
-    assert curve_fit.lookup_error(coarse) < 1e-4
+    assert curve_check.largest_lookup_error(coarse) < 1e-4
 
 
 def test_difference_knows_a_scaled_curve(actuator):
     kept = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:40]
     data = TorqueCurve(kept.phi_rad[rows], 0.9 * kept.torque_Nm_per_A[rows])
-    found = curve_fit.difference(data, actuator.magnet, actuator.coil, Mesh(12, 64, 6, 12))
+    found = curve_check.difference(data, actuator.magnet, actuator.coil, Mesh(12, 64, 6, 12))
     assert found.scale == pytest.approx(0.9, abs=1e-4)
     assert found.as_given.worst == pytest.approx(0.1, rel=0.02)
     assert found.as_given.worst_deg == pytest.approx(10.5, abs=1.0)

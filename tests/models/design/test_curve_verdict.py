@@ -7,9 +7,9 @@ import pytest
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
-from spheretwin.models.base.check import broken
+from spheretwin.models.base.checks import broken
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.design import curve_fit, curve_verdict, pole_torque
+from spheretwin.models.design import curve_check, pole_torque
 from spheretwin.models.torque_curve import TorqueCurve
 
 TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
@@ -25,7 +25,7 @@ def few_samples(monkeypatch):
 def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
     kept = actuator.torque_curve
     rows = np.r_[0:120:4, 120:721:20]
-    judged = curve_verdict.judge(TorqueCurve(kept.phi_rad[rows], 0.93 * kept.torque_Nm_per_A[rows]))
+    judged = curve_check.judge(TorqueCurve(kept.phi_rad[rows], 0.93 * kept.torque_Nm_per_A[rows]))
     assert judged.rows == 61
     # The shipped samples are rounded to 12 decimals, 5e-11 of the peak.
     assert judged.geometry.scale == pytest.approx(0.93, abs=1e-6)
@@ -39,7 +39,7 @@ def test_a_weaker_magnet_is_a_factor_and_no_difference_in_shape(actuator):
 
 @pytest.mark.usefixtures("few_samples")
 def test_a_computed_curve_is_bounded():
-    computed = curve_verdict.compute()
+    computed = curve_check.compute()
     mesh, lookup = computed.checks
     assert broken(computed.checks) == computed.warnings == []
     assert (mesh.bound, lookup.bound) == (5e-3, 1e-6)
@@ -53,9 +53,9 @@ def test_a_computed_curve_is_bounded():
 
 @pytest.mark.usefixtures("few_samples")
 def test_a_table_that_misses_the_spline_breaks_its_bound_alone(monkeypatch):
-    right = curve_fit.lookup_table
-    monkeypatch.setattr(curve_fit, "lookup_table", lambda curve: (1 + 1e-5) * right(curve))
-    computed = curve_verdict.compute()
+    right = curve_check.lookup_table
+    monkeypatch.setattr(curve_check, "lookup_table", lambda curve: (1 + 1e-5) * right(curve))
+    computed = curve_check.compute()
     assert broken(computed.checks) == ["lookup"]
     # Over the peak of one coil, while the table holds it and its opposite; its own error is 3e-7.
     assert computed.lookup_error == pytest.approx(1e-5, rel=0.1)
@@ -66,10 +66,8 @@ def test_a_model_with_nothing_but_poles_and_coils_has_a_curve(tmp_path):
     (path := tmp_path / "mine.xml").write_text(TEXT.replace("group_resistance_ohm", "elsewhere"))
     with pytest.raises(InputError, match="group_resistance_ohm"):
         actuators.load(path)
-    computed = curve_verdict.compute(path)
+    computed = curve_check.compute(path)
     assert computed.warnings == broken(computed.checks) == []
     # The table's intervals are promised to the shipped model alone.
     assert computed.checks[1].bound is None
-    np.testing.assert_array_equal(
-        computed.curve.torque_Nm_per_A, curve_verdict.compute().curve.torque_Nm_per_A
-    )
+    np.testing.assert_array_equal(computed.curve.torque_Nm_per_A, curve_check.compute().curve.torque_Nm_per_A)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from spheretwin.models.design import field_check
-from spheretwin.models.design.field_check import Quadrature, Rule
+from spheretwin.models.design import direct_summation
+from spheretwin.models.design.direct_summation import Quadrature, Rule
 from spheretwin.models.design.pole_torque import compute_curve
 from spheretwin.models.design.workspace import pose
-from spheretwin.models.drawing.solids import revolve
 from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.meshes.solids import revolve
 from spheretwin.models.torque_curve import TorqueCurve
 
 COARSE = Quadrature(near=Rule(8, 8, 32, 8), far=Rule(6, 6, 24, 4))
@@ -21,12 +21,12 @@ TILTS = np.radians([8.0, 50.0])
 
 @pytest.fixture(scope="module")
 def compared(actuator):
-    return field_check.compare(actuator, TILTS, seed=3, quadrature=COARSE)
+    return direct_summation.compare(actuator, TILTS, seed=3, quadrature=COARSE)
 
 
 def torque_on_coils(actuator, pole, axes, rule):
-    magnet = field_check._magnet(actuator, pole, 1.0, rule.stacked)
-    return field_check._torque_on_coils(magnet, axes, actuator.coil, rule)
+    magnet = direct_summation._magnet(actuator, pole, 1.0, rule.stacked)
+    return direct_summation._torque_on_coils(magnet, axes, actuator.coil, rule)
 
 
 def flat(actuator):
@@ -48,7 +48,7 @@ def pair_errors(actuator, rule, degrees=(2.0, 7.0, 10.5, 18.0)):
 @pytest.mark.parametrize("stacked", [1, 5, 24])
 def test_a_stack_has_the_volume_of_the_ground_pole(actuator, stacked):
     magnet = actuator.magnet
-    pieces = field_check._cylinders(magnet, stacked)
+    pieces = direct_summation._cylinders(magnet, stacked)
     assert len(pieces) == stacked
     volume = sum(np.pi * radius**2 * (top - bottom) for radius, bottom, top in pieces)
     assert volume == pytest.approx(magnet.volume_m3, rel=1e-12)
@@ -59,7 +59,7 @@ def test_a_stack_has_the_volume_of_the_ground_pole(actuator, stacked):
 
 def test_a_flat_pole_is_one_cylinder(actuator):
     magnet = flat(actuator).magnet
-    assert field_check._cylinders(magnet, 24) == [(magnet.radius_m, magnet.back_m, magnet.front_m)]
+    assert direct_summation._cylinders(magnet, 24) == [(magnet.radius_m, magnet.back_m, magnet.front_m)]
 
 
 def drawn_body(magnet, sections, steps):
@@ -87,7 +87,8 @@ def test_a_stack_s_field_tends_to_that_of_the_body(actuator):
     coarse, fine = (drawn_body(magnet, n, n // 4).getB(points) for n in (48, 96))
     body = fine + (fine - coarse) / 3
     off = [
-        np.abs(field_check._magnet(actuator, z, 1.0, stacked).getB(points) - body).max() / np.abs(body).max()
+        np.abs(direct_summation._magnet(actuator, z, 1.0, stacked).getB(points) - body).max()
+        / np.abs(body).max()
         for stacked in (8, 16, 32)
     ]
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.25)
@@ -105,17 +106,17 @@ def test_a_pair_s_torque_tends_to_the_current_sheet_s(actuator):
 
 def test_a_flat_pole_s_torque_is_the_current_sheet_s(actuator):
     # Its rim lies within the winding near 7 degrees: a quadrature of an infinite field.
-    assert np.abs(pair_errors(flat(actuator), field_check.FLAT.near)).max() < 5e-4
+    assert np.abs(pair_errors(flat(actuator), direct_summation.FLAT.near)).max() < 5e-4
 
 
 def error_share(compared, actuator):
-    errors = field_check.errors(compared, actuator.group.current_limit_A)
+    errors = direct_summation.errors(compared, actuator.group.current_limit_A)
     return errors.model_Nm.max() / errors.torque_Nm.max()
 
 
 def test_turns_have_their_length(actuator):
     coil = actuator.coil
-    position, element = field_check._conductors(coil, Rule(4, 4, 12))
+    position, element = direct_summation._conductors(coil, Rule(4, 4, 12))
     mean = (coil.inner_radius_m + coil.outer_radius_m) / 2
     assert_allclose(np.linalg.norm(element, axis=1).sum(), coil.turns * 2 * np.pi * mean, rtol=1e-12)
     assert_allclose(np.sum(element * position, axis=1), 0, atol=1e-15)
@@ -145,8 +146,8 @@ def test_finer_sums_come_closer(actuator):
     q = pose(TILTS[0], 0.7, 0.3)
     G = torque_matrix(q, actuator)
     distance = [
-        np.linalg.norm(field_check.direct_torque_matrix(q, actuator, quadrature) - G)
-        for quadrature in (COARSE.halved(), COARSE, field_check.STANDARD)
+        np.linalg.norm(direct_summation.direct_torque_matrix(q, actuator, quadrature) - G)
+        for quadrature in (COARSE.halved(), COARSE, direct_summation.STANDARD)
     ]
     assert distance[2] < distance[1] < distance[0]
     assert distance[2] < distance[0] / 5
@@ -168,7 +169,7 @@ def test_wrong_curve_is_found(compared, actuator):
 
 
 def test_same_seed_same_poses(actuator, monkeypatch):
-    monkeypatch.setattr(field_check, "direct_torque_matrix", lambda *_: np.zeros((3, 18)))
-    first, again, other = (field_check.compare(actuator, TILTS, seed=seed).q for seed in (1, 1, 2))
+    monkeypatch.setattr(direct_summation, "direct_torque_matrix", lambda *_: np.zeros((3, 18)))
+    first, again, other = (direct_summation.compare(actuator, TILTS, seed=seed).q for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)

@@ -5,16 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spheretwin.models.base.check import broken
-from spheretwin.models.design import field_check, field_verdict
+from spheretwin.models.base.checks import broken
+from spheretwin.models.design import direct_summation
+from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
 
 
 @pytest.fixture
 def coarse(monkeypatch):
     """Fewer points in the windings: errors of a thousandth, enough to tell right from wrong."""
-    few = field_check.Quadrature(field_check.Rule(12, 12, 48), field_check.Rule(6, 6, 24))
-    monkeypatch.setattr(field_check, "STANDARD", few)
+    few = direct_summation.Quadrature(direct_summation.Rule(12, 12, 48), direct_summation.Rule(6, 6, 24))
+    monkeypatch.setattr(direct_summation, "STANDARD", few)
 
 
 def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
@@ -36,8 +37,8 @@ def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
 
 @pytest.mark.usefixtures("coarse")
 def test_a_wrong_matrix_is_not_laid_to_the_curve(actuator, monkeypatch):
-    right = field_check.torque_matrix
-    monkeypatch.setattr(field_check, "torque_matrix", lambda q, actuator: -right(q, actuator))
+    right = direct_summation.torque_matrix
+    monkeypatch.setattr(direct_summation, "torque_matrix", lambda q, actuator: -right(q, actuator))
     verdict = field_verdict.judge(actuator, poses=1)
     assert broken(verdict.checks) == ["torque"]
     assert verdict.checks[0].value == pytest.approx(2, abs=0.01)  # as far off as the torque is large, twice
@@ -57,7 +58,7 @@ def test_a_wrong_curve_is_found_and_named(actuator):
 
 
 def test_few_poses_come_from_all_bands(actuator, monkeypatch):
-    monkeypatch.setattr(field_check, "direct_torque_matrix", lambda *_: np.ones((3, 18)))
+    monkeypatch.setattr(direct_summation, "direct_torque_matrix", lambda *_: np.ones((3, 18)))
     verdict = field_verdict.judge(actuator, poses=7, seed=3)
     assert [band.poses for band in verdict.by_tilt] == [2, 2, 1, 1, 1]
     assert [band.tilt_deg[1] for band in verdict.by_tilt] == list(field_verdict.BANDS_DEG[1:])

@@ -17,7 +17,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from spheretwin.models.design import field_check
+from spheretwin.models.design import direct_summation
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
 
@@ -62,7 +62,7 @@ def turned_to(axis):
 def flux_linkage(R_SR, group, actuator):
     """Flux of the 16 magnets through the turns of one group, Wb."""
     poles = zip(actuator.pole_axes @ R_SR.T, actuator.pole_polarity, strict=True)
-    pieces = field_check._cylinders(actuator.magnet, STACKED)
+    pieces = direct_summation._cylinders(actuator.magnet, STACKED)
     magnets = magpylib.Collection(
         [
             magpylib.magnet.Cylinder(

@@ -3,25 +3,25 @@
 from dataclasses import replace
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models.design import warnings
+from spheretwin.models.design import geometry_check
 
 
 def test_a_curve_of_another_geometry_is_named_beside_the_parts(actuator):
-    assert warnings.of_geometry(actuator) == []
+    assert geometry_check.of_geometry(actuator) == []
     coil = replace(actuator.coil, turns=640.0)
-    (line,) = warnings.of_geometry(replace(actuator, coil=coil))
+    (line,) = geometry_check.of_geometry(replace(actuator, coil=coil))
     assert line == "torque curve torque_curve.csv was computed for coil turns 320, the model has 640"
 
 
 def test_a_model_file_is_held_against_a_curve_that_says_what_it_is_for(actuator, tmp_path):
     text = actuators.MJCF_PATH.read_text(encoding="utf-8")
     (path := tmp_path / "mine.xml").write_text(text.replace('_turns" data="320"', '_turns" data="640"'))
-    (line,) = warnings.of_model_file(path, actuator.torque_curve)
+    (line,) = geometry_check.of_model_file(path, actuator.torque_curve)
     assert "coil turns 320" in line
     # As one that has just been computed from the file itself.
-    assert warnings.of_model_file(path, replace(actuator.torque_curve, computed_for=None)) == []
+    assert geometry_check.of_model_file(path, replace(actuator.torque_curve, computed_for=None)) == []
 
 
 def test_a_model_file_without_a_rotor_is_not_warned_of(actuator, tmp_path):
     (path := tmp_path / "mine.xml").write_text("<mujoco/>")
-    assert warnings.of_model_file(path, actuator.torque_curve) == []
+    assert geometry_check.of_model_file(path, actuator.torque_curve) == []

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spheretwin.models.base.check import broken
+from spheretwin.models.base.checks import broken
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.design import workspace_verdict
+from spheretwin.models.design import torque_map
 
 
 @pytest.fixture(scope="module")
 def surveyed(actuator):
-    return workspace_verdict.survey(actuator, largest_tilt_deg=12)
+    return torque_map.survey(actuator, largest_tilt_deg=12)
 
 
 def test_torque_is_told_by_tilt(surveyed):
-    verdict = workspace_verdict.judge(surveyed)
+    verdict = torque_map.judge(surveyed)
     assert [row.tilt_deg for row in verdict.by_tilt] == list(range(13))
     # Measured by another program: 0.8745 upright, 0.5574 at 12 degrees.
     assert verdict.by_tilt[0].least_norm_Nm == pytest.approx(0.8745, rel=1e-3)
@@ -31,20 +31,20 @@ def test_torque_is_told_by_tilt(surveyed):
 
 
 def test_weakest_pose_is_the_worst_of_all_tilts(surveyed):
-    verdict = workspace_verdict.judge(surveyed)
+    verdict = torque_map.judge(surveyed)
     weakest = verdict.weakest[0]
     assert weakest.figure == "least_norm"
     assert weakest.least_norm_Nm == pytest.approx(min(row.least_norm_Nm for row in verdict.by_tilt))
     assert np.linalg.norm(weakest.direction) == pytest.approx(1)
     assert [pose.figure for pose in verdict.weakest] == sorted(
-        (pose.figure for pose in verdict.weakest), key=list(workspace_verdict.TOLD).index
+        (pose.figure for pose in verdict.weakest), key=list(torque_map.TOLD).index
     )
 
 
 def test_a_need_is_met_up_to_the_worst_torque(surveyed):
-    worst = workspace_verdict.judge(surveyed).weakest[0].least_norm_Nm
+    worst = torque_map.judge(surveyed).weakest[0].least_norm_Nm
     for need_Nm, names in ((0.999 * worst, []), (1.001 * worst, ["need"])):
-        verdict = workspace_verdict.judge(surveyed, need_Nm)
+        verdict = torque_map.judge(surveyed, need_Nm)
         assert broken(verdict.checks) == names
         assert verdict.checks[-1].value == pytest.approx(need_Nm / worst)
 
@@ -55,7 +55,7 @@ def test_a_lost_direction_is_told_and_meets_no_need(actuator):
     polarity = np.where(np.arange(16) < opposite, 1.0, -1.0)
     assert np.all(polarity == -polarity[opposite])
     dead = replace(actuator, pole_polarity=polarity)
-    verdict = workspace_verdict.judge(workspace_verdict.survey(dead, largest_tilt_deg=1), need_Nm=0.1)
+    verdict = torque_map.judge(torque_map.survey(dead, largest_tilt_deg=1), need_Nm=0.1)
     (warning,) = verdict.warnings
     assert warning.startswith("the torque matrix loses the direction (")
     assert warning.endswith("at 2 of 2 tilts")
@@ -67,4 +67,4 @@ def test_a_lost_direction_is_told_and_meets_no_need(actuator):
 def test_hinges_that_reach_no_pose_are_refused(actuator):
     nowhere = replace(actuator, hinge_range_rad=np.full((3, 2), 9.0))
     with pytest.raises(InputError, match="hinge ranges that hold some pose"):
-        workspace_verdict.survey(nowhere, largest_tilt_deg=0)
+        torque_map.survey(nowhere, largest_tilt_deg=0)

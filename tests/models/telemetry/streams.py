@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from spheretwin.models.telemetry import file as telemetry_file
-from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry import parquet as telemetry_file
+from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
 

@@ -10,9 +10,9 @@ import pyarrow.parquet
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.models.telemetry import file as telemetry_file
+from spheretwin.models.telemetry import parquet as telemetry_file
 from spheretwin.models.telemetry.checksums import write_parquet
-from spheretwin.models.telemetry.file import TelemetryFile, join
+from spheretwin.models.telemetry.parquet import TelemetryFile, join
 from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, read_parquet
 

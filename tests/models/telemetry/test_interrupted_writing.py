@@ -16,8 +16,8 @@ import pyarrow.parquet
 import pytest
 
 from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.models.telemetry.file import join
-from spheretwin.models.telemetry.parts import list_of
+from spheretwin.models.telemetry.parquet import join
+from spheretwin.models.telemetry.partial_files import list_of
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
 

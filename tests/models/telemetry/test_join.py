@@ -9,8 +9,8 @@ import pyarrow.parquet
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry import parts as telemetry_parts
-from spheretwin.models.telemetry.file import join
+from spheretwin.models.telemetry import partial_files as telemetry_parts
+from spheretwin.models.telemetry.parquet import join
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from spheretwin.models.telemetry.kept import KeptTelemetry
 from spheretwin.models.telemetry.signals import Signal, width
-from spheretwin.models.telemetry.table import Table
+from spheretwin.models.telemetry.table import KeptTelemetry, Table
 
 TIME, RATE, GAIN = Signal("t_s", "s", 1, "time"), Signal("w", "rad/s", 3, "rate"), Signal("g", "1", 1, "gain")
 

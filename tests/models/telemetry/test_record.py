@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.record import Change, RunRecord
+from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.status import Status
 
 texts = st.text(st.characters(codec="utf-8"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.series import Series, check_rising, read
+from spheretwin.models.telemetry.csv_series import Series, check_rising, read
 
 GOOD = "t_s,a,b\n0,1,-2\n0.5,3,4\n2,5,6e-1\n"
 VALUES = [[1.0, -2.0], [3.0, 4.0], [5.0, 0.6]]

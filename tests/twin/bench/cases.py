@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.bench import Bench
 
 # No load: a rotor that is let go then stays within its workspace for the length of a test.
 QUIET = {

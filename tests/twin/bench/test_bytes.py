@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spheretwin import replay
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.record import RunRecord
+from spheretwin.models.telemetry.run_record import RunRecord
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin.records import replay
 from tests.twin.bench.cases import MODES, begun, bench, done, kept_rows, said, same_when_replayed
 
 SETTINGS = [

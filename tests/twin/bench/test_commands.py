@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
+from spheretwin.bench.command_queue import MOST_WAITING
+from spheretwin.bench.commands import COMMANDS
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.bench import Bench
-from spheretwin.twin.bench.commands.registry import COMMANDS
-from spheretwin.twin.bench.queue import MOST_WAITING
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 from tests.twin.bench.cases import MODES, begun, bench, done, said
 
 

@@ -5,11 +5,11 @@ import shlex
 import numpy as np
 import pytest
 
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.bench.keeping import Keeping
-from spheretwin.twin.review import figures
-from spheretwin.twin.review import run as reviewed
-from spheretwin.twin.scenario import flags
+from spheretwin import scenario as scenarios
+from spheretwin.analysis import recorded_run as reviewed
+from spheretwin.analysis import run_summary
+from spheretwin.outputs import Keeping
+from spheretwin.scenario import reading
 from tests.twin.bench.cases import begun, done, kept_rows, said
 
 
@@ -43,7 +43,7 @@ def test_a_recording_and_a_telemetry_file_hold_the_same_rows_from_then_on(files)
 
 
 def test_a_file_that_begins_on_the_way_can_be_reviewed(files):
-    told = figures.figures(reviewed.read(files[1]))
+    told = run_summary.figures(reviewed.read(files[1]))
     assert told["rows"] == 500
     assert told["status"] == "completed"
 
@@ -131,7 +131,7 @@ def test_the_settings_are_written_down_and_read_again_are_the_same(tmp_path):
             assert path.read_text() == made.scenario_toml()
             words = shlex.split(made.command_line())
             assert words[:2] == ["spheretwin", "simulate"]
-            assert scenarios.load(words[2], flags.overrides(words[3:])) == loaded
+            assert scenarios.load(words[2], reading.overrides(words[3:])) == loaded
         # What the jogging made of it is no part of the settings.
         assert loaded.trajectory.shape == "multisine"
         assert loaded.trajectory.approach is None

@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from spheretwin.twin.bench import modes
-from spheretwin.twin.bench.modes import Limits
-from spheretwin.twin.trajectories.shapes.hold import Hold
+from spheretwin.bench import modes
+from spheretwin.bench.modes import Limits
+from spheretwin.trajectories.shapes import Hold
 from tests.twin.bench.cases import MODES, begun, done, kept_rows, said
 
 BY_HAND = ("off", "manual")

@@ -2,10 +2,10 @@
 
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
+from spheretwin.bench.operators import MOST_CLIENTS, GONE_s, Operators
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.bench import Bench
-from spheretwin.twin.bench.operators import MOST_CLIENTS, GONE_s, Operators
 from tests.twin.bench.cases import QUIET, done
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.twin.bench.pace import MOST_TICKS, CHUNK_s, LATE_s, Pace
+from spheretwin.bench.pace import MOST_TICKS, CHUNK_s, LATE_s, Pace
 from tests.twin.bench.cases import MODES, begun, bench, done, kept_rows, said
 from tests.twin.bench.test_operators import Clock
 

@@ -9,32 +9,25 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from spheretwin import cli
+from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, suite, trajectories
+from spheretwin.crosscheck import identities as free_rotor
+from spheretwin.crosscheck import suite as page
+from spheretwin.crosscheck import trajectories as closed_loop
 from spheretwin.models import actuator as actuators
-from spheretwin.models.base.check import Check
+from spheretwin.models.base.checks import Check
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
-from spheretwin.twin import cli
-from spheretwin.twin.crosscheck import (
-    closed_loop,
-    coil_driven,
-    dynamics,
-    free_rotor,
-    friction,
-    identities,
-    page,
-    suite,
-    trajectories,
-)
-from spheretwin.twin.plant import lagrangian as plant
-from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.simulation import simulate
+from spheretwin.plant import lagrangian_rotor as plant
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.simulation import simulate
 
 FEW = 50
 assembly_of_the_plant = coil_driven.assembly.plant_of
 QUANTITIES = [quantity.name for quantity in dynamics.QUANTITIES]
 ENGINES = ("MuJoCo", "Pinocchio")
-COMMAND = [sys.executable, "-m", "spheretwin.twin.cli", "crosscheck"]
+COMMAND = [sys.executable, "-m", "spheretwin.cli", "crosscheck"]
 FIGURES = ("margins", "dynamics", "trajectory", "convergence", "torque_free", "friction", "closed_loop")
 
 
@@ -153,20 +146,20 @@ def test_wrong_coriolis_term_breaks_bias_and_symmetry(monkeypatch, actuator):
         monkeypatch.setattr(module, "coriolis_matrix", wrong_sign)
     found = broken(dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks)
     assert found == of_both("bias C q̇ + G", "inverse dynamics", "forward dynamics")
-    assert "Ṁ - 2C is skew-symmetric" in broken(identities.check(actuator, FEW).checks)
+    assert "Ṁ - 2C is skew-symmetric" in broken(identities.check_identities(actuator, FEW).checks)
 
 
 def test_symmetry_tells_the_christoffel_form_from_others_of_the_same_torque(monkeypatch, actuator):
     for module in (dynamics, identities):
         monkeypatch.setattr(module, "coriolis_matrix", not_christoffel)
     assert not broken(dynamics.compare(actuators.MJCF_PATH, actuator, FEW).checks)
-    assert broken(identities.check(actuator, FEW).checks) == {"Ṁ - 2C is skew-symmetric"}
+    assert broken(identities.check_identities(actuator, FEW).checks) == {"Ṁ - 2C is skew-symmetric"}
 
 
 def test_wrong_coupling_term_breaks_its_row(monkeypatch, actuator):
     flipped = np.array([[1, 1, 1], [1, -1, 1]])
     monkeypatch.setattr(identities, "coupling_torques", lambda *state: flipped * coupling_torques(*state))
-    assert broken(identities.check(actuator, FEW).checks) == {"coupling torques (3)-(10)"}
+    assert broken(identities.check_identities(actuator, FEW).checks) == {"coupling torques (3)-(10)"}
 
 
 def test_wrong_inertia_breaks_the_trajectory(monkeypatch, actuator):
@@ -175,12 +168,14 @@ def test_wrong_inertia_breaks_the_trajectory(monkeypatch, actuator):
     monkeypatch.setattr(
         trajectories, "integrate", lambda pieces, inertia: right(pieces, inertia * (1 + 2e-8 * np.eye(3)[1]))
     )
-    assert "trajectory: MuJoCo RK4" in broken(trajectories.compare(actuators.MJCF_PATH, actuator).checks)
+    assert "trajectory: MuJoCo RK4" in broken(
+        trajectories.compare_trajectories(actuators.MJCF_PATH, actuator).checks
+    )
 
 
 def test_a_method_of_another_order_breaks_its_row(monkeypatch, actuator):
     monkeypatch.setattr(trajectories, "ORDERS", {"Euler": 4})
-    found = broken(trajectories.compare(actuators.MJCF_PATH, actuator).checks)
+    found = broken(trajectories.compare_trajectories(actuators.MJCF_PATH, actuator).checks)
     assert found == {"order of convergence: MuJoCo Euler"}
 
 
@@ -189,7 +184,7 @@ def test_another_integrator_breaks_every_row_of_the_free_rotor(monkeypatch, actu
     monkeypatch.setattr(
         free_rotor, "Rotor", lambda mjcf, step_s, _, *rest: Rotor(mjcf, step_s, "implicitfast", *rest)
     )
-    checks = free_rotor.check(actuators.MJCF_PATH, actuator).checks
+    checks = free_rotor.check_free_rotor(actuators.MJCF_PATH, actuator).checks
     assert broken(checks) == {check.name for check in checks}
     assert len(checks) == 6
 
@@ -204,7 +199,7 @@ def test_a_rotor_that_is_not_axisymmetric_does_not_move_as_euler_found(monkeypat
         "fly",
         lambda mjcf, inertia, spin: fly(mjcf, inertia * nearly, spin)._replace(inertia=inertia),
     )
-    checks = free_rotor.check(actuators.MJCF_PATH, actuator).checks
+    checks = free_rotor.check_free_rotor(actuators.MJCF_PATH, actuator).checks
     assert "torque-free rotor at 2π rad/s: attitude" in broken(checks)
 
 
@@ -227,7 +222,7 @@ def test_wrong_plant_breaks_the_closed_loop(monkeypatch, error, rows):
         return LagrangianRotor(actuator, step_s, integrator, modelling_error + error, payload_kg, **rest)
 
     monkeypatch.setattr(plant, "LagrangianRotor", heavier)
-    assert broken(closed_loop.compare(actuators.MJCF_PATH).checks) == rows
+    assert broken(closed_loop.compare_closed_loop(actuators.MJCF_PATH).checks) == rows
 
 
 def lagging(*arguments):
@@ -247,7 +242,7 @@ def test_a_field_that_lags_by_half_a_step_breaks_every_row_of_coils(monkeypatch,
 
 def test_a_field_that_lags_by_half_a_step_breaks_the_rows_of_step_size(monkeypatch):
     monkeypatch.setattr(coil_driven.assembly, "plant_of", lagging)
-    assert broken(closed_loop.compare(actuators.MJCF_PATH).checks) == {
+    assert broken(closed_loop.compare_closed_loop(actuators.MJCF_PATH).checks) == {
         "closed loop: step size, MuJoCo",
         "closed loop: step size, Lagrangian",
     }
@@ -271,7 +266,7 @@ def test_runs_that_end_apart_break_their_rows(monkeypatch):
         return dataclasses.replace(finished, status="left_workspace", telemetry=cut) if early else finished
 
     monkeypatch.setattr(closed_loop, "simulate", ends_early)
-    checks = closed_loop.compare(actuators.MJCF_PATH).checks
+    checks = closed_loop.compare_closed_loop(actuators.MJCF_PATH).checks
     assert broken(checks) == {"closed loop under PD: trace", "closed loop under AFSM: trace"}
     assert checks[0].row()["value"] is None
     json.dumps([check.row() for check in checks], allow_nan=False)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from spheretwin.crosscheck import friction
+from spheretwin.crosscheck import hinge as moving
+from spheretwin.crosscheck import hinge as runs
+from spheretwin.crosscheck.hinge import Hinge, STEP_s, by_mujoco, by_stage
 from spheretwin.models import actuator as actuators
-from spheretwin.models.base.check import Check
-from spheretwin.twin.crosscheck import friction
-from spheretwin.twin.crosscheck.bearing import moving, runs
-from spheretwin.twin.crosscheck.bearing.hinge import Hinge, STEP_s
-from spheretwin.twin.crosscheck.bearing.moving import by_mujoco, by_stage
+from spheretwin.models.base.checks import Check
 
 J = 2.256e-3
 HINGE = Hinge(J, 2e-3, 1e-4, 0.01)

@@ -3,15 +3,10 @@
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.disturbances import Constant, Disturbance, Draws, Random, Sinusoidal, Steps, term_draws
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.disturbances.constant import Constant
-from spheretwin.twin.disturbances.disturbance import Disturbance
-from spheretwin.twin.disturbances.draws import Draws, term_draws
-from spheretwin.twin.disturbances.random import Random
-from spheretwin.twin.disturbances.sinusoidal import Sinusoidal
-from spheretwin.twin.disturbances.steps import Steps
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 
 T = np.linspace(0, 2, 2001)
 

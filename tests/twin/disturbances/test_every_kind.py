@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from spheretwin import scenario as scenarios
+from spheretwin.disturbances import KINDS, AnyDisturbance, term_draws
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.disturbances.draws import term_draws
-from spheretwin.twin.disturbances.registry import KINDS, AnyDisturbance
-from spheretwin.twin.simulation import simulate
+from spheretwin.simulation import simulate
 
 TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0.5,0.1,0,0\n1.5,0.3,-0.2,0\n2.0,0,0,0.4\n"
 PERIOD = 1e-3

@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from spheretwin.disturbances import KINDS, Constant, Random, Sinusoidal, Steps, Table, term_draws
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.disturbances.constant import Constant
-from spheretwin.twin.disturbances.draws import term_draws
-from spheretwin.twin.disturbances.random import Random
-from spheretwin.twin.disturbances.registry import KINDS
-from spheretwin.twin.disturbances.sinusoidal import Sinusoidal
-from spheretwin.twin.disturbances.steps import Steps
-from spheretwin.twin.disturbances.table import Table
 
 TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0.5,0.1,0,0\n1.5,0.3,-0.2,0\n2.0,0,0,0.4\n"
 PERIOD = 1e-3

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.sensing.adc import MOST_CONVERSIONS, AdcSection, CONVERSION_s, adc, converted
+from spheretwin.electronics.converters import MOST_CONVERSIONS, AdcSection, CONVERSION_s, adc, converted
 
 NO_DRAWS = np.empty(0)
 ANY = st.floats()

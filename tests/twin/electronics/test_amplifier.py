@@ -9,15 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from spheretwin.twin.electronics.driving.amplifier import (
-    AmplifierSection,
-    amplifier,
-    clear,
-    drive_coils,
-    flow,
-)
-from spheretwin.twin.electronics.driving.coil import CoilSection, coil
-from spheretwin.twin.electronics.driving.lag import advance, drive
+from spheretwin.electronics.amplifier import AmplifierSection, amplifier, clear, drive_coils, flow
+from spheretwin.electronics.coil import CoilSection, coil
+from spheretwin.electronics.drive_chain import advance_lag, drive
 
 STEP_S = 5e-4
 SUPPLY = {"supply_V": 24.0, "drop_up_V": 4.8, "drop_down_V": 4.6}
@@ -161,7 +155,7 @@ def test_with_enough_voltage_the_current_is_the_ideal_lag():
         for _ in range(100):
             asked = generator.uniform(-10, 10, groups)  # some beyond the limit
             drive_coils(amplifiers, coils, asked, generator.normal(size=groups), current, passed)
-            advance(drive(1 / 4096.0, STEP_S, 8.0), asked, ideal, mean)
+            advance_lag(drive(1 / 4096.0, STEP_S, 8.0), asked, ideal, mean)
             # Both are the same closed form; the roundings of a few currents of 8 A.
             np.testing.assert_allclose(current, ideal, rtol=0, atol=1e-14)
             np.testing.assert_allclose(passed.mean_current_A, mean, rtol=0, atol=1e-14)

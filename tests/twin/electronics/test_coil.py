@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from spheretwin.electronics.coil import CoilSection, back_emf, coil, overheated, warm
 from spheretwin.models.magnetics import rotor_torque
-from spheretwin.twin.electronics.driving.coil import CoilSection, back_emf, coil, overheated, warm
 
 R, L, PERIOD_S = 1.3, 0.9e-3, 1e-3
 COPPER = CoilSection(resistance_per_K=0.0039)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.driving.dac import DacSection, convert, dac
+from spheretwin.electronics.converters import DacSection, convert, dac
 
 GAIN_A_V, RANGE_V, GROUPS = 0.8, 10.0, 18
 LSB_A = GAIN_A_V * 2 * RANGE_V / 2**16

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.driving.delay import DelaySection, delay, due, latch
+from spheretwin.electronics.delay import DelaySection, delay, due, latch
 
 STEP_S = 5e-4
 

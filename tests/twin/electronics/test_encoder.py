@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.sensing.encoder import EncoderSection, counted
-from spheretwin.twin.electronics.sensing.stage import SensorSetup
+from spheretwin.electronics.sensor_stage import SensorSetup
+from spheretwin.electronics.transducers import EncoderSection, counted
 
 COUNTS = st.integers(1, 2**20)
 

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from spheretwin.twin.disturbances.draws import term_draws
-from spheretwin.twin.electronics.sensing.noise import noise_rows, noise_table, width_of
-from spheretwin.twin.electronics.streams import stream_key
+from spheretwin.disturbances import term_draws
+from spheretwin.electronics.random_streams import noise_rows, noise_table, stream_key, width_of
 
 SEED, TICKS, WIDTH, NAME = 7, 400, 11, "adc noise"
 

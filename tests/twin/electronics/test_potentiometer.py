@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from spheretwin.twin.electronics.sensing.potentiometer import (
+from spheretwin.electronics.transducers import (
     HARMONICS,
     LARGEST_SHARE,
     PotentiometerSection,

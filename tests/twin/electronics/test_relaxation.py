@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.driving.relaxation import SERIES_TO, relaxation
+from spheretwin.electronics.coil import SERIES_TO, relaxation
 
 SCALES = [*10.0 ** np.linspace(-14, 18, 1000), *np.linspace(0.9 * SERIES_TO, 1.1 * SERIES_TO, 100)]
 

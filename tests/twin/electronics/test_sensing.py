@@ -9,14 +9,12 @@ from hypothesis import strategies as st
 from numba.core.runtime import _nrt_python, rtsys
 from scipy.optimize import minimize_scalar
 
+from spheretwin import electronics
+from spheretwin.electronics.prototype import PROTOTYPE_SENSORS
+from spheretwin.electronics.random_streams import noise_rows, noise_table, stream_key, width_of
+from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
 from spheretwin.models.base.compiled import compiled
-from spheretwin.twin import electronics
-from spheretwin.twin.electronics.hardware import PROTOTYPE_SENSORS
-from spheretwin.twin.electronics.sensing.chain import noise_streams, sense, sensor_chain
-from spheretwin.twin.electronics.sensing.noise import noise_rows, noise_table, width_of
-from spheretwin.twin.electronics.sensing.sections import SensorsSection
-from spheretwin.twin.electronics.streams import stream_key
-from spheretwin.twin.scenario.fields import every_field
+from spheretwin.scenario.fields import every_field
 
 NO_NOISE = np.empty(0)
 STAGES = {

@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from spheretwin.control.parts.parameters import LARGEST
-from spheretwin.twin.electronics.driving.amplifier import (
-    AmplifierSection,
-    amplifier,
-    clear,
-    drive_coils,
-    flow,
-)
-from spheretwin.twin.electronics.driving.coil import CoilSection, back_emf, coil, warm
-from spheretwin.twin.electronics.driving.dac import DacSection, convert, dac
-from spheretwin.twin.electronics.driving.delay import DelaySection, delay, due, latch
-from spheretwin.twin.electronics.hardware import PROTOTYPE_DRIVE
+from spheretwin.control.law import LARGEST
+from spheretwin.electronics.amplifier import AmplifierSection, amplifier, clear, drive_coils, flow
+from spheretwin.electronics.coil import CoilSection, back_emf, coil, warm
+from spheretwin.electronics.converters import DacSection, convert, dac
+from spheretwin.electronics.delay import DelaySection, delay, due, latch
+from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
 
 STEP_S, SUBSTEPS, GROUPS, LIMIT_A = 5e-4, 2, 18, 8.0
 PERIOD_S = STEP_S * SUBSTEPS

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from spheretwin.control.supervision.groups import FOUND_OPEN, FOUND_SHORTED, TOLD
+from spheretwin import scenario as scenarios
+from spheretwin.control.supervision.enabled_groups import FOUND_OPEN, FOUND_SHORTED, TOLD
+from spheretwin.faults.fault_injector import FaultLines
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.faults.told import FaultLines
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 GROUPS = 18
 START_S = 1.0

@@ -6,12 +6,12 @@ What each mode does is held against a copy in tests/twin/prototype/test_whole_ch
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.faults.fault import MODES
+from spheretwin.faults.schedule import part_names
+from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.faults.fault import MODES
-from spheretwin.twin.faults.plan import part_names
-from spheretwin.twin.faults.targets.registry import TARGETS
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 
 GROUPS = 18
 EACH = pytest.mark.parametrize("name", list(TARGETS))

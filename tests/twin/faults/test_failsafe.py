@@ -5,16 +5,16 @@ import json
 import numpy as np
 import pytest
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario.reading import shipped
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow, simulate
+from spheretwin.scenario.reading import shipped
+from spheretwin.session import Session
+from spheretwin.simulation import follow, simulate
 
 RUNDOWN = 30
 WATCHED = {"plant.engine": "lagrangian", "watchdog.on": True, "watchdog.rundown_s": RUNDOWN * 1e-3, "seed": 4}

@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
+from spheretwin.electronics.stages import LAST
+from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.electronics.fault_line import LAST
-from spheretwin.twin.faults.targets.registry import TARGETS
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 TICKS, PERIOD_S = 60, 1e-3
 ENDS = {Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAILSAFE}

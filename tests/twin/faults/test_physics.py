@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from spheretwin import scenario as scenarios
+from spheretwin.electronics.stages import NOISE
+from spheretwin.faults.schedule import FaultPlan
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.electronics.fault_line import NOISE
-from spheretwin.twin.faults.plan import FaultPlan
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 
 GROUPS, R_OHM, L_H, STEP_S = 18, 1.3, 0.9e-3, 1e-3
 COLD = {"drive.resistance_per_K": 0.0, "watchdog.on": False, "plant.engine": "lagrangian"}

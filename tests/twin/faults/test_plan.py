@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics.streams import stream_key
-from spheretwin.twin.faults.fault import MODES, Fault
-from spheretwin.twin.faults.plan import NEVER, FaultPlan, part_names, part_of
-from spheretwin.twin.faults.targets.registry import TARGETS
+from spheretwin.electronics.random_streams import stream_key
+from spheretwin.faults.fault import MODES, Fault
+from spheretwin.faults.schedule import NEVER, FaultPlan, part_names, part_of
+from spheretwin.faults.targets import TARGETS
 
 GROUPS, PERIOD_S = 18, 1e-3
 

@@ -7,10 +7,10 @@ import pytest
 from scipy import signal
 from scipy.linalg import solve_discrete_are
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.linear.model import linearise
-from spheretwin.twin.simulation import simulate
+from spheretwin.linear import linearise
+from spheretwin.simulation import simulate
 
 PERIOD_S, SETTLING_S, STEP_S = 1e-3, 0.5, 0.25
 UPRIGHT, TILTED = np.zeros(3), np.array([0.3, -0.2, 0.4])

@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
+from spheretwin import assembly
+from spheretwin import scenario as scenarios
+from spheretwin.active_config import at_start
+from spheretwin.linear import knowledge, linearise
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration, loaded_inertia
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.twin import assembly
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.in_force import at_start
-from spheretwin.twin.linear.knowledge import knowledge
-from spheretwin.twin.linear.model import linearise
-from spheretwin.twin.plant.friction import friction, slow_down
-from spheretwin.twin.plant.stepping import step
+from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.step import step
 
 LOADED = {"plant.modelling_error": 0.2, "plant.payload_kg": 0.05}
 TILTED = np.array([0.3, -0.2, 0.4])

@@ -9,9 +9,9 @@ from types import ModuleType
 
 import pytest
 
+from spheretwin import scenario
+from spheretwin.linear import linearise
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario
-from spheretwin.twin.linear.model import linearise
 
 SCRIPT = """
 import control

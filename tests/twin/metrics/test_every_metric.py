@@ -8,13 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spheretwin import scenario as scenarios
+from spheretwin.metrics import METRICS, Planned
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.metrics.metric import Planned
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.records.summary import figures_of
-from spheretwin.twin.simulation import simulate
+from spheretwin.run import figures_of
+from spheretwin.simulation import simulate
 
 
 @pytest.fixture(scope="module")

@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.metrics import METRICS, PIECE_TICKS, BAND_rad, Planned
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.metrics.metric import Planned
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.metrics.tracking.rms_error import PIECE_TICKS
-from spheretwin.twin.metrics.tracking.settling_time import BAND_rad
-from spheretwin.twin.records.summary import figures_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.run import figures_of
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 UNITS = {"_A_s": "A/s", "_rad": "rad", "_Nm": "N·m", "_A": "A", "_J": "J", "_s": "s", "_fraction": "0 to 1"}
 

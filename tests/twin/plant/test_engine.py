@@ -8,7 +8,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.kinematics import rotor_rate_jacobian
 from spheretwin.models.lagrangian import inertia_matrix
-from spheretwin.twin.plant.engine import Rotor, step
+from spheretwin.plant.mujoco_rotor import Rotor, step
 
 STEP_S = 5e-4
 

@@ -5,15 +5,14 @@ import pickle
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.plant.registry import ENGINES
-from spheretwin.twin.plant.rotor import Setting
-from spheretwin.twin.plant.stepping import step
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.plant.rotor import Setting
+from spheretwin.plant.step import ENGINES, step
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 
 def hold(name):

@@ -14,9 +14,9 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import inertia_matrix, loaded_inertia
-from spheretwin.twin.plant import lagrangian
-from spheretwin.twin.plant.friction import friction, slow_down
-from spheretwin.twin.plant.lagrangian import LagrangianRotor
+from spheretwin.plant import lagrangian_rotor
+from spheretwin.plant.friction import friction, slow_down
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 
 NONE = np.zeros(3)
 STEP_S, COULOMB_Nm, SMOOTHING_rad_s = 5e-4, 5e-3, 1e-3
@@ -36,7 +36,7 @@ def moving(plant, friction, torque, q, qdot):
             q[row, i], qdot[row, i] = plant.q[i], plant.qdot[i]
             plant.torque_q[i] = torque[i]
         slow_down(friction, plant.q, plant.qdot, on_hinges)
-        lagrangian.step(plant)
+        lagrangian_rotor.step(plant)
         slow_down(friction, plant.q, plant.qdot, on_hinges)
 
 

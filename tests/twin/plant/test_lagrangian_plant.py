@@ -8,7 +8,9 @@ import pytest
 from numba.core.runtime import _nrt_python, rtsys
 from scipy.integrate import solve_ivp
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
+from spheretwin.crosscheck.trajectories import HOLD_s, nutation_pieces
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
@@ -21,12 +23,12 @@ from spheretwin.models.lagrangian import (
     gravity_torque,
     inertia_matrix,
 )
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.crosscheck.trajectories import HOLD_s, nutation_pieces
-from spheretwin.twin.plant import engine, lagrangian, stepping
-from spheretwin.twin.plant.engine import Rotor
-from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.simulation import simulate
+from spheretwin.plant import lagrangian_rotor
+from spheretwin.plant import mujoco_rotor as engine
+from spheretwin.plant import step as stepping
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.simulation import simulate
 
 STEP_S, PAYLOAD_KG = 5e-4, 0.05
 
@@ -98,7 +100,7 @@ def test_payload_weighs_what_gravity_makes_of_it(actuator, gravity_m_s2):
     earth = LagrangianRotor(actuator, STEP_S, payload_kg=PAYLOAD_KG)
     np.testing.assert_array_equal(rotor.inertia, earth.inertia)
     plant = rotor.start(np.array([0.1, 0.0, 0.0]), np.zeros(3))
-    lagrangian.step(plant)
+    lagrangian_rotor.step(plant)
     assert np.sign(plant.qdot[0]) == np.sign(gravity_m_s2)  # a tilted shaft falls to where gravity pulls
 
 
@@ -123,7 +125,7 @@ def end_of_steps(actuator, step_s, duration, torque_q):
     plant = LagrangianRotor(actuator, step_s, payload_kg=PAYLOAD_KG).start(START[:3], START[3:])
     plant.torque_q[:] = torque_q
     for _ in range(round(duration / step_s)):
-        lagrangian.step(plant)
+        lagrangian_rotor.step(plant)
     return np.concatenate([plant.q, plant.qdot])
 
 
@@ -173,7 +175,7 @@ def test_steps_on_scalars_are_those_on_matrices(actuator, payload_kg):
     apart = []
     for torque in pieces.torque:
         weight = gravity_torque(slow.q, slow.weight_moment)
-        for plant, step in ((ours, lagrangian.step), (slow, slow_step)):
+        for plant, step in ((ours, lagrangian_rotor.step), (slow, slow_step)):
             plant.torque_q[:] = torque + weight
             for _ in range(round(HOLD_s / STEP_S)):
                 step(plant)
@@ -186,7 +188,7 @@ def test_steps_on_scalars_are_those_on_matrices(actuator, payload_kg):
 @compiled
 def many_steps(plant, count):
     for _ in range(count):
-        lagrangian.step(plant)
+        lagrangian_rotor.step(plant)
 
 
 def test_a_step_allocates_nothing(actuator):
@@ -221,7 +223,7 @@ def ten_steps(plant):
         stepping.step(plant)
 
 
-@pytest.mark.parametrize("kind", [engine, lagrangian])
+@pytest.mark.parametrize("kind", [engine, lagrangian_rotor])
 def test_compiled_code_steps_what_python_steps(actuator, kind):
     def start():
         # Kept alive: compiled code holds bare addresses of MuJoCo's own.
@@ -245,7 +247,7 @@ def test_compiled_code_steps_what_python_steps(actuator, kind):
 def test_start_does_not_hold_on_to_its_arguments(actuator):
     pose = np.zeros(3)
     plant = LagrangianRotor(actuator, STEP_S).start(pose, np.array([1.0, 0.0, 0.0]))
-    lagrangian.step(plant)
+    lagrangian_rotor.step(plant)
     np.testing.assert_array_equal(pose, 0)
 
 

@@ -12,18 +12,18 @@ import numba
 import numpy as np
 import pytest
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import generalised_torque
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.plant.engine import Rotor, step
-from spheretwin.twin.plant.lagrangian import LagrangianRotor
-from spheretwin.twin.plant.lagrangian import step as lagrangian_step
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.lagrangian_rotor import step as lagrangian_step
+from spheretwin.plant.mujoco_rotor import Rotor, step
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 # By its path: the tests are no package.
 models = SimpleNamespace(**runpy.run_path(str(Path(__file__).with_name("user_models.py"))))

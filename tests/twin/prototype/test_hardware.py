@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from spheretwin.control.estimation.estimator import estimates
-from spheretwin.control.estimation.registry import ESTIMATORS
+from spheretwin import assembly, cli
+from spheretwin import scenario as scenarios
+from spheretwin.control.estimators import ESTIMATORS
+from spheretwin.control.estimators.estimator import estimates
+from spheretwin.electronics.random_streams import noise_table
+from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import assembly, cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.electronics.sensing.chain import noise_streams, sense, sensor_chain
-from spheretwin.twin.electronics.sensing.noise import noise_table
-from spheretwin.twin.scenario import flags
-from spheretwin.twin.scenario.hardware import HARDWARE
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.scenario import reading
+from spheretwin.scenario.sections import HARDWARE
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 MADE = [kind for kind in ESTIMATORS if kind != "ideal"]
 
@@ -88,7 +88,7 @@ def test_a_field_that_is_set_is_not_set_by_the_hardware(tmp_path):
     (path := tmp_path / "mine.toml").write_text(
         'hardware = "prototype"\n[trajectory]\nshape = "hold"\n[sensors.adc]\nbits = 12\n'
     )
-    scenario = scenarios.load(str(path), flags.overrides(["--sensors.encoder.counts", "4096"]))
+    scenario = scenarios.load(str(path), reading.overrides(["--sensors.encoder.counts", "4096"]))
     assert (scenario.sensors.adc.bits, scenario.sensors.encoder.counts) == (12, 4096)
     assert scenario.sensors.adc.noise_V == HARDWARE["prototype"]["sensors.adc.noise_V"]
     assert scenario.plant.coulomb_Nm == (2e-3, 2e-3, 2e-3)

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.electronics.amplifier import drive_coils
+from spheretwin.electronics.coil import back_emf
+from spheretwin.electronics.delay import due
+from spheretwin.electronics.drive_chain import begin, drive_chain, end
+from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.electronics.driving.amplifier import drive_coils
-from spheretwin.twin.electronics.driving.chain import begin, drive_chain, end
-from spheretwin.twin.electronics.driving.coil import back_emf
-from spheretwin.twin.electronics.driving.delay import due
-from spheretwin.twin.electronics.hardware import PROTOTYPE_DRIVE
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 L_H = 0.9e-3
 
@@ -178,7 +178,7 @@ def test_neutral_stages_move_no_bit():
 
 
 def test_copper_loss_is_what_the_coils_say_they_lost():
-    from spheretwin.twin.records.summary import figures_of
+    from spheretwin.run import figures_of
 
     run = simulate(driven("nutation", duration=0.3))
     told = run.telemetry["copper_loss_W"].sum() * 1e-3

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.electronics import streams
-from spheretwin.twin.electronics.driving.sections import STAGES as DRIVE_STAGES
-from spheretwin.twin.electronics.sensing.sections import STAGES as SENSOR_STAGES
-from spheretwin.twin.electronics.streams import errors, stream_key, uniforms
-from spheretwin.twin.faults.plan import part_names
+from spheretwin.electronics import random_streams
+from spheretwin.electronics.drive_chain import STAGES as DRIVE_STAGES
+from spheretwin.electronics.random_streams import errors, stream_key, uniforms
+from spheretwin.electronics.sensor_chain import STAGES as SENSOR_STAGES
+from spheretwin.faults.schedule import part_names
 
 # One word of entropy for a seed, two, and more than the pool of four words holds.
 SEEDS = [0, 1, 2**32 - 1, 2**32, 2**53 - 1, 2**64, 2**200 + 12345]
@@ -38,7 +38,7 @@ def test_so_are_those_of_any_seed_and_name(seed, name, channels, count):
 
 def test_a_key_with_one_word_is_hashed_as_numpy_does(monkeypatch):
     """One key in 2³² has no second word, which then is not hashed."""
-    monkeypatch.setattr(streams, "stream_key", lambda name: 101)
+    monkeypatch.setattr(random_streams, "stream_key", lambda name: 101)
     np.testing.assert_array_equal(uniforms(7, "any", 1, 5)[0], np.random.default_rng([7, 101, 0]).random(5))
 
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
+from spheretwin import scenario as scenarios
+from spheretwin.faults.targets import TARGETS
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.faults.targets.registry import TARGETS
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 
 PERIOD_S, GROUPS, SEED, TICKS, CONVERSIONS = 1e-3, 18, 21, 400, 3
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(30)

@@ -6,16 +6,16 @@ import re
 import numpy as np
 import pytest
 
-from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.wording import shown
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.review import tolerances
-from spheretwin.twin.scenario import explaining, flags
-from spheretwin.twin.scenario.changing import changed
-from spheretwin.twin.scenario.fields import every_field
-from spheretwin.twin.scenario.sections import Scenario
-from spheretwin.twin.study import study as studies
-from spheretwin.twin.study.tuning.section import Optimise
+from spheretwin import scenario as scenarios
+from spheretwin.analysis import tolerances
+from spheretwin.models.base.errors import InputError, shown
+from spheretwin.scenario import fields as explaining
+from spheretwin.scenario import reading
+from spheretwin.scenario.changes import changed
+from spheretwin.scenario.fields import every_field
+from spheretwin.scenario.sections import Scenario
+from spheretwin.study import study as studies
+from spheretwin.study.optimise import Optimise
 
 # Names of types count where they stand alone: "string" of a text that a user gave must not be counted.
 FORBIDDEN = re.compile(
@@ -63,7 +63,7 @@ def test_overrides(law):
 @pytest.mark.parametrize("value", ["null", "true", "x", "[]", '{"a": 1}', "1.5", "nan", "9" * 5000, "-1e300"])
 def test_flags(value):
     for name in NAMES:
-        line = message(lambda text: scenarios.load("hold", flags.overrides([f"--{name}", text])), value)  # noqa: B023
+        line = message(lambda text: scenarios.load("hold", reading.overrides([f"--{name}", text])), value)  # noqa: B023
         assert line is None or not FORBIDDEN.search(line), line
 
 
@@ -151,7 +151,7 @@ def test_every_kind_of_error_of_the_sections_has_words():
 def test_a_user_s_field_of_several_types_is_named_without_them(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(
-        "from spheretwin.control.parts.parameters import LawParameters\n"
+        "from spheretwin.control.law_components.parameters import LawParameters\n"
         "class Mine(LawParameters):\n"
         "    gain: float | tuple[float, float] = 1.0\n"
         "    def build(self, known): ...\n"

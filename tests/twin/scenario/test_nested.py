@@ -2,11 +2,11 @@
 
 import pytest
 
+from spheretwin import scenario as scenarios
+from spheretwin.disturbances import KINDS
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.disturbances.registry import KINDS
-from spheretwin.twin.scenario.flags import described
-from spheretwin.twin.session import Session
+from spheretwin.scenario.reading import described
+from spheretwin.session import Session
 
 HOLD = '[trajectory]\nshape = "hold"\n[[disturbance.terms]]\n'
 SINES = '[trajectory]\nshape = "multisine"\n[[trajectory.components]]\n'

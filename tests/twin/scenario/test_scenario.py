@@ -2,14 +2,15 @@
 
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario import flags, reading
-from spheretwin.twin.scenario.changing import changed as changed_in
-from spheretwin.twin.scenario.fields import every_field
-from spheretwin.twin.scenario.sections import Scenario
+from spheretwin.scenario import reading
+from spheretwin.scenario import reading as flags
+from spheretwin.scenario.changes import changed as changed_in
+from spheretwin.scenario.fields import every_field
+from spheretwin.scenario.sections import Scenario
 
 PATHS = ("plant.mjcf", "plant.torque_curve", "nominal.torque_curve")
 

@@ -4,10 +4,10 @@ import shlex
 
 import pytest
 
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario import flags
-from spheretwin.twin.scenario.reading import shipped
-from spheretwin.twin.scenario.writing import as_command, as_toml
+from spheretwin import scenario as scenarios
+from spheretwin.scenario import reading
+from spheretwin.scenario.reading import shipped
+from spheretwin.scenario.writing import as_command, as_toml
 
 CHANGES = {
     "nothing": {},
@@ -45,7 +45,7 @@ def test_read_again_it_is_the_same(tmp_path, name, changes):
     assert scenarios.load(str(path)) == scenario
     verb, _, source, *words = shlex.split(as_command(scenario))
     assert verb == "spheretwin"
-    assert scenarios.load(source, flags.overrides(words)) == scenario
+    assert scenarios.load(source, reading.overrides(words)) == scenario
 
 
 def test_a_file_says_what_a_user_would_and_no_more():

@@ -3,12 +3,12 @@
 import numba
 import numpy as np
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
-from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import record_of
-from spheretwin.twin.session import Session
+from spheretwin.run import record_of
+from spheretwin.session import Session
 
 SHIPPED, ENGINES = ("pd", "adaptive_fuzzy", "afsm"), ("mujoco", "lagrangian")
 RANDOM = {"disturbance.random_bound_Nm": 0.05}

@@ -5,13 +5,13 @@ import pickle
 import numpy as np
 import pytest
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario import flags
-from spheretwin.twin.session import Session
+from spheretwin.scenario import reading
+from spheretwin.session import Session
 
 LAWS = '''
 import numba
@@ -370,14 +370,14 @@ def test_nothing_of_the_caller_s_is_altered(tables, monkeypatch):
 
 def test_a_text_of_a_law_from_a_file_may_look_like_a_number(file):
     tokens = ["--controller.law", f"{file}:Pid", "--controller.mode", "12"]
-    assert scenarios.load("hold", flags.overrides(tokens)).controller.mode == "12"
+    assert scenarios.load("hold", reading.overrides(tokens)).controller.mode == "12"
 
 
 def test_a_flag_nested_beyond_measure_is_refused():
     value = "[" * 900 + "]" * 900
     with pytest.raises(InputError):
         scenarios.load(
-            "hold", flags.overrides(f"--event.0.t-s 0 --event.0.set plant --event.0.value {value}".split())
+            "hold", reading.overrides(f"--event.0.t-s 0 --event.0.set plant --event.0.value {value}".split())
         )
 
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from spheretwin import scenario as scenarios
+from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.exogenous import BLOCK_TICKS
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 
 # By its path: the tests are no package.
 shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario import flags
-from spheretwin.twin.scenario.planned import Change
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.models.telemetry.run_record import Change
+from spheretwin.scenario import reading
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 EVENTS = """
 [[event]]
@@ -96,13 +96,13 @@ def test_a_snapshot_goes_on_with_the_events_to_come(planned, at):
 
 def test_flags_write_the_same_list(planned):
     tokens = ["--event.0.t-s", "0.15", "--event.0.set", "disturbance.load", "--event.0.value", "2.0"]
-    scenario = scenarios.load("hold", flags.overrides(tokens))
+    scenario = scenarios.load("hold", reading.overrides(tokens))
     assert scenario.event == planned.event[:1]
-    changed = scenarios.load("hold", flags.overrides([*tokens, "--event.0.value", "3.0"]))
+    changed = scenarios.load("hold", reading.overrides([*tokens, "--event.0.value", "3.0"]))
     assert changed.event[0].value == 3.0
-    rows = {flag: value for flag, value, _ in flags.described(scenario)}
+    rows = {flag: value for flag, value, _ in reading.described(scenario)}
     assert rows["--event.0.set"] == "disturbance.load"
-    assert "--event" in {flag for flag, *_ in flags.described(scenarios.load("hold"))}
+    assert "--event" in {flag for flag, *_ in reading.described(scenarios.load("hold"))}
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_flags_write_the_same_list(planned):
 )  # fmt: skip
 def test_an_event_that_is_none_is_refused_before_the_run(tokens, part):
     with pytest.raises(InputError) as caught:
-        scenarios.load("hold", flags.overrides(tokens.split()))
+        scenarios.load("hold", reading.overrides(tokens.split()))
     assert part in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.faults.targets.registry import TARGETS
-from spheretwin.twin.records.facts import record_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
+from spheretwin.run import record_of
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
 
 TICKS = 1500
 PLAN = [

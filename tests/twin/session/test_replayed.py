@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spheretwin.models.telemetry import file as telemetry_file
-from spheretwin.models.telemetry.file import TelemetryFile
+from spheretwin import cli, replay
+from spheretwin.models.telemetry import parquet as telemetry_file
+from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli
-from spheretwin.twin.records import replay
-from spheretwin.twin.records.facts import record_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
+from spheretwin.run import record_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
 
 # By its path: the tests are no package.
 shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))

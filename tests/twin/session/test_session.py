@@ -11,8 +11,8 @@ from spheretwin.control.law import Known, Law
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table, read_parquet
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.simulation import follow, simulate
+from spheretwin.run import facts_of
+from spheretwin.simulation import follow, simulate
 
 # By its path: the tests are no package.
 shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.session import Change, Session
-from spheretwin.twin.simulation import follow
+from spheretwin.models.telemetry.run_record import Change
+from spheretwin.session import Session
+from spheretwin.simulation import follow
 
 GAMMA = '<joint name="gamma" axis="0 0 1"/>'
 

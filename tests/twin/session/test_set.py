@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from spheretwin.control.law import Law
+from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import common_signals
-from spheretwin.twin.exogenous import BLOCK_TICKS
-from spheretwin.twin.session import Change
 
 SIGNALS = common_signals(18)
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from spheretwin.control.law import Law
+from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.exogenous import BLOCK_TICKS
 
 # By its path: the tests are no package.
 shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))

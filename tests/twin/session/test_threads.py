@@ -10,7 +10,7 @@ import pytest
 
 from spheretwin.control.law import Law
 from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.twin.session import Session
+from spheretwin.session import Session
 
 # By its path: the tests are no package.
 shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))

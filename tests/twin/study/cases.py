@@ -2,9 +2,9 @@
 
 import pyarrow.parquet as parquet
 
-from spheretwin.twin.study import run
-from spheretwin.twin.study.running import TELEMETRY
-from spheretwin.twin.study.study import made
+from spheretwin.study import run
+from spheretwin.study.runner import TELEMETRY
+from spheretwin.study.study import made
 
 SHORT = {"duration": 0.02}
 

@@ -8,11 +8,8 @@ from scipy import stats
 from scipy.stats import qmc
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.study.axes.linspace import Linspace
-from spheretwin.twin.study.axes.logspace import Logspace
-from spheretwin.twin.study.axes.normal import Normal
-from spheretwin.twin.study.axes.uniform import Uniform
-from spheretwin.twin.study.grid import STAGE, Grid
+from spheretwin.study.axes import Linspace, Logspace, Normal, Uniform
+from spheretwin.study.grid import STAGE, Grid
 from tests.twin.study.cases import study
 
 FIELD = "disturbance.load"

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.study.axes.axis import DrawnAxis
-from spheretwin.twin.study.axes.registry import AnyAxis
-from spheretwin.twin.study.grid import Grid
+from spheretwin.study.axes import AnyAxis, DrawnAxis
+from spheretwin.study.grid import Grid
 from tests.conftest import check_every_field_says_what_it_is
 from tests.twin.study.cases import study
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.study.grid import Grid, _mixed
+from spheretwin.study.grid import Grid, _mixed
 from tests.twin.study.cases import loads, study, values
 
 

@@ -9,10 +9,10 @@ import sys
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.twin.study.grid import Grid, Row
-from spheretwin.twin.study.kept import journal
-from spheretwin.twin.study.kept.journal import Journal
-from spheretwin.twin.study.row import Result
+from spheretwin.study import journal
+from spheretwin.study.grid import Grid, Row
+from spheretwin.study.journal import Journal
+from spheretwin.study.row import Result
 from tests.twin.study.cases import found, loads, study, table, values
 
 ROWS = [Row(number, f"{number:016x}", number, {}, None, 0) for number in range(6)]
@@ -144,7 +144,7 @@ def test_an_edited_file_of_the_user_s_makes_another_study(tmp_path):
 def test_a_second_writer_is_refused(path):
     # The lock is a process's, so the second is one: within a process it would be the same on some systems.
     script = (
-        "import sys; from pathlib import Path; from spheretwin.twin.study.kept.journal import Journal\n"
+        "import sys; from pathlib import Path; from spheretwin.study.journal import Journal\n"
         "with Journal(Path(sys.argv[1]), 'd', 6): print('in', flush=True); input()"
     )
     with subprocess.Popen(

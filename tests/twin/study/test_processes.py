@@ -9,10 +9,10 @@ import time
 
 import pytest
 
-from spheretwin.twin import cli
+from spheretwin import cli
 from tests.twin.study.cases import found, rows_of, study, table, values
 
-COMMAND = [sys.executable, "-m", "spheretwin.twin.cli", "sweep"]
+COMMAND = [sys.executable, "-m", "spheretwin.cli", "sweep"]
 LOADS = [0.1 * place for place in range(60)]
 MANY = study(values("disturbance.load", *LOADS), law=[{"law": "pd"}], fields={"duration": 2.0})
 SOURCE = f"""

@@ -7,14 +7,14 @@ import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 
+from spheretwin import cli, scenario
+from spheretwin.metrics import METRICS
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli, scenario
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.records.summary import figures_of
-from spheretwin.twin.simulation import simulate
-from spheretwin.twin.study.grid import Grid
-from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import load
+from spheretwin.run import figures_of
+from spheretwin.simulation import simulate
+from spheretwin.study.grid import Grid
+from spheretwin.study.row import Rows
+from spheretwin.study.study import load
 from tests.twin.study.cases import LOADS, found, loads, study, telemetry, values
 
 FAULTS = (

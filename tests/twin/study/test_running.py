@@ -6,9 +6,9 @@ import re
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.twin.study import agreement, run
-from spheretwin.twin.study import table as tables
-from spheretwin.twin.study.engines.local import AHEAD
+from spheretwin.study import agreement, run
+from spheretwin.study import table as tables
+from spheretwin.study.engines.threads import AHEAD
 from tests.twin.study.cases import found, loads, rows_of, study, table, values
 
 

@@ -3,10 +3,10 @@
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.study import checking, run
-from spheretwin.twin.study.grid import Grid
-from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import load, shipped
+from spheretwin.study import run, runner
+from spheretwin.study.grid import Grid
+from spheretwin.study.row import Rows
+from spheretwin.study.study import load, shipped
 from tests.twin.study.cases import LOADS, found, study, values
 
 PD = [{"law": "pd"}]
@@ -31,7 +31,7 @@ def test_studies_ship_and_each_has_the_rows_that_it_says():
     assert [law["law"] for law in studies["paper"].law] == ["pd", "adaptive_fuzzy", "afsm"]
     assert studies["robustness"].fields["duration"] == 1.0
     for chosen in studies.values():
-        checking.check(Grid(chosen), Rows(chosen))
+        runner.check(Grid(chosen), Rows(chosen))
 
 
 def refusal(action):

@@ -5,14 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
-from spheretwin.twin.trajectories.approach import FADING, Approach, SOON_s, faded
-from spheretwin.twin.trajectories.shapes.hold import Hold
-from spheretwin.twin.trajectories.shapes.jog import Jog
-from spheretwin.twin.trajectories.shapes.nutation import Nutation
-from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
+from spheretwin.simulation import simulate
+from spheretwin.trajectories.rounding import FADING, Approach, SOON_s, faded
+from spheretwin.trajectories.shapes import Hold, Jog, Nutation, Sinusoid
 
 STEP = 1e-5
 BEGUN = {

@@ -8,11 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from spheretwin.twin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded, told
-from spheretwin.twin.trajectories.shapes.nutation import Nutation
-from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
-from spheretwin.twin.trajectories.shapes.steps import Steps
-from spheretwin.twin.trajectories.shapes.tilt import Tilt
+from spheretwin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded, told
+from spheretwin.trajectories.shapes import Nutation, Sinusoid, Steps, Tilt
 
 FINE = 1e-4
 ANGLES = st.floats(-2, 2).filter(lambda angle: angle == 0 or abs(angle) > 1e-6)

@@ -8,9 +8,9 @@ import numpy as np
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.bench import front
-from spheretwin.viz.bench.machine import Choices, Setting
+from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
+from spheretwin.viz.bench.protocols import Choices, Setting
 
 GROUPS = 18
 
@@ -119,7 +119,7 @@ CHOICES = Choices(
 def shown(bench):
     """A page that follows a bench, in a thread of its own."""
     ended = threading.Event()
-    with Page(bench, CHOICES, front.listen(0)) as page:
+    with Page(bench, CHOICES, server.listen(0)) as page:
         following = threading.Thread(target=page.show, args=(ended.is_set,))
         following.start()
         try:

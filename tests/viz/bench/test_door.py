@@ -14,8 +14,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.bench import front
-from spheretwin.viz.bench.hand import STEERED_S
+from spheretwin.viz.bench import server
+from spheretwin.viz.bench.event_handlers import STEERED_S
 from tests.viz.bench import fake
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -113,7 +113,7 @@ def test_a_path_gives_the_page_or_nothing(page, path):
 
 def test_a_port_in_use_is_refused(page):
     with pytest.raises(InputError, match=f"expected a port that is free, received {port(page)}"):
-        front.listen(port(page))
+        server.listen(port(page))
 
 
 def test_two_benches_stand_side_by_side(page):
@@ -239,7 +239,7 @@ def test_whatever_is_sent_it_goes_on(page, bench, capfd):
                 visitor.send(changed(name, value=value))
         wait_until_all_is_heard(page, bench, visitor)
         assert len(bench.commands()) > 30  # there are more buttons and sliders than that
-        visitor.send(b"x" * (front.LARGEST_MESSAGE + 1))
+        visitor.send(b"x" * (server.LARGEST_MESSAGE + 1))
         with pytest.raises(ConnectionClosed):
             read_for_ever(visitor)
     assert is_alive(page)
@@ -260,8 +260,8 @@ def test_no_message_takes_stop_away(page, bench):
 
 def test_only_what_a_page_sends_passes():
     value = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": True}}
-    assert front._is_a_pages(msgspec.msgpack.encode(value))
-    assert front._is_a_pages(msgspec.msgpack.encode(CAMERA))
+    assert server._is_a_pages(msgspec.msgpack.encode(value))
+    assert server._is_a_pages(msgspec.msgpack.encode(CAMERA))
     for other in (
         {**value, "updates": {"removed": True}},
         {**value, "updates": {"value": True, "removed": True}},
@@ -271,7 +271,7 @@ def test_only_what_a_page_sends_passes():
         {"type": "ShareUrlRequest"},
         {"type": "GuiUpdateMessage"},
     ):
-        assert not front._is_a_pages(msgspec.msgpack.encode(other))
+        assert not server._is_a_pages(msgspec.msgpack.encode(other))
 
 
 def test_fifty_pages_come_and_go(page):
@@ -287,7 +287,7 @@ def test_fifty_pages_come_and_go(page):
 
 
 def test_one_page_more_than_there_is_room_for_is_refused(page, monkeypatch):
-    monkeypatch.setattr(front, "MOST_PAGES", 2)
+    monkeypatch.setattr(server, "MOST_PAGES", 2)
     with socket_to(page), socket_to(page):
         with pytest.raises(InvalidStatus) as refusal:
             socket_to(page)
@@ -311,7 +311,7 @@ def test_a_flood_waits_in_its_own_socket(page, bench):
         assert len(bench.commands()) - before <= 2 + (waited_s + sending_s) / STEERED_S
         # Of messages, a second's worth is taken at once and the rest at its rate: the moves count themselves.
         moves = page._server.gui._gui_input_handle_from_uuid[name].value / 0.01
-        assert 0 < moves <= 1 + front.MOST_MESSAGES_PER_S * (1 + time.monotonic() - begun + sending_s)
+        assert 0 < moves <= 1 + server.MOST_MESSAGES_PER_S * (1 + time.monotonic() - begun + sending_s)
         flooding.socket.shutdown(socket.SHUT_RDWR)
 
 

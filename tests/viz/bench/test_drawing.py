@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from spheretwin.models.kinematics import rotation
-from spheretwin.viz import palette
-from spheretwin.viz.bench import front
-from spheretwin.viz.bench.drawing import colours, solids
-from spheretwin.viz.bench.drawing.parts import parts_of, quaternions_along
-from spheretwin.viz.bench.drawing.scene import Scene
+from spheretwin.viz import theme
+from spheretwin.viz.bench import scene as colours
+from spheretwin.viz.bench import server as front
+from spheretwin.viz.bench.actuator import parts_of, quaternions_along
+from spheretwin.viz.bench.scene import Scene
+from spheretwin.viz.scene import solids
 
 # Coordinates are single precision: 1e-7 of a length, and of a volume three times that.
 SINGLE = 1e-6
@@ -52,14 +53,14 @@ def as_the_page_shows(albedo):
 
 @pytest.mark.parametrize("current", np.linspace(-1.0, 1.0, 9))
 def test_a_current_is_shown_in_its_own_colour(current):
-    meant = palette.current_colours(np.array(current), 1.0)
+    meant = theme.current_colours(np.array(current), 1.0)
     seen = as_the_page_shows(colours.of_instances(meant) / 255)
     # No colour of a surface makes the curve's blue as deep as the screen's: 14.3 of 255; the others, to 4.
     assert seen == pytest.approx(meant, abs=15 if current == -1.0 else 4)
 
 
 def test_one_solid_is_shown_in_its_own_colour():
-    for meant in (palette.TRACE, (150, 156, 166), (70, 76, 86)):
+    for meant in (theme.TRACE, (150, 156, 166), (70, 76, 86)):
         encoded = np.array(colours.of_one(meant)) / 255
         albedo = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
         assert as_the_page_shows(albedo) == pytest.approx(meant, abs=11)  # the trace is nearly all light

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from spheretwin.models.kinematics import rotation
-from spheretwin.viz import palette
+from spheretwin.viz import theme
 from tests.browser import Browser, needs_a_browser
 from tests.viz.bench import fake
 from tests.viz.bench.on_page import STATUS, errors, on_screen, opened, write
@@ -224,7 +224,7 @@ def test_a_coil_has_the_colour_of_its_current(browser, tmp_path):
             bench.now.current_A = (0.0,) * group + (current,) + (0.0,) * (fake.GROUPS - 1 - group)
             time.sleep(1.5)
             seen = np.array(Image.open(tab.screenshot(tmp_path / "page.png")).convert("RGB").getpixel(at))
-            meant = palette.current_colours(np.array(current), 8.0).astype(float)
+            meant = theme.current_colours(np.array(current), 8.0).astype(float)
             cosine = seen @ meant / np.linalg.norm(seen) / np.linalg.norm(meant)
             assert cosine > ALIKE, current
         tab.close()

@@ -5,9 +5,9 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
-from spheretwin.control.laws.registry import LAWS
-from spheretwin.viz import palette
-from spheretwin.viz.figures import errors, heat, plots
+from spheretwin.control.laws import LAWS
+from spheretwin.viz import theme
+from spheretwin.viz.figures import crosscheck, maps, over_time
 
 WINDOWS = 0.1 + np.linspace(0, 1, 40)[None, :, None] + 0.1 * np.arange(3)[:, None, None] * np.ones((1, 1, 2))
 SIZES = np.array([0.1, 0.3, 0.2])
@@ -16,29 +16,32 @@ ROWS, COLUMNS = ["ideal", "all"], ["pd", "afsm"]
 
 def courses(windows=WINDOWS):
     by_label = {
-        "AFSM": errors.Course("afsm", windows, 0.12, (0,)),
-        "PID": errors.Course("pid", windows, 0.0, ()),
+        "AFSM": over_time.ErrorCourse("afsm", windows, 0.12, (0,)),
+        "PID": over_time.ErrorCourse("pid", windows, 0.0, ()),
     }
-    return errors.courses(by_label, 0.02, ("α", "β"), "courses")
+    return over_time.courses(by_label, 0.02, ("α", "β"), "courses")
 
 
 def lines():
-    line = errors.Line("as printed", SIZES, 0.5 * SIZES)
-    groups = [errors.Group("afsm", "AFSM", [line, line], 0.12), errors.Group("pid", "PID", [line], None)]
-    return errors.lines(groups, "largest |error|, degrees", "lines")
+    line = over_time.Line("as printed", SIZES, 0.5 * SIZES)
+    groups = [
+        over_time.Group("afsm", "AFSM", [line, line], 0.12),
+        over_time.Group("pid", "PID", [line], None),
+    ]
+    return over_time.lines(groups, "largest |error|, degrees", "lines")
 
 
 def heated():
     values = np.array([[0.1, 9.0], [np.nan, 0.3]])
-    panels = {"α": heat.Panel(values, values - 0.2), "β": heat.Panel(values, 0 * values)}
-    return heat.heat(panels, ROWS, COLUMNS, "heat", "change, degrees")
+    panels = {"α": maps.HeatPanel(values, values - 0.2), "β": maps.HeatPanel(values, 0 * values)}
+    return maps.heat(panels, ROWS, COLUMNS, "heat", "change, degrees")
 
 
 @pytest.mark.parametrize("draw", [courses, lines, heated])
 def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        plots.save(draw(), path)
+        crosscheck.save(draw(), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     inked = np.any(imread(paths[0])[:, :, :3] < 0.9, axis=2)
     assert 0.003 < inked.mean() < 0.8
@@ -47,7 +50,7 @@ def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw
 def test_courses_show_the_median_in_the_colour_of_the_law():
     above, below = courses().axes
     (median,) = [line for line in above.get_lines() if line.get_label() == "AFSM"]
-    assert median.get_color() == palette.law_colour("afsm")
+    assert median.get_color() == theme.law_colour("afsm")
     np.testing.assert_allclose(median.get_ydata(), np.median(WINDOWS[:, :, 0], axis=0))
     np.testing.assert_allclose(median.get_xdata()[:2], [0.01, 0.03])  # middles of the windows
     dotted = [[line for line in axes.get_lines() if line.get_linestyle() == ":"] for axes in (above, below)]
@@ -81,18 +84,18 @@ def test_heat_writes_what_is_a_number():
 @pytest.mark.parametrize(("columns", "beside"), [(5, True), (6, False)])
 def test_panels_of_many_columns_are_one_below_the_other(columns, beside):
     panel, names = (
-        heat.Panel(np.zeros((2, columns)), np.zeros((2, columns))),
+        maps.HeatPanel(np.zeros((2, columns)), np.zeros((2, columns))),
         [str(i) for i in range(columns)],
     )
-    figure = heat.heat({"α": panel, "β": panel}, ROWS[:2], names, "heat", "change, degrees")
+    figure = maps.heat({"α": panel, "β": panel}, ROWS[:2], names, "heat", "change, degrees")
     first, second = (axes.get_subplotspec() for axes in figure.axes[:2])
     assert (first.rowspan == second.rowspan) == beside
     assert (first.colspan == second.colspan) != beside
 
 
 def test_laws_have_colours_of_their_own_or_share_the_last():
-    assert set(palette.LAW_COLOURS) <= set(LAWS)
-    colours = [palette.law_colour(law) for law in palette.LAW_COLOURS]
+    assert set(theme.LAW_COLOURS) <= set(LAWS)
+    colours = [theme.law_colour(law) for law in theme.LAW_COLOURS]
     assert len(set(colours)) == len(colours)
     assert all(to_hex(colour) == colour for colour in colours)
-    assert palette.law_colour("one of the user's") == palette.OTHER_LAW not in colours
+    assert theme.law_colour("one of the user's") == theme.OTHER_LAW not in colours

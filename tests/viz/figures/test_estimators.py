@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from spheretwin.viz.figures import estimators
+from spheretwin.viz.figures import conditions
 
 BANDWIDTHS = np.geomspace(20, 1000, 7)
 CURVES = {
-    "slow": estimators.Curve(
+    "slow": conditions.Curve(
         BANDWIDTHS / 1e3, 1 / BANDWIDTHS, np.full(7, 1e-6), BANDWIDTHS / 1e3, 1 / BANDWIDTHS, 150.0
     ),
-    "exact": estimators.Curve(
+    "exact": conditions.Curve(
         BANDWIDTHS / 3e3, np.linspace(-1e-4, 1e-3, 7), np.full(7, 1e-4), BANDWIDTHS / 3e3, np.zeros(7), 800.0
     ),
 }
 
 
 def drawn() -> Figure:
-    return estimators.estimators(BANDWIDTHS, CURVES, "rates")
+    return conditions.estimators(BANDWIDTHS, CURVES, "rates")
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def figure() -> Figure:
 def test_same_curves_give_the_same_bytes(tmp_path):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        estimators.save(drawn(), path)
+        conditions.save(drawn(), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
@@ -55,7 +55,7 @@ def test_each_estimator_keeps_its_colour_and_has_its_default(figure):
     for axes in figure.axes:
         lines = axes.get_lines()
         colours = {line.get_label().split(":")[0]: line.get_color() for line in lines}
-        assert colours["slow"] == estimators.SERIES[0]
-        assert colours["exact"] == estimators.SERIES[1]
+        assert colours["slow"] == conditions.SERIES[0]
+        assert colours["exact"] == conditions.SERIES[1]
         dashed = {line.get_color(): line.get_xdata()[0] for line in lines if line.get_linestyle() == "--"}
-        assert dashed == {estimators.SERIES[0]: 150.0, estimators.SERIES[1]: 800.0}
+        assert dashed == {conditions.SERIES[0]: 150.0, conditions.SERIES[1]: 800.0}

@@ -6,25 +6,25 @@ from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.figures import plots
-from spheretwin.viz.palette import AXIS_COLOURS
+from spheretwin.viz.figures import crosscheck
+from spheretwin.viz.theme import AXIS_COLOURS
 
 T = np.linspace(0, 1, 50)
 THREE = np.stack([np.sin(T), np.cos(T), T], axis=1)
 
 
 def bounded(bound=1e-3):
-    return plots.Bounded(1e-6 * (1 + T), bound)
+    return crosscheck.Bounded(1e-6 * (1 + T), bound)
 
 
 FIGURES = {
-    "margins": lambda: plots.margins({"one": 0.5, "two": 2.0, "three": 0.0, "four": np.inf}, "margins"),
-    "spreads": lambda: plots.spreads({"engine": {"M": 1e-13 * T}}, {"M": 1e-12}, "spreads"),
-    "motion": lambda: plots.motion(T, THREE, 1e-12 * THREE, 1e-8, "motion"),
-    "convergence": lambda: plots.convergence({"RK4": plots.Slope(T[1:6], T[1:6] ** 4, 4.0)}, "order"),
-    "drifts": lambda: plots.drifts(T, {"energy, relative": {"2π": bounded(), "30": bounded(None)}}, "drift"),
-    "closed_loops": lambda: plots.closed_loops(
-        T, {"PD": (THREE, THREE[:30])}, {"PD": plots.Bounded(1e-9 * T[:30], 1e-8)}, ("one", "other"), "loops"
+    "margins": lambda: crosscheck.margins({"one": 0.5, "two": 2.0, "three": 0.0, "four": np.inf}, "margins"),
+    "spreads": lambda: crosscheck.spreads({"engine": {"M": 1e-13 * T}}, {"M": 1e-12}, "spreads"),
+    "motion": lambda: crosscheck.motion(T, THREE, 1e-12 * THREE, 1e-8, "motion"),
+    "convergence": lambda: crosscheck.convergence({"RK4": crosscheck.Slope(T[1:6], T[1:6] ** 4, 4.0)}, "order"),
+    "drifts": lambda: crosscheck.drifts(T, {"energy, relative": {"2π": bounded(), "30": bounded(None)}}, "drift"),
+    "closed_loops": lambda: crosscheck.closed_loops(
+        T, {"PD": (THREE, THREE[:30])}, {"PD": crosscheck.Bounded(1e-9 * T[:30], 1e-8)}, ("one", "other"), "loops"
     ),
 }  # fmt: skip
 
@@ -33,10 +33,10 @@ FIGURES = {
 def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, name):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        plots.save(FIGURES[name](), path)
+        crosscheck.save(FIGURES[name](), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     pixels = imread(paths[0])
-    assert pixels.shape[1] == plots.WIDTH_in * plots.DPI
+    assert pixels.shape[1] == crosscheck.WIDTH_in * crosscheck.DPI
     inked = np.any(pixels[:, :, :3] < 0.9, axis=2)
     assert 0.003 < inked.mean() < 0.6
 
@@ -63,9 +63,9 @@ def test_axes_have_the_colours_of_the_recordings():
 
 def test_a_broken_bound_stands_out():
     colours = {line.get_label(): line.get_color() for line in FIGURES["margins"]().axes[0].get_lines()}
-    assert colours["broken"] == plots.BROKEN != colours["kept"]
+    assert colours["broken"] == crosscheck.BROKEN != colours["kept"]
 
 
 def test_a_figure_that_cannot_be_written_is_bad_input(tmp_path):
     with pytest.raises(InputError, match="writable path"):
-        plots.save(FIGURES["margins"](), tmp_path / "missing" / "figure.png")
+        crosscheck.save(FIGURES["margins"](), tmp_path / "missing" / "figure.png")

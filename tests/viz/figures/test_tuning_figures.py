@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.figures import plots, tuning
+from spheretwin.viz.figures import crosscheck, fronts
 
-TRIALS = tuning.Trials(
+TRIALS = fronts.Trials(
     law="pid",
     numbers=np.arange(6.0),
     values=np.array([[3.0, 1.0], [2.0, 5.0], [np.nan, np.nan], [9.0, 9.0], [1.0, 6.0], [4.0, 8.0]]),
@@ -24,7 +24,7 @@ def drawn(panel):
 
 
 def test_every_trial_is_drawn_once_and_the_best_so_far_only_gets_better(tmp_path):
-    figure = tuning.progress({"pid": TRIALS}, OBJECTIVES, "trials")
+    figure = fronts.progress({"pid": TRIALS}, OBJECTIVES, "trials")
     for place, panel in enumerate(figure.axes):
         series = drawn(panel)
         counts = {name.partition(", ")[2]: len(points) for name, points in series.items()}
@@ -32,29 +32,29 @@ def test_every_trial_is_drawn_once_and_the_best_so_far_only_gets_better(tmp_path
         best = series["pid, best so far"][:, 1]
         assert np.all(np.diff(best) <= 0)
         assert best[-1] == np.nanmin(TRIALS.values[TRIALS.completed, place])
-    plots.save(figure, tmp_path / "trials.png")
+    crosscheck.save(figure, tmp_path / "trials.png")
 
 
 def test_of_what_is_to_be_large_the_best_so_far_grows():
-    figure = tuning.progress({"pid": TRIALS._replace(signs=np.array([-1.0, -1.0]))}, OBJECTIVES, "trials")
+    figure = fronts.progress({"pid": TRIALS._replace(signs=np.array([-1.0, -1.0]))}, OBJECTIVES, "trials")
     best = drawn(figure.axes[0])["pid, best so far"][:, 1]
     np.testing.assert_array_equal(best, [3, 3, 3, 3, 3, 4])
 
 
 def test_the_front_is_drawn_with_its_start_and_its_fresh_seeds(tmp_path):
-    figure = tuning.front({"pid": TRIALS}, OBJECTIVES, "front")
+    figure = fronts.front({"pid": TRIALS}, OBJECTIVES, "front")
     series = drawn(figure.axes[0])
     np.testing.assert_array_equal(series["pid, trial"], TRIALS.values[TRIALS.completed])
     np.testing.assert_array_equal(series["pid, front"], [[1, 6], [2, 5], [3, 1]])
     np.testing.assert_array_equal(series["pid, front under fresh seeds"], TRIALS.fresh)
     np.testing.assert_array_equal(series["pid, start"], [[3, 1]])
-    plots.save(figure, tmp_path / "front.png")
+    crosscheck.save(figure, tmp_path / "front.png")
 
 
 @pytest.mark.parametrize("kind", ["progress", "front"])
 def test_without_a_completed_trial_there_is_still_a_figure(tmp_path, kind):
     none = np.zeros(6, dtype=bool)
     lost = TRIALS._replace(completed=none, best=none, values=np.full((6, 2), np.nan), fresh=np.empty((0, 2)))
-    figure = getattr(tuning, kind)({"pid": lost}, OBJECTIVES, "nothing")
-    plots.save(figure, tmp_path / "nothing.png")
+    figure = getattr(fronts, kind)({"pid": lost}, OBJECTIVES, "nothing")
+    crosscheck.save(figure, tmp_path / "nothing.png")
     assert (tmp_path / "nothing.png").stat().st_size > 0

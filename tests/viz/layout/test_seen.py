@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.viz.layout.seen import CLIPPED_FROM, LABELLED, MARGIN, Channel, Seen, labelled, nice
+from spheretwin.viz.layout.extents import CLIPPED_FROM, LABELLED, MARGIN, Channel, Seen, labelled, nice
 
 T_s = np.arange(100) * 0.1
 ERROR = Channel("error")

@@ -4,15 +4,23 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import COMMON_NAMES, common_signals
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
-from spheretwin.viz.layout.paths import STYLES, TELEMETRY, VALUES
-from spheretwin.viz.layout.view import AFTER_THE_END, VIEW_NAMES, View, application, shown_until_s
-from spheretwin.viz.layout.views.registry import VIEWS
-from spheretwin.viz.recording.parts.drawn import quantities
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+from spheretwin.viz.layout.view import (
+    AFTER_THE_END,
+    STYLES,
+    TELEMETRY,
+    VALUES,
+    VIEW_NAMES,
+    View,
+    application,
+    shown_until_s,
+)
+from spheretwin.viz.layout.views import VIEWS
+from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
 
 OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detect": True}
@@ -157,7 +165,7 @@ def test_the_names_of_views_are_those_of_the_registry():
 
 @pytest.mark.parametrize("view", VIEW_NAMES)
 def test_the_chosen_view_is_open(view, tmp_path, monkeypatch):
-    monkeypatch.setattr(quantities, "OPENED_AFTER_s", 0.0)
+    monkeypatch.setattr(plots, "OPENED_AFTER_s", 0.0)
     path, _ = recorded(tmp_path / "run.rrd", "hold", {"duration": 0.02}, view)
     opening, whole = layouts(path)
     active = [
@@ -189,7 +197,7 @@ def test_an_early_end_is_marked_in_plots_and_states(tmp_path):
 def test_a_recording_that_takes_long_is_laid_out_before_its_end(tmp_path, monkeypatch):
     path, _ = recorded(tmp_path / "brief.rrd", "hold", {})
     assert len(layouts(path)) == 1
-    monkeypatch.setattr(quantities, "OPENED_AFTER_s", 0.0)
+    monkeypatch.setattr(plots, "OPENED_AFTER_s", 0.0)
     path, _ = recorded(tmp_path / "long.rrd", "hold", {})
     opening, _ = layouts(path)
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}

@@ -10,18 +10,21 @@ from spheretwin.models import lagrangian
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.telemetry.signals import ANGLES, Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.quantities import margin
-from spheretwin.viz.quantities.copper_loss import COPPER_LOSS
-from spheretwin.viz.quantities.coupling import COUPLING
-from spheretwin.viz.quantities.delivered import DELIVERED
-from spheretwin.viz.quantities.error import ERROR
-from spheretwin.viz.quantities.error_angle import ERROR_ANGLE
-from spheretwin.viz.quantities.estimated_rate import ESTIMATED_RATE
-from spheretwin.viz.quantities.margin import MARGIN
-from spheretwin.viz.quantities.measured_angle import MEASURED_ANGLE
-from spheretwin.viz.quantities.quantity import Rows
-from spheretwin.viz.quantities.registry import QUANTITIES, quantities_of
-from spheretwin.viz.quantities.tip_distance import TIP_DISTANCE
+from spheretwin.viz import quantities
+from spheretwin.viz.quantities import (
+    COPPER_LOSS,
+    COUPLING,
+    DELIVERED,
+    ERROR,
+    ERROR_ANGLE,
+    ESTIMATED_RATE,
+    MARGIN,
+    MEASURED_ANGLE,
+    QUANTITIES,
+    TIP_DISTANCE,
+    Rows,
+    quantities_of,
+)
 
 SIGNALS = (
     *common_signals(18),
@@ -80,12 +83,12 @@ def test_the_margin_is_how_far_a_command_can_be_scaled(rows):
     factor = 1 + MARGIN.values(rows)
     scaled = np.max(np.abs(factor * commands), axis=1)
     largest = np.max(np.abs(commands), axis=1)
-    told = largest > LIMIT_A / (1 + margin.MOST)
+    told = largest > LIMIT_A / (1 + quantities.MOST)
     assert 0 < np.count_nonzero(told & (largest <= LIMIT_A)) < COUNT
     within = told & (largest <= LIMIT_A)
     np.testing.assert_allclose(scaled[within], LIMIT_A, rtol=1e-15)
     np.testing.assert_array_equal(factor[largest > LIMIT_A], 1.0)
-    np.testing.assert_allclose(factor[~told], 1 + margin.MOST, rtol=1e-15)
+    np.testing.assert_allclose(factor[~told], 1 + quantities.MOST, rtol=1e-15)
 
 
 def test_nothing_is_left_where_the_limit_has_cut_the_torque(rows):

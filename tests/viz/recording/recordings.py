@@ -4,11 +4,11 @@ import numpy as np
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
-from spheretwin.viz.layout.paths import TIMELINE
+from spheretwin import scenario as scenarios
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.recording.recorder import Recorder
 
 

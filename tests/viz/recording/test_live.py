@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.commands.outputs import Outputs
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
-from spheretwin.viz.reading.reading import read
+from spheretwin.outputs import Outputs
+from spheretwin.session import Session
+from spheretwin.simulation import follow
 from spheretwin.viz.recording.live import LIVE_RATE_Hz
-from spheretwin.viz.recording.viewer.server import RECORDING
+from spheretwin.viz.recording.reader import read
+from spheretwin.viz.recording.viewer_server import RECORDING
 from tests.browser import Browser, needs_a_browser
 
 CHANGES = {"plant.engine": "lagrangian", "duration": 1.5, "plant.modelling_error": 0.2}
@@ -100,7 +100,7 @@ def test_a_viewer_gets_a_hundred_rows_a_second_and_every_event(tmp_path, headles
 def test_a_killed_run_leaves_no_server():
     """Nothing that it started goes on: the kernel closes its ports, and no process has its mark."""
     mark = f"LIVE_MARK_{os.getpid()}"
-    command = [sys.executable, "-m", "spheretwin.twin.cli", "simulate", "hold", "--live", "--duration", "60"]
+    command = [sys.executable, "-m", "spheretwin.cli", "simulate", "hold", "--live", "--duration", "60"]
     command += ["--plant.engine", "lagrangian"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, mark: "1"}

@@ -9,20 +9,20 @@ import rerun as rr
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
-from spheretwin.viz import palette
-from spheretwin.viz.layout.paths import EVENTS, SCENARIO, TELEMETRY
-from spheretwin.viz.reading.reading import read
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+from spheretwin.viz import theme
+from spheretwin.viz.layout.view import EVENTS, SCENARIO, TELEMETRY
+from spheretwin.viz.recording.reader import read
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
-from spheretwin.viz.scene import paths as scene
+from spheretwin.viz.scene import meshes as scene
 from tests.viz.recording.recordings import hold_facts, recorded, rows_of
 
 SIGNALS = common_signals(18)
@@ -86,7 +86,7 @@ def test_both_coils_of_a_group_show_its_current(run):
     times, pixels = rows_of(path, scene.COILS, "Mesh3D:albedo_texture_buffer")
     colours = pixels.reshape(len(times), 36, 3)
     current = finished.telemetry["current_A"][times // 1_000_000]
-    expected = palette.current_colours(current, session.scenario.drive.current_limit_A)
+    expected = theme.current_colours(current, session.scenario.drive.current_limit_A)
     for side in range(2):
         np.testing.assert_array_equal(colours[:, session.actuator.groups[:, side]], expected)
 

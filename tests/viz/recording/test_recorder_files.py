@@ -9,15 +9,15 @@ import sys
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow, simulate
-from spheretwin.viz.layout.paths import TELEMETRY
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow, simulate
+from spheretwin.viz.layout.view import TELEMETRY
 from spheretwin.viz.recording import recorder as recording
 from spheretwin.viz.recording.recorder import Recorder
 from tests.viz.recording.recordings import hold_facts, recorded, rows_of

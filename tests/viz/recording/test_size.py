@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import width
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
-from spheretwin.viz.recording.parts.drawn import quantities
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
 
 
@@ -27,7 +27,7 @@ def size_and_raw(path, duration_s, rate_Hz):
 # rows a second, 60 and those that stand out are a tenth.
 @pytest.mark.parametrize(("rate_Hz", "share"), [(None, 1.0), (60.0, 0.15)])
 def test_a_recording_grows_no_faster_than_its_numbers(tmp_path, monkeypatch, rate_Hz, share):
-    monkeypatch.setattr(quantities, "OPENED_AFTER_s", np.inf)  # a slow machine would add a layout
+    monkeypatch.setattr(plots, "OPENED_AFTER_s", np.inf)  # a slow machine would add a layout
     brief, long = (size_and_raw(tmp_path / f"{each:g}.rrd", each, rate_Hz) for each in (10.0, 20.0))
     grown, raw = long - brief
     assert grown <= share * raw

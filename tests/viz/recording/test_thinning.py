@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.status import QUIET_S
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.commands.outputs import Outputs, check_rate
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
-from spheretwin.viz.reading.reading import read
-from spheretwin.viz.recording.parts.events import QUIET_S
-from spheretwin.viz.recording.thinning import WINDOW_S, Firsts, FirstsAndExtremes
+from spheretwin.outputs import Outputs, check_rate
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+from spheretwin.viz.decimation import WINDOW_S, Firsts, FirstsAndExtremes
+from spheretwin.viz.recording.reader import read
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),

@@ -7,19 +7,18 @@ import pytest
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf, torque_curve
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.viz import palette
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.viz import theme
 from spheretwin.viz.layout.layout import layout
-from spheretwin.viz.layout.paths import TELEMETRY
-from spheretwin.viz.layout.view import View, application
+from spheretwin.viz.layout.view import TELEMETRY, View, application
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.viz.scene import paths as scene
+from spheretwin.viz.scene import meshes as scene
 
 LAYER = 'count="12" euler="0 0 30"'
 ROWS = 40
@@ -76,7 +75,7 @@ def test_a_variant_is_recorded_with_its_own_groups(variant, tmp_path):
     assert shape[0]["width"] == 2 * groups
     textures = one_row_each(path, scene.COILS, "Mesh3D:albedo_texture_buffer")
     first = np.reshape(np.frombuffer(bytes(textures[0][0]), np.uint8), (2 * groups, 3))
-    expected = palette.current_colours(table["current_A"][0], facts.current_limit_A)
+    expected = theme.current_colours(table["current_A"][0], facts.current_limit_A)
     for side in range(2):
         np.testing.assert_array_equal(first[actuator.groups[:, side]], expected)
 

@@ -8,7 +8,7 @@ import rerun as rr
 import trimesh
 
 from spheretwin.models import actuator as actuators
-from spheretwin.viz.scene import gltf
+from spheretwin.viz.scene import meshes as gltf
 from spheretwin.viz.scene.meshes import read_meshes
 
 

@@ -13,12 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rotation
-from spheretwin.viz import palette
-from spheretwin.viz.scene.coils import SECTIONS
-from spheretwin.viz.scene.marks import ALONG, current_scale, current_scale_labels, size_of
-from spheretwin.viz.scene.meshes import read_meshes
-from spheretwin.viz.scene.paths import WORLD
-from spheretwin.viz.scene.poses import body_quaternions, shaft_tip
+from spheretwin.viz import theme
+from spheretwin.viz.scene.meshes import SECTIONS, WORLD, read_meshes
+from spheretwin.viz.scene.motion import body_quaternions, shaft_tip
+from spheretwin.viz.scene.static import ALONG, current_scale, current_scale_labels, size_of
 
 poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
 
@@ -160,7 +158,7 @@ def test_faces_and_normals_of_a_coil_point_outward(actuator):
 
 def test_all_poles_are_drawn_in_the_grey_of_their_polarity(actuator):
     pieces = read_meshes(actuators.MJCF_PATH).others
-    for polarity, name, grey in ((1, "north", palette.NORTH), (-1, "south", palette.SOUTH)):
+    for polarity, name, grey in ((1, "north", theme.NORTH), (-1, "south", theme.SOUTH)):
         piece = pieces[f"{WORLD}/rotor/poles_{name}"]
         axes = actuator.pole_axes[actuator.pole_polarity == polarity]
         directions = placed(piece).mean(axis=1)
@@ -170,9 +168,9 @@ def test_all_poles_are_drawn_in_the_grey_of_their_polarity(actuator):
         np.testing.assert_array_equal(match.sum(axis=0), 1)
         np.testing.assert_array_equal(match.sum(axis=1), 1)
         assert piece.colour == grey
-    for red, green, blue in (palette.NORTH, palette.SOUTH):
+    for red, green, blue in (theme.NORTH, theme.SOUTH):
         assert max(red, green, blue) - min(red, green, blue) < 16  # no hue: red and blue are currents
-    assert min(palette.NORTH) > 2.5 * max(palette.SOUTH)  # and told apart by lightness alone
+    assert min(theme.NORTH) > 2.5 * max(theme.SOUTH)  # and told apart by lightness alone
 
 
 def world_positions(model, data, geom):
@@ -232,10 +230,10 @@ def test_meshes_without_names_have_those_of_their_files_and_move_with_what_carri
 
 
 def test_current_colours_tell_sign_and_size():
-    idle, small, full, negative = palette.current_colours(np.array([0.0, 2.0, 8.0, -8.0]), 8.0).astype(int)
+    idle, small, full, negative = theme.current_colours(np.array([0.0, 2.0, 8.0, -8.0]), 8.0).astype(int)
     assert full[0] > small[0] > idle[0]
     assert negative[2] > full[2]
-    np.testing.assert_array_equal(palette.current_colours(np.array([100.0]), 8.0)[0], full)
+    np.testing.assert_array_equal(theme.current_colours(np.array([100.0]), 8.0)[0], full)
 
 
 def test_the_scale_has_the_colours_that_coils_have_at_its_currents():
@@ -245,7 +243,7 @@ def test_the_scale_has_the_colours_that_coils_have_at_its_currents():
     along = positions(scale) @ ALONG
     share = 2 * (along - along.min()) / np.ptp(along) - 1
     # Single precision moves a share by 1e-6, and near none the root of it by a step of eight bits.
-    np.testing.assert_allclose(shown, palette.current_colours(6.0 * share, 6.0), atol=1)
+    np.testing.assert_allclose(shown, theme.current_colours(6.0 * share, 6.0), atol=1)
     texts = labels.labels.as_arrow_array().to_pylist()
     at = 2 * (positions(labels) @ ALONG - along.min()) / np.ptp(along) - 1
     np.testing.assert_allclose([float(text.removesuffix("A")) for text in texts], 6.0 * at, atol=1e-5)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from spheretwin.models.base.check import Check
-from spheretwin.viz.terminal import style
-from spheretwin.viz.terminal.checks import print_checks
+from spheretwin.models.base.checks import Check
+from spheretwin.viz.terminal import tables
+from spheretwin.viz.terminal.tables import print_checks
 
 CHECKS = [
     Check("mesh [1]", "this mesh with that", 3, 1e-6, 5e-3, "as much as is known"),
@@ -56,7 +56,7 @@ def test_a_pipe_gets_plain_text_of_a_width_that_can_be_read(monkeypatch, capsys)
     print_checks("magnetics check", CHECKS)
     out = capsys.readouterr().out
     assert "\x1b" not in out
-    assert max(map(len, out.splitlines())) <= style.WIDTH_WITHOUT_TERMINAL
+    assert max(map(len, out.splitlines())) <= tables.WIDTH_WITHOUT_TERMINAL
     assert set("─━│┃").isdisjoint(out)
 
 
@@ -74,12 +74,12 @@ def test_a_pipe_gets_plain_text_of_a_width_that_can_be_read(monkeypatch, capsys)
     ],
 )
 def test_figures_have_three_significant_digits(value, text):
-    assert style.three_digits(value) == text
+    assert tables.three_digits(value) == text
 
 
 def test_a_title_is_not_wrapped_to_a_narrow_table(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
-    table = style.table("a title much wider than its table [is]", "a", "b")
+    table = tables.new_table("a title much wider than its table [is]", "a", "b")
     table.add_row("1", "2")
-    style.console().print(table)
+    tables.terminal_console().print(table)
     assert capsys.readouterr().out.splitlines()[0].rstrip() == "a title much wider than its table [is]"

@@ -6,8 +6,8 @@ import pytest
 from rich.text import Text
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.viz.terminal import style
-from spheretwin.viz.terminal.tables import COLOURS, print_run
+from spheretwin.viz.terminal import tables
+from spheretwin.viz.terminal.runs import COLOURS, print_run
 
 SUMMARY = {
     "scenario": {"name": "hold"},
@@ -74,4 +74,4 @@ def test_a_failure_stands_out_in_a_terminal(capsys, monkeypatch):
     first = printed(capsys, status="left_workspace")[0]
     assert "\x1b[1;31m" in first
     assert Text.from_ansi(first).plain.startswith("hold under pd: left_workspace")
-    assert style.console().is_terminal
+    assert tables.terminal_console().is_terminal

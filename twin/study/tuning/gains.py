@@ -7,15 +7,14 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.metrics import METRICS
+from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.user_code import is_reference
-from spheretwin.models.base.wording import did_you_mean, shown
-from spheretwin.twin.metrics.registry import METRICS
-from spheretwin.twin.study.grid import Row
-from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import Study
-from spheretwin.twin.study.tuning.section import ON, Gain, Optimise
-from spheretwin.twin.study.tuning.trial import with_fields
+from spheretwin.study.grid import Row
+from spheretwin.study.optimise import ON, Gain, Optimise
+from spheretwin.study.row import Rows
+from spheretwin.study.study import Study
+from spheretwin.study.tuning.trials import with_fields
 
 
 def section_of(study: Study) -> Optimise:

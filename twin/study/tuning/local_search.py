@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.twin.study.tuning import objectives
-from spheretwin.twin.study.tuning.gains import numbers
-from spheretwin.twin.study.tuning.section import Gain, Optimise
-from spheretwin.twin.study.tuning.trial import Ended, Kept
+from spheretwin.study import optimise as objectives
+from spheretwin.study.optimise import Gain, Optimise
+from spheretwin.study.tuning.gains import numbers
+from spheretwin.study.tuning.trials import Ended, Kept
 
 Array = NDArray[np.float64]
 

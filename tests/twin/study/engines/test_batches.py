@@ -5,8 +5,8 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.study.engines import batches
-from spheretwin.twin.study.engines.batches import Batches
+from spheretwin.study.engines import engine
+from spheretwin.study.engines.engine import Batches
 
 
 @given(
@@ -32,7 +32,7 @@ def test_a_batch_grows_until_it_lasts_a_second(row_s):
     sizes = [len(cut.next(1)) for _ in range(12) if cut.landed(cut.rows, cut.rows * row_s) is None]
     assert all(after <= 2 * before for before, after in pairwise(sizes))
     # Rounded down to whole rows, and twelve doublings reach a thousand.
-    assert batches.TASK_S - row_s <= sizes[-1] * row_s <= batches.TASK_S * (1 + 1e-9)
+    assert engine.TASK_S - row_s <= sizes[-1] * row_s <= engine.TASK_S * (1 + 1e-9)
 
 
 def test_one_slow_batch_does_not_undo_what_was_learnt():

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from spheretwin import study as studies
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.twin import study as studies
-from spheretwin.twin.study.engines import batches, cluster, worker
-from spheretwin.twin.study.kept import journal
-from spheretwin.twin.study.study import Study, load
+from spheretwin.study import journal
+from spheretwin.study.engines import engine, ray_cluster, ray_worker
+from spheretwin.study.study import Study, load
 
 ROOT = Path(__file__).parents[4]
 
@@ -61,7 +61,7 @@ def wanted(study, tmp_path_factory):
 def machines():
     """Two nodes of a core each, on 127.0.0.1 alone."""
     environment = dict(os.environ)
-    cluster._ray(local=True)
+    ray_cluster._ray(local=True)
     from ray.cluster_utils import Cluster
 
     # A killed node is missed within seconds, not a quarter of a minute.
@@ -103,13 +103,13 @@ def slowly_in(folder):
 
         import ray
 
-        from spheretwin.twin.study.engines import worker
+        from spheretwin.study.engines import ray_worker
 
         at_work = folder / ray.get_runtime_context().get_node_id()
         at_work.touch()
         time.sleep(SLOWLY_s)  # in the process of a node
         at_work.unlink()
-        return worker.carried_out(job, numbers)
+        return ray_worker.carried_out(job, numbers)
 
     return slowly
 
@@ -127,12 +127,12 @@ def has_just_begun(at_work):
 
 def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, tmp_path, monkeypatch):
     lost = []
-    back = batches.Batches.lost
+    back = engine.Batches.lost
     monkeypatch.setattr(
-        batches.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
+        engine.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
     )
     (folder := tmp_path / "at_work").mkdir()
-    monkeypatch.setattr(worker, "carried_out", slowly_in(folder))
+    monkeypatch.setattr(ray_worker, "carried_out", slowly_in(folder))
     killed = []
 
     def kill(done, of):
@@ -155,25 +155,25 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
 
 
 def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
-    carried_out = worker.carried_out
+    carried_out = ray_worker.carried_out
 
     def of_plants_that_differ(job, numbers):
-        from spheretwin.twin.study import agreement
-        from spheretwin.twin.study.engines import worker
+        from spheretwin.study import agreement
+        from spheretwin.study.engines import ray_worker
 
         agreement.BOUND = -1.0  # in the process of a node
-        return worker.carried_out(job, numbers)
+        return ray_worker.carried_out(job, numbers)
 
-    monkeypatch.setattr(worker, "carried_out", of_plants_that_differ)
+    monkeypatch.setattr(ray_worker, "carried_out", of_plants_that_differ)
     with pytest.raises(SpheretwinError, match="to be the same on both plants"):
         run(study, tmp_path, machines)
-    monkeypatch.setattr(worker, "carried_out", carried_out)
+    monkeypatch.setattr(ray_worker, "carried_out", carried_out)
     assert (tmp_path / "table.parquet").exists()
     assert len((tmp_path / journal.NAME).read_text().splitlines()) < 1 + ROWS
 
 
 def test_a_row_that_takes_its_process_along_is_told_of(study, machines, tmp_path, monkeypatch):
-    monkeypatch.setattr(batches, "MOST_LOSSES", 1)
+    monkeypatch.setattr(engine, "MOST_LOSSES", 1)
     (tmp_path / "own.py").write_text("import os\n\n\ndef dies(run):\n    os._exit(1)\n")
     fatal = study.model_copy(update={"metrics": (f"{tmp_path}/own.py:dies",), "telemetry": ()})
     with pytest.raises(SpheretwinError, match="expected row 0 to leave its process alive, received Worker"):
@@ -225,7 +225,7 @@ def test_an_address_where_nobody_answers_loses_nothing(study, machines, wanted, 
 
 def test_who_answers_but_is_no_cluster_is_refused(study, tmp_path, monkeypatch):
     # The probe of one that is silent for ever is cut off: how soon makes no difference.
-    monkeypatch.setattr(cluster, "CONNECT_S", 1.0)
+    monkeypatch.setattr(ray_cluster, "CONNECT_S", 1.0)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(InputError, match="received an answer, but none of Ray's within 1 s"):
@@ -254,7 +254,7 @@ def test_an_installation_without_ray_names_the_extra(study, tmp_path, monkeypatc
 
 def started(source, folder, *options):
     """The command line in a process of its own, when ten rows are in its journal."""
-    program = "import sys; from spheretwin.twin.cli import main; sys.exit(main(sys.argv[1:]))"
+    program = "import sys; from spheretwin.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", program, "sweep", str(source), "--out", str(folder), "--engine", "ray"]
     going = subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True)
     path = folder / journal.NAME

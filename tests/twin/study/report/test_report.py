@@ -8,11 +8,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.study.report import page
-from spheretwin.twin.study.report.drawings import drawings
-from spheretwin.twin.study.report.ranking import ranked, strongest
-from spheretwin.twin.study.report.reading import Rows, largest, read
-from spheretwin.twin.study.report.summary import summary
+from spheretwin.study import report
+from spheretwin.study.report import drawings
+from spheretwin.study.statistics import Rows, largest, ranked, read, strongest, summary
 from tests.twin.study.cases import LOADS, found, loads, study, values
 
 LISTS = st.none() | st.lists(st.none() | st.floats(-9, 9), min_size=1, max_size=3)
@@ -130,7 +128,7 @@ def test_figures_suit_the_axes(axes, files, laws):
 @pytest.mark.parametrize("lost", [range(24), range(23)])
 def test_where_hardly_a_row_was_completed_nothing_fails(tmp_path, lost):
     rows = made(24, {"max_abs_error_rad": NUMBERS}, {"a": NUMBERS, "b": NUMBERS, "c": NUMBERS}, lost=lost)
-    assert len(page.write(tmp_path, rows, summary(rows), (24, 24), "made", {})) == 2
+    assert len(report.write(tmp_path, rows, summary(rows), (24, 24), "made", {})) == 2
     assert "| pd | left_workspace |" in (tmp_path / "report.md").read_text()
 
 
@@ -138,7 +136,7 @@ def test_the_page_tells_of_a_study(tmp_path):
     chosen = loads(axis=[*LOADS, values("plant.payload_kg", 0.0, -1.0)])
     told = found(chosen, tmp_path)
     rows = read(tmp_path / "table.parquet")
-    markdown, html = page.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml", {"python": "3"})
+    markdown, html = report.write(tmp_path, rows, summary(rows), (48, 48), "my study.toml", {"python": "3"})
     text = markdown.read_text()
     assert "48 of 48 rows: 24 completed, 24 refused." in text
     assert "afsm, surface_slope = [60.0, 60.0, 60.0]" in text
@@ -158,7 +156,7 @@ def test_the_same_table_gives_the_same_page(tmp_path):
     for name in ("a", "b"):
         found(loads(), tmp_path / name)
         rows = read(tmp_path / name / "table.parquet")
-        page.write(tmp_path / name, rows, summary(rows), (24, 24), "short", {})
+        report.write(tmp_path / name, rows, summary(rows), (24, 24), "short", {})
     for path in (tmp_path / "a").glob("report*"):
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
 
@@ -166,7 +164,7 @@ def test_the_same_table_gives_the_same_page(tmp_path):
 def test_a_study_of_one_row_has_a_page(tmp_path):
     found(study(), tmp_path)
     rows = read(tmp_path / "table.parquet")
-    page.write(tmp_path, rows, summary(rows), (1, 1), "short", {})
+    report.write(tmp_path, rows, summary(rows), (1, 1), "short", {})
     assert "Nothing but the seed." in (tmp_path / "report.md").read_text()
 
 

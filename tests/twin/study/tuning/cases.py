@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from spheretwin.twin.study.study import Study, made
+from spheretwin.study.study import Study, made
 
 FIGURES = '''
 import math

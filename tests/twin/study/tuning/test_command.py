@@ -7,10 +7,10 @@ import signal
 import pyarrow.parquet as parquet
 import pytest
 
+from spheretwin import cli
+from spheretwin.cli import sweep
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import cli
-from spheretwin.twin.commands import sweep
-from spheretwin.twin.study.tuning.report import page
+from spheretwin.study.tuning import report
 from tests.twin.study.tuning.cases import FIGURES
 
 STUDY = """
@@ -198,7 +198,7 @@ def test_people_get_the_start_the_front_and_where_all_is(small, tmp_path, capsys
 
 
 def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys, monkeypatch):
-    for module in (sweep, page):
+    for module in (sweep, report):
         monkeypatch.setattr(module, "find_spec", lambda name: None)
     assert cli.main(["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out")]) == cli.DONE
     out, err = capsys.readouterr()

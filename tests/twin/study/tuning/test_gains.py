@@ -2,14 +2,14 @@
 
 import pytest
 
-from spheretwin.control.laws.pid import triple_pole
-from spheretwin.control.laws.registry import LAWS
+from spheretwin.control.law_components.feedback import triple_pole
+from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import load, made
-from spheretwin.twin.study.tuning.gains import gains_of, middle, numbers, values
-from spheretwin.twin.study.tuning.running import tuned
-from spheretwin.twin.study.tuning.section import Gain
+from spheretwin.study.optimise import Gain
+from spheretwin.study.row import Rows
+from spheretwin.study.study import load, made
+from spheretwin.study.tuning.gains import gains_of, middle, numbers, values
+from spheretwin.study.tuning.tuning import tuned
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 SHIPPED = load("tuning")

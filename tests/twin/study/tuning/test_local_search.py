@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from spheretwin.twin.study.tuning.local_search import NARROWEST, WIDEST, proposed
-from spheretwin.twin.study.tuning.running import tuned
-from spheretwin.twin.study.tuning.section import Gain, Objective, Optimise
-from spheretwin.twin.study.tuning.trial import Ended, Kept, Tried
+from spheretwin.study.optimise import Gain, Objective, Optimise
+from spheretwin.study.tuning.local_search import NARROWEST, WIDEST, proposed
+from spheretwin.study.tuning.trials import Ended, Kept, Tried
+from spheretwin.study.tuning.tuning import tuned
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 DRAWS, PERTURBATIONS = 64, 40

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.twin.study.tuning import objectives
-from spheretwin.twin.study.tuning.section import Objective
+from spheretwin.study import optimise
+from spheretwin.study.optimise import Objective
 
 VALUES = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=9)
 OVER = st.sampled_from(["worst", "median", "first"])
@@ -17,30 +17,30 @@ def test_an_objective_over_all_rows_is_what_its_name_says(values, over):
     objective = Objective(metric="copper_loss_J", over=over)
     slow = {"worst": np.max, "median": np.median, "first": lambda each: each[0]}[over](values)
     # A median of an even number is a mean of two, which NumPy rounds otherwise: by some units of 1e6 · 2⁻⁵³.
-    assert objectives.of_rows(objective, values, len(values)) == pytest.approx(slow, rel=1e-12, abs=1e-9)
+    assert optimise.of_rows(objective, values, len(values)) == pytest.approx(slow, rel=1e-12, abs=1e-9)
 
 
 @given(VALUES, OVER, st.data())
 def test_what_is_certain_is_never_above_what_comes(values, over, data):
     objective = Objective(metric="copper_loss_J", over=over)
     known = data.draw(st.integers(0, len(values) - 1))
-    whole = objectives.of_rows(objective, values, len(values))
-    bounds = [objectives.of_rows(objective, values[:k], len(values)) for k in range(known, len(values))]
+    whole = optimise.of_rows(objective, values, len(values))
+    bounds = [optimise.of_rows(objective, values[:k], len(values)) for k in range(known, len(values))]
     assert [*bounds, whole] == sorted([*bounds, whole])
 
 
 @given(st.lists(st.floats(1e-6, 1e6), min_size=1, max_size=9))
 def test_a_geometric_mean_is_that_of_all_rows_and_certain_of_nothing_before(values):
     objective = Objective(metric="copper_loss_J", over="geometric_mean")
-    whole = objectives.of_rows(objective, values, len(values))
+    whole = optimise.of_rows(objective, values, len(values))
     # Logarithms up to 14 in magnitude: their sum and its exponential round by some units of 1e-15.
     assert whole == pytest.approx(np.exp(np.mean(np.log(values))), rel=1e-12)
-    assert all(objectives.of_rows(objective, values[:k], len(values)) == 0 for k in range(len(values)))
+    assert all(optimise.of_rows(objective, values[:k], len(values)) == 0 for k in range(len(values)))
 
 
 def test_within_a_limit_the_least_first_objective_is_best():
     values = {0: (3.0, 1.0), 1: (1.0, 9.0), 2: (2.0, 4.0), 3: (2.0, 5.0)}
-    best = {limit: objectives.best_within(values, limit) for limit in (0.5, 1.0, 5.0, 20.0)}
+    best = {limit: optimise.best_within(values, limit) for limit in (0.5, 1.0, 5.0, 20.0)}
     assert best == {0.5: None, 1.0: 0, 5.0: 2, 20.0: 1}
 
 
@@ -48,18 +48,18 @@ def test_within_a_limit_the_least_first_objective_is_best():
 def test_one_dominates_where_it_is_never_worse_and_not_the_same(pair):
     one, other = pair
     slow = one != other and max(a - b for a, b in zip(one, other, strict=True)) <= 0
-    assert objectives.dominates(one, other) == slow
+    assert optimise.dominates(one, other) == slow
 
 
 def test_of_a_figure_of_each_hinge_the_worst_of_its_entries_is_taken():
     figure = [0.1, 0.3, 0.9]
     of_two = {"metric": "max_abs_error_rad", "of": ("alpha", "beta")}
-    assert objectives.of_row(Objective(**of_two), figure) == 0.3
-    assert objectives.of_row(Objective(metric="max_abs_error_rad"), figure) == 0.9
+    assert optimise.of_row(Objective(**of_two), figure) == 0.3
+    assert optimise.of_row(Objective(metric="max_abs_error_rad"), figure) == 0.9
     # To be large: the smallest is the worst, and all signs are changed.
-    assert objectives.of_row(Objective(**of_two, direction="maximise"), figure) == -0.1
+    assert optimise.of_row(Objective(**of_two, direction="maximise"), figure) == -0.1
 
 
 @pytest.mark.parametrize("figure", [None, [], [0.1, None, 0.2], float("nan"), float("inf"), True, "0.1", {}])
 def test_what_is_no_number_is_none(figure):
-    assert objectives.of_row(Objective(metric="max_abs_error_rad"), figure) is None
+    assert optimise.of_row(Objective(metric="max_abs_error_rad"), figure) is None

@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
-from spheretwin.twin.study.tuning import storage
-from spheretwin.twin.study.tuning.running import tuned
+from spheretwin.study.tuning import sampler as storage
+from spheretwin.study.tuning.tuning import tuned
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 TRIALS = 24
@@ -104,7 +104,7 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     noisy = study(tmp_path, **TWO)
     tuned(noisy, tmp_path, trials=8)
     before = (tmp_path / storage.NAME).read_bytes()
-    monkeypatch.setattr("spheretwin.twin.study.tuning.trial.carried_out", None)
+    monkeypatch.setattr("spheretwin.study.tuning.trials.carried_out", None)
     found = tuned(noisy, tmp_path, trials=8)
     assert (found.trials, found.resumed) == (8, 8)
     assert (tmp_path / storage.NAME).read_bytes() == before
@@ -186,6 +186,6 @@ def test_without_optuna_the_extra_is_named(tmp_path, monkeypatch):
 
 
 def test_nothing_but_a_tuning_needs_optuna():
-    script = "import sys, spheretwin.twin.cli; print(sorted({'optuna', 'sqlalchemy'} & set(sys.modules)))"
+    script = "import sys, spheretwin.cli; print(sorted({'optuna', 'sqlalchemy'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert done.stdout.strip() == "[]"

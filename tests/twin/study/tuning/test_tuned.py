@@ -6,13 +6,14 @@ import pyarrow.parquet as parquet
 import pytest
 
 from spheretwin.control.laws.pid import PID
-from spheretwin.twin.study import run
-from spheretwin.twin.study.grid import Grid
-from spheretwin.twin.study.row import Rows
-from spheretwin.twin.study.study import made
-from spheretwin.twin.study.tuning import gains, trial
-from spheretwin.twin.study.tuning.running import tuned
-from spheretwin.twin.study.tuning.trial import Ended
+from spheretwin.study import run
+from spheretwin.study.grid import Grid
+from spheretwin.study.row import Rows
+from spheretwin.study.study import made
+from spheretwin.study.tuning import gains
+from spheretwin.study.tuning import trials as trial
+from spheretwin.study.tuning.trials import Ended
+from spheretwin.study.tuning.tuning import tuned
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 SAMPLERS = ("tpe", "nsga2", "random", "local")

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.status import Status
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
-from spheretwin.twin.trajectories.registry import SHAPES, Trajectory
-from spheretwin.twin.trajectories.shapes.hold import Hold
-from spheretwin.twin.trajectories.shapes.multisine import Component
+from spheretwin.simulation import simulate
+from spheretwin.trajectories import SHAPES, Trajectory
+from spheretwin.trajectories.shapes import Component, Hold
 
 STEP = 1e-5
 POSES = "t_s,alpha_rad,beta_rad,gamma_rad\n0.5,0,0,0\n1.25,0.2,-0.1,1\n3,0.1,0.3,-1\n4.5,0,0,0.5\n"

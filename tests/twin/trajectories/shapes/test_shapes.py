@@ -7,17 +7,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy import signal
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.simulation import simulate
-from spheretwin.twin.trajectories.registry import SHAPES
-from spheretwin.twin.trajectories.shapes.chirp import Chirp
-from spheretwin.twin.trajectories.shapes.hold import Hold
-from spheretwin.twin.trajectories.shapes.multisine import Component, Multisine
-from spheretwin.twin.trajectories.shapes.nutation import Nutation
-from spheretwin.twin.trajectories.shapes.sinusoid import Sinusoid
-from spheretwin.twin.trajectories.shapes.steps import Steps
-from spheretwin.twin.trajectories.shapes.tilt import Tilt
+from spheretwin.simulation import simulate
+from spheretwin.trajectories import SHAPES
+from spheretwin.trajectories.shapes import Chirp, Component, Hold, Multisine, Nutation, Sinusoid, Steps, Tilt
 
 POSES = "t_s,alpha_rad,beta_rad,gamma_rad\n0.5,0,0,0\n1.25,0.2,-0.1,1\n3,0.1,0.3,-1\n4.5,0,0,0.5\n"
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from spheretwin import cli
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.series import Series
-from spheretwin.twin import cli
-from spheretwin.twin.trajectories.shapes.waypoints import Path, Waypoints
+from spheretwin.models.telemetry.csv_series import Series
+from spheretwin.trajectories.waypoints import Path, Waypoints
 
 HEADER = "t_s,alpha_rad,beta_rad,gamma_rad"
 T = np.array([0.5, 1.25, 3.0, 4.5])

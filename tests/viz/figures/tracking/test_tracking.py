@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.figures import plots
-from spheretwin.viz.figures.tracking import by_condition, over_time, paths
-from spheretwin.viz.figures.tracking.style import styles
-from spheretwin.viz.palette import law_colour
+from spheretwin.viz.figures import conditions, crosscheck, over_time, paths
+from spheretwin.viz.figures.style import styles
+from spheretwin.viz.theme import law_colour
 
 LAWS = ("pd", "pid", "adaptive_fuzzy", "afsm", "new_one", "other_new_one")
 HINGES = ("α", "β", "γ")
@@ -14,7 +13,7 @@ HINGES = ("α", "β", "γ")
 
 def series(law, scale, whole=(True, True), paper=None):
     errors = scale * np.array([0.9, 1.0, 1.2])[:, None, None] * np.array([1.0, 2.0])[:, None] * np.ones(3)
-    return by_condition.Series(law, np.array([0.0, 1.0]), errors, np.array(whole), paper or {})
+    return conditions.Series(law, np.array([0.0, 1.0]), errors, np.array(whole), paper or {})
 
 
 def drawn():
@@ -22,7 +21,7 @@ def drawn():
         "PD": series("pd", 0.1, (True, False)),
         "AFSM": series("afsm", 0.01, paper={1.0: (0.03, 0.04, 0.05)}),
     }
-    return by_condition.by_condition(by_label, HINGES, "load L", "largest |error|", "title")
+    return conditions.by_condition(by_label, HINGES, "load L", "largest |error|", "title")
 
 
 def test_laws_are_told_apart_without_colour():
@@ -96,7 +95,7 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
     for folder in ("one", "other"):
         (tmp_path / folder).mkdir()
         path = tmp_path / folder / f"errors.{suffix}"
-        plots.save(drawn(), path)
+        crosscheck.save(drawn(), path)
         found.append(path.read_bytes())
     assert found[0] == found[1]
     assert (b"<svg" in found[0]) == (suffix == "svg")

@@ -6,25 +6,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import Signal, width
-from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.status import QUIET_S, Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import simulate
-from spheretwin.viz import palette
-from spheretwin.viz.layout.paths import CURRENT_BARS, CURRENT_MAP, SUMMARY, TIMELINE, derived
-from spheretwin.viz.layout.seen import Channel
-from spheretwin.viz.quantities.quantity import Kept, Rows
-from spheretwin.viz.quantities.registry import quantities_of
-from spheretwin.viz.recording.parts.drawn import currents, quantities
-from spheretwin.viz.recording.parts.drawn.bins import FIRST_S, Bins
-from spheretwin.viz.recording.parts.drawn.limits import LEVELS, Spells
-from spheretwin.viz.recording.parts.drawn.summary import Summary
-from spheretwin.viz.recording.parts.drawn.survey import SPANS, Survey
-from spheretwin.viz.recording.parts.events import QUIET_S
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+from spheretwin.viz import theme
+from spheretwin.viz.decimation import FIRST_S, Bins
+from spheretwin.viz.layout.extents import SPANS, Channel, Survey
+from spheretwin.viz.layout.view import CURRENT_BARS, CURRENT_MAP, SUMMARY, TIMELINE, derived
+from spheretwin.viz.quantities import Kept, Rows, quantities_of
+from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.recording.status import LEVELS, Spells, Summary
 
 TICK_s = 1e-3
 
@@ -63,7 +59,7 @@ def spans(t_s, rate_Hz):
 def test_every_derived_quantity_is_recorded_with_its_peaks(run):
     path, session, table = run
     given_rows = Rows(table, table.rows(0, 1), session.actuator, 8.0)
-    bins = spans(table["t_s"], quantities.RATE_Hz)
+    bins = spans(table["t_s"], plots.QUANTITY_RATE_Hz)
     for quantity in quantities_of({signal.name for signal in table.signals}):
         whole = quantity.values(given_rows)
         _, drawn = read(path, derived(quantity.name), "Scalars:scalars")
@@ -81,14 +77,14 @@ def test_every_derived_quantity_is_recorded_with_its_peaks(run):
 
 def test_the_map_of_the_currents_has_their_colours(run):
     path, _, table = run
-    bins = spans(table["t_s"], currents.RATE_Hz)
+    bins = spans(table["t_s"], plots.CURRENT_MAP_RATE_Hz)
     peaks = np.array(
         [
             [row[np.argmax(np.abs(row))] for row in table["current_A"][rows].T]  # of each group
             for rows in bins
         ]
     )
-    colours = palette.current_colours(peaks, 8.0).astype(np.int64)
+    colours = theme.current_colours(peaks, 8.0).astype(np.int64)
     packed = (colours[..., 0] << 24) + (colours[..., 1] << 16) + (colours[..., 2] << 8) + 255
     for entity, component in ((CURRENT_MAP, "SeriesLines:colors"), (CURRENT_BARS, "LineStrips2D:colors")):
         times, drawn = read(path, entity, component)

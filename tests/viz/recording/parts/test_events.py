@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from spheretwin.models.telemetry.signals import Signal, width
-from spheretwin.models.telemetry.status import Level, Status
+from spheretwin.models.telemetry.status import QUIET_S, Events, Level, Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.recording.parts.events import QUIET_S, Events
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),

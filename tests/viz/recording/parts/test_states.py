@@ -6,15 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rerun.chunk import RrdReader
 
+from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import Table, read_parquet
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
-from spheretwin.viz.recording.parts.states import StateChanges
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
 from spheretwin.viz.recording.recorder import Recorder
+from spheretwin.viz.recording.status import StateChanges
 
 SIGNALS = (
     Signal("t_s", "s", 1, "time"),

@@ -3,7 +3,7 @@
 import itertools
 import threading
 
-from spheretwin.viz.recording.viewer.broadcast import Broadcast
+from spheretwin.viz.recording.viewer_server import Broadcast
 
 
 def piece(number, size=100):

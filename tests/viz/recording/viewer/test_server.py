@@ -11,10 +11,8 @@ from pathlib import Path
 import pytest
 
 from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.viz.recording.viewer import assets
-from spheretwin.viz.recording.viewer.assets import FILES, HOST, INDEX
-from spheretwin.viz.recording.viewer.broadcast import Broadcast
-from spheretwin.viz.recording.viewer.server import RECORDING, ViewerServer
+from spheretwin.viz.recording import viewer_server
+from spheretwin.viz.recording.viewer_server import FILES, HOST, INDEX, RECORDING, Broadcast, ViewerServer
 
 
 @pytest.fixture(scope="module")
@@ -83,17 +81,17 @@ def test_the_program_that_holds_the_files_keeps_nothing_of_its_own(served, home)
 
 
 def test_a_program_that_is_not_there_is_told(monkeypatch, tmp_path):
-    monkeypatch.setattr(assets.rerun_cli, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(viewer_server.rerun_cli, "__file__", str(tmp_path / "__init__.py"))
     with pytest.raises(SpheretwinError, match="expected Rerun's viewer at"):
-        assets.read_assets()
+        viewer_server.read_assets()
 
 
 def test_a_program_that_ends_at_once_is_told(monkeypatch, tmp_path):
     (program := tmp_path / "rerun").write_text("#!/bin/sh\nexit 1\n")
     program.chmod(0o755)
-    monkeypatch.setattr(assets.rerun_cli, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(viewer_server.rerun_cli, "__file__", str(tmp_path / "__init__.py"))
     with pytest.raises(SpheretwinError, match="expected the files of Rerun's viewer"):
-        assets.read_assets()
+        viewer_server.read_assets()
 
 
 KILLED = """

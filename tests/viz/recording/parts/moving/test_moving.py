@@ -8,25 +8,21 @@ import pyarrow as pa
 import pytest
 from rerun.chunk import RrdReader
 
+from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
-from spheretwin.viz.layout.paths import TIMELINE
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.recording import stream
-from spheretwin.viz.recording.parts.moving.actuator import MovingActuator
-from spheretwin.viz.recording.parts.moving.ending import Ending
-from spheretwin.viz.recording.parts.moving.torques import Torques
-from spheretwin.viz.recording.parts.moving.traces import Traces
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.viz.scene.marks import AXES_LENGTH_m
-from spheretwin.viz.scene.paths import FAILURE, FAILURE_TEXT, PAYLOAD, TORQUES
-from spheretwin.viz.scene.torques import SCALE, METRES_PER_Nm
-from spheretwin.viz.scene.traces import TRACES, TRAIL_S
+from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
+from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, PAYLOAD, TORQUES
+from spheretwin.viz.scene.motion import SCALE, TRACES, TRAIL_S, METRES_PER_Nm
+from spheretwin.viz.scene.static import AXES_LENGTH_m
 
 PAYLOAD_kg = 0.1
 

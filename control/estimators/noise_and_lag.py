@@ -1,0 +1,109 @@
+"""Estimators side by side: rates of a noisy sine, against bandwidth, measured and derived."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.control.estimators import ESTIMATORS
+from spheretwin.control.estimators.estimator import Sampling, estimates
+from spheretwin.models.base.errors import InputError
+
+Array = NDArray[np.float64]
+
+BANDWIDTH = "bandwidth_rad_s"
+SETTLING = 0.25  # share of a record, at least, that is not judged
+
+
+class Motion(NamedTuple):
+    """A sine of the angle, and how it is sampled: the paper's sinusoid on the prototype's potentiometers."""
+
+    amplitude_rad: float = 0.2
+    frequency_Hz: float = 0.5
+    noise_rad: float = math.radians(0.02)
+    period_s: float = 1e-3
+    duration_s: float = 64.0
+    seed: int = 0
+
+
+class Compared(NamedTuple):
+    """One estimator over its bandwidths."""
+
+    rms_error_rad_s: Array  # (b,) estimated minus true rate
+    lag_s: Array  # (b,) of the estimate's share at the sine's frequency; below zero where it is ahead
+    lag_deviation_s: Array  # (b,) standard deviation of the lag, by its scatter over the sine's periods
+    derived_rms_error_rad_s: Array  # (b,) by the derived noise gain, and lag times acceleration
+    derived_lag_s: Array  # (b,) behind a ramp of the rate: the limit of low frequencies
+    default_rad_s: float  # bandwidth
+
+
+def compare(bandwidths_rad_s: Sequence[float], motion: Motion | None = None) -> dict[str, Compared]:
+    """Every estimator that has a bandwidth, on the same samples.
+
+    The same sine on three axes, each with noise of its own: lags and squared errors are their means.
+
+    Parameters
+    ----------
+    bandwidths_rad_s : sequence of float, rad/s
+    motion : Motion, optional
+
+    Returns
+    -------
+    dict of kind to Compared
+
+    Raises
+    ------
+    InputError
+        The record is too short for a period to be judged.
+    """
+    motion = motion or Motion()
+    if (1 - SETTLING) * motion.duration_s * motion.frequency_Hz < 2:
+        raise InputError(
+            f"motion: expected a duration of at least {2 / (1 - SETTLING) / motion.frequency_Hz:g} s,"
+            f" received {motion.duration_s:g}"
+        )
+    ticks = round(motion.duration_s / motion.period_s)
+    t_s = motion.period_s * np.arange(ticks, dtype=np.float64)
+    phase = 2 * np.pi * motion.frequency_Hz * t_s
+    noise = np.random.default_rng(motion.seed).normal(scale=motion.noise_rad, size=(len(t_s), 3))
+    angle_rad = motion.amplitude_rad * np.sin(phase)[:, None] + noise
+    return {
+        kind: _over(bandwidths_rad_s, kind, motion, phase, angle_rad)
+        for kind, parameters in ESTIMATORS.items()
+        if BANDWIDTH in parameters.model_fields
+    }
+
+
+def _over(
+    bandwidths_rad_s: Sequence[float], kind: str, motion: Motion, phase: Array, angle_rad: Array
+) -> Compared:
+    judged = [_judged(kind, bandwidth, motion, phase, angle_rad) for bandwidth in bandwidths_rad_s]
+    rms, lag, deviation, derived_rms, derived_lag = np.array(judged).T
+    default = ESTIMATORS[kind].model_fields[BANDWIDTH].default[0]
+    return Compared(rms, lag, deviation, derived_rms, derived_lag, default)
+
+
+def _judged(
+    kind: str, bandwidth_rad_s: float, motion: Motion, phase: Array, angle_rad: Array
+) -> tuple[float, ...]:
+    parameters = ESTIMATORS[kind].model_validate({BANDWIDTH: float(bandwidth_rad_s)})
+    sampling = Sampling(motion.period_s, np.full(3, motion.noise_rad), np.zeros(3))
+    estimator = parameters.build(sampling)
+    assert estimator is not None  # it has a bandwidth
+    derived = parameters.derived(sampling)
+    pulsation = 2 * np.pi * motion.frequency_Hz
+    periods = math.floor((1 - SETTLING) * motion.duration_s * motion.frequency_Hz)
+    judged = slice(-round(periods / (motion.frequency_Hz * motion.period_s)), None)
+    true = motion.amplitude_rad * pulsation * np.cos(phase[judged])
+    rate = estimates(estimator, angle_rad)[judged]
+    rms = math.sqrt(np.mean((rate - true[:, None]) ** 2))
+    shares = np.exp(-1j * phase[judged])[:, None] * rate
+    lags = [-np.angle(share.sum(axis=0)) / pulsation for share in np.array_split(shares, periods)]
+    lag, deviation = np.mean(lags), np.std(lags, ddof=1) / math.sqrt(np.size(lags))
+    acceleration = motion.amplitude_rad * pulsation**2 / math.sqrt(2)
+    of_noise, of_lag = derived.noise_gain_1_s[0] * motion.noise_rad, derived.lag_s[0]
+    return rms, float(lag), float(deviation), math.hypot(of_noise, of_lag * acceleration), of_lag

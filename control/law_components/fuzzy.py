@@ -1,0 +1,124 @@
+"""First-order Takagi-Sugeno approximator of one axis: 25 rules, 75 adapted consequents (32)-(34), (57).
+
+The input is ``x = (x1, x2)``, rate and angle of the axis. Five Gaussian sets each cover an input; a rule is
+one set of the rate and one of the angle; its consequent is ``theta_0 + theta_1 x1 + theta_2 x2``.
+"""
+
+from math import exp, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import allocation_free
+
+CENTRES = (-3.0, -1.5, 0.0, 1.5, 3.0)
+WIDTH = 1.0  # sigma of (57)
+SHAPE = 0.5  # b of (57)
+SETS = len(CENTRES)
+RULES = SETS * SETS
+CONSEQUENTS = 3 * RULES
+
+
+@allocation_free
+def memberships(x: float) -> tuple[float, float, float, float, float]:
+    """Degrees of membership of `x` in the five sets, normalised to sum 1.
+
+    The nearest set's exponent is taken off before the exponential (which divides numerator and
+    denominator alike), so at least one degree is 1 before normalising: nothing underflows, wherever the
+    square of `x` is a number (up to 1e150).
+    """
+    a, b, c, d, e = exponent(x, 0), exponent(x, 1), exponent(x, 2), exponent(x, 3), exponent(x, 4)
+    nearest = max(a, b, c, d, e)
+    a, b, c = exp(a - nearest), exp(b - nearest), exp(c - nearest)
+    d, e = exp(d - nearest), exp(e - nearest)
+    share = 1.0 / (a + b + c + d + e)
+    return a * share, b * share, c * share, d * share, e * share
+
+
+@allocation_free
+def exponent(x: float, k: int) -> float:
+    """Logarithm of the membership of `x` in set `k` (57)."""
+    return -SHAPE * ((x - CENTRES[k]) / (2.0 * WIDTH)) ** 2
+
+
+@allocation_free
+def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: NDArray[np.float64]) -> float:
+    """Output ``theta^T Psi`` (33), then one Euler step ``theta += drive Psi`` of its adaptation (43).
+
+    Parameters
+    ----------
+    rate, angle : float, rad/s and rad
+        Input of the axis.
+    drive : float
+        ``-eta s`` times the control period.
+    consequents : (75,) array
+        theta, changed in place: 25 constants, 25 factors of the rate, 25 factors of the angle.
+
+    Returns
+    -------
+    float
+        The approximator's output before the adaptation.
+    """
+    of_rate, of_angle = memberships(rate), memberships(angle)
+    output = 0.0
+    for i in range(SETS):
+        for j in range(SETS):
+            k = SETS * i + j
+            psi = of_rate[i] * of_angle[j]
+            output += psi * (
+                consequents[k] + consequents[RULES + k] * rate + consequents[2 * RULES + k] * angle
+            )
+            step = drive * psi
+            consequents[k] += step
+            consequents[RULES + k] += step * rate
+            consequents[2 * RULES + k] += step * angle
+    return output
+
+
+class Restraint(NamedTuple):
+    """What keeps the consequents from drifting."""
+
+    dead_zone: float  # of |s|, rad/s
+    leakage: float  # 1/s
+    bound: float  # of the norm of theta
+
+
+@allocation_free
+def approximate_within_bounds(
+    rate: float,
+    angle: float,
+    s: float,
+    adaptation_rate: float,
+    restraint: Restraint,
+    period_s: float,
+    consequents: NDArray[np.float64],
+) -> float:
+    """Output ``theta^T Psi``, then one Euler step of the restrained adaptation.
+
+    Parameters
+    ----------
+    rate, angle : float, rad/s and rad
+        Input of the axis.
+    s : float, rad/s
+        Sliding variable.
+    adaptation_rate : float
+        eta; 0 learns nothing, and what was learnt leaks away.
+    restraint : Restraint
+    period_s : float, s
+    consequents : (75,) array
+        theta, changed in place.
+    """
+    learnt_from = s if abs(s) > restraint.dead_zone else 0.0
+    drive = -adaptation_rate * learnt_from * period_s
+    output = approximate_and_adapt(rate, angle, drive, consequents)
+    squares = 0.0
+    for k in range(consequents.shape[0]):
+        squares += consequents[k] * consequents[k]
+    kept = max(0.0, 1.0 - restraint.leakage * period_s)
+    norm = kept * sqrt(squares)
+    if norm > restraint.bound:
+        kept *= restraint.bound / norm
+    for k in range(consequents.shape[0]):
+        consequents[k] *= kept
+    return output

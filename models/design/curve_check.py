@@ -1,0 +1,251 @@
+"""How well the twin's torque curve stands for the samples it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models import torque_curve
+from spheretwin.models.actuator import MJCF_PATH, Coil, Magnet, read_magnet_and_coil
+from spheretwin.models.base.checks import Check
+from spheretwin.models.design import geometry_check, pole_torque
+from spheretwin.models.design.pole_torque import Mesh, compute_curve
+from spheretwin.models.magnetics import lookup_table, place
+from spheretwin.models.torque_curve import TorqueCurve
+
+Array = NDArray[np.float64]
+
+# Angles at which the look-up table is held against the spline: 64 or more in each of its intervals.
+LOOKUP_POINTS = 50_001
+
+# Samples compared with the geometry's own curve at most: each costs 23 ms, of a flat pole 16.
+COMPARED = 181
+
+
+class Misfit(NamedTuple):
+    """Differences over all samples, in units of a peak."""
+
+    rms: float
+    worst: float
+    worst_deg: float
+    """Angle of the largest difference."""
+
+
+class Difference(NamedTuple):
+    """Samples against the curve computed from a geometry, in units of the computed peak."""
+
+    as_given: Misfit
+    scale: float
+    """Factor on the computed curve that brings it closest to the samples, by least squares."""
+    scaled: Misfit
+    """What is left after that: a difference in shape."""
+
+
+def leave_one_out(curve: TorqueCurve) -> Misfit:
+    """Leave out one inner sample at a time: how far the spline through the others misses it.
+
+    Noise shows, and samples that are too far apart. It overstates the error of the curve itself, whose
+    gaps are half as wide.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        Samples.
+
+    Returns
+    -------
+    Misfit
+        In units of the curve's peak.
+    """
+    inner = range(1, len(curve.phi_rad) - 1)
+    missed = np.array([_without(curve, i).spline(curve.phi_rad[i]) for i in inner])
+    return _misfit(missed - curve.torque_Nm_per_A[1:-1], curve.phi_rad[1:-1], curve.peak_Nm_per_A)
+
+
+def largest_lookup_error(curve: TorqueCurve) -> float:
+    """Largest distance of the compiled look-up table from the spline, in units of the curve's peak.
+
+    The table holds a coil and its opposite together (see `models.magnetics`), and so does this figure.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        Samples.
+    """
+    phi = np.linspace(1e-6, np.pi - 1e-6, LOOKUP_POINTS)
+    table = lookup_table(curve)
+    row = np.array([place(cosine) for cosine in np.cos(phi)])
+    index = row.astype(np.int64)
+    h = np.polynomial.polynomial.polyval(row - index, table[index].T, tensor=False)
+    pair = curve.spline(phi) - curve.spline(np.pi - phi)
+    return float(np.max(np.abs(h * np.sin(phi) - pair)) / curve.peak_Nm_per_A)
+
+
+def difference(
+    curve: TorqueCurve,
+    magnet: Magnet,
+    coil: Coil,
+    mesh: Mesh | None = None,
+    track: Callable[[range], Iterable[int]] = iter,
+) -> Difference:
+    """Compare samples with the curve computed from a geometry, at the samples' own angles.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        Samples, measured or computed elsewhere.
+    magnet, coil, mesh, track
+        As in `pole_torque.compute_curve`.
+    """
+    chosen = np.unique(np.linspace(0, len(curve.phi_rad) - 1, COMPARED).round().astype(np.int64))
+    phi, sample = curve.phi_rad[chosen], curve.torque_Nm_per_A[chosen]
+    computed = compute_curve(magnet, coil, phi, mesh, track)
+    expected, peak = computed.torque_Nm_per_A, computed.peak_Nm_per_A
+    scale = float(sample @ expected / (expected @ expected))
+    return Difference(
+        as_given=_misfit(sample - expected, phi, peak),
+        scale=scale,
+        scaled=_misfit(sample - scale * expected, phi, peak),
+    )
+
+
+def _without(curve: TorqueCurve, index: int) -> TorqueCurve:
+    return TorqueCurve(np.delete(curve.phi_rad, index), np.delete(curve.torque_Nm_per_A, index))
+
+
+def _misfit(distance: Array, phi_rad: Array, peak: float) -> Misfit:
+    worst = int(np.argmax(np.abs(distance)))
+    return Misfit(
+        rms=float(np.sqrt(np.mean(distance**2)) / peak),
+        worst=float(np.abs(distance[worst]) / peak),
+        worst_deg=float(np.degrees(phi_rad[worst])),
+    )
+
+
+MESH_BOUND = 5e-3
+LOOKUP_BOUND = 1e-6
+
+
+class Peak(NamedTuple):
+    """Where a curve is largest."""
+
+    peak_Nm_per_A: float
+    peak_deg: float
+
+
+class ComputedCurve(NamedTuple):
+    """A curve computed from a geometry, and what is known of it."""
+
+    curve: TorqueCurve
+    csv: str
+    """Text of its file, which says what it was computed from."""
+    peak: Peak
+    doubled_mesh: pole_torque.Convergence
+    lookup_error: float
+    """Distance of the compiled table from the spline, over the peak."""
+    checks: list[Check]
+    warnings: list[str]
+
+
+class JudgedCurve(NamedTuple):
+    """A curve beside the one that the geometry gives. Nothing is bounded: its owner judges the data."""
+
+    rows: int
+    peak: Peak
+    leave_one_out: Misfit
+    geometry: Difference
+    lookup_error: float
+    warnings: list[str]
+
+
+def compute(mjcf: Path = MJCF_PATH, track: Callable[[range], Iterable[int]] = iter) -> ComputedCurve:
+    """Compute the torque curve of a model file's poles and coils, and how sure it is.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file; it may lack what is no pole and no coil.
+    track : callable
+        Passes on the numbers of the samples, first of the curve, then of some of them on a doubled mesh,
+        and may show progress.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, lacks poles or coils, or magpylib is not installed.
+    """
+    magnet, coil = read_magnet_and_coil(mjcf)
+    curve = pole_torque.compute_curve(magnet, coil, track=track)
+    measured = pole_torque.convergence(curve, magnet, coil, track=track)
+    lookup_error = largest_lookup_error(curve)
+    return ComputedCurve(
+        curve=curve,
+        csv=torque_curve.to_csv(curve, pole_torque.provenance(magnet, coil, measured)),
+        peak=_peak(curve),
+        doubled_mesh=measured,
+        lookup_error=lookup_error,
+        checks=[_mesh(measured), _lookup(lookup_error, shipped=mjcf.resolve() == MJCF_PATH)],
+        warnings=geometry_check.of_model_file(mjcf, curve),
+    )
+
+
+def judge(
+    curve: TorqueCurve, mjcf: Path = MJCF_PATH, track: Callable[[range], Iterable[int]] = iter
+) -> JudgedCurve:
+    """Tell how smooth a curve is, and how far it is from the geometry's.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        From a bench or another program.
+    mjcf, track
+        As in `compute`.
+
+    Raises
+    ------
+    InputError
+        As in `compute`.
+    """
+    magnet, coil = read_magnet_and_coil(mjcf)
+    missed = leave_one_out(curve)
+    return JudgedCurve(
+        rows=len(curve.phi_rad),
+        peak=_peak(curve),
+        leave_one_out=missed,
+        geometry=difference(curve, magnet, coil, track=track),
+        lookup_error=largest_lookup_error(curve),
+        warnings=geometry_check.of_model_file(mjcf, curve),
+    )
+
+
+def _peak(curve: TorqueCurve) -> Peak:
+    top = int(np.argmax(np.abs(curve.torque_Nm_per_A)))
+    return Peak(curve.peak_Nm_per_A, float(np.degrees(curve.phi_rad[top])))
+
+
+def _mesh(measured: pole_torque.Convergence) -> Check:
+    return Check(
+        name="mesh",
+        compares="peak of the curve against the one on half the mesh, over the peak",
+        states=1,
+        value=measured.peak,
+        bound=MESH_BOUND,
+        why="a real magnet's remanence is not known better than half a percent",
+    )
+
+
+def _lookup(error: float, shipped: bool) -> Check:
+    return Check(
+        name="lookup",
+        compares="compiled look-up table against the spline, over the peak",
+        states=LOOKUP_POINTS,
+        value=error,
+        bound=LOOKUP_BOUND if shipped else None,
+        why="a tenth of the curve's own error of 1e-5"
+        if shipped
+        else "the table's intervals were chosen for the shipped geometry; smaller parts need finer ones",
+    )

@@ -1,0 +1,237 @@
+"""What torque there is in every direction over the workspace, where it is least, and whether it suffices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.checks import Check
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.design import geometry_check
+from spheretwin.models.design import workspace as workspaces
+from spheretwin.models.design.capability import Capability, capability
+from spheretwin.models.design.workspace import (
+    FIGURES,
+    LARGEST_TILT_DEG,
+    Found,
+    Workspace,
+    local_minima,
+    worst_by_tilt,
+)
+
+TILT_STEP_DEG = 1.0
+
+# Weak poses told of each figure.
+TOLD = {"least_norm": 3, "best": 1, "singular_value": 1}
+
+ROUNDING = 1e-9
+
+
+class Survey(NamedTuple):
+    """All that the verdict and the figures are taken from."""
+
+    actuator: Actuator
+    largest_tilt_deg: float
+    workspace: Workspace
+    on_grid: Capability
+    """Of the workspace's poses, in its shape."""
+    worst: dict[str, Found]
+    """Worst pose at each tilt, by the names of `FIGURES`."""
+    weakest: dict[str, Found]
+    """Worst poses of all, the worst first, by the names of `TOLD`."""
+
+
+class Tilt(NamedTuple):
+    """The worst, and the median, of all poses at one tilt."""
+
+    tilt_deg: float
+    least_norm_Nm: float
+    least_norm_median_Nm: float
+    best_Nm: float
+    best_median_Nm: float
+    singular_value_Nm_per_A: float
+    condition: float
+    copper_W_per_Nm2: float
+
+
+class WeakPose(NamedTuple):
+    """A pose in which one of the figures is at its worst."""
+
+    figure: str
+    q_deg: list[float]
+    tilt_deg: float
+    azimuth_deg: float
+    spin_deg: float
+    direction: list[float]
+    """Of the least torque, stator frame."""
+    least_norm_Nm: float
+    best_Nm: float
+    singular_value_Nm_per_A: float
+    copper_W_per_Nm2: float
+
+
+class WorkspaceVerdict(NamedTuple):
+    """The torque within reach, judged."""
+
+    largest_tilt_deg: float
+    poses: int
+    """Within the hinges' ranges."""
+    current_limit_A: float
+    by_tilt: list[Tilt]
+    weakest: list[WeakPose]
+    checks: list[Check]
+    warnings: list[str]
+
+
+def survey(
+    actuator: Actuator,
+    largest_tilt_deg: float = LARGEST_TILT_DEG,
+    track: Callable[[range], Iterable[int]] = iter,
+) -> Survey:
+    """Compute the torque capability over the workspace, and look for its worst between the grid's lines.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Magnetics, current limit, resistance and hinge ranges.
+    largest_tilt_deg : float, degrees
+        Of the shaft.
+    track : callable
+        Passes on the numbers of the blocks of poses, and may show progress.
+
+    Raises
+    ------
+    InputError
+        No pose is within the hinges' ranges.
+    """
+    workspace = workspaces.grid(actuator, largest_tilt_deg, TILT_STEP_DEG)
+    if not workspace.reachable.any():
+        raise InputError("workspace: expected hinge ranges that hold some pose, received none")
+    flat = capability(workspace.q.reshape(-1, 3), actuator, track)
+    on_grid = flat.reshaped(workspace.reachable.shape)
+    worst = {name: worst_by_tilt(workspace, on_grid, figure, actuator) for name, figure in FIGURES.items()}
+    weakest = {name: local_minima(workspace, worst[name], FIGURES[name], actuator) for name in TOLD}
+    return Survey(actuator, largest_tilt_deg, workspace, on_grid, worst, weakest)
+
+
+def judge(surveyed: Survey, need_Nm: float | None = None) -> WorkspaceVerdict:
+    """Tell the torque by tilt and in the weakest poses, and hold it against a need.
+
+    Parameters
+    ----------
+    surveyed : Survey
+        What `survey` found.
+    need_Nm : float, N·m
+        Torque that least-norm currents have to give in every pose and direction; none unless given.
+    """
+    actuator = surveyed.actuator
+    return WorkspaceVerdict(
+        largest_tilt_deg=surveyed.largest_tilt_deg,
+        poses=int(surveyed.workspace.reachable.sum()),
+        current_limit_A=actuator.group.current_limit_A,
+        by_tilt=_by_tilt(surveyed),
+        weakest=[row for name, count in TOLD.items() for row in _told(name, surveyed.weakest[name], count)],
+        checks=[_best_currents(surveyed), *([_need(surveyed, need_Nm)] if need_Nm else [])],
+        warnings=[*geometry_check.of_geometry(actuator), *_lost(surveyed.worst["condition"])],
+    )
+
+
+def direction_text(direction: Sequence[float]) -> str:
+    """A unit vector in a line."""
+    return " ".join(f"{round(part, 2) + 0.0:.2f}" for part in direction)  # no negative zero
+
+
+def _pose_text(q_deg: Sequence[float]) -> str:
+    return ", ".join(f"{name} {round(angle, 1) + 0.0:.1f}°" for name, angle in zip("αβγ", q_deg, strict=True))
+
+
+def _lost(worst_condition: Found) -> list[str]:
+    """Whether the torque matrix loses a direction, and where first."""
+    lost = np.flatnonzero(np.isinf(worst_condition.capability.condition))
+    if not len(lost):
+        return []
+    first = worst_condition.at(lost[0])
+    direction = direction_text(first.capability.weak_direction.tolist())
+    return [
+        f"the torque matrix loses the direction ({direction}) at {_pose_text(np.degrees(first.q).tolist())},"
+        f" and at {len(lost)} of {len(worst_condition.q)} tilts"
+    ]
+
+
+def _by_tilt(surveyed: Survey) -> list[Tilt]:
+    workspace, on_grid = surveyed.workspace, surveyed.on_grid
+    tilts = np.flatnonzero(workspace.reachable.any(axis=(1, 2)))
+    least_norm, best, singular, condition = (
+        surveyed.worst[name].capability for name in ("least_norm", "best", "singular_value", "condition")
+    )
+    rows = []
+    for row, tilt in enumerate(tilts):
+        here = workspace.reachable[tilt]
+        rows.append(
+            Tilt(
+                tilt_deg=round(float(np.degrees(workspace.tilt_rad[tilt])), 9),
+                least_norm_Nm=float(least_norm.least_norm_Nm[row]),
+                least_norm_median_Nm=float(np.median(on_grid.least_norm_Nm[tilt][here])),
+                best_Nm=float(best.best_Nm[row]),
+                best_median_Nm=float(np.median(on_grid.best_Nm[tilt][here])),
+                singular_value_Nm_per_A=float(singular.singular_value_Nm_per_A[row]),
+                condition=float(condition.condition[row]),
+                copper_W_per_Nm2=float(singular.copper_W_per_Nm2[row]),
+            )
+        )
+    return rows
+
+
+def _told(name: str, found: Found, count: int) -> list[WeakPose]:
+    rows = []
+    for i in range(min(count, len(found.q))):
+        here = found.capability.at(i)
+        direction = {
+            "least_norm": here.least_norm_direction,
+            "best": here.best_direction,
+            "singular_value": here.weak_direction,
+        }[name]
+        tilt, azimuth, spin = np.degrees(found.tilt_azimuth_spin_rad[i]).tolist()
+        rows.append(
+            WeakPose(
+                figure=name,
+                q_deg=np.degrees(found.q[i]).tolist(),
+                tilt_deg=tilt,
+                azimuth_deg=azimuth % 360,
+                spin_deg=spin,
+                direction=direction.tolist(),
+                least_norm_Nm=float(here.least_norm_Nm),
+                best_Nm=float(here.best_Nm),
+                singular_value_Nm_per_A=float(here.singular_value_Nm_per_A),
+                copper_W_per_Nm2=float(here.copper_W_per_Nm2),
+            )
+        )
+    return rows
+
+
+def _best_currents(surveyed: Survey) -> Check:
+    reached = surveyed.on_grid.at(surveyed.workspace.reachable)
+    least_norm, best = reached.least_norm_Nm, reached.best_Nm
+    return Check(
+        name="best_currents",
+        compares="torque by least-norm currents over that by the best ones, two computations",
+        states=len(best),
+        value=float(np.max(least_norm[best > 0] / best[best > 0], initial=0.0)),
+        bound=1.0 + ROUNDING,
+        why="least-norm currents are among all currents; rounding is allowed for",
+    )
+
+
+def _need(surveyed: Survey, need_Nm: float) -> Check:
+    available = float(surveyed.weakest["least_norm"].capability.least_norm_Nm.min())
+    return Check(
+        name="need",
+        compares=f"{need_Nm:g} N·m over the least-norm torque in the worst pose and direction",
+        states=int(surveyed.workspace.reachable.sum()),
+        value=need_Nm / available if available else np.inf,
+        bound=1.0,
+        why="asked for by --need",
+    )

@@ -1,0 +1,146 @@
+"""The meshes that the MJCF draws, remade from the numbers it holds.
+
+``python -m spheretwin.models.meshes.mesh_files`` rewrites them; it needs the extra ``meshes``. Solids are built
+and cut by manifold3d, in metres, in the frame of the body that carries them (pole and coil: origin at their
+centre, z outward).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+
+from spheretwin.models import actuator as actuators
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.meshes import joint, rotor, stator
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+# Faces that meet at less than this angle are shaded as one smooth surface.
+CREASE_DEG = 30.0
+VERTEX_DECIMALS = 7
+NORMAL_DECIMALS = 3
+
+
+def to_mesh(solid: Manifold) -> Trimesh:
+    """Mesh of a solid in an order that depends on its shape alone."""
+    from trimesh import Trimesh  # slow to import
+
+    raw = solid.as_original().simplify(10.0**-VERTEX_DECIMALS * 5).to_mesh64()
+    corners = np.round(raw.vert_properties[:, :3], VERTEX_DECIMALS) + 0.0  # no negative zero
+    vertices, index = np.unique(corners, axis=0, return_inverse=True)
+    faces = index.ravel()[raw.tri_verts.astype(np.int64)]
+    # The least vertex first keeps the winding; a face that lost a corner to rounding goes.
+    first = np.argmin(faces, axis=1)
+    faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    faces = faces[np.lexsort(faces.T[::-1])]
+    return Trimesh(vertices, faces, process=False)
+
+
+def to_obj(mesh: Trimesh) -> str:
+    """Text of an OBJ file: vertices in metres, and normals that are split along sharp edges.
+
+    Without normals of its own a mesh gets one normal per vertex from MuJoCo, and every edge looks worn.
+    """
+    corner_normals = np.round(crease_normals(mesh).reshape(-1, 3), NORMAL_DECIMALS) + 0.0
+    normals, normal_of_corner = np.unique(corner_normals, axis=0, return_inverse=True)
+    normal_of_corner = normal_of_corner.reshape(-1, 3)
+    lines = [
+        f"v {x:.{VERTEX_DECIMALS}f} {y:.{VERTEX_DECIMALS}f} {z:.{VERTEX_DECIMALS}f}"
+        for x, y, z in mesh.vertices
+    ]
+    lines += [
+        f"vn {x:.{NORMAL_DECIMALS}f} {y:.{NORMAL_DECIMALS}f} {z:.{NORMAL_DECIMALS}f}" for x, y, z in normals
+    ]
+    for vertices, corners in zip(mesh.faces + 1, normal_of_corner + 1, strict=True):
+        lines.append("f " + " ".join(f"{v}//{n}" for v, n in zip(vertices, corners, strict=True)))
+    return "\n".join(lines) + "\n"
+
+
+def crease_normals(mesh: Trimesh) -> NDArray[np.float64]:
+    """Normal at each corner of each face: the mean over the vertex's faces that are nearly coplanar.
+
+    Returns
+    -------
+    (faces, 3, 3) array
+        Unit normals, weighted by the angle a face spans at the vertex.
+    """
+    from scipy.sparse import coo_array, csr_array  # slow to import
+
+    vertex = mesh.faces.ravel()
+    corner = np.arange(len(vertex))
+    normal = np.repeat(mesh.face_normals, 3, axis=0)  # (corners, 3)
+    at_vertex = csr_array((np.ones(len(vertex)), (vertex, corner)))
+    pairs = (at_vertex.T @ at_vertex).tocoo()  # corners that share a vertex
+    a, b = pairs.coords
+    smooth = np.einsum("ij,ij->i", normal[a], normal[b]) > np.cos(np.radians(CREASE_DEG))
+    weight = np.where(smooth, mesh.face_angles.ravel()[b], 0.0)
+    total = coo_array((weight, (a, b)), shape=pairs.shape) @ normal
+    return (total / np.linalg.norm(total, axis=1, keepdims=True)).reshape(-1, 3, 3)
+
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+ASSETS = actuators.FOLDER / "assets"
+
+
+def meshes(actuator: Actuator) -> dict[str, Trimesh]:
+    """Make every mesh that ``actuator.xml`` draws.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Its magnets, coils and shaft give the dimensions that are simulated.
+
+    Returns
+    -------
+    dict of Trimesh, m
+        By mesh name: watertight, in the frame of the body (pole and coil: of the part itself).
+    """
+    solids = {
+        "stator": stator.stator(actuator),
+        "outer_ring": joint.outer_ring(),
+        "inner_ring": joint.inner_ring(),
+        "ball": rotor.ball(actuator),
+        "hoop": rotor.hoop(actuator),
+        "shaft": rotor.shaft(actuator),
+        "pole": rotor.pole(actuator),
+        "coil": stator.coil(actuator),
+    }
+    return {name: to_mesh(solid) for name, solid in solids.items()}
+
+
+def write(folder: Path, actuator: Actuator) -> list[Path]:
+    """Write every mesh as OBJ, the same bytes for the same meshes.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if missing; files of the same names are overwritten.
+    actuator : Actuator
+        See `meshes`.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, mesh in meshes(actuator).items():
+        path = folder / f"{name}.obj"
+        path.write_text(to_obj(mesh), encoding="ascii", newline="\n")
+        written.append(path)
+    return written
+
+
+if __name__ == "__main__":
+    for path in write(ASSETS, actuators.load()):
+        print(path)

@@ -1,0 +1,141 @@
+"""The rotor: poles, the ball around them, the hoop behind them, the shaft.
+
+What is simulated, the poles' shape and the shaft's length, is the actuator's; the rest is drawn alone.
+"""
+
+import numpy as np
+from manifold3d import Manifold
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.meshes.joint import BEARING_HALF_HEIGHT_M, BEARING_INNER_RADIUS_M, RUNNING_CLEARANCE_M
+from spheretwin.models.meshes.solids import (
+    MM,
+    PIN_SECTIONS,
+    RING_CHAMFER_M,
+    SECTIONS,
+    SMALL_SECTIONS,
+    along,
+    around,
+    cylinder,
+    revolve,
+    spherical_shell,
+    tube,
+)
+
+# Circles of a pole's front, from its rim to its middle.
+FRONT_STEPS = 6
+
+# Ball: a truncated shell whose holes leave a thin dark line around the poles.
+BALL_WALL_M = 3.0 * MM
+BALL_CUT_HEIGHT_M = 26.0 * MM
+POLE_CLEARANCE_M = 0.35 * MM
+
+# Back iron: a hoop that the poles are seated into, with a groove between their layers.
+HOOP_INNER_RADIUS_M = 36.5 * MM
+HOOP_OUTER_RADIUS_M = 41.2 * MM
+HOOP_HALF_HEIGHT_M = 20.0 * MM
+HOOP_GROOVE_HALF_WIDTH_M = 2.5 * MM
+HOOP_GROOVE_DEPTH_M = 2.5 * MM
+
+# Shaft: a spider of four arms joins it to the ball's upper cut; a flange holds the payload.
+SHAFT_RADIUS_M = 3.0 * MM
+SPIDER_ARMS = 4
+SPIDER_ARM_HALF_WIDTH_M = 2.2 * MM
+SPIDER_RIM_WIDTH_M = 4.2 * MM
+SPIDER_THICKNESS_M = 2.5 * MM
+SCREWS = 8
+SCREW_RADIUS_M = 1.1 * MM
+SCREW_HEIGHT_M = 0.8 * MM
+HUB_RADIUS_M = 9.0 * MM
+HUB_HEIGHT_M = 35.0 * MM
+PAYLOAD_FLANGE_RADIUS_M = 10.5 * MM
+PAYLOAD_FLANGE_HALF_HEIGHT_M = 1.0 * MM
+
+
+def ball_radius(actuator: Actuator) -> float:
+    """Radius of the ball, m: the middles of the poles' fronts lie on it."""
+    return actuator.magnet.front_m
+
+
+def pole(actuator: Actuator) -> Manifold:
+    """One pole as it is modelled, sharp edges and all: a cylinder, its front flat or ground to a sphere."""
+    magnet = actuator.magnet
+    middle = magnet.length_m / 2
+    rho = np.linspace(magnet.radius_m, 0.0, FRONT_STEPS) if magnet.front_radius_m else [magnet.radius_m, 0.0]
+    front = [(float(r), middle - magnet.sagitta_at_m(float(r))) for r in rho]
+    return revolve([(0.0, -middle), (magnet.radius_m, -middle), *front], SMALL_SECTIONS)
+
+
+def ball(actuator: Actuator) -> Manifold:
+    """Hollow ball, cut flat above and below, with a hole for each pole."""
+    radius = ball_radius(actuator)
+    shell = spherical_shell(radius - BALL_WALL_M, radius, -60.0, 60.0)
+    band = shell.trim_by_plane([0, 0, 1], -BALL_CUT_HEIGHT_M).trim_by_plane([0, 0, -1], -BALL_CUT_HEIGHT_M)
+    hole = cylinder(actuator.magnet.radius_m + POLE_CLEARANCE_M, 0.5 * radius, 1.5 * radius, SMALL_SECTIONS)
+    return band - along(hole, actuator.pole_axes)
+
+
+def hoop(actuator: Actuator) -> Manifold:
+    """Back iron behind both layers of poles, with a flat seat for each pole's inner face."""
+    groove = HOOP_OUTER_RADIUS_M - HOOP_GROOVE_DEPTH_M
+    band = spherical_shell(HOOP_INNER_RADIUS_M, HOOP_OUTER_RADIUS_M, -45.0, 45.0)
+    band = band.trim_by_plane([0, 0, 1], -HOOP_HALF_HEIGHT_M).trim_by_plane([0, 0, -1], -HOOP_HALF_HEIGHT_M)
+    band -= tube(groove, 2 * groove, -HOOP_GROOVE_HALF_WIDTH_M, HOOP_GROOVE_HALF_WIDTH_M)
+    back = actuator.magnet.back_m
+    seat = cylinder(actuator.magnet.radius_m + POLE_CLEARANCE_M, back, 2 * back, SMALL_SECTIONS)
+    return band - along(seat, actuator.pole_axes)
+
+
+def shaft(actuator: Actuator) -> Manifold:
+    """Output shaft: journal in the bearing, spider on the ball's upper cut, payload flange, tip."""
+    tip, mount = actuator.shaft_tip_m[2], actuator.payload_mount_m[2]
+    journal = BEARING_INNER_RADIUS_M - RUNNING_CLEARANCE_M
+    c = RING_CHAMFER_M
+    hub_top = HUB_HEIGHT_M + 2 * SPIDER_THICKNESS_M
+    flange = PAYLOAD_FLANGE_HALF_HEIGHT_M
+    outline = [
+        (0.0, -BEARING_HALF_HEIGHT_M),
+        (journal - c, -BEARING_HALF_HEIGHT_M),
+        (journal, -BEARING_HALF_HEIGHT_M + c),
+        (journal, BEARING_HALF_HEIGHT_M - c),
+        (journal - c, BEARING_HALF_HEIGHT_M),
+        (SHAFT_RADIUS_M, BEARING_HALF_HEIGHT_M),
+        (SHAFT_RADIUS_M, HUB_HEIGHT_M),
+        (HUB_RADIUS_M, HUB_HEIGHT_M),
+        (HUB_RADIUS_M, hub_top - c),
+        (HUB_RADIUS_M - c, hub_top),
+        (SHAFT_RADIUS_M + 2 * c, hub_top),
+        (SHAFT_RADIUS_M, hub_top + 4 * c),
+        (SHAFT_RADIUS_M, mount - flange),
+        (PAYLOAD_FLANGE_RADIUS_M, mount - flange),
+        (PAYLOAD_FLANGE_RADIUS_M, mount + flange),
+        (SHAFT_RADIUS_M, mount + flange),
+        (SHAFT_RADIUS_M, tip - 2 * c),
+        (SHAFT_RADIUS_M - 2 * c, tip),
+        (0.0, tip),
+    ]
+    return revolve(outline, SMALL_SECTIONS) + _spider(actuator)
+
+
+def _spider(actuator: Actuator) -> Manifold:
+    """Rim that is screwed onto the ball's upper cut, and the arms from there up to the hub."""
+    thick = SPIDER_THICKNESS_M
+    low, high = BALL_CUT_HEIGHT_M, BALL_CUT_HEIGHT_M + thick
+    # The rim's upper edge stays inside the ball's sphere.
+    rim = float(np.sqrt(ball_radius(actuator) ** 2 - high**2)) - RING_CHAMFER_M
+    inside = rim - SPIDER_RIM_WIDTH_M
+    ring = revolve([(inside, low), (rim, low), (rim, high), (inside, high)], SECTIONS)
+    root = HUB_RADIUS_M / 2
+    cone = revolve(
+        [
+            (inside + 0.4 * thick, low),
+            (inside + 1.2 * thick, high),
+            (root, HUB_HEIGHT_M + 1.5 * thick),
+            (root, HUB_HEIGHT_M),
+        ],
+        SECTIONS,
+    )
+    arm = Manifold.cube([rim, 2 * SPIDER_ARM_HALF_WIDTH_M, 4 * HUB_HEIGHT_M], True).translate([rim / 2, 0, 0])
+    screw = cylinder(SCREW_RADIUS_M, low + thick / 2, high + SCREW_HEIGHT_M, PIN_SECTIONS)
+    screw = screw.translate([rim - SPIDER_RIM_WIDTH_M / 2, 0, 0])
+    return ring + (cone ^ around(arm, SPIDER_ARMS)) + around(screw, SCREWS, first_deg=180 / SCREWS)

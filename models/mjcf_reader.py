@@ -1,0 +1,130 @@
+"""The joint that the kinematics assume, and the bounds of what turns on it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import InputError, told_apart
+
+# Lengths of one kind are equal in the MJCF; norms of positions turned by degrees keep 1e-15.
+GEOMETRY_TOLERANCE = 1e-9
+
+# Beyond these a number is a slip of its unit; within them no product or quotient of theirs overflows, and
+# the drive takes all that the model file has.
+LEAST, LARGEST = 1e-9, 1e9
+LEAST_LENGTH_M, LARGEST_LENGTH_M = 1e-6, 1e3
+
+
+def named(model: mujoco.MjModel, kind: mujoco.mjtObj, label: str, name: str) -> int:
+    """Index of the part of this kind and name; `InputError` where there is none."""
+    index = mujoco.mj_name2id(model, kind, name)
+    if index < 0:
+        raise InputError(f'model: expected a {label} named "{name}", received none')
+    return index
+
+
+def body(model: mujoco.MjModel, name: str) -> int:
+    """Index of the body of this name."""
+    return named(model, mujoco.mjtObj.mjOBJ_BODY, "body", name)
+
+
+def site(model: mujoco.MjModel, name: str) -> int:
+    """Index of the site of this name."""
+    return named(model, mujoco.mjtObj.mjOBJ_SITE, "site", name)
+
+
+def number(model: mujoco.MjModel, name: str) -> float:
+    """The custom numeric of this name, refused where it is beyond what its unit can mean."""
+    named(model, mujoco.mjtObj.mjOBJ_NUMERIC, "custom numeric", name)
+    return within(float(model.numeric(name).data[0]), LEAST, LARGEST, name)
+
+
+def within(value: float, least: float, largest: float, what: str) -> float:
+    """The value itself; `InputError` where it is not within the bounds."""
+    if not least <= value <= largest:
+        low, high, received = told_apart(least, largest, value)
+        raise InputError(f"model: expected {what} from {low} to {high}, received {received}")
+    return value
+
+
+def sites(model: mujoco.MjModel, prefix: str) -> list[int]:
+    """Indices of all sites whose names begin so, in the order of the file."""
+    found = [i for i in range(model.nsite) if model.site(i).name.startswith(prefix)]
+    if not found:
+        raise InputError(f'model: expected sites named "{prefix}…", received none')
+    return found
+
+
+def shared(values: NDArray[np.float64], what: str) -> float:
+    """The one length, m, that all parts of a kind have; `InputError` where they differ."""
+    if np.ptp(values) > GEOMETRY_TOLERANCE:
+        least, largest = told_apart(values.min(), values.max())
+        raise InputError(f"model: expected one {what}, received {least} to {largest} m")
+    return within(float(values[0]), LEAST_LENGTH_M, LARGEST_LENGTH_M, f"a {what} in metres")
+
+
+HINGES = ("alpha", "beta", "gamma")
+LOCKED_DEG = 90.0
+
+# Axes and anchors are along x, y, z and at 0 in the MJCF; rotations built from degrees keep 1e-15.
+TOLERANCE = 1e-9
+
+
+def check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """The joint that the kinematics assume: hinges about x, y, z, in this order, through one point."""
+    if model.nv != 3 or model.nq != 3:
+        raise InputError(f"model: expected three degrees of freedom, received {model.nv}")
+    for i, (name, axis) in enumerate(zip(HINGES, "xyz", strict=True)):
+        joint = named(model, mujoco.mjtObj.mjOBJ_JOINT, "joint", name)
+        is_hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+        along = np.allclose(data.xaxis[joint], np.eye(3)[i], atol=TOLERANCE)
+        centred = np.allclose(data.xanchor[joint], 0.0, atol=TOLERANCE)
+        if not (joint == i and is_hinge and along and centred):
+            raise InputError(
+                f"model: expected joint {i + 1} to be hinge {name} about {axis} through the origin"
+            )
+    if np.any(model.qpos0):
+        raise InputError(f"model: expected hinges without ref, received {np.degrees(model.qpos0)} degrees")
+    payload = body(model, "payload")
+    mass, inertia = model.body_mass[payload], model.body_inertia[payload].max()
+    if mass > 0 or inertia > 0:
+        raise InputError(
+            "model: expected an empty payload mount, whose mass a run sets by plant.payload_kg,"
+            f" received {mass:g} kg and {inertia:g} kg·m²"
+        )
+    rotor = body(model, "rotor")
+    upright = abs(model.body_iquat[rotor][0]) > 1 - TOLERANCE
+    if not upright or np.any(np.abs(model.body_ipos[rotor]) > TOLERANCE):
+        raise InputError(
+            "model: expected the rotor's centre of mass at the origin and its principal axes along its own"
+        )
+    range_deg = np.degrees(hinge_range(model)[1])
+    if np.any(np.abs(range_deg) >= LOCKED_DEG):
+        least, largest, low, high = told_apart(-LOCKED_DEG, LOCKED_DEG, *range_deg)
+        raise InputError(
+            f"model: expected a range of beta inside {least} to {largest} degrees, where the joint locks,"
+            f" received {low} to {high}"
+        )
+
+
+def check_bounded(model: mujoco.MjModel) -> None:
+    """Refuse numbers of the model that are not finite, or that only a slip of a unit explains."""
+    arrays = {
+        name: getattr(model, name)
+        for name in ("body_mass", "body_inertia", "body_pos", "site_pos", "site_size", "jnt_range")
+    }
+    for name, numbers in {**arrays, "gravity": model.opt.gravity}.items():
+        if not np.all(np.isfinite(numbers)):
+            raise InputError(f"model: expected finite numbers, received NaN or infinity in {name}")
+        if np.any(np.abs(numbers) > LARGEST):
+            largest, received = told_apart(LARGEST, numbers.flat[np.argmax(np.abs(numbers))])
+            raise InputError(f"model: expected numbers of at most {largest}, received {received} in {name}")
+
+
+def hinge_range(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """(3, 2) array, rad: least and greatest angle of each hinge; infinite where it turns freely."""
+    joints = [named(model, mujoco.mjtObj.mjOBJ_JOINT, "joint", name) for name in HINGES]
+    limited = model.jnt_limited[joints].astype(bool)[:, None]
+    return np.where(limited, model.jnt_range[joints], [-np.inf, np.inf])

@@ -1,1 +1,0 @@
-"""What a compiled model file holds, looked up by name, within bounds, and refused where it is not there."""

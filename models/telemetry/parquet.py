@@ -1,0 +1,274 @@
+"""Telemetry streamed to a Parquet file while a run goes on, in memory that does not grow with it.
+
+What has been flushed lies in a hidden folder beside the file, in parts that are Arrow streams: a killed
+process leaves them, any Arrow reader opens them, and `join` makes one file of them.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
+from spheretwin.models.base.files import OPEN_FILES, PartialFile, check_writable
+from spheretwin.models.telemetry.checksums import write_parquet
+from spheretwin.models.telemetry.partial_files import Parts, read_batches, read_schema
+from spheretwin.models.telemetry.signals import Signal, width
+from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+# Rows of a batch of a part: four seconds at 1 kHz, some 3 MB in memory.
+PART_ROWS = 4096
+
+# How long a process that ends at once waits for a chunk that is being written.
+PATIENCE_s = 2.0
+
+# Batches of a row group of the file. The rows of one group are in memory at a time, and Arrow keeps 15 kB of
+# each until the file is whole: over two hours at 1 kHz, three or four batches need the least memory.
+GROUP_BATCHES = 4
+
+
+class TelemetryFile:
+    """Follows a run into a Parquet file, which appears when it is closed.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    signals : tuple of Signal
+        Columns, for a run that ends before its first row.
+    facts : mapping
+        What is known of the run before it starts; kept with every part.
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    """
+
+    def __init__(self, path: Path, signals: tuple[Signal, ...], facts: Mapping[str, str]) -> None:
+        check_writable(path)
+        self._path, self._facts = path, dict(facts)
+        self._rows = Table(signals, np.empty((0, width(signals))))
+        self._waiting: list[Table] = []
+        self._parts = Parts(path, facts)
+        self._fault: SpheretwinError | None = None
+        self._lock, self._closed = threading.Lock(), False
+        OPEN_FILES.add(self)
+
+    def write(self, rows: Table) -> None:
+        """Take the rows of one chunk, which must not change any more.
+
+        What goes wrong is raised by `close`, so that the run itself goes on.
+        """
+        with self._lock:
+            self._write(rows)
+
+    def _write(self, rows: Table) -> None:
+        if self._fault:
+            return
+        if rows.signals != self._rows.signals:
+            self._flush()
+            self._rows = rows.rows(0, 0)
+        self._waiting.append(rows)
+        # Batches of one length, whatever the chunks: the same rows give the same bytes.
+        while not self._fault and sum(map(len, self._waiting)) >= PART_ROWS:
+            self._flush(PART_ROWS)
+
+    def note(self, t_s: float, text: str) -> None:
+        """Nothing: the command journal is among the facts that `close` is given."""
+
+    def finish(self, status: str) -> None:
+        """Take note of how the run ended."""
+        self._facts["status"] = status
+
+    def close(self, facts: Mapping[str, str]) -> None:
+        """Make the file.
+
+        Parameters
+        ----------
+        facts : mapping
+            What is known of the run now that it has ended, as its command journal.
+
+        Raises
+        ------
+        SpheretwinError
+            It could not be written: what was there before is untouched, and the parts are kept.
+        """
+        with self._lock:
+            try:
+                self._close({**self._facts, **facts})
+            finally:
+                self._closed = True
+                OPEN_FILES.remove(self)
+
+    def partial(self) -> PartialFile | None:
+        """Flush the rows that wait; return the parts, if there are rows. For a process that ends at once."""
+        if self._lock.acquire(timeout=PATIENCE_s):  # who holds it has flushed what there was, or is about to
+            try:
+                if not (self._fault or self._closed):
+                    self._flush()
+            finally:
+                self._lock.release()
+        if self._closed or not self._parts.rows:
+            return None
+        return PartialFile(self._parts.folder, self._path, self._parts.rows)
+
+    def _close(self, known: Mapping[str, str]) -> None:
+        if self._fault:
+            raise self._fault
+        if not self._parts.rows:
+            self._pending().write_parquet(self._path, known)
+            return
+        self._flush()
+        if self._fault:
+            raise self._fault
+        try:
+            self._parts.close()
+            join(self._parts.paths, self._path, known)
+        except OSError as error:
+            raise self._unwritten(error) from None
+        except SpheretwinError as error:
+            raise SpheretwinError(f"{error}{self._kept()}") from None
+        self._parts.remove()
+
+    def _pending(self) -> Table:
+        values = [self._rows.values, *(rows.values for rows in self._waiting)]
+        return Table(self._rows.signals, np.concatenate(values))
+
+    def _flush(self, most: int | None = None) -> None:
+        """Append the rows that wait to the parts, or the first of them; the others wait on."""
+        rows = self._pending()
+        last = len(rows) if most is None else most
+        self._waiting = [rows.rows(last, len(rows))] if last < len(rows) else []
+        if not last:
+            return
+        try:
+            self._parts.append(rows.rows(0, last))
+        except OSError as error:
+            self._fault = self._unwritten(error)
+            self._waiting = []
+
+    def _unwritten(self, error: OSError) -> SpheretwinError:
+        return SpheretwinError(
+            f"output: {self._path} could not be written, {without_breaks(error)}{self._kept()}"
+        )
+
+    def _kept(self) -> str:
+        return f"; {self._parts.rows} rows are kept in {self._parts.folder}" if self._parts.rows else ""
+
+
+def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = None) -> int:
+    """Make one file of the parts that a run has flushed.
+
+    Parameters
+    ----------
+    parts : sequence of Path
+        In their order. Where one lacks a column that another has (the law was changed), it is NaN there. The
+        last may be torn, as a killed process leaves it: its whole batches are taken.
+    path : Path
+        The file.
+    facts : mapping, optional
+        Metadata of the file; those of the first part unless given.
+
+    Returns
+    -------
+    int
+        Rows of the file.
+
+    Raises
+    ------
+    InputError
+        There is no part, one is no telemetry, one before the last is torn, none has a whole batch, or two
+        have different columns of one name.
+    SpheretwinError
+        Writing failed; what was there before is untouched.
+    """
+    if not parts:
+        raise InputError("telemetry: expected at least one part, received none")
+    schema = _joint_schema(parts, facts)
+    return write_parquet(path, schema, _groups(parts, schema), **PARQUET_FORMAT)
+
+
+def _groups(parts: Sequence[Path], schema: pa.Schema) -> Iterator[pa.Table]:
+    """Row groups of the file; at least one."""
+    import pyarrow as pa  # slow to import, and most runs write no file
+
+    batches = (_widened(batch, schema) for batch in _batches(parts))
+    rows = 0
+    while len(group := pa.Table.from_batches(islice(batches, GROUP_BATCHES), schema)):
+        rows += len(group)
+        yield group
+        pa.default_memory_pool().release_unused()  # else Arrow keeps what a hundred groups have needed
+    if not rows:
+        raise _empty(parts)
+
+
+def _batches(parts: Sequence[Path]) -> Iterator[pa.RecordBatch]:
+    """Whole batches of all parts."""
+    for place, part in enumerate(parts, 1):
+        torn = yield from read_batches(part)
+        if torn and place < len(parts):  # rows are missing, and not at the end
+            raise InputError(f"telemetry {part}: expected only the last part to be torn, received a torn one")
+
+
+def _joint_schema(parts: Sequence[Path], facts: Mapping[str, str] | None) -> pa.Schema:
+    """Columns of all parts, each once, in the order in which they first appear."""
+    import pyarrow as pa
+
+    found: dict[str, pa.Field] = {}
+    metadata = facts
+    for part in parts:
+        schema = read_schema(part)
+        if schema is None:
+            continue
+        metadata = schema.metadata if metadata is None else metadata
+        for field in schema:
+            known = found.setdefault(field.name, field)
+            if not known.equals(field, check_metadata=True):
+                raise InputError(
+                    f"telemetry {part}: expected {field.name} as {_size(known)} numbers {_words(known)},"
+                    f" received {_size(field)} {_words(field)}"
+                )
+    if not found:
+        raise _empty(parts)
+    return pa.schema(found.values(), metadata=metadata)
+
+
+def _empty(parts: Sequence[Path]) -> InputError:
+    return InputError(f"telemetry {parts[0]}: expected a part with a whole batch of rows, received none")
+
+
+def _words(field: pa.Field) -> str:
+    described = {key.decode(): value.decode() for key, value in field.metadata.items()}
+    return f"in {described['unit']} ({described['meaning']})"
+
+
+def _size(field: pa.Field) -> int:
+    return getattr(field.type, "list_size", 1)
+
+
+def _widened(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    """A batch with all columns of the file."""
+    import pyarrow as pa
+
+    present = set(batch.schema.names)
+    columns = [
+        batch.column(field.name) if field.name in present else _nowhere(field, len(batch)) for field in schema
+    ]
+    return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _nowhere(field: pa.Field, rows: int) -> pa.Array:
+    """A column of NaN."""
+    import pyarrow as pa
+
+    flat = pa.array(np.full(rows * _size(field), np.nan))
+    return flat if pa.types.is_float64(field.type) else pa.FixedSizeListArray.from_arrays(flat, _size(field))

@@ -1,0 +1,164 @@
+"""What a telemetry file says of its run beside the rows: enough to run it again."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from spheretwin.models.base.errors import InputError, shown
+from spheretwin.models.telemetry.status import Status, named
+
+_RUN = "scenario, journal and ticks of a run"
+
+
+class Change(NamedTuple):
+    """One entry of the command journal."""
+
+    tick: int
+    """First tick that it is in force."""
+    name: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Typed form of a telemetry file's metadata; nothing in it differs between two equal runs.
+
+    Attributes
+    ----------
+    scenario : mapping
+        In force at tick 0, by section, as JSON has it.
+    journal : tuple of Change
+        What was changed on the way.
+    ticks : int
+        Control ticks done.
+    files : mapping of str
+        Digest of each model and curve by its path; None for one that could not be read.
+    versions : mapping of str
+        Of Python and of every package that a figure may depend on.
+    first_tick : int
+        Control tick of the first row; those before were not kept.
+    status : Status, optional
+        How the run ended; None while it goes on, and in what a killed run leaves.
+    """
+
+    scenario: Mapping[str, Any]
+    journal: tuple[Change, ...]
+    ticks: int
+    files: Mapping[str, str | None]
+    versions: Mapping[str, str]
+    status: Status | None = None
+    first_tick: int = 0
+
+    def metadata(self) -> dict[str, str]:
+        """The record as texts by name, as a file keeps them."""
+        texts = {
+            "scenario": json.dumps(self.scenario),
+            "journal": json.dumps(self.journal),
+            "ticks": str(self.ticks),
+            "files": json.dumps(self.files),
+            "versions": json.dumps(self.versions),
+        }
+        if self.first_tick:
+            texts["first_tick"] = str(self.first_tick)
+        return texts if self.status is None else {**texts, "status": str(self.status)}
+
+    @classmethod
+    def from_metadata(cls, texts: Mapping[str, str]) -> RunRecord:
+        """Record of the texts that a file keeps; those of older versions lack files or versions.
+
+        Raises
+        ------
+        InputError
+            Scenario, journal or ticks are missing, or a text is not what this package writes.
+        """
+        return cls(
+            scenario=_read(texts, "scenario", _mapping),
+            journal=_read(texts, "journal", _journal),
+            ticks=_read(texts, "ticks", int),
+            files=_read(texts, "files", _mapping, "{}"),
+            versions=_read(texts, "versions", _mapping, "{}"),
+            status=named(texts["status"]) if "status" in texts else None,
+            first_tick=_read(texts, "first_tick", int, "0"),
+        )
+
+
+def _read(
+    texts: Mapping[str, str], name: str, parse: Callable[[str], Any], default: str | None = None
+) -> Any:
+    """The value of one text; `InputError` if it is missing and has no default, or cannot be read."""
+    expected = f"metadata: expected {_RUN}"
+    text = texts.get(name, default)
+    if text is None:
+        raise InputError(f"{expected}, received no {name}")
+    try:
+        return parse(text)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise InputError(f"{expected}, received {name} as {shown(text)}") from None
+
+
+def _mapping(text: str) -> Mapping[str, Any]:
+    fields = json.loads(text)
+    if not isinstance(fields, dict):
+        raise TypeError
+    return fields
+
+
+def _journal(text: str) -> tuple[Change, ...]:
+    return tuple(Change(int(tick), str(name), value) for tick, name, value in json.loads(text))
+
+
+@dataclass(frozen=True)
+class RunFacts:
+    """What is known of a run from its start, without a word of how a scenario is built.
+
+    Attributes
+    ----------
+    name, description : str
+        Of the scenario.
+    law : str
+        Name of the law that it begins under.
+    duration_s : float
+        Planned length, s.
+    current_limit_A : float
+        Largest group current of the amplifiers, A.
+    payload_kg : float
+        Mass on the shaft's payload mount, kg.
+    gravity_m_s2 : float or None
+        Gravity along -z of the stator, m/s²; None where the model's own acts, which is along another line.
+    mjcf : Path
+        Model file.
+    sections : mapping of mappings
+        Everything that the run depends on, for people: value by field by section, as JSON has values.
+    """
+
+    name: str
+    description: str
+    law: str
+    duration_s: float
+    current_limit_A: float
+    payload_kg: float
+    gravity_m_s2: float | None
+    mjcf: Path
+    sections: Mapping[str, Mapping[str, Any]]
+
+
+PACKAGES = ("spheretwin", "mujoco", "numba", "numpy", "scipy", "pydantic", "pyarrow", "rerun-sdk")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Version of Python and of every package that a figure may depend on."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found

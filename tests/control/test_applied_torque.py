@@ -1,0 +1,130 @@
+"""What the controller believes of the torque that its commands led to, against the plant's own account."""
+
+import numba
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from spheretwin import scenario as scenarios
+from spheretwin.control.applied_torque import belief, believe
+from spheretwin.control.law import Law
+from spheretwin.models.base.compiled import restore_state, save_state
+from spheretwin.models.kinematics import generalised_torque, rate_jacobian
+from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+
+PERIOD_S = 1e-3
+BELIEVED = (Signal("believed_Nm", "N·m", 3, "torque of the last period, as believed", ANGLES),)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.0, 2.75])
+@pytest.mark.parametrize("lag_s", [0.0, 1e-4, 7e-4, 5e-2])
+def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
+    """Against the convolution of the piecewise constant command with the lag, by quadrature."""
+    generator = np.random.default_rng(3)
+    commands = generator.normal(size=12)
+    mine = belief(True, 1, PERIOD_S, delay * PERIOD_S, lag_s)
+    G, pose = np.zeros((3, 1)), np.zeros(3)
+
+    def command(t):
+        tick = int(np.floor(t / PERIOD_S - delay + 1e-9))
+        return commands[tick] if tick >= 0 else 0.0
+
+    def current(t):  # the exact response, switch by switch
+        if lag_s == 0:
+            return command(t)
+        total = 0.0
+        for tick, value in enumerate(commands):
+            begun = (tick + delay) * PERIOD_S
+            step = value - (commands[tick - 1] if tick else 0.0)
+            if t > begun:
+                total += step * -np.expm1(-(t - begun) / lag_s)
+        return total
+
+    for tick in range(len(commands)):
+        believe(mine, pose, G, commands[tick : tick + 1])
+        begin, end = tick * PERIOD_S, (tick + 1) * PERIOD_S
+        switch = begin + (delay % 1) * PERIOD_S
+        parts = [(begin, switch), (switch, end)] if switch > begin else [(begin, end)]
+        # Midpoints of a jump are no matter: each part is smooth. Quadrature keeps 1e-12 of the largest.
+        inside = 1e-13
+        mean = sum(quad(current, a + inside, b - inside, epsabs=0, epsrel=1e-11)[0] for a, b in parts)
+        np.testing.assert_allclose(mine.mean[0], mean / PERIOD_S, rtol=1e-8, atol=1e-9)
+
+
+def test_torque_on_the_hinges_is_the_transposed_jacobian_s():
+    generator = np.random.default_rng(0)
+    for _ in range(50):
+        q, torque_S, torque_q = generator.uniform(-1.3, 1.3, 3), generator.normal(size=3), np.empty(3)
+        generalised_torque(q, torque_S, torque_q)
+        # Three products each: rounding.
+        np.testing.assert_allclose(torque_q, rate_jacobian(q).T @ torque_S, rtol=0, atol=1e-15)
+
+
+def test_its_state_brings_it_back():
+    one, other = (belief(True, 4, PERIOD_S, 1.5e-3, 7e-4) for _ in range(2))
+    generator = np.random.default_rng(1)
+    G, pose = generator.normal(size=(3, 4)), np.array([0.1, 0.2, 0.3])
+    for _ in range(5):
+        believe(one, pose, G, generator.normal(size=4))
+    restore_state(other, save_state(one), "belief")
+    command = generator.normal(size=4)
+    for each in (one, other):
+        believe(each, pose, G, command)
+    np.testing.assert_array_equal(save_state(one), save_state(other))
+
+
+@numba.njit
+def asking_step(t, reference, measurement, parameters, state, torque):
+    for i in range(3):
+        state[i] = measurement[2, i]
+        error = measurement[0, i] - reference[0, i]
+        torque[i] = -parameters[0] * error - parameters[1] * (measurement[1, i] - reference[1, i])
+
+
+def asking(asks=True):
+    return Law("asking", asking_step, np.array([0.5, 0.03]), np.zeros(3), BELIEVED if asks else (), asks)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "lagrangian"])
+def test_where_the_model_is_true_it_is_the_torque_of_the_coils(engine):
+    """Against G_t(q) times the mean current of the plant, over the whole period."""
+    scenario = scenarios.load("hold", {"plant.engine": engine, "duration": 0.1, "plant.step_s": 1e-3})
+    table = simulate(scenario, asking()).telemetry
+    np.testing.assert_array_equal(table["believed_Nm"][0], 0)
+    actuator = Session(scenario).actuator
+    for row in range(99):
+        torque_q = np.empty(3)
+        # One physics step a period, so that what is logged is the mean over the period.
+        torque_S = torque_matrix(table["q_rad"][row], actuator) @ table["current_A"][row]
+        generalised_torque(table["q_rad"][row], torque_S, torque_q)
+        # Sums of 18 products of 1e-2 N·m in another order.
+        np.testing.assert_allclose(table["believed_Nm"][row + 1], torque_q, rtol=0, atol=1e-15)
+
+
+def test_what_is_not_asked_for_is_no_number_and_moves_no_bit():
+    scenario = scenarios.load("hold", {"duration": 0.1})
+    silent, told = simulate(scenario, asking(asks=False)), simulate(scenario, asking())
+    np.testing.assert_array_equal(silent.telemetry["q_rad"], told.telemetry["q_rad"])
+    logging = Law("unasked", asking_step, np.array([0.5, 0.03]), np.zeros(3), BELIEVED)
+    lost = simulate(scenario, logging)
+    assert (lost.status, len(lost.telemetry)) == ("diverged", 0)  # it logs what is no number
+
+
+@pytest.mark.parametrize("nominal", [{"nominal.delay_s": 2.5e-3}, {"nominal.time_constant_s": 0.0}])
+def test_a_session_goes_on_with_what_it_believed(nominal):
+    scenario = scenarios.load("hold", nominal)
+    with Session(scenario, asking()) as session, Session(scenario, asking()) as other:
+        session.advance(37)
+        other.restore(session.snapshot())
+        assert other.advance(50).values.tobytes() == session.advance(50).values.tobytes()
+
+
+def test_a_change_beside_the_law_leaves_the_belief(tmp_path):
+    scenario = scenarios.load("hold")
+    with Session(scenario, asking()) as kept, Session(scenario, asking()) as changed:
+        changed.advance(20)
+        changed.set("plant.group_gain", [1.0] * 18)  # builds the controller anew
+        assert changed.advance(20).values.tobytes() == kept.advance(40).rows(20, 40).values.tobytes()

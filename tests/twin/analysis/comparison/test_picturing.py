@@ -1,0 +1,201 @@
+"""Figures and page of runs: every series is there, and the page has no source but itself."""
+
+import base64
+import json
+import os
+import re
+import runpy
+import xml.etree.ElementTree as ElementTree
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin import cli
+from spheretwin.analysis import comparison
+from spheretwin.analysis.comparison import beside
+from spheretwin.analysis.recorded_run import read
+from spheretwin.models.base.errors import InputError
+from spheretwin.viz.quantities import compared_quantities
+
+# By its path: the tests are no package.
+written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
+
+NAMES = ["whole", "error", "angle", "sliding", "effort", "more", "currents", "spectra", "events"]
+LARGEST_BYTES = 6_000_000
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Two runs of one law, one of them of a name that would end a script."""
+    folder = tmp_path_factory.mktemp("runs")
+    first, _ = written(folder, "first", duration=0.4)
+    other, _ = written(
+        folder, "<b>&<i>", **{"duration": 0.3, "controller.period_s": 2e-3, "disturbance.load": 2}
+    )
+    return [first, other]
+
+
+@pytest.fixture(scope="module")
+def drawn_into(files, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drawn") / "new"
+    assert cli.main(["review", *map(str, files), "--figures", str(folder)]) == 0
+    return folder
+
+
+class Sources(HTMLParser):
+    """What a page asks for, what it says in its head, and its scripts."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.asked, self.policies, self.scripts, self.styles, self.inside = [], [], [], [], None
+        self.buttons = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        named = dict(attributes)
+        self.inside = tag if tag in ("script", "style", "button") else None
+        self.asked += [
+            named[each] for each in ("src", "href", "data", "action", "poster", "srcset") if each in named
+        ]
+        if tag == "meta" and named.get("http-equiv") == "Content-Security-Policy":
+            self.policies.append(named["content"])
+        if tag == "button":
+            self.buttons.append("")
+
+    def handle_endtag(self, tag):
+        self.inside = None
+
+    def handle_data(self, data):
+        if self.inside == "script":
+            self.scripts.append(data)
+        elif self.inside == "style":
+            self.styles.append(data)
+        elif self.inside == "button":
+            self.buttons[-1] += data
+
+
+@pytest.fixture(scope="module")
+def page(drawn_into):
+    return Sources((drawn_into / comparison.PAGE).read_text(encoding="utf-8"))
+
+
+def figures_of(page):
+    """What the page's own script is given to draw."""
+    (script,) = (each for each in page.scripts if each.startswith("const figures = "))
+    content = script.removeprefix("const figures = ")
+    return json.JSONDecoder().raw_decode(content)[0]
+
+
+def decoded(values):
+    if isinstance(values, dict):
+        return np.frombuffer(base64.b64decode(values["bdata"]), dtype=np.dtype(values["dtype"]))
+    return np.array(values)
+
+
+def test_every_figure_is_there_twice_beside_the_page(drawn_into):
+    kinds = [f"{name}.{kind}" for name in NAMES for kind in ("png", "svg")]
+    assert sorted(os.listdir(drawn_into)) == sorted([comparison.PAGE, *kinds])
+    for name in NAMES:
+        assert (drawn_into / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert ElementTree.parse(drawn_into / f"{name}.svg").getroot().tag.endswith("svg")
+
+
+def test_the_page_asks_no_host_for_anything(page, drawn_into):
+    assert page.asked == []
+    assert not re.search(r"url\(|@import", "".join(page.styles))
+    (policy,) = page.policies
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert rules["default-src"] == "'none'"
+    assert not re.search(r"https?:|\*", policy)
+    assert "connect-src" not in rules  # so that of `default-src` holds
+    own = [script for script in page.scripts if not script.lstrip().startswith("/**")]
+    assert not re.search(r"https?://|fetch|XMLHttpRequest|import\(", "".join(own))
+    assert (drawn_into / comparison.PAGE).stat().st_size < LARGEST_BYTES
+
+
+def test_every_series_of_every_run_is_on_the_page_to_seven_digits(files, page):
+    runs = beside([read(path) for path in files])
+    traces = figures_of(page)["over-time"]["data"]
+    for quantity in compared_quantities([run.table for run in runs]):
+        for place, run in enumerate(runs):
+            wanted = quantity.of(run.rows)
+            found = [
+                trace for trace in traces
+                if trace["meta"] == f"{place}" and trace["type"] == "scatter" and trace["mode"] == "lines"
+                and len(decoded(trace["y"])) == len(wanted)
+                and np.allclose(decoded(trace["y"]), wanted, rtol=1e-6, atol=1e-12)
+            ]  # fmt: skip
+            assert found, (quantity.name, place)
+            assert all(trace["dx"] == run.period_s for trace in found)
+    maps = [trace for trace in traces if trace["type"] == "heatmap"]
+    assert [trace["z"]["shape"] for trace in maps] == ["18, 400", "18, 150"]
+
+
+def test_the_axes_have_units_and_the_buttons_name_the_runs(page):
+    figures = figures_of(page)
+    titles = [each["text"] for each in figures["over-time"]["layout"]["annotations"]]
+    for heading in (
+        "error as one angle [°]",
+        "error of β [mrad]",
+        "angle γ [rad]",
+        "top current [A]",
+    ):
+        assert f"<b>{heading}</b>" in titles
+    assert figures["over-time"]["layout"]["xaxis"]["title"]["text"] == "time [s]"
+    assert figures["spectra"]["layout"]["xaxis"]["title"]["text"] == "frequency [Hz]"
+    assert page.buttons == ["1 first: afsm, L 1, duration 0.4, …", "2 <b>&<i>: afsm, L 2, duration 0.3, …"]
+
+
+def test_text_of_a_user_is_never_markup(page):
+    """The name of a file in a title of the plots; what a script holds ends at no tag within."""
+    titles = [each["text"] for each in figures_of(page)["over-time"]["layout"]["annotations"]]
+    assert any("&lt;b&gt;&amp;&lt;i&gt;" in title for title in titles)
+    own = [script for script in page.scripts if script.startswith("const figures = ")]
+    assert "<" not in own[0].split("const config")[0]
+
+
+def test_the_same_runs_give_the_same_bytes(files, drawn_into, tmp_path):
+    assert cli.main(["review", *map(str, files), "--figures", str(tmp_path)]) == 0
+    for name in os.listdir(drawn_into):
+        assert (tmp_path / name).read_bytes() == (drawn_into / name).read_bytes(), name
+
+
+def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypatch):
+    from spheretwin.viz.pages import interactive
+
+    monkeypatch.setattr(interactive, "MOST_NUMBERS", 0)  # then as few points as ever
+    monkeypatch.setattr(interactive, "FEWEST_POINTS", 50)
+    assert cli.main(["review", str(files[0]), "--figures", str(tmp_path)]) == 0
+    assert len(os.listdir(tmp_path)) == 2 * len(NAMES) + 1
+    text = (tmp_path / comparison.PAGE).read_text(encoding="utf-8")
+    assert "drawn by the lowest and the highest" in text
+    traces = [each for each in figures_of(Sources(text))["over-time"]["data"] if each["type"] == "scatter"]
+    (largest,) = {float(decoded(each["y"]).max()) for each in traces[:1]}
+    quantity = compared_quantities([read(files[0]).table])[0]
+    assert largest == np.float32(quantity.of(beside([read(files[0])])[0].rows).max())
+
+
+@pytest.mark.parametrize("library", ["matplotlib", "plotly"])
+def test_what_is_not_installed_is_told_on_one_line(files, tmp_path, monkeypatch, library, capsys):
+    from spheretwin.viz.pages import markdown
+
+    present = markdown.find_spec
+    monkeypatch.setattr(markdown, "find_spec", lambda name: None if name == library else present(name))
+    assert cli.main(["review", str(files[0]), "--figures", str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"received an installation without {library}" in line
+
+
+def test_a_folder_that_is_a_file_is_refused(files, capsys):
+    assert cli.main(["review", str(files[0]), "--figures", str(files[1])]) == 2
+    assert "expected a writable folder" in capsys.readouterr().err
+
+
+def test_a_run_without_a_tick_is_not_drawn(files, tmp_path):
+    from dataclasses import replace
+
+    run = read(files[0])
+    with pytest.raises(InputError, match="at least one tick"):
+        comparison.write_figures([replace(run, table=run.table.rows(0, 0))], [{}], tmp_path)

@@ -1,0 +1,268 @@
+"""A run is the same from either of its files, to the last bit; of a killed one, what is whole is told."""
+
+import csv
+import json
+import os
+import runpy
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.analysis import recovery
+from spheretwin.analysis.recorded_run import export, headings, read
+from spheretwin.analysis.run_summary import figures
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.parquet import TelemetryFile
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.outputs import Outputs
+from spheretwin.run import figures_of, record_of
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("runs.py")))
+PLANT, WITH_EVENTS, written = shared["PLANT"], shared["WITH_EVENTS"], shared["written"]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Telemetry and recording of a run in which much happens."""
+    return written(tmp_path_factory.mktemp("files"), **WITH_EVENTS)
+
+
+def same_but_path(run):
+    return {**figures(run), "path": ""}
+
+
+def test_a_recording_says_what_the_telemetry_says_to_the_last_bit(files):
+    telemetry, recording = map(read, files)
+    assert recording.table.signals == telemetry.table.signals
+    assert recording.table.values.tobytes() == telemetry.table.values.tobytes()
+    told = same_but_path(recording)
+    assert told == same_but_path(telemetry)
+    lines = [event["text"] for event in told["events"]]
+    assert "controller.law set to pd" in lines
+    assert any("coil.07 open" in line for line in lines)
+    assert lines[-1] == "the run is complete"
+
+
+@pytest.mark.parametrize("period_s", [5e-4, 7e-4, 2e-3])
+def test_ticks_of_any_period_keep_their_bits(tmp_path, period_s):
+    telemetry, recording = map(read, written(tmp_path, **{"duration": 0.3, "controller.period_s": period_s,
+                                                          "plant.step_s": 1e-4}))  # fmt: skip
+    assert recording.table.values.tobytes() == telemetry.table.values.tobytes()
+
+
+def test_a_review_tells_the_figures_of_the_run_itself(files):
+    run = simulate(scenarios.load("hold", WITH_EVENTS))
+    told = figures(read(files[0]))
+    expected = figures_of(run)
+    assert {name: told[name] for name in expected} == expected
+    assert (told["scenario"], told["law"], told["status"]) == ("hold", "afsm", "completed")
+    assert told["energy_J"] == told["copper_loss_J"] + told["mechanical_work_J"]
+
+
+def test_a_run_whose_law_is_gone_is_still_reviewed(tmp_path):
+    law = tmp_path / "mine.py"
+    law.write_text(
+        "from spheretwin.control.laws.pd import PD\n\nclass Mine(PD):\n    law: str = 'x'\n", encoding="utf-8"
+    )
+    telemetry, _ = written(tmp_path, **{"duration": 0.05, "controller.law": "pd"})
+    table, metadata = read_parquet(telemetry)
+    scenario = json.loads(metadata["scenario"])
+    scenario["controller"]["law"] = f"{law}:Mine"
+    law.unlink()
+    table.write_parquet(telemetry, {**metadata, "scenario": json.dumps(scenario)})
+    assert figures(read(telemetry))["law"] == f"{law}:Mine"
+
+
+@pytest.mark.parametrize("kind", [0, 1], ids=["telemetry", "recording"])
+def test_columns_come_back_bit_for_bit(files, tmp_path, kind):
+    run = read(files[kind])
+    export(run, path := tmp_path / "columns.parquet")
+    assert read(path).table.values.tobytes() == run.table.values.tobytes()
+    export(run, path := tmp_path / "columns.csv")
+    header, *rows = csv.reader(path.read_text(encoding="utf-8").splitlines())
+    assert header == [name for signal in run.table.signals for name in headings(signal)]
+    assert np.array(rows, dtype=float).tobytes() == run.table.values.tobytes()
+    assert header[:2] == ["t_s", "q_rad[α]"]
+
+
+# --- what killed processes leave
+
+
+def killed_telemetry(folder, rows):
+    """What is left of a run's telemetry where the process was killed after some rows."""
+    session = Session(scenarios.load("hold", {**PLANT, "duration": 5.0}))
+    file = TelemetryFile(folder / "run.parquet", session.signals, record_of(session).metadata())
+    file.write(session.advance(rows))
+    return file
+
+
+def test_telemetry_of_a_killed_process_is_read_and_made_whole(tmp_path, capsys):
+    file = killed_telemetry(tmp_path, 5000)
+    path, out = tmp_path / "run.parquet", tmp_path / "whole.parquet"
+    run = read(path)
+    assert (len(run.table), run.whole, run.record.status) == (4096, False, None)
+    assert cli.main(["review", str(path), "--json"]) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["runs"][0]["rows"] == 4096
+    assert "was not closed: 4096 rows, 4.096 s of the run, were recovered" in printed.err
+    assert cli.main(["recover", str(path), "--out", str(out)]) == 0
+    assert "recovered 4096 rows, 4.096 s" in capsys.readouterr().out
+    assert read(out).table.values.tobytes() == run.table.values.tobytes()
+    file.close({})
+
+
+KILLED = """
+import os, signal, sys, time
+from pathlib import Path
+from spheretwin.twin import scenario as scenarios
+from spheretwin.twin.commands.outputs import Outputs
+from spheretwin.twin.session import Session
+from spheretwin.twin.simulation import follow
+
+folder = Path(sys.argv[1])
+session = Session(scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 6.0}))
+files = Outputs(session, folder / "run.rrd", folder / "run.parquet", live=False)
+follow(session, 5000, files.sinks)
+(part,) = folder.glob(".run.rrd.*.part")
+while part.stat().st_size < 2_000_000:  # what every run has is 1 MB of it, a thousand rows are 0.6 MB
+    time.sleep(0.01)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_process_that_was_killed_leaves_both_files_readable(tmp_path):
+    done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)], timeout=120)
+    assert done.returncode == -signal.SIGKILL
+    telemetry, recording = read(tmp_path / "run.parquet"), read(tmp_path / "run.rrd")
+    assert (telemetry.whole, recording.whole) == (False, False)
+    rows = min(len(telemetry.table), len(recording.table))
+    assert rows >= 1000
+    for run in (telemetry, recording):
+        assert figures(run)["law"] == "afsm"
+    assert recording.table.values[:rows].tobytes() == telemetry.table.values[:rows].tobytes()
+
+
+def test_a_run_without_a_tick_is_reviewed(tmp_path):
+    session = Session(scenarios.load("hold", {**PLANT, "duration": 0.1}))
+    paths = tmp_path / "run.rrd", tmp_path / "run.parquet"
+    assert Outputs(session, *paths, live=False).close() == []
+    for path in paths:
+        told = figures(read(path))
+        assert (told["rows"], told["max_abs_error_rad"], told["energy_J"]) == (0, None, None)
+
+
+def test_wherever_a_recording_is_cut_its_whole_ticks_are_read(files, tmp_path):
+    """A killed process has no footer, and may have half a message."""
+    whole, content = read(files[1]).table, files[1].read_bytes()
+    path, out, rows = tmp_path / "run.rrd", tmp_path / "whole.rrd", []
+    for size in np.linspace(0.1, 1.0, 10) * len(content):
+        (tmp_path / ".run.rrd.00.part").write_bytes(content[: int(size) - 40])
+        try:
+            run = read(path)
+        except InputError:  # cut within the meshes
+            rows.append(0)
+            continue
+        rows.append(len(run.table))
+        assert not run.whole
+        columns = range(run.table.values.shape[1])
+        assert np.array_equal(run.table.values, whole.values[: rows[-1], columns], equal_nan=True)
+        assert recovery.recover(path, out) == (rows[-1], run.simulated_s, True)
+        again = read(out)
+        assert again.whole
+        assert again.table.values.tobytes() == run.table.values.tobytes()
+    assert rows == sorted(rows)
+    assert len(set(rows) - {0, len(whole)}) > 0
+    assert rows[-1] == len(whole)
+
+
+def test_half_of_the_last_rows_are_no_rows(files, tmp_path):
+    """Cut anywhere in the rows that were recorded last; behind them stands the layout."""
+    content, sizes = files[1].read_bytes(), set()
+    for part in np.linspace(0.6, 0.95, 20):
+        (path := tmp_path / "run.rrd").write_bytes(content[: int(part * len(content))])
+        table = read(path).table
+        sizes.add(len(table))
+        assert not np.isnan(table["current_A"]).any()
+    assert len(sizes) > 1
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+FOREIGN = {
+    "empty.parquet": lambda path: path.touch(),
+    "empty.rrd": lambda path: path.touch(),
+    "text.parquet": lambda path: path.write_text("no run"),
+    "text.rrd": lambda path: path.write_text("no run, and longer than a header"),
+    "missing.parquet": lambda path: None,
+    "folder.rrd": lambda path: path.mkdir(),
+    "folder.parquet": lambda path: path.mkdir(),
+    "header.rrd": lambda path: path.write_bytes(b"RRF2\x00)\x00\x00\x01\x02\x00\x00"),
+}
+
+
+@pytest.mark.parametrize("verb", ["review", "recover"])
+@pytest.mark.parametrize("name", [*FOREIGN, "cut.parquet", "cut.rrd"])
+def test_what_is_no_run_is_refused_on_one_line(files, tmp_path, name, verb, capsys):
+    path = tmp_path / name
+    if name in FOREIGN:
+        FOREIGN[name](path)
+    else:
+        shutil.copy(files[0 if name.endswith("parquet") else 1], path)
+        cut(path)
+    before = sorted(os.listdir(tmp_path))
+    out = ["--out", str(tmp_path / "out")] if verb == "recover" else []
+    assert cli.main([verb, str(path), *out]) == 2
+    printed = capsys.readouterr()
+    (line,) = printed.err.splitlines()
+    assert line.startswith("spheretwin: ")
+    assert "expected" in line
+    assert name in line
+    assert printed.out == ""
+    assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_a_recording_of_something_else_is_refused(tmp_path):
+    import rerun as rr
+
+    recording = rr.RecordingStream("else")
+    recording.save(path := tmp_path / "else.rrd")
+    recording.log("telemetry/q_rad", rr.Scalars(1.0), static=True)
+    recording.flush()
+    recording.disconnect()
+    with pytest.raises(InputError, match="expected one of a run"):
+        read(path)
+
+
+def test_a_whole_file_is_not_recovered(files, tmp_path):
+    for path in files:
+        with pytest.raises(InputError, match="received a whole"):
+            recovery.recover(path, tmp_path / "out")
+    assert os.listdir(tmp_path) == []
+
+
+def test_what_several_processes_left_is_not_guessed(tmp_path):
+    for number in "01":
+        (tmp_path / f".run.rrd.{number}.part").touch()
+    with pytest.raises(InputError, match="what 2 processes left"):
+        read(tmp_path / "run.rrd")
+
+
+@pytest.mark.parametrize("time_s", [np.nan, np.inf, 0.0])
+def test_rows_out_of_order_are_damage(files, tmp_path, time_s):
+    table, metadata = read_parquet(files[0])
+    table.values[500, 0] = time_s
+    table.write_parquet(path := tmp_path / "run.parquet", metadata)
+    with pytest.raises(InputError, match="expected rows whose times rise"):
+        read(path)

@@ -1,0 +1,188 @@
+"""Runs against tolerances: constructed differences, shifts in time, edges; the shipped gate."""
+
+import json
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spheretwin import cli
+from spheretwin.analysis import tolerances
+from spheretwin.analysis.tolerances import Tolerance, Tolerances, beyond, exceeded
+from spheretwin.models.base.errors import InputError
+
+# By its path: the tests are no package.
+shared = runpy.run_path(str(Path(__file__).with_name("runs.py")))
+made_of, named, written = shared["made_of"], shared["named"], shared["written"]
+
+T = np.arange(200) * 1e-3
+WAVE = np.stack([np.sin(40 * T), 2 + np.cos(40 * T)], axis=1)
+
+
+def first(reference, values, **tolerance):
+    allowed = Tolerances(signals={"x_rad": Tolerance(**tolerance)})
+    return exceeded(made_of(reference), named(made_of(values), "other.rrd"), allowed)
+
+
+def test_the_same_run_is_within_no_tolerance_at_all():
+    assert first(WAVE, WAVE.copy()) == []
+
+
+def test_where_and_by_how_much_an_absolute_tolerance_is_left():
+    other = WAVE.copy()
+    other[120:, 1] += 0.003
+    other[150:, 0] -= 0.5
+    assert first(WAVE, other, absolute=0.6) == []
+    (place,) = first(WAVE, other, absolute=0.001)
+    assert place[:3] == ("other.rrd", "x_rad", "β")
+    # Rounding of numbers up to 3, some units in their last place.
+    assert place.t_s == pytest.approx(0.120, abs=1e-12)
+    assert place.by == pytest.approx(0.002, abs=1e-14)
+
+
+def test_a_relative_tolerance_grows_with_the_reference():
+    assert first(WAVE, 1.009 * WAVE, relative=0.01) == []
+    (place,) = first(WAVE, 1.02 * WAVE, relative=0.01)
+    assert place.by == pytest.approx(0.01 * 3.0, rel=1e-12)  # β begins at 3, α at 0
+    assert place.t_s == 0.0
+
+
+@pytest.mark.parametrize("ticks", [-3, -1, 1, 3])
+def test_a_shift_in_time_is_within_as_much_and_no_less(ticks):
+    wave = np.stack([np.sin(40 * (T - 0.1)), T], axis=1)
+    shifted = np.stack([np.sin(40 * (T - 0.1 - ticks * 1e-3)), T - ticks * 1e-3], axis=1)
+    inner = slice(3, -3)  # at both ends the reference does not say what would come
+    allowed = Tolerance(time_s=abs(ticks) * 1e-3, absolute=1e-12)  # of rounding
+    less = Tolerance(time_s=(abs(ticks) - 1) * 1e-3, absolute=1e-12)
+    assert not beyond(wave, shifted, allowed, 1e-3)[inner].any()
+    assert beyond(wave, shifted, less, 1e-3)[inner].any(axis=0).all()
+
+
+numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
+
+
+@given(numbers, st.floats(0, 1e3), st.floats(0, 1), st.floats(0, 2))
+def test_the_edge_itself_is_within_and_what_is_past_it_is_not(reference, absolute, relative, share):
+    allowed = absolute + relative * abs(reference)
+    tolerance = Tolerance(absolute=absolute, relative=relative)
+    for sign in (-1, 1):
+        edge = reference + sign * allowed
+        past = np.nextafter(edge, sign * np.inf)
+        value = reference + sign * share * allowed
+        column = np.array([[edge], [past], [value]])
+        over = beyond(np.full((3, 1), reference), column, tolerance, 1e-3)[:, 0]
+        assert over[0] == 0 < over[1]
+        assert (over[2] == 0) == (sign * value <= sign * edge)
+
+
+@given(st.lists(numbers, min_size=1, max_size=30), st.data())
+def test_a_window_is_what_its_definition_says(values, data):
+    """Against a loop over every row's window."""
+    n = len(values)
+    reference = np.array(values)
+    run = np.array(data.draw(st.lists(numbers, min_size=n, max_size=n)))
+    ticks, absolute = data.draw(st.integers(0, 40)), data.draw(st.floats(0, 1e5))
+    over = beyond(reference[:, None], run[:, None], Tolerance(absolute=absolute, time_s=ticks * 1e-3), 1e-3)
+    for i in range(n):
+        near = reference[max(0, i - ticks) : i + ticks + 1]
+        low, high = (near - absolute).min(), (near + absolute).max()
+        assert over[i, 0] == max(0.0, run[i] - high, low - run[i])
+
+
+def test_gaps_are_the_same_only_as_gaps():
+    with_gap = WAVE.copy()
+    with_gap[50:60] = np.nan
+    assert first(with_gap, with_gap.copy()) == []
+    for reference, other in ((WAVE, with_gap), (with_gap, WAVE)):
+        (place,) = first(reference, other, absolute=1e9)
+        assert (place.t_s, place.by) == (0.05, np.inf)
+
+
+@pytest.mark.parametrize(("mine", "other"), [(200, 150), (150, 200)])
+def test_a_run_that_ends_elsewhere_is_never_within(mine, other):
+    (place,) = first(WAVE[:mine], WAVE[:other], absolute=1e9)
+    assert (place.t_s, place.by) == (0.15, np.inf)
+
+
+def test_what_cannot_be_held_is_refused_by_name():
+    with pytest.raises(InputError, match=r"received x_rd; did you mean x_rad\?"):
+        exceeded(made_of(WAVE), made_of(WAVE), Tolerances(signals={"x_rd": Tolerance()}))
+    with pytest.raises(InputError, match=r"control period of 0\.001 s .* received 0\.002 s"):
+        exceeded(made_of(WAVE), made_of(WAVE, 2e-3), Tolerances(signals={"x_rad": Tolerance()}))
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "signals: expected a value"),
+        ("[signals]", "signals"),
+        ("[signals.q_rad]\nabsolute = -1.0", "greater than or equal to 0"),
+        ("[signals.q_rad]\nabsolute = inf", "finite"),
+        ("[signals.q_rad]\nrelativ = 1.0", "did you mean relative"),
+        ("signals = 1", "signals"),
+        ("no toml", "readable TOML"),
+    ],
+)
+def test_bad_tolerances_are_refused_by_name(tmp_path, text, complaint):
+    (path := tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="expected") as refusal:
+        tolerances.load(str(path))
+    assert complaint in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+# --- the shipped gate
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """A run, and one with a little and with much more load."""
+    folder = tmp_path_factory.mktemp("runs")
+    loads = {"first": 1.0, "near": 1.0, "far": 1.5}
+    return {
+        name: written(folder, name, duration=0.2, **{"controller.law": "pd", "disturbance.load": load})
+        for name, load in loads.items()
+    }
+
+
+@pytest.mark.parametrize("name", tolerances.shipped())
+def test_a_shipped_gate_lets_the_same_run_pass_and_stops_another(runs, name, capsys):
+    first, near, far = ([str(path) for path in runs[each]] for each in ("first", "near", "far"))
+    assert cli.main(["review", first[0], near[1], "--tolerance", name, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["within_tolerance"], told["exceeded"]) == (True, [])
+    assert cli.main(["review", first[1], near[0], far[0], "--tolerance", name, "--json"]) == 1
+    printed = capsys.readouterr()
+    told = json.loads(printed.out)
+    assert told["within_tolerance"] is False
+    assert {place["path"] for place in told["exceeded"]} == {far[0]}
+    (line,) = printed.err.splitlines()
+    assert "leaves its tolerance first at" in line
+
+
+def test_without_tolerances_nothing_is_held(runs, capsys):
+    assert cli.main(["review", str(runs["first"][0]), str(runs["far"][0]), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["within_tolerance"] is None
+
+
+def test_people_see_one_run_whole_and_of_two_the_differences(runs, capsys):
+    assert cli.main(["review", str(runs["first"][0])]) == 0
+    alone = capsys.readouterr().out
+    assert "hold under pd: completed" in alone
+    assert "mrad (degrees)" in alone
+    assert cli.main(["review", str(runs["first"][0]), str(runs["near"][1]), str(runs["far"][0])]) == 0
+    beside = capsys.readouterr().out
+    assert "the same" in beside
+    assert " %" in beside
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--tolerance", "gate"], ["--export", "x.txt"], ["--tolerance", "gat"], ["--nothing"]],
+)
+def test_what_cannot_be_asked_is_bad_input(runs, arguments, capsys):
+    assert cli.main(["review", str(runs["first"][0]), *arguments]) == 2
+    assert "expected" in capsys.readouterr().err

@@ -1,0 +1,135 @@
+"""What a bench's page offers: each field as the command line has it, and what it may be."""
+
+import json
+
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
+from spheretwin.cli.bench import choices_of, read, settings_of, shape_settings
+from spheretwin.models.base.errors import InputError
+from spheretwin.scenario.fields import fields_of
+from spheretwin.scenario.reading import shipped
+from spheretwin.trajectories import SHAPES
+
+
+def fields(scenario):
+    return [(name, value, field.description or "") for name, value, field in fields_of(scenario)]
+
+
+def setting(name, scenario):
+    return next(each for each in settings_of(fields(scenario)) if each.name == name)
+
+
+@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("hardware", ["ideal", "prototype"])
+def test_what_is_shown_of_a_field_is_read_as_what_it_is(name, hardware):
+    scenario = scenarios.load(name, {"hardware": hardware})
+    known = {dotted: value for dotted, value, _ in fields(scenario)}
+    for each in settings_of(fields(scenario)):
+        if each.name in ("name", "description"):  # words, which no form has
+            continue
+        value = json.loads(json.dumps(known[each.name]))
+        if value not in ("", []):
+            assert read(each.name, each.text) == value, each.name
+        assert not each.choices or each.text in ("", *each.choices)
+
+
+def test_families_and_names_can_be_chosen_from():
+    scenario = scenarios.load("hold")
+    assert {"pd", "afsm", "adrc"} < set(setting("controller.law", scenario).choices)
+    assert setting("plant.integrator", scenario).choices == ("RK4", "Euler", "implicitfast")
+    assert {"bounded", "least_norm"} <= set(setting("allocation", scenario).choices)
+    assert setting("estimator.kind", scenario).choices
+
+
+def test_bounds_are_told_beside_the_meaning():
+    found = setting("plant.step_s", scenarios.load("hold"))
+    assert found.meaning == "physics step, s, ≥ 1e-07, ≤ 1"
+    assert found.default == "0.0005"
+
+
+def test_the_gains_are_those_of_the_law_that_is_in_force():
+    scenario = scenarios.load("hold", {"controller.law": "pid", "controller.integral": 3.0})
+    gains = {each.name for each in settings_of(fields(scenario)) if each.name.startswith("controller.")}
+    assert "controller.surface_slope" not in gains
+    assert setting("controller.integral", scenario).text == "3 3 3"
+    assert setting("controller.integral", scenario).default != "3 3 3"
+
+
+def test_text_is_read_as_by_the_command_line():
+    assert read("controller.stiffness", "1 2.5 -3") == [1, 2.5, -3]
+    assert read("fault.0.known", "true") is True
+    assert read("plant.mjcf", "'a file.xml'") == "a file.xml"
+    assert read("trajectory.points", "[[0, 1], [2, 3]]") == [[0, 1], [2, 3]]
+    assert read("plant.mjcf", "  ") is None
+
+
+@pytest.mark.parametrize("text", ["'open", "--plant.step-s 1", "1 --x 2"])
+def test_what_is_no_value_is_refused(text):
+    with pytest.raises(InputError, match=r"^plant\.step_s: expected a value, received "):
+        read("plant.step_s", text)
+
+
+def test_every_shape_is_offered_as_it_comes_and_the_present_one_as_it_is():
+    scenario = scenarios.load(
+        "sinusoid", {"trajectory.amplitude_rad": [0.1, 0.1, 0.1 / 3], "plant.engine": "lagrangian"}
+    )
+    with Bench(scenario) as bench:
+        assert choices_of(bench).targets["coil.17"] == ("open", "short", "gain", "intermittent")
+        for shape in SHAPES:
+            offered = {each.name: each for each in shape_settings(shape, bench)}
+            assert "approach" not in offered
+            expected = {name for name in SHAPES[shape].model_fields if name not in ("shape", "approach")}
+            assert set(offered) == expected
+        present = {each.name: each for each in shape_settings("sinusoid", bench)}
+        assert present["amplitude_rad"].text == f"0.1 0.1 {0.1 / 3!r}"
+        assert present["amplitude_rad"].default == "0.2 0.2 0.2"
+        assert shape_settings("no such shape", bench) == []
+
+
+def test_a_shape_with_a_list_of_tables_is_offered_as_it_is():
+    rows = [
+        {"amplitude_rad": [0.1, 0.1, 0.1], "frequency_Hz": [0.5, 0.5, 0.5]},
+        {"amplitude_rad": [0.05, 0.0, 0.0], "frequency_Hz": [1.5, 1.5, 1.5]},
+    ]
+    given = {"trajectory": {"shape": "multisine", "components": rows}, "plant.engine": "lagrangian"}
+    with Bench(scenarios.load("sinusoid", given)) as bench:
+        (components,) = [each for each in shape_settings("multisine", bench) if each.name == "components"]
+        before = bench.fields()
+        assert bench.command(
+            "trajectory", fields={"shape": "multisine", "components": read("x", components.text)}
+        )
+        bench.advance(0)
+        assert bench.state().refused is None
+        at = "trajectory.components."
+        assert [each for each in bench.fields() if each[0].startswith(at)] == [
+            each for each in before if each[0].startswith(at)
+        ]
+
+
+def test_a_law_of_a_persons_own_is_offered_as_it_is_and_nothing_is_made_up(tmp_path):
+    """A gain of the same name as a shipped law's has neither its bounds nor its default."""
+    (tmp_path / "mine.py").write_text(OWN)
+    law = f"{tmp_path / 'mine.py'}:Mine"
+    with Bench(scenarios.load("hold", {"plant.engine": "lagrangian", "controller.law": law})) as bench:
+        found = {each.name: each for each in settings_of(bench.fields())}
+    assert found["controller.law"].text == law
+    assert (found["controller.stiffness"].text, found["controller.stiffness"].default) == ("3 3 3", None)
+    assert found["controller.stiffness"].meaning == "my own"
+
+
+OWN = """
+from pydantic import Field
+from spheretwin.control.law import Law
+from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each
+
+def step(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+
+class Mine(LawParameters):
+    stiffness: PositiveEach = Field(each(3.0), description="my own")
+
+    def build(self, known):
+        return Law("mine", step, [*self.stiffness], [])
+"""

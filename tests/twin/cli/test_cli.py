@@ -1,0 +1,241 @@
+"""The command as its users meet it: a process, its exit code, its two streams."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from spheretwin.models.telemetry.table import read_parquet
+
+COMMAND = [sys.executable, "-m", "spheretwin.cli"]
+
+
+def spheretwin(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True)
+
+
+def started(*arguments):
+    command, pipe = [*COMMAND, *map(str, arguments)], subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, preexec_fn=_heed_ctrl_c)
+
+
+def _heed_ctrl_c():
+    """As from a terminal, although tests that a shell runs in the background are told to ignore it."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def one_line(stderr):
+    """The single line of a refused call."""
+    (line,) = stderr.splitlines()
+    assert line.startswith("spheretwin: ")
+    return line
+
+
+def test_run_prints_a_table_and_writes_its_files(tmp_path):
+    done = spheretwin(
+        "simulate", "nutation", "--duration", "0.5", "--telemetry", tmp_path / "n.parquet", "--record",
+        tmp_path / "n.rrd",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "nutation under afsm: completed" in done.stdout
+    assert "rerun" in done.stdout
+    table, metadata = read_parquet(tmp_path / "n.parquet")
+    assert len(table) == 500
+    assert json.loads(metadata["scenario"])["duration"] == 0.5
+    assert (tmp_path / "n.rrd").stat().st_size > 100_000
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["n.parquet", "n.rrd"]
+
+
+def test_json_stands_alone_on_stdout():
+    done = spheretwin("simulate", "hold", "--json", "--controller.law", "pd", "--duration", "0.2")
+    assert done.returncode == 0
+    figures = json.loads(done.stdout)
+    assert figures["status"] == "completed"
+    assert figures["scenario"]["controller"]["law"] == "pd"
+    for name in ("max_abs_error_rad", "rms_error_rad", "tail_rms_error_rad"):
+        assert len(figures[name]) == 3
+    for name in ("max_abs_current_A", "saturated_fraction", "wall_s", "realtime_factor", "versions"):
+        assert name in figures
+
+
+def test_same_command_same_bytes_other_seed_other_bytes(tmp_path):
+    def written(name, *flags):
+        path = tmp_path / name
+        spheretwin("simulate", "nutation", "--duration", "0.3", "--telemetry", path, *flags)
+        return path.read_bytes()
+
+    first = written("a.parquet", "--seed", "1")
+    assert written("b.parquet", "--seed", "1") == first
+    assert written("c.parquet", "--seed", "2") != first
+
+
+def test_left_workspace_exits_1_and_keeps_the_run(tmp_path):
+    path = tmp_path / "run.parquet"
+    flags = ["--controller.law", "pd", "--disturbance.load", "5", "--telemetry", path, "--json"]
+    done = spheretwin("simulate", "sinusoid", *flags)
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["status"] == "left_workspace"
+    assert "left_workspace" in one_line(done.stderr)
+    assert len(read_parquet(path)[0]) > 100
+
+
+LONG_s = 600
+"""Longer than any process takes on a busy machine: a test that waits so long has failed."""
+
+TALKING = """
+import sys
+
+
+def talking(t, reference, measurement, parameters, state, torque):
+    torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
+    if t > 0.1 and not TOLD:
+        TOLD.append(t)
+        print("it runs", file=sys.stderr, flush=True)
+
+
+TOLD = []
+"""
+
+
+def running(folder, *arguments):
+    """A run of a minute at the pace of the clock, of which some ticks are done."""
+    (folder / "law.py").write_text(TALKING)
+    law = ["--controller.law", folder / "law.py:talking", "--plant.engine", "lagrangian"]
+    process = started("simulate", "hold", "--live", "--duration", "60", *law, *arguments)
+    assert any("it runs" in line for line in process.stderr)
+    return process
+
+
+def test_ctrl_c_keeps_the_run(tmp_path):
+    telemetry, recording = tmp_path / "run.parquet", tmp_path / "run.rrd"
+    process = running(tmp_path, "--telemetry", telemetry, "--record", recording, "--json")
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=LONG_s)
+    assert process.returncode == 1
+    assert json.loads(stdout)["status"] == "interrupted"
+    assert "Traceback" not in stderr
+    assert 100 < len(read_parquet(telemetry)[0]) < 60_000
+    assert recording.exists()
+
+
+def test_termination_keeps_the_run_too(tmp_path):
+    telemetry = tmp_path / "run.parquet"
+    process = running(tmp_path, "--telemetry", telemetry)
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=LONG_s)
+    assert process.returncode == 1
+    assert 100 < len(read_parquet(telemetry)[0]) < 60_000
+
+
+def test_live_serves_on_this_machine_alone_and_answers_when_it_tells_where():
+    process = started("simulate", "hold", "--live", "--duration", "20")
+    try:
+        line = process.stderr.readline()
+        page = re.fullmatch(r"watch: http://127\.0\.0\.1:(\d+)/\n", line)
+        assert page, line
+        assert _answers("127.0.0.1", int(page[1]))
+        assert _listening_hosts(int(page[1])) == {"127.0.0.1"}
+        assert _ports_of(process.pid) == {int(page[1])}
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=LONG_s)
+
+
+def _ports_of(pid):
+    """Ports on which a process listens, from the kernel's tables."""
+    own = set()
+    for link in Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # it has closed it
+            own.add(os.readlink(link))
+    tables = [Path("/proc/net", name).read_text().splitlines()[1:] for name in ("tcp", "tcp6")]
+    rows = [row.split() for table in tables for row in table]
+    return {int(row[1].split(":")[1], 16) for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in own}
+
+
+def _listening_hosts(port):
+    """Addresses on which some process listens at a port, from the kernel's table."""
+    hosts = set()
+    for table in ("tcp", "tcp6"):
+        for row in Path("/proc/net", table).read_text().splitlines()[1:]:
+            address, state = row.split()[1], row.split()[3]
+            host, hexadecimal = address.split(":")
+            if state == "0A" and int(hexadecimal, 16) == port:
+                hosts.add("127.0.0.1" if host == "0100007F" else host)
+    return hosts
+
+
+def _answers(host, port):
+    with socket.socket() as probe:
+        probe.settimeout(1)
+        return probe.connect_ex((host, port)) == 0
+
+
+INSTALLED = [str(Path(sys.executable).with_name("spheretwin"))]
+
+
+@pytest.mark.parametrize("command", [COMMAND, INSTALLED], ids=["module", "installed"])
+@pytest.mark.parametrize("arguments", [["fly"], ["simulate", "hold", "--plant.mjcf", "missing.xml"]])
+def test_a_refused_process_says_so_on_one_line_and_exits_2(command, arguments):
+    done = subprocess.run([*command, *arguments], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert arguments[-1] in one_line(done.stderr)
+
+
+def test_help_lists_verbs_options_and_fields():
+    assert "simulate" in spheretwin("--help").stdout
+    assert "--out" in spheretwin("magnetics", "curve", "--help").stdout
+    fields = spheretwin("simulate", "tilt", "--help")
+    assert fields.returncode == 0
+    for flag in ("--record", "--controller.law", "--plant.modelling-error", "--trajectory.rate-rad-s"):
+        assert flag in fields.stdout
+
+
+def test_reader_that_leaves_is_no_error():
+    process = started("simulate", "hold", "--json", "--duration", "0.1")
+    with process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+
+
+def test_console_script_is_this_command():
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    assert project["scripts"] == {"spheretwin": "spheretwin.cli:main"}
+
+
+def test_what_is_not_chosen_is_not_compiled(tmp_path):
+    """The bounded allocation alone would take longer to compile than all the rest."""
+    environment = {**os.environ, "SPHERETWIN_CACHE_DIR": str(tmp_path / "cache")}
+    command = [*COMMAND, "simulate", "hold", "--duration", "0.01"]
+    subprocess.run(command, env=environment, capture_output=True, check=True)
+    entries = [path.name for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    assert any("allocate" in name or "allocation" in name for name in entries)
+    assert any("engine" in name for name in entries)
+    for part in ("bounded", "simplex", "plant-lagrangian"):
+        assert not [name for name in entries if part in name], part
+
+
+# What comes with an extra, and what takes long to import though a run needs nothing of it.
+NOT_FOR_A_RUN = (
+    "matplotlib magpylib manifold3d trimesh ray optuna pinocchio control scipy.ndimage scipy.linalg rerun"
+)
+
+
+def test_a_run_imports_nothing_that_it_does_not_need():
+    asked = (
+        "import sys; from spheretwin import cli;"
+        "code = cli.main(['simulate', 'hold', '--duration', '0.01', '--json']);"
+        f"found = sorted(set({NOT_FOR_A_RUN.split()!r}) & set(sys.modules));"
+        "sys.exit(f'{code} {found}')"
+    )
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, cwd="/", check=False)
+    assert done.stderr.splitlines()[-1] == "0 []"

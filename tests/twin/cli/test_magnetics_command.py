@@ -1,0 +1,287 @@
+"""``spheretwin magnetics`` as its users meet it; long parts on small numbers of poses."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from spheretwin import cli
+from spheretwin.models import actuator as actuators
+from spheretwin.models import torque_curve
+from spheretwin.models.design import curve_check, direct_summation, pole_torque, torque_map
+from spheretwin.models.design import field_check as field_verdict
+from spheretwin.models.torque_curve import TorqueCurve
+
+COMMAND = [sys.executable, "-m", "spheretwin.cli", "magnetics"]
+ASSETS = str(actuators.FOLDER / "assets")
+
+
+def magnetics(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True)
+
+
+def here(capsys, *arguments):
+    """The same in this process, so that parts of it can be replaced: exit code, stdout, stderr."""
+    code = cli.main(["magnetics", *map(str, arguments)])
+    return code, *capsys.readouterr()
+
+
+def one_line(stderr):
+    (line,) = stderr.splitlines()
+    assert line.startswith("spheretwin: ")
+    return line
+
+
+@pytest.fixture
+def changed_model(tmp_path):
+    """Write the shipped MJCF with pieces of its text replaced."""
+
+    def write(*replacements):
+        text = actuators.MJCF_PATH.read_text().replace('meshdir="assets"', f'meshdir="{ASSETS}"')
+        for old, new in replacements:
+            assert old in text
+            text = text.replace(old, new)
+        path = tmp_path / "changed.xml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def user_csv(tmp_path):
+    """Coarse data of a weaker magnet, as from a bench."""
+
+    def write(scale=0.93):
+        kept = actuators.load().torque_curve
+        rows = np.r_[0:120:4, 120:721:20]
+        path = tmp_path / "bench.csv"
+        curve = TorqueCurve(kept.phi_rad[rows], scale * kept.torque_Nm_per_A[rows])
+        path.write_text(torque_curve.to_csv(curve, ["bench"]))
+        return path
+
+    return write
+
+
+# curve
+
+
+def test_user_s_curve_is_judged_in_a_table(user_csv):
+    path = user_csv()
+    done = magnetics("curve", "--csv", path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "0.93" in done.stdout
+    assert "left out" in done.stdout
+
+
+def test_user_s_curve_is_judged_in_json(capsys, user_csv):
+    code, out, err = here(capsys, "curve", "--csv", user_csv(), "--json")
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    assert figures["rows"] == 61
+    assert figures["geometry"]["scale"] == pytest.approx(0.93, abs=1e-6)
+    assert figures["geometry"]["difference_after_scaling"]["worst"] < 1e-6
+    assert figures["geometry"]["difference"]["worst"] == pytest.approx(0.07, rel=0.01)
+    assert 0 < figures["leave_one_out"]["rms"] < 0.01
+    assert 0 < figures["lookup_error"] < 1e-4
+    assert figures["checks"] == []
+
+
+@pytest.fixture
+def few_samples(monkeypatch):
+    """A twentieth of the samples: the checks and their exit code, not the figures."""
+    full = pole_torque.sample_angles
+    monkeypatch.setattr(pole_torque, "sample_angles", lambda: full()[::20])
+
+
+@pytest.mark.usefixtures("few_samples")
+def test_computed_curve_is_written_and_judged(capsys, tmp_path):
+    out = tmp_path / "curve.csv"
+    code, text, err = here(capsys, "curve", "--out", out)
+    assert (code, err) == (0, "")
+    assert "2 of 2 checks hold" in text
+    assert len(torque_curve.read(out).phi_rad) == 37
+    code, text, err = here(capsys, "curve")
+    assert (code, text) == (0, out.read_text())
+    assert err.startswith("peak 0.02")
+
+
+@pytest.mark.usefixtures("few_samples")
+def test_computed_curve_that_breaks_a_bound_fails(capsys, monkeypatch):
+    right = curve_check.lookup_table
+    monkeypatch.setattr(curve_check, "lookup_table", lambda curve: (1 + 1e-5) * right(curve))
+    code, out, err = here(capsys, "curve", "--json")
+    assert code == 1
+    assert one_line(err) == "spheretwin: magnetics curve: broken: lookup"
+    mesh, lookup = json.loads(out)["checks"]
+    assert set(mesh) >= {"name", "value", "bound", "ok", "why"}
+    assert (mesh["ok"], lookup["ok"]) == (True, False)
+
+
+# check
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Fewer points in the windings: errors of a thousandth, enough to tell right from wrong."""
+    few = direct_summation.Quadrature(direct_summation.Rule(12, 12, 48), direct_summation.Rule(6, 6, 24))
+    monkeypatch.setattr(direct_summation, "STANDARD", few)
+
+
+def test_check_gives_its_verdict_as_json(capsys, coarse, actuator):
+    code, out, err = here(capsys, "check", "--poses", 2, "--seed", 5, "--json")
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    verdict = field_verdict.judge(actuator, poses=2, seed=5)
+    assert list(figures) == list(verdict._fields)
+    assert [row["tilt_deg"] for row in figures["by_tilt"]] == [[0, 12], [12, 24]]
+    assert figures["by_tilt"][1]["largest_relative_error"] == verdict.by_tilt[1].largest_relative_error
+    assert figures["checks"] == [check.row() for check in verdict.checks]
+    assert figures["sources"] == verdict.sources._asdict()
+
+
+def test_check_prints_a_table(capsys, coarse):
+    code, out, err = here(capsys, "check", "--poses", 1)
+    assert (code, err) == (0, "")
+    assert "0° to 12°" in out
+    assert "Where it comes from" in out
+    assert "2 of 2 checks hold" in out
+
+
+def test_check_finds_a_wrong_polarity(capsys, coarse, monkeypatch):
+    right = direct_summation.torque_matrix
+    monkeypatch.setattr(direct_summation, "torque_matrix", lambda q, actuator: -right(q, actuator))
+    code, out, err = here(capsys, "check", "--poses", 1, "--json")
+    assert code == 1
+    assert "broken: torque" in one_line(err)
+    assert json.loads(out)["checks"][0]["value"] > 1
+
+
+def test_check_finds_a_wrong_curve_and_says_so(capsys, coarse, user_csv):
+    code, out, err = here(capsys, "check", "--poses", 1, "--csv", user_csv(1.03), "--json")
+    assert code == 1
+    assert not json.loads(out)["checks"][0]["ok"]
+    assert "2.9 % of its peak away" in err
+    assert "broken: torque" in err
+
+
+# map
+
+
+def test_map_draws_and_tabulates(capsys, tmp_path):
+    code, out, err = here(capsys, "map", "--largest-tilt", 4, "--out", tmp_path / "figures")
+    assert (code, err) == (0, "")
+    assert "weakest poses" in out
+    names = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert names == ["capability_by_tilt.png", "capability_map.png"]
+    for name in names:
+        assert name in out.replace("\n", "")
+        assert (tmp_path / "figures" / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_map_gives_its_verdict_as_json(capsys, actuator):
+    code, out, err = here(capsys, "map", "--largest-tilt", 2, "--json")
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    verdict = torque_map.judge(torque_map.survey(actuator, largest_tilt_deg=2))
+    assert list(figures) == [*verdict._fields, "figures"]
+    assert figures["by_tilt"] == [row._asdict() for row in verdict.by_tilt]
+    assert figures["weakest"] == [pose._asdict() for pose in verdict.weakest]
+    assert figures["checks"] == [check.row() for check in verdict.checks]
+    assert figures["figures"] == []
+
+
+def test_map_fails_where_more_is_needed(capsys):
+    assert here(capsys, "map", "--largest-tilt", 0, "--need", 0.87)[0] == 0
+    code, out, err = here(capsys, "map", "--largest-tilt", 0, "--need", 0.88)
+    assert code == 1
+    assert "BROKEN" in out
+    assert "1 of 2 checks hold" in out
+    assert "broken: need" in one_line(err)
+
+
+def test_map_warns_of_lost_rank_and_goes_on(capsys, changed_model):
+    path = changed_model(
+        ('pole_lower_north" class="north"', 'pole_lower_north" class="x"'),
+        ('pole_lower_south" class="south"', 'pole_lower_south" class="north"'),
+        ('pole_lower_north" class="x"', 'pole_lower_north" class="south"'),
+    )
+    code, out, err = here(capsys, "map", "--largest-tilt", 1, "--mjcf", path, "--json")
+    assert code == 0
+    assert "warning: the torque matrix loses the direction" in one_line(err)
+    assert "α" in err
+    figures = json.loads(out)
+    assert figures["warnings"][0] in err
+    assert figures["by_tilt"][0]["condition"] is None
+    assert figures["by_tilt"][0]["best_Nm"] == 0
+    # With a bound it fails.
+    assert here(capsys, "map", "--largest-tilt", 0, "--mjcf", path, "--need", 0.1)[0] == 1
+
+
+@pytest.mark.parametrize("arguments", [["map", "--largest-tilt", 0], ["check", "--poses", 1]])
+def test_overlapping_coils_are_named(capsys, coarse, changed_model, arguments):
+    path = changed_model(('size="0.011 0.0125"', 'size="0.012 0.0125"'))
+    code, out, err = here(capsys, *arguments, "--mjcf", path, "--json")
+    warning, curve = json.loads(out)["warnings"]
+    for line in (warning, curve):
+        assert f"spheretwin: warning: {line}" in err.splitlines()
+    assert curve.endswith("was computed for coil outer_radius_m 0.011, the model has 0.012")
+    assert "coil 0 (latitude 28°, azimuth 0°) and coil 1" in warning
+    assert "23 more pairs" in warning
+    # The curve is the shipped coil's: that breaks `check`, the overlap alone breaks nothing.
+    assert code == (1 if arguments[0] == "check" else 0)
+
+
+# Bad input
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["fly"], ["curve", "check", "map", "fly"]),
+        (["curve", "--csv", "missing.csv"], ["readable", "missing.csv"]),
+        (["curve", "--csv", "{csv}", "--out", "x.csv"], ["--out or --csv", "both"]),
+        (["curve", "--out", "missing/x.csv"], ["writable", "missing"]),
+        (["curve", "--mjcf", "missing.xml"], ["missing.xml"]),
+        (["check", "--poses", "0"], ["poses", "1 to 10000", "0"]),
+        (["check", "--poses", "many"], ["poses", "many"]),
+        (["check", "--seed", "-1"], ["seed"]),
+        (["check", "--csv", "missing.csv"], ["missing.csv"]),
+        (["check", "--colour"], ["--poses", "--colour"]),
+        (["map", "--largest-tilt", "90"], ["0 to 85", "90"]),
+        (["map", "--largest-tilt", "nan"], ["0 to 85", "nan"]),
+        (["map", "--need", "-1"], ["above 0", "-1"]),
+        (["map", "--need", "inf"], ["above 0", "inf"]),
+        (["map", "--out", "{csv}"], ["folder"]),
+        (["map", "now"], ["--largest-tilt", "now"]),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, user_csv, arguments, parts):
+    monkeypatch.chdir(tmp_path)
+    path = str(user_csv())
+    code, out, err = here(capsys, *(argument.replace("{csv}", path) for argument in arguments))
+    assert (code, out) == (2, "")
+    line = one_line(err)
+    for part in parts:
+        assert part in line
+    assert [each.name for each in tmp_path.iterdir()] == ["bench.csv"]
+
+
+def test_missing_matplotlib_is_named_before_the_work(capsys, tmp_path, monkeypatch):
+    for drawing in ("magnetic_plots", "plots"):
+        monkeypatch.delitem(sys.modules, f"spheretwin.viz.figures.{drawing}", raising=False)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, _, err = here(capsys, "map", "--out", tmp_path / "figures")
+    assert code == 2
+    assert "spheretwin[plots]" in one_line(err)
+    assert not (tmp_path / "figures").exists()
+
+
+def test_missing_magpylib_is_named(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "magpylib.magnet", None)
+    code, _, err = here(capsys, "check", "--poses", "1")
+    assert code == 2
+    assert "spheretwin[magnetics]" in one_line(err)

@@ -1,0 +1,183 @@
+"""What a user is told where model, torque curve and scenario do not say the same."""
+
+import contextlib
+import io
+import json
+import re
+
+import pytest
+
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.models import actuator as actuators
+from spheretwin.session import Session
+
+TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
+OPTION = '<option integrator="RK4" timestep="0.0005">'
+FLAGS = '<flag autoreset="disable" contact="disable"/>'
+CURVE = "torque curve torque_curve.csv was computed for "
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(*edits):
+        text = TEXT
+        for old, new in edits:
+            assert old in text
+            text = text.replace(old, new)
+        (path := tmp_path / "mine.xml").write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def told_by_a_session(path, overrides):
+    with Session(scenarios.load("hold", {"plant.mjcf": str(path)} | overrides)) as session:
+        return session.warnings()
+
+
+def told_by_the_command(path, overrides):
+    flags = [text for name, value in overrides.items() for text in (f"--{name}", str(value))]
+    # Started where it is to be held, the rotor needs no torque that would be worth a warning.
+    held = ["--plant.initial-rad", "0.2", "-0.1", "0.3", "--controller.law", "pd"]
+    arguments = ["simulate", "hold", "--duration", "0.003", "--plant.mjcf", str(path), *held, *flags]
+    stdout = io.StringIO()
+    with contextlib.redirect_stdout(stdout):
+        assert cli.main([*arguments, "--json"]) == cli.DONE
+    return json.loads(stdout.getvalue())["warnings"]
+
+
+GEOMETRY = {
+    "poles inward": ('pos="0.045 0 0"', 'pos="0.0445 0 0"', "magnet distance_m 0.045, the model has 0.0445"),
+    "coils outward": ('pos="0.063 0 0"', 'pos="0.0635 0 0"', "coil distance_m 0.063, the model has 0.0635"),
+    "turns": ('_turns" data="320"', '_turns" data="300"', "coil turns 320, the model has 300"),
+    "remanence": ('data="1.2"', 'data="1.25"', "magnet remanence_T 1.2, the model has 1.25"),
+    "pole radius": ('size="0.010 0.005"', 'size="0.009 0.005"', "magnet radius_m 0.01, the model has 0.009"),
+    "bore": ('data="0.003"', 'data="0.004"', "coil inner_radius_m 0.003, the model has 0.004"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("told", [told_by_a_session, told_by_the_command])
+@pytest.mark.parametrize(("old", "new", "line"), GEOMETRY.values(), ids=GEOMETRY)
+def test_geometry_that_the_curve_was_not_computed_for_is_told(written, told, old, new, line):
+    assert told(written((old, new)), {}) == [CURVE + line]
+
+
+def test_each_disagreement_has_its_line(written):
+    lines = told_by_a_session(written(*((old, new) for old, new, _ in GEOMETRY.values())), {})
+    assert sorted(lines) == sorted(CURVE + line for _, _, line in GEOMETRY.values())
+
+
+OVERRIDDEN = {
+    "timestep": (((OPTION, OPTION.replace("0.0005", "0.001")),), {},
+                 "timestep of 0.001 s is not used: plant.step_s is 0.0005 s"),
+    "timestep that differs by little": (((OPTION, OPTION.replace("0.0005", "0.00050000001")),), {},
+                                        "timestep of 0.00050000001 s is not used: plant.step_s is 0.0005 s"),
+    "step": ((), {"plant.step_s": 1e-4}, "timestep of 0.0005 s is not used: plant.step_s is 0.0001 s"),
+    "integrator": (((OPTION, OPTION.replace("RK4", "implicitfast")),), {},
+                   "integrator implicitfast is not used: plant.integrator is RK4"),
+    "integrator that a scenario cannot name": (((OPTION, OPTION.replace("RK4", "discrete")),), {},
+                                               "integrator discrete is not used: plant.integrator is RK4"),
+    "another integrator": ((), {"plant.integrator": "Euler"},
+                           "integrator RK4 is not used: plant.integrator is Euler"),
+    "gravity": (((OPTION, OPTION.replace(">", ' gravity="0 0 -1.62">')),), {"plant.gravity_m_s2": 9.81},
+                "gravity of 0 0 -1.62 m/s² is not used: plant.gravity_m_s2 is 9.81 m/s²"),
+    "gravity aslant": (((OPTION, OPTION.replace(">", ' gravity="1 0 -9.8">')),), {"plant.gravity_m_s2": 9.8},
+                       "gravity of 1 0 -9.8 m/s² is not used: plant.gravity_m_s2 is 9.8 m/s²"),
+    "gravity switched off": (((FLAGS, '<flag gravity="disable"/>'),), {"plant.gravity_m_s2": 9.81},
+                             "gravity of 0 0 0 m/s² is not used: plant.gravity_m_s2 is 9.81 m/s²"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("told", [told_by_a_session, told_by_the_command])
+@pytest.mark.parametrize(("edits", "overrides", "line"), OVERRIDDEN.values(), ids=OVERRIDDEN)
+def test_an_option_of_the_model_that_the_scenario_overrides_is_told(written, told, edits, overrides, line):
+    assert told(written(*edits), overrides) == [f"the model's own {line}"]
+
+
+SILENT = {
+    "the shipped model": ((), {}),
+    "no options": (((OPTION, "<option>"),), {}),
+    "the engine's own defaults": (
+        ((OPTION, '<option integrator="Euler" timestep="0.002" gravity="0 0 -9.81">'),),
+        {"plant.gravity_m_s2": 1.62},
+    ),
+    "gravity that is used": (((OPTION, OPTION.replace(">", ' gravity="1 0 -1.62">')),), {}),
+    "weightlessness that is used": (((FLAGS, '<flag gravity="disable"/>'),), {}),
+    "the same said twice": (
+        ((OPTION, '<option integrator="implicitfast" timestep="0.001" gravity="0 0 -1.62">'),),
+        {"plant.integrator": "implicitfast", "plant.step_s": 0.001, "plant.gravity_m_s2": 1.62},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("told", [told_by_a_session, told_by_the_command])
+@pytest.mark.parametrize(("edits", "overrides"), SILENT.values(), ids=SILENT)
+def test_nothing_is_told_where_nothing_is_lost(written, told, edits, overrides):
+    assert told(written(*edits), overrides) == []
+
+
+def test_a_change_during_the_run_is_told_from_then_on(written):
+    path = written((OPTION, OPTION.replace(">", ' gravity="0 0 -1.62">')))
+    with Session(scenarios.load("hold", {"plant.mjcf": str(path)})) as session:
+        assert session.warnings() == []
+        session.set("plant.gravity_m_s2", 9.81)
+        (line,) = session.warnings()
+        assert re.search(r"gravity of 0 0 -1\.62 .* is 9\.81", line)
+        session.set("plant.integrator", "Euler")
+        assert len(session.warnings()) == 2
+
+
+def test_weightlessness_is_no_negative_zero(written):
+    # It is in the record of the run.
+    for edit in ((FLAGS, '<flag gravity="disable"/>'), (OPTION, OPTION.replace(">", ' gravity="0 0 0">'))):
+        with Session(scenarios.load("hold", {"plant.mjcf": str(written(edit))})) as session:
+            assert str(session.scenario.plant.gravity_m_s2) == "0.0"
+
+
+DEPRECATED = 'autolimits="true"', 'autolimits="true" settotalmass="3"'
+FLEX = '<deformable><flex name="cloth" dim="1" body="rotor payload" element="0 1"/></deformable>'
+COMPILER = {
+    "settotalmass": (DEPRECATED, "compiler attribute 'settotalmass' is deprecated"),
+    "flex": (("</mujoco>", FLEX + "</mujoco>"), "flex 'cloth' is not rigid and has no equality constraints"),
+}
+
+
+@pytest.mark.parametrize("told", [told_by_a_session, told_by_the_command])
+@pytest.mark.parametrize(("edit", "line"), COMPILER.values(), ids=COMPILER)
+def test_a_warning_of_the_compiler_is_one_line_of_ours(written, told, edit, line, capfd):
+    """The engine's Python package raises it as a warning at each of three compilations, in several lines."""
+    path = written(edit)
+    (received,) = told(path, {"plant.engine": "mujoco"})
+    assert received.startswith(f"model {path}: {line}")
+    assert "\n" not in received
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_flexible_grid_has_no_line_but_the_refusal(written, capfd):
+    grid = (
+        '<flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.05 0.05 0.05" dim="2" mass="0.1"'
+        ' pos="0 0 1"/></worldbody>'
+    )
+    path = written(("</worldbody>", grid))
+    assert cli.main(["simulate", "hold", "--plant.mjcf", str(path)]) == cli.BAD_INPUT
+    printed = capfd.readouterr()
+    (line,) = printed.err.splitlines()
+    assert line.startswith("spheretwin: model: expected three degrees of freedom, received 30")
+    assert printed.out == ""
+
+
+def test_a_recording_adds_no_second_line(written, capfd, tmp_path):
+    """Meshes are read by a compilation of their own."""
+    text = TEXT.replace('meshdir="assets"', f'meshdir="{actuators.MJCF_PATH.parent / "assets"}"')
+    (path := tmp_path / "drawn.xml").write_text(text.replace(*DEPRECATED), encoding="utf-8")
+    (line,) = told_by_the_command(path, {"record": tmp_path / "run.rrd"})
+    printed = capfd.readouterr()
+    assert "settotalmass" in line
+    assert printed.err == ""
+
+
+def test_other_verbs_print_it_once(written, capfd):
+    assert cli.main(["magnetics", "map", "--mjcf", str(written(DEPRECATED))]) == cli.DONE
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("spheretwin: warning: model ")

@@ -1,0 +1,111 @@
+"""``spheretwin reproduce``: its two streams, its exit codes, its page."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from spheretwin import cli
+from spheretwin.cli import reproduce
+from tests.twin.paper.cases import IDEAL, LOST, experiment
+
+COMMAND = [sys.executable, "-m", "spheretwin.cli", "reproduce"]
+
+
+def test_json_stands_alone_and_the_page_is_written(tmp_path):
+    folder = tmp_path / "page"
+    arguments = ["figure11", "--json", "--seeds", "2", "--limit", "4", "--out", str(folder)]
+    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    told = json.loads(done.stdout)
+    assert set(told) == {"rows", "seeds", "wall_s", "versions"}
+    assert [row["controller"] for row in told["rows"]] == ["pd", "adaptive_fuzzy", "afsm", "pid"]
+    for row in told["rows"]:
+        assert (row["figure"], row["m"], row["L"], row["seeds"], row["status"]) == (
+            "figure11",
+            0,
+            0,
+            2,
+            "completed",
+        )
+        assert len(row["max_abs_error_rad"]) == len(row["tail_rms_error_rad"]) == 3
+    assert {"reproduce.md", "reproduce.html", "figure11_errors.png"} <= {
+        path.name for path in folder.iterdir()
+    }
+    text = (folder / "reproduce.md").read_text(encoding="utf-8")
+    assert "`spheretwin reproduce figure11 --seeds 2 --limit 4`" in text
+
+
+def test_people_get_tables(capsys, monkeypatch):
+    monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(IDEAL))
+    assert cli.main(["reproduce", "short", "--seeds", "1"]) == cli.DONE
+    out, err = capsys.readouterr()
+    assert "short, What | was found. Errors" in out
+    assert "ideal" in out
+    assert err == ""
+
+
+def test_names_are_run_once_each_and_all_is_all(capsys, monkeypatch):
+    monkeypatch.setattr(
+        reproduce, "EXPERIMENTS", {name: experiment(IDEAL)._replace(name=name) for name in "ab"}
+    )
+    for names in (["all"], ["b", "a", "b"]):
+        assert cli.main(["reproduce", *names, "--json"]) == cli.DONE
+        rows = json.loads(capsys.readouterr().out)["rows"]
+        assert [row["figure"] for row in rows] == ["a", "b"]
+
+
+def test_a_run_that_ends_early_exits_1_and_is_named(capsys, monkeypatch):
+    monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(IDEAL, LOST))
+    assert cli.main(["reproduce", "short", "--json"]) == cli.FAILED
+    out, err = capsys.readouterr()
+    assert [row["status"] for row in json.loads(out)["rows"]] == ["completed", "left_workspace"]
+    assert err == "spheretwin: reproduce: ended early: short: lost (left_workspace)\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        ([], ["NAME"]),
+        (["figure12"], ["figure11", "budget", "all", "'figure12'", "did you mean figure11?"]),
+        (["figure11", "tilted"], ["'tilted'"]),
+        (["figure11", "--seeds", "0"], ["--seeds", "from 1 to 1000", "0"]),
+        (["figure11", "--seeds", "1001"], ["--seeds", "1001"]),
+        (["figure11", "--limit", "few"], ["--limit", "few"]),
+        (["figure11", "--colour", "red"], ["--out, --json, --seeds, --limit or --plant", "--colour red"]),
+        (["figure11", "--plant", "water"], ["--plant", "mujoco", "lagrangian", "water"]),
+        (["figure11", "--out", "taken"], ["writable folder", "taken"]),
+    ],
+)
+def test_bad_input_is_one_line_exit_2_and_no_folder(tmp_path, monkeypatch, capsys, arguments, parts):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("a file")
+    assert cli.main(["reproduce", *arguments]) == cli.BAD_INPUT
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
+    for part in parts:
+        assert part in line
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def test_a_law_without_what_a_figure_varies_is_bad_input(tmp_path, monkeypatch, capsys):
+    case = IDEAL._replace(fields={"controller.law": "pd", "controller.surface_slope": 5.0})
+    monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(case))
+    assert cli.main(["reproduce", "short", "--out", str(tmp_path / "page")]) == cli.BAD_INPUT
+    _, err = capsys.readouterr()
+    (line,) = err.splitlines()
+    assert "reproduce short, ideal" in line
+    assert "surface_slope" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_rows_run_on_the_plant_that_is_asked_for(capsys, monkeypatch):
+    case = IDEAL._replace(fields={"duration": 0.05})
+    monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(case))
+    for flags, plant in (([], "lagrangian"), (["--plant", "mujoco"], "mujoco")):
+        assert cli.main(["reproduce", "short", "--json", *flags]) == cli.DONE
+        (row,) = json.loads(capsys.readouterr().out)["rows"]
+        assert row["plant"] == plant
+        assert f"--plant.engine {plant}" in row["command"]

@@ -1,0 +1,288 @@
+"""A short fault study: its rows, its verdicts, its reasons, its page."""
+
+import json
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.control.supervision.fault_detector import LEAST_SHARE
+from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import fault_latency, fault_sections, fault_study
+from spheretwin.paper.cases import carried_out, failed, planned, scenario_of
+from spheretwin.paper.experiment import Outcome
+from spheretwin.paper.fault_cases import (
+    ALONE,
+    BASE,
+    BOUNDED,
+    DETECTING,
+    HEALTHY,
+    HEALTHY_PROTOTYPE,
+    NOT_TOLD,
+    OF_GROUPS,
+    OF_PARTS,
+    RELEASE,
+    TOLD,
+    failures,
+    of_groups,
+    of_part,
+    on_other_engine,
+    shorted,
+)
+from spheretwin.paper.fault_outcomes import Found, keep, more, reason, tracks
+from spheretwin.paper.rows import rows
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+
+# Nine open groups that leave a tenth of the torque needed, and a pair that is hard for who is not told.
+MANY, PAIR = (2, 3, 4, 9, 10, 11, 14, 15, 16), (0, 1)
+DROPOUT = next(each for each in failures() if (each.part, each.mode) == ("encoder.gamma", "dropout"))
+STUDY = [
+    HEALTHY,
+    HEALTHY_PROTOTYPE,
+    *(of_groups(groups, way) for groups in ((0,), PAIR, MANY) for way in OF_GROUPS),
+    *(of_part(DROPOUT, way) for way in OF_PARTS),
+    on_other_engine((0,), TOLD),
+    shorted((0,), DETECTING),
+]
+EXPERIMENT = fault_study.EXPERIMENT._replace(cases=lambda: STUDY)
+
+
+@pytest.fixture(scope="module")
+def found():
+    plan = planned(EXPERIMENT, seeds=2)
+    return plan, carried_out(plan, workers=2)
+
+
+def row(found, case):
+    return next(each for each in rows(*found) if each["case"] == case.name)
+
+
+def outcome(ratio, status=Status.COMPLETED, **more_of_it):
+    kept = Found(
+        start_s=1.0,
+        after_rad=0.01 * ratio,
+        healthy_rad=0.01,
+        ended_s=5.0,
+        numbers=True,
+        stopped=Reason.NONE,
+        stopped_s=float("nan"),
+        told=True,
+        least_norm=True,
+        left=None,
+        found_s=(),
+        driven_ticks=(),
+        wrongly_found=0,
+    )._replace(**more_of_it)
+    return Outcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), kept)
+
+
+def test_rows_are_the_same_whatever_the_threads(found):
+    plan = planned(EXPERIMENT, seeds=2)
+    assert json.dumps(rows(plan, carried_out(plan, workers=1))) == json.dumps(rows(*found))
+
+
+def test_every_run_ends_with_a_status_and_numbers(found):
+    plan, outcomes = found
+    assert failed(plan, outcomes) == []
+    assert all(run.kept.numbers for each in outcomes.values() for run in each)
+    assert (
+        "each ended with a status and with nothing but numbers"
+        in fault_sections.groups_section(outcomes).text
+    )
+
+
+def test_single_group_and_pair_track_where_told_or_found_and_else_not(found):
+    for groups in ((0,), PAIR):
+        for way in (TOLD, DETECTING, BOUNDED):
+            told = row(found, of_groups(groups, way))
+            assert (told["tracks"], told["reason"], told["rank"]) == (2, None, 3)
+            assert 0.9 < told["error_ratio_range"][0] <= told["error_ratio_range"][1] < 1.15
+        untold = row(found, of_groups(groups, NOT_TOLD))
+        assert untold["tracks"] == 0
+        assert "of the torque asked for comes" in untold["reason"]
+
+
+def test_errors_are_those_of_the_healthy_run_with_the_same_seed(found):
+    _, outcomes = found
+    case = of_groups(PAIR, NOT_TOLD)
+    for seed, run in enumerate(outcomes[case.name]):
+        errors = [
+            np.abs(simulate(scenarios.load("nutation", {**fields, "seed": seed})).telemetry["error_rad"])
+            for fields in (case.fields_of(seed), BASE)
+        ]
+        first = round(run.kept.start_s / 1e-3)
+        assert case.drawn(seed)["fault.0.start_s"] == pytest.approx(run.kept.start_s)
+        assert (run.kept.after_rad, run.kept.healthy_rad) == tuple(error[first:].max() for error in errors)
+        np.testing.assert_array_equal(*(error[: first + 1] for error in errors))  # nothing has failed yet
+        assert np.any(errors[0][first + 1 :] != errors[1][first + 1 :])
+    for run in outcomes[HEALTHY.name]:
+        assert (run.kept.ratio, run.kept.start_s) == (1.0, 0.0)
+
+
+def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(found):
+    _, outcomes = found
+    bounded = scenario_of(of_groups(PAIR, BOUNDED), None, 1)
+    run = outcomes[of_groups(PAIR, BOUNDED).name][1]
+    error = np.abs(simulate(bounded.model_copy(update={"fault": ()})).telemetry["error_rad"])
+    assert run.kept.healthy_rad == error[round(run.kept.start_s / 1e-3) :].max()
+    # It leaves the workspace before the end: the window of the reference ends there too.
+    case = of_part(DROPOUT, ALONE)
+    run = outcomes[case.name][0]
+    assert run.status == Status.LEFT_WORKSPACE
+    healthy = simulate(scenario_of(HEALTHY_PROTOTYPE, None, 0)).telemetry["error_rad"]
+    window = slice(round(run.kept.start_s / 1e-3), round(run.kept.ended_s / 1e-3))
+    assert run.kept.healthy_rad == np.abs(healthy[window]).max()
+
+
+def test_the_detector_s_times_are_told(found):
+    told = row(found, of_groups(PAIR, DETECTING))
+    assert [len(times) for times in told["time_to_detection_s"]] == [2, 2]
+    assert told["wrongly_found"] == 0
+    assert row(found, of_groups(PAIR, TOLD))["time_to_detection_s"] == [[None, None]] * 2
+
+
+def opened(group, start_s, end_s=5.0, **changes):
+    """One open group in the nutation of the study, with a detector."""
+    fault = {"target": f"coil.{group:02d}", "mode": "open", "start_s": start_s, "detect": True}
+    return simulate(scenarios.load("nutation", {**BASE, "fault": [fault], "duration": end_s, **changes}))
+
+
+def test_an_idle_group_is_not_detected_until_it_is_driven():
+    """The longest time in which a group is commanded less than the threshold: a fault that starts there."""
+    healthy = simulate(scenarios.load("nutation", BASE))
+    threshold_A = LEAST_SHARE * healthy.actuator.group.current_limit_A
+    with Session(scenarios.load("nutation", {**BASE, "detector.detect": True})) as session:
+        # What the study takes for the threshold of the detector.
+        assert threshold_A == session._machine._controller.supervision.detector.threshold_A
+    idle = np.abs(healthy.telemetry["current_command_A"]) <= threshold_A
+    length, end, group = max(
+        (length, end, group) for group in range(18) for length, end in stretches(idle[:, group])
+    )
+    assert length >= 50
+    begin = end - length
+    # Cut off within the idle stretch it is not detected, and otherwise some ticks after it.
+    missed = keep(opened(group, 1e-3 * (begin + 2), 1e-3 * end))
+    assert (missed.found_s, missed.driven_ticks) == ((None,), (0,))
+    (latency_s,) = keep(opened(group, 1e-3 * (begin + 2))).found_s
+    assert latency_s > 1e-3 * (length - 2)
+
+
+def stretches(true):
+    """Length and end of every run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(int)))
+    return [(end - begin, end) for begin, end in edges.reshape(-1, 2)]
+
+
+def test_latency_is_a_distribution_in_which_the_undetected_count():
+    runs = [
+        outcome(1.0, found_s=(time_s,), driven_ticks=(5 if time_s else 1,), left=None)
+        for time_s in [4e-3] * 80 + [5e-3] * 12 + [0.2] * 5 + [None] * 3
+    ]
+    told = outcome(0.9)
+    names = [of_groups((0,), way).name for way in (DETECTING, TOLD)]
+    section = fault_latency.section({names[0]: runs, names[1]: [told] * len(runs)})
+    (row,) = section.tables[0].rows
+    assert row == (
+        "one open", "100", "4", "5", "200", "not detected", "200", "3 (3.0 %)", "5", "5", "1",
+    )  # fmt: skip
+    assert "Of the 3 that were not, 3 had fewer than 5" in section.text
+    by_latency = {row[0]: row for row in section.tables[1].rows}
+    assert {name: row[1] for name, row in by_latency.items()} == {
+        "up to 6": "92", "above 100": "5", "not detected": "3", "all": "100",
+    }  # fmt: skip
+    # A tenth of a healthy error of 10 mrad, in every pair of runs.
+    assert set(by_latency["all"][2:6]) == {"1.000"}
+
+
+def test_cost_is_what_the_delay_adds_with_the_same_seed_and_start(found):
+    _, outcomes = found
+    detecting, told = (outcomes[of_groups(PAIR, way).name] for way in (DETECTING, TOLD))
+    for one, other in zip(detecting, told, strict=True):
+        assert one.kept.start_s == other.kept.start_s
+        assert fault_latency.cost_rad(one, other) == one.kept.after_rad - other.kept.after_rad
+
+
+def test_too_little_torque_is_the_reason(found):
+    told = row(found, of_groups(MANY, TOLD))
+    assert told["tracks"] == 0
+    assert told["torque_left_over_needed"] < 0.5
+    assert told["least_norm_torque_over_needed"] <= told["torque_left_over_needed"]
+    assert told["reason"].endswith("by least norm")
+
+
+def test_the_watchdog_s_reason_is_told(found):
+    assert row(found, of_part(DROPOUT, RELEASE))["reason"] == "no fresh measurement"
+    assert row(found, of_part(DROPOUT, RELEASE))["status"] == "failsafe"
+    assert row(found, of_part(DROPOUT, ALONE))["status"] == "left_workspace"
+
+
+def test_the_other_engine_agrees(found):
+    _, outcomes = found
+    ((one, other),) = fault_study.compared(outcomes, TOLD)
+    assert fault_study.agree(one, other)
+    assert fault_study.difference_rad(one, other) < 1e-12  # 10,000 steps that round otherwise
+    apart = other._replace(kept=other.kept._replace(after_rad=other.kept.after_rad + 2e-9))
+    assert not fault_study.agree(one, apart)
+
+
+def test_page_shows_every_figure_and_row(found):
+    _, outcomes = found
+    groups, delays, reasons, parts, other = fault_study.tell(outcomes)
+    assert [row[0] for row in delays.tables[0].rows] == [
+        "one open", "two open", "three to nine open", "one shorted",
+    ]  # fmt: skip
+    assert [row[:2] for row in groups.tables[0].rows] == [
+        (str(number), way.name) for number in (1, 2, 9) for way in OF_GROUPS
+    ]
+    assert "told, 4 of 4 runs track" in groups.text
+    assert {row[0] for row in reasons.tables[1].rows} == {" ".join(map(str, MANY))}
+    (dropout,) = parts.tables[0].rows
+    assert dropout[1].startswith("left_workspace: ")
+    assert dropout[4] == "no fresh measurement"
+    assert len(other.tables[0].rows) == 1
+    drawn = [draw().file for section in (groups, delays, reasons, parts, other) for draw in section.draw]
+    assert drawn == [
+        "faults_shares.png", "faults_pairs.png", "faults_latency.png", "faults_torque.png",
+    ]  # fmt: skip
+
+
+def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(found):
+    ratios = fault_sections.ratios(found[1], NOT_TOLD)
+    there = np.argwhere(np.isfinite(ratios)).tolist()
+    assert there == [[0, 0], [1, 0]]
+    assert ratios[1, 0] == row(found, of_groups(PAIR, NOT_TOLD))["error_ratio"]
+
+
+def test_tracking_is_to_complete_and_to_stay_within_twice():
+    assert tracks(outcome(2.0))
+    assert not tracks(outcome(2.001))
+    assert not tracks(outcome(1.0, Status.LEFT_WORKSPACE))
+    assert not tracks(outcome(float("nan"), Status.LEFT_WORKSPACE))  # it ended before the fault
+
+
+def test_a_lost_direction_is_the_first_reason(found):
+    left = found[1][of_groups(PAIR, TOLD).name][0].kept.left
+    assert reason(outcome(3.0, left=left._replace(rank=2))) == "rank 2"
+    assert reason(outcome(1.5, left=left._replace(rank=2))) is None
+
+
+def test_a_run_that_ends_before_the_fault_has_no_ratio():
+    kept = keep(opened(0, 1.0, 0.5))
+    assert np.isnan(kept.ratio)
+    assert json.loads(json.dumps(more([outcome(float("nan"))]), allow_nan=False))["error_ratio"] is None
+
+
+def test_a_figure_parts_the_good_from_the_bad_with_the_fewest_errors():
+    assert fault_study.split([2.0, 3.0, 5.0], [0.5, 1.0]) == (1.5, 1.0)
+    parted = fault_study.split([0.9, 2.0, 3.0, 4.0], [0.5, 1.0, 1.2])
+    assert parted.at == pytest.approx(1.6)
+    assert parted.rightly == pytest.approx(6 / 7)
+    assert fault_study.split([1.0], []).rightly == 1.0
+
+
+def test_shares_are_not_rounded_up_to_all():
+    assert fault_sections.percent([True] * 2000 + [False]) == "99.9 %"
+    assert fault_sections.percent([True, True]) == "100 %"
+    assert fault_sections.percent([False] * 2000 + [True]) == "0.1 %"

@@ -1,0 +1,112 @@
+"""Figures 6 and 7: what is varied, what is printed, and what is said to have been reproduced."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import sinusoid
+from spheretwin.paper.cases import carried_out, failed, planned
+from spheretwin.paper.experiment import COMPARED, OF_PAPER
+from spheretwin.paper.rows import PRINTED_rad, printed_rad, rows
+from spheretwin.paper.sinusoid import EXPERIMENT_6, EXPERIMENT_7, FIGURE6, FIGURE7, Condition, case
+
+AT = Condition(0.2, 2.0)
+
+
+@pytest.fixture(scope="module")
+def figure7():
+    plan = planned(EXPERIMENT_7, seeds=1)
+    return plan, carried_out(plan)
+
+
+def test_figure_6_varies_m_alone_and_figure_7_the_load_alone():
+    for experiment, field, values in (
+        (EXPERIMENT_6, "plant.modelling_error", [0, 0.1, 0.2, 0.3, 0.4, 0.5]),
+        (EXPERIMENT_7, "disturbance.load", [0, 1, 2, 3, 4, 5]),
+    ):
+        cases = experiment.cases()
+        assert len(cases) == len(values) * len(COMPARED)
+        assert sorted({each.fields[field] for each in cases}) == values
+        kept = ({"plant.modelling_error", "disturbance.load"} - {field}).pop()
+        assert {each.fields[kept] for each in cases} == {1.0 if kept.endswith("load") else 0.2}
+        for each in cases:
+            scenario = scenarios.load(each.scenario, each.fields)
+            assert scenario.controller == type(scenario.controller)()  # the gains are the laws' own
+            assert scenario.plant.modelling_torque_Nm == (0.002, 0.001, 0.001)  # (54), whatever m
+
+
+def test_printed_numbers_are_in_their_order():
+    """PD errs most, AFSM least, and the load makes it worse: a slip of the pen would show."""
+    for of_laws in PRINTED_rad.values():
+        pd, fuzzy, afsm = (np.array(of_laws[law]) for law in ("pd", "adaptive_fuzzy", "afsm"))
+        assert np.all(pd > fuzzy)
+        assert np.all(fuzzy > afsm)
+    for law in PRINTED_rad[0.2, 1.0]:
+        assert np.all(np.array(printed_rad(law, 0.2, 2.0)) > np.array(printed_rad(law, 0.2, 1.0)))
+    assert printed_rad("pid", 0.2, 1.0) is None
+    assert printed_rad("pd", 0.3, 1.0) is None
+
+
+def test_rows_have_what_is_printed_and_a_lost_run_is_a_row(figure7):
+    plan, outcomes = figure7
+    told = {(row["controller"], row["L"]): row for row in rows(plan, outcomes)}
+    assert told["afsm", 2.0]["paper"] == [0.1854, 0.1986, 0.1769]
+    assert told["afsm", 3.0]["paper"] is None
+    assert told["pd", 2.0]["status"] == "left_workspace"
+    assert failed(plan, outcomes) == []
+    for law, L, error in (("afsm", 1, 0.030), ("afsm", 2, 0.041), ("adaptive_fuzzy", 1, 0.038)):
+        row = told[law, float(L)]
+        assert row["max_abs_error_rad"][0] == pytest.approx(error, abs=5e-4)  # as README prints them
+        assert row["rms_error_rad"][0] < row["max_abs_error_rad"][0]
+        assert row["rms_torque_Nm"] > 0.05 * L  # the load alone, on three hinges
+        assert row["current_variation_A_s"] > 0
+
+
+def test_order_and_growth_of_the_paper_came_out_again_and_its_sizes_did_not(figure7):
+    said = EXPERIMENT_7.findings(figure7[1])
+    order, sizes, lost, growth = said
+    assert order.held
+    assert "PD > adaptive fuzzy > AFSM over L = 0 to 5" in order.text
+    assert not sizes.held
+    assert not lost.held
+    assert "1 of 1 runs ended as left_workspace" in lost.text
+    assert growth.held
+
+
+def made_up(errors, status=Status.COMPLETED):
+    """Outcomes of one seed by law, with the same error on all three hinges."""
+    figures = {"saturated_fraction": 0.5}
+    return {
+        case(compared, AT).name: [
+            SimpleNamespace(max_abs_error=np.array(error) * np.ones(3), figures=figures, status=status)
+        ]
+        for compared, error in zip(OF_PAPER, errors, strict=True)
+    }
+
+
+def test_findings_are_of_the_outcomes():
+    printed = [printed_rad(compared.law, *AT) for compared in OF_PAPER]
+    (found,) = sinusoid.sizes(AT, made_up(printed))
+    assert found.held
+    assert "PD 1.00 to 1.00 times, adaptive fuzzy 1.00 to 1.00 times, AFSM 1.00 to 1.00 times" in found.text
+    far = [np.array(each) * factor for each, factor in zip(printed, (1.24, 1.26, 0.76), strict=True)]
+    held = {each.held: each.text for each in sinusoid.sizes(AT, made_up(far))}
+    assert "adaptive fuzzy 1.26" in held[False]
+    assert "closer than the paper says" not in held[False]
+    assert "PD" in held[True]
+    assert "AFSM" in held[True]
+    (kept,) = sinusoid.order(FIGURE7, made_up([3.0, 2.0, 1.0]))
+    (broken,) = sinusoid.order(FIGURE7, made_up([3.0, 1.0, 2.0]))
+    assert kept.held
+    assert not broken.held
+    assert "in 3 of 6 comparisons" in broken.text
+
+
+def test_nothing_is_said_of_what_was_not_run():
+    for varied in (FIGURE6, FIGURE7):
+        assert sinusoid.order(varied, {}) == []
+    assert sinusoid.sizes(AT, {}) == []
+    assert sinusoid.growth(FIGURE7, {}) == []

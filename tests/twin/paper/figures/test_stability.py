@@ -1,0 +1,100 @@
+"""Stability: V from its definition, margins by their ends, and what is kept of a run."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import stability
+from spheretwin.paper import stability as conditions
+from spheretwin.paper.cases import planned, sample, scenario_of
+from spheretwin.paper.stability import REACHED_rad_s, consequents, descent, keep, regressor
+from spheretwin.simulation import simulate
+
+FAST = {"plant.engine": "lagrangian", "duration": 2.0}
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(scenarios.load("sinusoid", {**FAST, "controller.law": "afsm"}))
+
+
+def test_consequents_from_the_telemetry_give_the_logged_fuzzy_torque(run):
+    table, gains = run.telemetry, run.scenario.controller
+    for axis, inertia in enumerate(run.scenario.nominal.inertia_kg_m2):
+        psi = regressor(table["qdot_rad_s"][:, axis], table["q_rad"][:, axis])
+        theta = consequents(psi, table["sliding_s"][:, axis], gains.fuzzy_rate[axis], gains.period_s)
+        ours = inertia * np.sum(theta * psi, axis=1)
+        logged = table["fuzzy_torque_Nm"][:, axis]
+        # Sums of 2000 steps in another order: some thousand roundings.
+        np.testing.assert_allclose(ours, logged, atol=1e-11 * np.abs(logged).max())
+
+
+def test_rules_of_the_regressor_sum_to_one():
+    psi = regressor(np.linspace(-8, 8, 50), np.linspace(-1, 1, 50))
+    np.testing.assert_allclose(psi[:, :25].sum(axis=1), 1.0, rtol=1e-14)
+    np.testing.assert_allclose(psi[:, 25:50].sum(axis=1), np.linspace(-8, 8, 50), atol=1e-13)
+
+
+def test_v_falls_and_is_of_afsm_alone(run):
+    found = descent(run)
+    assert found.risen < found.fallen
+    assert 0 < found.of_parameters < 1
+    pid = simulate(scenarios.load("sinusoid", {**FAST, "duration": 0.1, "controller.law": "pid"}))
+    assert descent(pid) is None
+    torque = {**FAST, "duration": 0.1, "controller.law": "afsm", "controller.level": "torque"}
+    assert descent(simulate(scenarios.load("sinusoid", torque))) is None
+
+
+def test_v_is_seen_to_rise_where_the_estimates_run_the_wrong_way(run):
+    """With the sign of the adaptation turned in the telemetry, the errors of the parameters grow."""
+    table = run.telemetry
+    values = table.values.copy()
+    turned = type(table)(table.signals, values)
+    turned["switching_gain"][:] *= -1
+    turned["bound_gain"][:] *= -1
+    other = SimpleNamespace(scenario=run.scenario, telemetry=turned)
+    assert descent(other).rises > 0.9
+
+
+def test_reaching_is_the_first_time_on_the_surface(run):
+    kept, table = keep(run), run.telemetry
+    s = np.abs(table["sliding_s"]).max(axis=1)  # AFSM's own λ is that of the figure
+    first = np.flatnonzero(s < REACHED_rad_s)
+    assert kept.reached_s == (table["t_s"][first[0]] if len(first) else None)
+    assert kept.early is None
+    assert kept.gains[0] == table["switching_gain"][-1].max()
+
+
+def test_ends_of_a_margin():
+    assert stability.ends_of([True, True, False, True]) == (1, 2)
+    assert stability.ends_of([True, True]) == (1, None)
+    assert stability.ends_of([False, True]) == (None, 0)
+
+
+def test_a_law_holds_by_its_error_and_its_end():
+    def outcome(error, status=Status.COMPLETED):
+        return SimpleNamespace(status=status, tail_rms_error=np.array([0.0, 0.0, error]))
+
+    assert stability.holds(outcome(0.99 * stability.HOLDS_rad))
+    assert not stability.holds(outcome(1.01 * stability.HOLDS_rad))
+    assert not stability.holds(outcome(np.nan))
+    assert not stability.holds(outcome(0.0, Status.DIVERGED))
+
+
+def test_margins_begin_at_what_is_healthy_and_are_compared_with_no_other_plant():
+    cases = conditions.cases()
+    assert len({case.name for case in cases}) == len(cases)
+    for law in conditions.WATCHED:
+        for of in conditions.MARGINS:
+            for step, case in zip(of.steps, conditions.margin(law, of), strict=True):
+                scenario = scenario_of(case, None)
+                assert not case.compared
+                if of is conditions.DELAY:
+                    assert scenario.drive.delay_s == pytest.approx(1e-3 * step)
+                    assert scenario.nominal.delay_s == 0.0  # nobody tells the law
+    jobs = sample(planned(stability.EXPERIMENT, seeds=1))
+    assert {job.case.fields["controller.law"] for job in jobs} == {law.law for law in conditions.WATCHED}
+    assert all(job.case.compared for job in jobs)

@@ -1,0 +1,114 @@
+"""The error budget: its stages are the prototype part by part, and the whole of it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.electronics.sensor_chain import accuracy
+from spheretwin.paper import error_budget
+from spheretwin.paper.cases import carried_out, planned
+from spheretwin.paper.error_budget import ALL, ESTIMATOR, IDEAL, PROTOTYPE, STAGES, WITH_RATES, WITHOUT_ERROR
+from spheretwin.scenario.sections import PROTOTYPE_NOMINAL
+from spheretwin.simulation import simulate
+
+BY_NAME = {stage.name: stage for stage in STAGES}
+SECTIONS = ("sensors", "estimator", "drive", "plant", "nominal")
+
+
+def scenario(stage, **more):
+    return scenarios.load("tilt", {**error_budget.case("pd", stage).fields, **more})
+
+
+def test_single_stages_together_are_the_prototype():
+    single = [dotted for stage in STAGES if stage.name != ALL for dotted in stage.fields]
+    assert set(single) | set(WITHOUT_ERROR) | set(PROTOTYPE_NOMINAL) == set(PROTOTYPE)
+    assert not set(single) & set(WITHOUT_ERROR)
+    named = {"delay", "quantisation", "sensor noise", "sensor nonlinearity", "friction", "voltage limit"}
+    assert {IDEAL, ALL, "amplifier bandwidth", *named} <= set(BY_NAME)
+
+
+def test_all_is_the_prototype():
+    resolved = scenario(BY_NAME[ALL])
+    prototype = scenarios.load("tilt", {"hardware": "prototype", "controller.law": "pd"})
+    for section in SECTIONS:
+        assert getattr(resolved, section) == getattr(prototype, section)
+
+
+def test_ideal_has_the_true_state_and_currents_at_once():
+    run = simulate(scenario(BY_NAME[IDEAL], duration=0.1))
+    names = {signal.name for signal in run.telemetry.signals}
+    assert not names & {"q_measured_rad", "friction_Nm", "supply_power_W"}
+    np.testing.assert_array_equal(run.telemetry["current_A"], run.telemetry["current_command_A"])
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+def test_the_controller_knows_the_parts_of_a_stage_but_not_the_mass(stage, actuator):
+    """Were they not known, a stage would show a mismatch beside the cost of its parts."""
+    run = simulate(scenario(stage, duration=0.002)).scenario
+    nominal, drive = run.nominal, run.drive
+    assert run.plant.payload_kg > 0
+    assert nominal.inertia_kg_m2 == tuple(actuator.inertia.tolist())
+    assert (nominal.delay_s, nominal.time_constant_s) == (drive.delay_s, drive.lag_s)
+    assert (nominal.coulomb_Nm, nominal.viscous_Nm_s) == (run.plant.coulomb_Nm, run.plant.viscous_Nm_s)
+    assert (nominal.angle_noise_rad, nominal.angle_resolution_rad) == accuracy(run.sensors)
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+def test_a_stage_is_run_for_each_seed_where_it_draws_and_only_there(stage):
+    def rows(seed):
+        return simulate(scenario(stage, duration=0.05, seed=seed)).telemetry.values
+
+    assert (rows(0).tobytes() != rows(1).tobytes()) == stage.draws
+
+
+@pytest.mark.parametrize("name", ["voltage limit", "amplifier bandwidth", "drive offset and gain"])
+def test_what_a_drive_s_stage_needs_beside_is_no_error(name):
+    """Amplifiers of ample voltage and bandwidth are currents at once, but for the offsets of the stage."""
+    stage = BY_NAME[name]
+    wide = {**stage.overrides, **BY_NAME["voltage limit"].beside, **BY_NAME["amplifier bandwidth"].beside}
+    wide |= {"drive.drop_up_V": 0.0, "drive.drop_down_V": 0.0}
+    wide |= {
+        f"drive.{each}": 0.0
+        for each in ("dac_offset_V", "dac_gain_error", "dac_inl_lsb", "amplifier_offset_V")
+    }
+    wide |= {"drive.dac_bits": 0}
+    run = simulate(scenarios.load("tilt", {"controller.law": "pd", **wide, "duration": 0.3}))
+    ideal = simulate(scenario(BY_NAME[IDEAL], duration=0.3))
+    # A lag of 1e-7 s beside a period of 1e-3 s: a part in 1e4 of how far a current moves in a period.
+    apart = np.abs(run.telemetry["q_rad"] - ideal.telemetry["q_rad"]).max()
+    assert apart < 1e-4 * np.abs(ideal.telemetry["q_rad"]).max()
+
+
+def test_single_sensor_errors_are_compared_with_the_estimator():
+    sensors = [stage for stage in STAGES if set(ESTIMATOR) < set(stage.fields) and stage.name != ALL]
+    assert len(sensors) == 4
+    assert {stage.base for stage in sensors} == {WITH_RATES}
+    assert {stage.base for stage in STAGES if stage not in sensors} == {IDEAL}
+
+
+def test_table_has_every_stage_and_law_and_says_what_was_not_run():
+    plan = planned(error_budget.EXPERIMENT, seeds=1, limit=2)
+    (section,) = error_budget.tell(carried_out(plan))
+    assert [table.title.split(" in ")[0][-1] for table in section.tables] == ["α", "β", "γ"]
+    for table in section.tables:
+        assert [row[0] for row in table.rows] == [stage.name for stage in STAGES]
+        assert [row[1] == "not run" for row in table.rows] == [False, False] + [True] * (len(STAGES) - 2)
+
+
+def test_the_part_that_changes_most_is_named():
+    """Outcomes made up: the estimator takes 0.01 rad off α, and friction, on β, is the worst by itself."""
+
+    def outcome(error):
+        return [SimpleNamespace(max_abs_error=np.array(error), figures={})]
+
+    errors = {stage.name: [0.3, 0.0, 0.0] for stage in STAGES}
+    errors["friction"] = [0.3, np.radians(2.0), 0.0]
+    errors[ALL] = [1.0, 1.0, 1.0]
+    errors[WITH_RATES] = [0.29, 0.0, 0.0]
+    errors |= {stage.name: errors[WITH_RATES] for stage in STAGES if stage.base == WITH_RATES}
+    outcomes = {error_budget.case("pd", stage).name: outcome(errors[stage.name]) for stage in STAGES}
+    assert error_budget._most(outcomes, "pd") == "pd, friction (β +2.000°)"
+    del outcomes["pd: delay"]
+    assert error_budget._most(outcomes, "pd") == ""

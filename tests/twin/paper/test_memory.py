@@ -1,0 +1,98 @@
+"""What was run is remembered by all that it depends on, and by nothing else."""
+
+import numpy as np
+import pytest
+
+from spheretwin.paper import cases
+from spheretwin.paper import cases as memories
+from spheretwin.paper.cases import Memory, carried_out, key_of, known, planned, scenario_of
+from spheretwin.paper.rows import rows
+from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
+
+MINE = IDEAL._replace(name="mine")
+
+
+@pytest.fixture(autouse=True)
+def cache(monkeypatch):
+    """A cache of its own, in memory."""
+    entries = {}
+    monkeypatch.setattr(memories, "kept", entries.get)
+    monkeypatch.setattr(memories, "keep", entries.__setitem__)
+    return entries
+
+
+@pytest.fixture
+def ran(monkeypatch):
+    """Scenarios that were really run."""
+    real, found = cases.simulate, []
+
+    def simulate(scenario):
+        found.append(scenario)
+        return real(scenario)
+
+    monkeypatch.setattr(cases, "simulate", simulate)
+    return found
+
+
+def remembering(plan):
+    return Memory(plan.experiment.name, {name: case.key for name, case in known(plan).items()})
+
+
+def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
+    made = experiment(NOISY, IDEAL, keep=lambda run: run.telemetry["error_rad"].copy())
+    plan = planned(made, seeds=3)
+    first = carried_out(plan, memory=remembering(plan))
+    assert len(ran) == 4
+    again = carried_out(plan, memory=remembering(plan))
+    assert len(ran) == 4
+    assert rows(plan, again) == rows(plan, first)
+    for name in first:
+        for one, other in zip(first[name], again[name], strict=True):
+            np.testing.assert_array_equal(one.kept, other.kept)
+    more = planned(made, seeds=5)
+    carried_out(more, memory=remembering(more))
+    assert sorted(scenario.seed for scenario in ran[4:]) == [3, 4]  # threads begin in any order
+
+
+def test_what_was_run_before_an_interruption_is_kept(ran, monkeypatch):
+    plan = planned(experiment(NOISY), seeds=4)
+    told = []
+
+    def done(name):
+        told.append(name)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        carried_out(plan, done, workers=1, memory=remembering(plan))
+    before = len(ran)
+    carried_out(plan, memory=remembering(plan))
+    assert len(ran) - before <= 2
+
+
+def test_a_key_is_of_every_field_but_plant_and_seed():
+    def key(case=IDEAL, plant=None, seed=0, **fields):
+        return key_of(scenario_of(case._replace(fields={**case.fields, **fields}), plant, seed))
+
+    assert key() == key(seed=5) == key(**{"plant.engine": "mujoco"})
+    others = [key(NOISY), key(**{"disturbance.load": 1e-9}), key(**{"controller.law": "pd"})]
+    assert len({key(), *others}) == 4
+
+
+def test_a_law_of_the_user_s_is_known_by_what_is_in_its_file(tmp_path):
+    law = tmp_path / "lazy.py"
+    case = MINE._replace(fields={**SHORT, "controller.law": f"{law}:step"})
+    text = "def step(t, reference, measurement, parameters, state, torque):\n    torque[:] = {}\n"
+    keys = []
+    for value in (0.0, 1e-3):
+        law.write_text(text.format(value))
+        keys.append(key_of(scenario_of(case, None)))
+    assert keys[0] != keys[1]
+
+
+def test_either_plant_is_remembered_for_itself(ran):
+    case = NOISY._replace(fields={"duration": 0.05})
+    for plant in ("mujoco", "lagrangian", "mujoco"):
+        plan = planned(experiment(case), seeds=1, plant=plant)
+        carried_out(plan, memory=remembering(plan))
+    assert [scenario.plant.engine for scenario in ran] == ["mujoco", "lagrangian"]

@@ -1,0 +1,240 @@
+"""The comparison of laws: frozen gains are those of the search, tables and findings say what ran."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from spheretwin.control.laws import LAWS
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import page, rival_conditions, rival_tables
+from spheretwin.paper.cases import carried_out, failed, planned, scenario_of
+from spheretwin.paper.experiment import BY_LAW
+from spheretwin.paper.page import Chapter
+from spheretwin.paper.rival_conditions import FOLDER, HARDWARE, IDEAL, PROTOTYPE, tuned_gains
+from spheretwin.paper.rival_results import results, start_error, within
+from spheretwin.paper.rivals import EXPERIMENT
+from spheretwin.paper.rows import rows
+from spheretwin.study.grid import Grid
+from spheretwin.study.row import Rows
+from spheretwin.study.study import load
+from spheretwin.study.tuning import gains as tuning_gains
+from spheretwin.study.tuning import trials
+from spheretwin.viz.theme import LAW_COLOURS, LAW_MARKS
+
+
+def frozen(hardware):
+    return json.loads((FOLDER / f"{hardware.study}.json").read_text(encoding="utf-8"))["laws"]
+
+
+def test_every_law_has_a_label_and_marks_of_its_own():
+    assert set(BY_LAW) == set(LAW_MARKS) == set(LAW_COLOURS) == set(LAWS)
+    assert len({marker for marker, _ in LAW_MARKS.values()}) == len(LAW_MARKS)
+
+
+@pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
+def test_every_law_is_searched_with_all_of_its_gains_and_the_same_budget(hardware):
+    study = load(hardware.study)
+    assert [law["law"] for law in study.law] == list(dict.fromkeys(law["law"] for law in study.law))
+    assert {law["law"] for law in study.law} == set(LAWS)
+    assert study.common_seeds
+    searched = Rows(study)
+    for law in study.law:
+        found = tuning_gains.gains_of(study, law, searched)
+        fields = set(tuning_gains.values(found, tuning_gains.middle(found)))
+        named = {field.split(".")[1] for field in fields}
+        base = set(LAWS["pd"].model_fields) - {"stiffness", "damping"}
+        own = set(LAWS[law["law"]].model_fields) - base - {"preset", "coupled"}
+        # The fuzzy approximator of AFSM-ESO is off as shipped: its numbers are no gains then.
+        own = {each for each in own if not (law["law"] == "afsm_eso" and each.startswith("fuzzy"))}
+        assert own <= named
+        assert {"controller.governor.acceleration_rad_s2", "controller.feed_forward.inertia"} <= fields
+        assert ("controller.feed_forward.friction" in fields) == (hardware is PROTOTYPE)
+    assert all(gain.reason for gain in study.optimise.gain)
+    assert {gain.called for gain in study.optimise.gain if not gain.law} == {
+        gain.called for gain in study.optimise.gain if gain.optional
+    }
+
+
+@pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
+def test_frozen_gains_are_within_their_ranges_and_limits(hardware):
+    study = load(hardware.study)
+    ranges = {(gain.law, gain.called): gain for gain in study.optimise.gain}
+    assert set(frozen(hardware)) == set(LAWS)
+    for law, found in frozen(hardware).items():
+        for each in found:
+            assert each["limit"] in hardware.limits_A_s
+            assert list(each["values"].values())[1] <= each["limit"]
+            for name, value in each["gains"].items():
+                gain = ranges.get((law, name)) or ranges["", name]
+                assert (value is None and gain.optional) or gain.low <= value <= gain.high
+        errors = [next(iter(each["values"].values())) for each in found]
+        assert errors == sorted(errors, reverse=True)
+
+
+@pytest.mark.parametrize("law", ["adrc", "afsm_eso", "lqi", "pd"])
+@pytest.mark.parametrize("hardware", HARDWARE, ids=lambda each: each.name)
+def test_frozen_gains_give_what_the_search_recorded(hardware, law):
+    """A spot check: rows of the search run again with the gains of the file."""
+    study = load(hardware.study)
+    searched = Rows(tuning_gains.judged(study))
+    rows_of_law = [row for row in Grid(searched.study) if row.law == {"law": law}]
+    assert frozen(hardware)[law]
+    for each in frozen(hardware)[law]:
+        tried = trials.carried_out(
+            searched, rows_of_law, each["fields"], study.optimise.objective, lambda _: False, lambda: False
+        )
+        # The same scenario and seed; another processor rounds otherwise, which a loop of high gain amplifies.
+        assert tried.values == pytest.approx(list(each["values"].values()), rel=1e-3)
+
+
+def test_seeds_of_the_search_are_none_of_the_page():
+    for hardware in HARDWARE:
+        assert min(row.seed for row in Grid(load(hardware.study))) > 1000
+
+
+def test_conditions_state_what_the_controller_knows():
+    by_name = {
+        (hardware.name, condition.name): {**hardware.fields, **condition.fields}
+        for hardware in HARDWARE
+        for condition in hardware.conditions
+    }
+    for hardware in HARDWARE:
+        friction = by_name[hardware.name, "friction 5 mN·m, nominal 2 mN·m"]
+        assert friction["plant.coulomb_Nm"] == [5e-3] * 3
+        assert friction["nominal.coulomb_Nm"] == [2e-3] * 3
+        delay = by_name[hardware.name, "1 ms of unknown delay"]
+        assert delay["drive.delay_s"] - delay["nominal.delay_s"] == pytest.approx(1e-3)
+
+
+def test_group_gains_are_drawn_from_the_seed_of_each_run():
+    condition = next(each for each in IDEAL.conditions if each.name.startswith("group gains"))
+    case = rival_conditions.tuned_case(IDEAL, condition, tuned_gains(IDEAL.study)[0])
+    first, again, other = (case.fields_of(seed)["plant.group_gain"] for seed in (0, 0, 1))
+    assert first == again != other
+    drawn = np.array([case.fields_of(seed)["plant.group_gain"] for seed in range(200)])
+    assert drawn.shape == (200, 18)
+    assert 0.97 <= drawn.min() < 0.9701
+    assert 1.0299 < drawn.max() <= 1.03
+    assert scenario_of(case, None, 1).plant.group_gain == tuple(other)
+
+
+def outcome(error, variation, status=Status.COMPLETED):
+    """With the same error on all hinges."""
+    return SimpleNamespace(
+        status=status,
+        figures={"current_variation_A_s": variation},
+        max_abs_error=np.full(3, error),
+        tail_rms_error=np.full(3, error / 10),
+        kept=np.full(3, error / 20),
+    )
+
+
+def made_up(limit, by_law, condition=IDEAL.conditions[0]):
+    """Outcomes of laws by the errors of their seeds."""
+    chosen = {each.law: each for each in tuned_gains(IDEAL.study) if each.limit_A_s == limit}
+    return {
+        rival_conditions.tuned_case(IDEAL, condition, chosen[law]).name: [
+            outcome(each, limit) for each in errors
+        ]
+        for law, errors in by_law.items()
+    }
+
+
+def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
+    outcomes = made_up(30.0, {"pid": (2e-3, 4e-3, 9e-3), "adrc": (1e-3, 1e-3, 1e-3)})
+    lost = next(name for name in outcomes if "adrc" in name)
+    outcomes[lost][1] = outcome(1e-3, 30.0, Status.FAILSAFE)
+    first, second = within(results(IDEAL, IDEAL.conditions[0], outcomes), 30.0)
+    assert (first.law, first.largest_rad, first.tail_rad) == ("pid", 4e-3, 4e-4)
+    assert second.is_lost
+
+
+@pytest.mark.parametrize(
+    ("errors", "expected"),
+    [
+        ({"afsm_eso": (1e-3,), "adrc": (2e-3,)}, "AFSM-ESO (1.00 mrad) is best, before ADRC (2.00 mrad)"),
+        ({"afsm_eso": (1e-3,), "adrc": (1.04e-3,)}, "is not alone; level: ADRC (1.04 mrad)"),
+        ({"afsm_eso": (1e-3,), "adrc": (0.9e-3,)}, "is not alone; better: ADRC (0.90 mrad)"),
+        ({"adrc": (0.9e-3,)}, "ADRC (0.90 mrad) is best, and AFSM-ESO lost the rotor or is beyond the limit"),
+    ],
+)
+def test_findings_say_where_rivals_are_level_or_better(errors, expected):
+    (finding,) = rival_tables.findings(made_up(30.0, errors))
+    assert expected in finding.text
+    assert "tuned within 30 A/s" in finding.text
+
+
+def test_nothing_is_found_where_nothing_ran():
+    assert rival_tables.findings({}) == []
+    assert EXPERIMENT.tell({}) == []
+
+
+def test_the_error_at_the_start_is_the_largest_until_the_rates_agree():
+    rate_error = np.array([[-1.0, -2.0, 1.0], [-0.5, 1.0, 0.5], [0.2, -1.0, 0.1]])
+    error = np.array([[0.1, 0.3, 0.1], [0.2, 0.4, 0.2], [0.3, 0.9, 0.3]])
+    table = {"error_rad": error, "qdot_rad_s": rate_error, "qdot_ref_rad_s": np.zeros((3, 3))}
+    # α agrees at the third tick, β at the second, γ not at all.
+    np.testing.assert_array_equal(start_error(SimpleNamespace(telemetry=table)), [0.3, 0.4, 0.3])
+
+
+@pytest.fixture(scope="module")
+def short():
+    """One seed of two laws, presets and full current under every condition; a tenth as long."""
+    chosen = [
+        case
+        for case in EXPERIMENT.cases()
+        if "limit_A_s" not in case.told or case.fields["controller.law"] in ("afsm_eso", "pid")
+    ]
+    cases = [
+        case._replace(fields={**case.fields, "duration": case.fields.get("duration", 0.6)}) for case in chosen
+    ]
+    plan = planned(EXPERIMENT._replace(cases=lambda: cases), seeds=1)
+    return plan, carried_out(plan)
+
+
+def test_rows_and_page_have_what_ran(short, tmp_path):
+    plan, outcomes = short
+    assert failed(plan, outcomes) == []
+    json.dumps(rows(plan, outcomes), allow_nan=False)
+    chapter = Chapter(plan.experiment, EXPERIMENT.tell(outcomes), EXPERIMENT.findings(outcomes))
+    written = page.write(tmp_path, [chapter], "", {})[0].read_text(encoding="utf-8")
+    for hardware in HARDWARE:
+        figure = f"rivals_{hardware.name}.png"
+        assert (tmp_path / figure).stat().st_size > 0
+        assert f"({figure})" in written
+        for each in load(hardware.study).optimise.gain:
+            assert each.reason in written
+    assert written.count("| rivals | ") == len(IDEAL.conditions) + len(PROTOTYPE.conditions)
+    assert "full current, bounded allocation" in written
+    assert "make tune-rivals" in written
+
+
+def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation(short):
+    """Within the same ±8 A: least norm gives away some of the torque, so that a law may share it better."""
+    _, outcomes = short
+    for condition in IDEAL.conditions:
+        if condition.perturbed:
+            continue
+        limits = {
+            allocation: np.max(outcomes[rival_conditions.limit_case(condition, allocation).name][0].kept)
+            for allocation in rival_conditions.ALLOCATIONS
+        }
+        assert limits["bounded"] < limits["least_norm"]
+        reached = [each.largest_rad for each in results(IDEAL, condition, outcomes)]
+        assert min(reached) > limits["bounded"]
+        # Least norm along one direction of torque: other directions are some percent better.
+        assert min(reached) > 0.9 * limits["least_norm"]
+
+
+def test_a_figure_has_a_line_a_law_and_the_floors(short):
+    from spheretwin.paper import rivals
+
+    _, outcomes = short
+    axes = rivals.figure(IDEAL, outcomes).figure.axes[0]
+    lines = [np.asarray(line.get_xydata()) for line in axes.lines]
+    found = [each for each in results(IDEAL, IDEAL.conditions[0], outcomes) if each.limit_A_s is not None]
+    for law in ("afsm_eso", "pid"):
+        points = sorted((each.variation_A_s, 1e3 * each.largest_rad) for each in found if each.law == law)
+        assert any(np.shape(line) == np.shape(points) and np.allclose(line, points) for line in lines)

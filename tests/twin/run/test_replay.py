@@ -1,0 +1,133 @@
+"""A run's own file names its model and curves so that it can be run again from anywhere, or says why not."""
+
+import json
+import os
+import shutil
+
+import pytest
+
+from spheretwin import cli, replay
+from spheretwin import scenario as scenarios
+from spheretwin.models import actuator as actuators
+from spheretwin.models import mjcf
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.outputs import Outputs
+from spheretwin.run import record_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+
+PATHS = {"plant.mjcf": "m.xml", "plant.torque_curve": "p.csv", "nominal.torque_curve": "n.csv"}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The working folder, with a model and two curves of the user's."""
+    (there := tmp_path / "there").mkdir()
+    shutil.copytree(actuators.FOLDER / "assets", there / "assets")
+    shutil.copy(actuators.MJCF_PATH, there / "m.xml")
+    for name in ("p.csv", "n.csv", "later.csv"):
+        shutil.copy(actuators.TORQUE_CURVE_PATH, there / name)
+    monkeypatch.chdir(there)
+    return there
+
+
+def written(path, changes=()):
+    """A run of 20 ticks, with changes after the tenth, as the command writes it."""
+    session = Session(scenarios.load("hold", {"duration": 0.02, "controller.law": "pd", **PATHS}))
+    files = Outputs(session, None, path, live=False)
+    follow(session, 10, files.sinks)
+    for name, value in changes:
+        session.set(name, value)
+    follow(session, 20, files.sinks)
+    assert files.close() == []
+    return path
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        [],
+        [("nominal.torque_curve", "later.csv"), ("plant.torque_curve", "later.csv")],
+        [("nominal", {"torque_curve": "later.csv"})],
+    ],
+    ids=["none", "fields", "section"],
+)
+def test_a_run_replays_from_another_folder(folder, changes, monkeypatch):
+    first = written(folder / "a.parquet", changes)
+    (elsewhere := folder.parent / "elsewhere").mkdir()
+    monkeypatch.chdir(elsewhere)
+    assert cli.main(["simulate", "--replay", str(first), "--telemetry", "b.parquet", "--json"]) == 0
+    assert (elsewhere / "b.parquet").read_bytes() == first.read_bytes()
+    _, metadata = read_parquet(first)
+    fields = json.loads(metadata["scenario"])
+    for dotted, name in PATHS.items():
+        section, field = dotted.split(".")
+        assert fields[section][field] == str(folder / name)
+
+
+def add_a_comment(path):
+    mark = "# edited\n" if path.suffix == ".csv" else "<!-- edited -->\n"
+    text = path.read_text()
+    path.write_text(mark + text if path.suffix == ".csv" else text + mark)
+
+
+@pytest.mark.parametrize("edit", [add_a_comment, os.remove], ids=["edited", "removed"])
+@pytest.mark.parametrize("name", [*PATHS.values(), "later.csv"])
+def test_another_file_than_the_run_s_is_refused_on_one_line(folder, name, edit):
+    path = written(folder / "a.parquet", [("nominal.torque_curve", "later.csv")])
+    replay.read(path)
+    edit(folder / name)
+    with pytest.raises(InputError, match="as it was when the run was made") as told:
+        replay.read(path)
+    assert str(folder / name) in f"{told.value}"
+    assert "\n" not in f"{told.value}"
+
+
+def test_an_edited_mesh_is_refused(folder):
+    path = written(folder / "a.parquet")
+    add_a_comment(folder / "assets" / "shaft.obj")
+    with pytest.raises(InputError, match=r"plant\.mjcf .*m\.xml as it was"):
+        replay.read(path)
+
+
+@pytest.mark.parametrize("edit", [add_a_comment, os.remove], ids=["edited", "removed"])
+def test_a_file_that_changes_under_a_run_is_told_as_the_run_had_it(folder, edit):
+    before = (folder / "p.csv").read_bytes()
+    session = Session(scenarios.load("hold", {"duration": 0.02, "controller.law": "pd", **PATHS}))
+    files = Outputs(session, None, folder / "a.parquet", live=False)
+    follow(session, 20, files.sinks)
+    edit(folder / "p.csv")
+    assert files.close() == []
+    with pytest.raises(InputError, match="as it was"):
+        replay.read(folder / "a.parquet")
+    (folder / "p.csv").write_bytes(before)
+    assert replay.read(folder / "a.parquet").ticks == 20
+
+
+def test_a_file_of_a_version_that_told_no_files_replays(folder):
+    run = Session(scenarios.load("hold", {"controller.law": "pd", **PATHS}))
+    table, known = run.advance(5), record_of(run).metadata()
+    del known["files"]
+    table.write_parquet(folder / "old.parquet", known)
+    assert replay.read(folder / "old.parquet").ticks == 5
+
+
+def test_a_file_whose_end_is_none_is_refused_by_its_name(folder):
+    run = Session(scenarios.load("hold", {"controller.law": "pd", **PATHS}))
+    table = run.advance(5)
+    table.write_parquet(path := folder / "odd.parquet", {**record_of(run).metadata(), "status": "flying"})
+    with pytest.raises(InputError, match=r"replay .*odd\.parquet: status: expected one of .*'flying'"):
+        replay.read(path)
+
+
+def test_a_model_with_the_same_contents_is_the_same_model(tmp_path):
+    """A checkout or a restored copy has other inodes and times; an edited mesh has another content."""
+    text = '<mujoco><asset><mesh file="a.obj"/></asset></mujoco>'
+    digests = []
+    for name, mesh in (("one", "v 0 0 0"), ("copy", "v 0 0 0"), ("edited", "v 0 0 1")):
+        (folder := tmp_path / name).mkdir()
+        (folder / "m.xml").write_text(text)
+        (folder / "a.obj").write_text(mesh)
+        digests.append(mjcf.contents_digest(folder / "m.xml"))
+    assert digests[0] == digests[1] != digests[2]

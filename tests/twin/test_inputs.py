@@ -1,0 +1,114 @@
+"""What comes from outside a loop: streams of random terms, snapshots, trajectories of the user's."""
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.inputs import BLOCK_TICKS, Exogenous
+from spheretwin.models.base.errors import InputError
+from spheretwin.trajectories.shapes import Nutation
+
+RANDOM_TERM = {"kind": "random", "bound_Nm": [0.01, 0.02, 0.03]}
+LENGTH = 2 * BLOCK_TICKS + 300
+
+
+def scenario(*terms, **changes):
+    return scenarios.load("sinusoid", {"seed": 4, "disturbance.terms": list(terms)} | changes)
+
+
+def run(exogenous, cuts=(), start=0, end=LENGTH):
+    found, tick, ends = [], start, [*cuts, end]
+    while tick < end:
+        rows = exogenous.rows(tick, min(each for each in ends if each > tick) - tick)
+        found.append(rows)
+        tick += len(rows.t)
+    return [np.concatenate(parts) for parts in zip(*found, strict=True)]
+
+
+def test_chunks_change_no_bit_of_a_random_term():
+    whole = run(Exogenous(scenario(RANDOM_TERM)))
+    cut = run(Exogenous(scenario(RANDOM_TERM)), [1, 999, 1000, 1001, 1500, 2000])
+    for one, other in zip(whole, cut, strict=True):
+        assert one.tobytes() == other.tobytes()
+
+
+def test_a_random_term_is_what_it_adds_and_leaves_the_paper_s_stream_alone():
+    torque = [
+        run(Exogenous(scenario(*terms, **changes)))[2]
+        for terms, changes in (
+            ((), {}),
+            ((RANDOM_TERM,), {}),
+            ((RANDOM_TERM,), {"disturbance.load": 0.0, "disturbance.random_bound_Nm": 0.0}),
+            ((RANDOM_TERM, RANDOM_TERM), {"disturbance.load": 0.0, "disturbance.random_bound_Nm": 0.0}),
+        )
+    ]
+    np.testing.assert_allclose(torque[1] - torque[0], torque[2], atol=1e-16)
+    second = torque[3] - torque[2]
+    assert abs(np.corrcoef(second[:, 0], torque[2][:, 0])[0, 1]) < 4 / np.sqrt(LENGTH)
+
+
+@pytest.mark.parametrize("tick", [1, 999, 1000, 1700])
+def test_a_state_goes_on_with_every_stream(tick):
+    first = Exogenous(scenario(RANDOM_TERM))
+    run(first, end=tick)
+    state = first.state()
+    ahead = run(first, start=tick)
+    other = Exogenous(scenario(RANDOM_TERM))
+    other.restore(state)
+    for one, again in zip(ahead, run(other, start=tick), strict=True):
+        assert one.tobytes() == again.tobytes()
+
+
+def test_a_term_may_come_in_between():
+    exogenous = Exogenous(scenario())
+    before = run(exogenous, end=500)[2]
+    exogenous.scenario = scenario(RANDOM_TERM)
+    after = run(exogenous, start=500)[2]
+    whole = run(Exogenous(scenario(RANDOM_TERM)))[2]
+    assert before.tobytes() == run(Exogenous(scenario()))[2][:500].tobytes()
+    assert after.tobytes() == whole[500:].tobytes()
+
+
+def test_a_growing_random_term_is_refused_before_it_overflows():
+    grown = Exogenous(scenario(RANDOM_TERM | {"gamma_envelope": "growing"}))
+    grown.check_horizon(200_000)
+    with pytest.raises(InputError, match="finite disturbance, received infinity at 240 s"):
+        grown.check_horizon(240_000)
+
+
+class Own:
+    """Nutation up to a time, after which it fails in a way of its own."""
+
+    def __init__(self, end_s=np.inf, after=None):
+        self.end_s, self.after = end_s, after
+
+    def sample(self, t):
+        samples = Nutation().sample(t)
+        if t[-1] > self.end_s:
+            return self.after(samples)
+        return samples
+
+
+def test_a_trajectory_of_the_user_s_is_followed_instead():
+    own = run(Exogenous(scenario(), Own()))
+    named = run(Exogenous(scenarios.load("nutation")))
+    assert own[1].tobytes() == named[1].tobytes()
+    assert own[2].tobytes() == run(Exogenous(scenario()))[2].tobytes()
+    kept = Exogenous(scenario(), Own())
+    kept.scenario = scenario(RANDOM_TERM)
+    assert run(kept)[1].tobytes() == named[1].tobytes()
+
+
+def test_one_that_fails_later_is_refused_then():
+    exogenous = Exogenous(scenario(), Own(1.5, lambda samples: samples[:, 0]))
+    run(exogenous, end=1000)
+    with pytest.raises(InputError, match=r"expected float64 of shape \(1000, 3, 3\)"):
+        exogenous.rows(1000, 1)
+    lost = Exogenous(
+        scenario(), Own(1.5, lambda samples: np.where(np.arange(1000)[:, None, None] < 700, samples, np.nan))
+    )
+    assert len(run(lost, end=1700)[0]) == 1700
+    with pytest.raises(InputError, match=r"expected a finite trajectory, received NaN at 1\.7 s"):
+        lost.rows(1700, 1)
+    with pytest.raises(InputError, match=r"an object with sample\(t\)"):
+        Exogenous(scenario(), 3.0)

@@ -1,0 +1,323 @@
+"""Laws of a user's that raise, do not compile, or write outside their arrays: one line, and exit 1 or 2."""
+
+import json
+import sys
+import threading
+
+import numba
+import pytest
+
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.control.law import Law
+from spheretwin.models.base.compiled import callback_errors
+from spheretwin.models.base.errors import LawError
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+
+FILE = """
+import sys
+
+import numba
+import numpy as np
+
+
+class Strange(BaseException):
+    pass
+
+
+def leaves(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+    if t > 0.005:
+        sys.exit(0)
+
+
+def closes(t, reference, measurement, parameters, state, torque):
+    raise GeneratorExit
+
+
+def strange(t, reference, measurement, parameters, state, torque):
+    raise Strange("so it is")
+
+
+@numba.njit
+def raises(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0  # a torque that could be taken for one of a law that works
+    if t > 0.0205:
+        raise ValueError("lost")
+
+
+@numba.njit
+def asserts(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+    assert t < 0.0205
+
+
+@numba.njit
+def unnamed(t, reference, measurement, parameters, state, torque):
+    torque[:] = nothing_of_that_name
+
+
+@numba.njit
+def deeper(matrix):
+    return matrix.no_such_attribute
+
+
+@numba.njit
+def nested(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+    torque[0] = deeper(measurement)
+
+
+@numba.njit
+def adds(t, reference, measurement, parameters, state, torque):
+    torque[0] = "a" + t
+
+
+@numba.njit
+def absent(t, reference, measurement, parameters, state, torque):
+    torque[:] = np.linalg.no_such_function(measurement)
+
+
+@numba.njit
+def opens(t, reference, measurement, parameters, state, torque):
+    with open("x") as file:
+        file.read()
+
+
+@numba.njit
+def short(t, reference):
+    pass
+
+
+@numba.njit
+def outside(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+    torque[3 + int(t)] = 0.0  # the compiler cannot know the place
+
+
+@numba.njit
+def put(torque, place):
+    torque[place] = 0.0
+    if place > 3:
+        put(torque, place - 1)
+
+
+@numba.njit
+def outside_below(t, reference, measurement, parameters, state, torque):
+    torque[:] = 0.0
+    put(torque, 4 + int(t))
+
+
+def metric_leaves(run):
+    sys.exit(0)
+
+
+def metric_closes(run):
+    raise GeneratorExit
+
+
+def metric_strange(run):
+    raise Strange("so it is")
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    (path := tmp_path / "failing.py").write_text(FILE)
+    return path
+
+
+def printed(capfd, *arguments):
+    """Run the command; return its exit code and all that came to the terminal, whoever wrote it."""
+    code = cli.main(["simulate", "hold", "--duration", "0.05", *map(str, arguments)])
+    out, err = capfd.readouterr()
+    return code, out, err
+
+
+RAISED = {
+    "leaves": "expected a torque at 0 s, received SystemExit: 0",
+    "closes": "expected a torque at 0 s, received GeneratorExit",
+    "strange": "expected a torque at 0 s, received Strange: so it is",
+    "raises": "expected a torque at 0.021 s, received ValueError: lost",
+    "asserts": "expected a torque at 0.021 s, received AssertionError",
+}
+
+
+@pytest.mark.parametrize("law", RAISED)
+def test_what_a_law_raises_is_one_line_and_exit_1(file, law, capfd):
+    for more in ([], ["--json"]):
+        told = f"spheretwin: law {law}: {RAISED[law]}\n"
+        assert printed(capfd, "--controller.law", f"{file}:{law}", *more) == (1, "", told)
+
+
+def test_rows_before_a_compiled_law_raised_are_kept(file, tmp_path, capfd):
+    path = tmp_path / "run.parquet"
+    assert printed(capfd, "--controller.law", f"{file}:raises", "--telemetry", path)[0] == 1
+    assert len(read_parquet(path)[0]) == 21
+
+
+def test_under_a_watchdog_the_line_has_the_time_of_the_exception(file, capfd):
+    """The currents run down first, and the line must not have the time of their end."""
+    watched = ["--watchdog.on", "true", "--watchdog.rundown-s", "0.01"]
+    told = f"spheretwin: law raises: {RAISED['raises']}\n"
+    assert printed(capfd, "--controller.law", f"{file}:raises", *watched) == (1, "", told)
+
+
+@pytest.mark.parametrize(
+    ("metric", "received"),
+    [("leaves", "SystemExit: 0"), ("closes", "GeneratorExit"), ("strange", "Strange: so it is")],
+)
+def test_what_a_metric_raises_is_one_line_and_exit_1(file, metric, received, capfd):
+    line = f"metric metric_{metric}: expected a figure, it raised {received}"
+    code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}")
+    assert (code, err) == (1, "")
+    assert [f"warning  {line}"] == [each for each in out.splitlines() if "raised" in each]
+    code, out, err = printed(capfd, "--metric", f"{file}:metric_{metric}", "--json")
+    assert (code, err) == (1, "")
+    assert json.loads(out)[f"metric_{metric}"] is None
+    assert line in json.loads(out)["warnings"]
+
+
+@pytest.mark.parametrize("law", RAISED)
+def test_a_row_whose_law_raises_has_failed(file, law, tmp_path, capfd):
+    (source := tmp_path / "study.toml").write_text(
+        'name = "failing"\nscenario = "hold"\nfields = {duration = 0.05}\n'
+        f'law = [{{law = "{file}:{law}"}}]\n'
+        '[[axis]]\nfield = "disturbance.load"\nkind = "values"\nvalues = [0.0, 1.0]\n'
+    )
+    assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
+    out, err = capfd.readouterr()
+    (found,) = json.loads(out)["summary"].values()
+    assert found["statuses"] == {"failed": 2}
+    assert err.startswith("spheretwin: sweep: 2 of 2 rows failed, the first with key ")
+    # A law in plain Python that raises an ordinary exception has no time of its own.
+    assert err.endswith(f"{RAISED[law]}\n")
+    assert err.count("\n") == 1
+
+
+def test_a_row_whose_metric_raises_has_failed(file, tmp_path, capfd):
+    (source := tmp_path / "study.toml").write_text(
+        'name = "failing"\nscenario = "hold"\nfields = {duration = 0.01}\n'
+        f'metrics = ["rms_error_rad", "{file}:metric_leaves"]\n'
+    )
+    assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
+    out, err = capfd.readouterr()
+    assert json.loads(out)["failed"] == 1
+    assert "1 of 1 rows failed" in err
+    assert "it raised SystemExit: 0" in err
+    assert err.count("\n") == 1
+
+
+def test_sys_exit_in_a_law_does_not_end_the_program_that_simulates():
+    def leaves(t, reference, measurement, parameters, state, torque):
+        sys.exit(0)
+
+    with pytest.raises(LawError, match="received SystemExit: 0") as raised:
+        simulate(scenarios.load("hold"), Law("leaves", leaves, [], []))
+    assert isinstance(raised.value.__cause__, SystemExit)
+
+
+def test_ctrl_c_in_a_law_stays_ctrl_c():
+    def interrupted(t, reference, measurement, parameters, state, torque):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate(scenarios.load("hold"), Law("interrupted", interrupted, [], []))
+
+
+def test_a_session_that_is_restored_has_no_error_any_more():
+    @numba.njit
+    def raises(t, reference, measurement, parameters, state, torque):
+        torque[:] = 0.0
+        if t > 0.0205:
+            raise ValueError("lost")
+
+    with Session(scenarios.load("hold"), Law("raises", raises, [], [])) as session:
+        before = session.snapshot()
+        assert len(session.advance(100)) == 21
+        assert (session.status, session.ended) == ("diverged", True)
+        assert "ValueError: lost" in str(session.law_error)
+        session.restore(before)
+        assert (session.law_error, session.status) == (None, "running")
+
+
+def test_exceptions_of_other_threads_go_where_they_went(monkeypatch):
+    """A hook is of the process, and what it takes is of one thread: of callbacks alone."""
+    others, own = [], []
+    monkeypatch.setattr(sys, "unraisablehook", others.append)
+    before = sys.unraisablehook
+
+    class Fails:
+        def __del__(self):
+            raise ValueError("elsewhere")
+
+    def lose():
+        Fails()
+
+    with callback_errors(own.append):
+        lose()
+        thread = threading.Thread(target=lose)
+        thread.start()
+        thread.join()
+        with callback_errors(own.append):
+            pass
+    assert (len(others), own) == (2, [])
+    assert sys.unraisablehook is before
+
+
+def line_of(text):
+    """Number of the line of the file that has a text."""
+    (number,) = [number for number, line in enumerate(FILE.splitlines(), 1) if text in line]
+    return number
+
+
+NOT_COMPILED = {
+    "unnamed": "NameError: name 'nothing_of_that_name' is not defined, in line"
+    f" {line_of('= nothing_of_that_name')}",
+    "nested": "Unknown attribute 'no_such_attribute' of type array(float64, 2d, C), in line"
+    f" {line_of('return matrix.no_such_attribute')}",
+    "adds": "No implementation of function Function(<built-in function add>) found for signature:"
+    f" add(Literal[str](a), float64), in line {line_of('+ t')}",
+    "absent": "module 'numpy.linalg' has no attribute 'no_such_function'",
+    "opens": "The 'with (context manager) as (variable):' construct is not supported",
+    "short": "Signature mismatch: 6 argument types given, but function takes 2 arguments",
+}
+
+
+@pytest.mark.parametrize("law", NOT_COMPILED)
+def test_why_a_law_does_not_compile_is_one_line(file, law, capfd):
+    expected = "a function of (t, reference, measurement, parameters, state, torque) that numba compiles"
+    told = f"spheretwin: law {law}: expected {expected}, received {NOT_COMPILED[law]}\n"
+    assert printed(capfd, "--controller.law", f"{file}:{law}") == (2, "", told)
+
+
+@pytest.mark.parametrize("law", ["outside", "outside_below"])
+@pytest.mark.parametrize("verb", ["simulate", "sweep"])
+def test_a_law_that_writes_outside_its_arrays_is_found_on_request(file, law, verb, tmp_path, capfd):
+    told = f"law {law}: expected a torque at 0 s, received IndexError: index is out of bounds\n"
+    checked = ["--controller.law", f"{file}:{law}", "--controller.check-bounds", "true"]
+    if verb == "simulate":
+        assert printed(capfd, *checked) == (1, "", f"spheretwin: {told}")
+        return
+    (source := tmp_path / "study.toml").write_text(
+        'name = "outside"\nscenario = "hold"\nfields = {duration = 0.01}\n'
+        f'law = [{{law = "{file}:{law}", check_bounds = true}}]\n'
+    )
+    assert cli.main(["sweep", str(source), "--out", str(tmp_path / "out"), "--json"]) == 1
+    assert capfd.readouterr().err.endswith(told)
+
+
+@pytest.mark.parametrize("law", ["pd", "afsm_eso"])
+def test_bounds_checks_change_no_bit_of_a_law_that_keeps_to_its_arrays(law):
+    runs = [
+        simulate(
+            scenarios.load(
+                "sinusoid", {"duration": 0.1, "controller.law": law, "controller.check_bounds": checked}
+            )
+        )
+        for checked in (False, True)
+    ]
+    assert [run.status for run in runs] == ["completed"] * 2
+    assert runs[0].telemetry.values.tobytes() == runs[1].telemetry.values.tobytes()

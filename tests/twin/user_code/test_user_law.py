@@ -1,0 +1,240 @@
+"""Laws from a file of their user's: a class with parameters, a Law, a function; compiled and plain."""
+
+import os
+
+import numpy as np
+import pytest
+
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.control.law import Law
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.scenario import reading
+from spheretwin.session import Session
+from spheretwin.simulation import simulate
+
+FILE = '''
+"""Laws of a user's."""
+
+from typing import Literal
+
+import numba
+import numpy as np
+from pydantic import Field
+
+from spheretwin.control.law import Law
+from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each
+from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
+
+
+@numba.njit
+def computed(t, reference, measurement, parameters, state, torque):
+    q, qdot, inertia = measurement[0], measurement[1], parameters[6:9]
+    wanted = np.empty(3)
+    for i in range(3):
+        error, error_rate = reference[0, i] - q[i], reference[1, i] - qdot[i]
+        wanted[i] = reference[2, i] + parameters[i] * error + parameters[3 + i] * error_rate
+    M, C = inertia_matrix(q, inertia), coriolis_matrix(q, qdot, inertia)
+    for i in range(3):
+        torque[i] = 0.0
+        for j in range(3):
+            torque[i] += M[i, j] * wanted[j] + C[i, j] * qdot[j]
+
+
+class ComputedTorque(LawParameters):
+    """Feedback linearisation by the nominal model."""
+
+    stiffness: PositiveEach = Field(each(900.0), description="of the error, 1/s²")
+    damping: PositiveEach = Field(each(60.0), description="of its rate, 1/s")
+
+    def build(self, known):
+        return Law("computed", computed, [*self.stiffness, *self.damping, *known.inertia], [])
+
+
+@numba.njit
+def fast(t, reference, measurement, parameters, state, torque):
+    for i in range(3):
+        error, error_rate = measurement[0, i] - reference[0, i], measurement[1, i] - reference[1, i]
+        torque[i] = -parameters[0] * error - parameters[1] * error_rate
+
+
+def plain(t, reference, measurement, parameters, state, torque):
+    torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * (measurement[1] - reference[1])
+
+
+ready = Law("ready", fast, [0.5, 0.03], [])
+number = 3
+'''
+
+
+@pytest.fixture
+def file(tmp_path):
+    (path := tmp_path / "mine.py").write_text(FILE)
+    return path
+
+
+def load(reference, *tokens, name="hold"):
+    return scenarios.load(name, reading.overrides(["--controller.law", str(reference), *tokens]))
+
+
+def test_a_class_has_its_parameters_as_fields(file):
+    scenario = load(f"{file}:ComputedTorque", "--controller.stiffness", "400", "--controller.damping", "40")
+    assert scenario.controller.stiffness == (400.0, 400.0, 400.0)
+    rows = {flag: (value, text) for flag, value, text in reading.described(scenario)}
+    assert rows["--controller.stiffness"] == ("400 400 400", "of the error, 1/s²")
+    assert rows["--controller.law"][0] == f"{file}:ComputedTorque"
+
+
+def test_computed_torque_by_the_public_equations_tracks_a_perfect_model(file):
+    """With a true model, no load and no limit, feedback linearisation leaves the discretisation alone."""
+    changes = {
+        "controller.law": f"{file}:ComputedTorque", "plant.modelling_error": 0.0, "disturbance.load": 0.0,
+        "plant.modelling_torque_Nm": [0.0, 0.0, 0.0], "disturbance.random_bound_Nm": 0.0,
+        "drive.time_constant_s": 0.0, "drive.current_limit_A": 1e3, "plant.engine": "lagrangian",
+        "plant.initial_rad_s": [0.2 * np.pi] * 3, "duration": 2.0,
+    }  # fmt: skip
+    errors = []
+    for period_s in (1e-3, 5e-4):
+        clock = {"controller.period_s": period_s, "plant.step_s": period_s / 2}
+        run = simulate(scenarios.load("sinusoid", changes | clock))
+        assert run.status == "completed"
+        errors.append(np.abs(run.telemetry["error_rad"]).max())
+    assert errors[0] < 1e-5
+    # The held torque is what is left: an error of first order in the period.
+    assert 1.8 < errors[0] / errors[1] < 2.2
+
+
+@pytest.mark.parametrize("name", ["ready", "fast", "plain", "ComputedTorque"])
+def test_every_form_runs_records_and_replays(file, name, tmp_path, capsys):
+    numbers = ["--controller.parameters", "0.5", "0.03"] if name == "fast" else []
+    law = ["--controller.law", f"{file}:{name}", *numbers]
+    first, again = tmp_path / "first.parquet", tmp_path / "again.parquet"
+    arguments = ["simulate", "hold", "--duration", "0.2", *law, "--telemetry", str(first)]
+    assert cli.main(arguments) == 0
+    assert cli.main(["simulate", "--replay", str(first), "--telemetry", str(again)]) == 0
+    assert first.read_bytes() == again.read_bytes()
+    assert capsys.readouterr().err == ""
+    file.write_text(FILE + "\n# edited since\n")
+    assert cli.main(["simulate", "--replay", str(first)]) == 2
+    assert "mine.py as it was when the run was made" in capsys.readouterr().err
+
+
+def test_all_forms_of_one_law_agree(file):
+    runs = [
+        simulate(load(f"{file}:{name}", "--duration", "0.2", *numbers)).telemetry["q_rad"]
+        for name, numbers in [
+            ("ready", []), ("fast", ["--controller.parameters", "0.5", "0.03"]), ("plain", []),
+        ]
+    ]  # fmt: skip
+    np.testing.assert_array_equal(runs[0], runs[1])
+    # Compiled code may fuse a product and a sum, which rounds once instead of twice.
+    np.testing.assert_allclose(runs[2], runs[0], rtol=0, atol=1e-12)
+
+
+def test_in_toml_its_path_is_taken_from_where_it_is_written(file, tmp_path, monkeypatch):
+    text = 'duration = 0.05\n[trajectory]\nshape = "hold"\n[controller]\nlaw = "mine.py:ComputedTorque"\n'
+    (tmp_path / "s.toml").write_text(text + "damping = [50, 60, 70]\n")
+    monkeypatch.chdir(tmp_path.parent)
+    scenario = scenarios.load(str(tmp_path / "s.toml"))
+    assert scenario.controller.damping == (50.0, 60.0, 70.0)
+    assert simulate(scenario).status == "completed"
+
+
+def test_a_session_exchanges_it_and_knows_it_in_another_process(file):
+    import pickle
+
+    with Session(load(f"{file}:ComputedTorque")) as session:
+        session.advance(50)
+        session.set("controller.stiffness", 500.0)
+        session.advance(50)
+        kept = pickle.loads(pickle.dumps(session.snapshot()))
+        ahead = session.advance(50).values.tobytes()
+        session.set("controller.law", "pd")
+        session.advance(10)
+        session.set("controller.law", f"{file}:ready")
+        assert [change.name for change in session.journal][-1] == "controller.law"
+        session.restore(kept)
+        assert session.advance(50).values.tobytes() == ahead
+
+
+def test_a_session_keeps_the_law_that_it_read(file):
+    with Session(load(f"{file}:ready")) as kept, Session(load(f"{file}:ready")) as session:
+        file.write_text(FILE.replace("parameters[0] * error", "3 * parameters[0] * error"))
+        session.set("disturbance.load", 0.5)
+        kept.set("disturbance.load", 0.5)
+        assert session.advance(50).values.tobytes() == kept.advance(50).values.tobytes()
+    edited = simulate(load(f"{file}:ready", "--duration", "0.05"))
+    file.write_text(FILE)
+    assert (
+        edited.telemetry.values.tobytes()
+        != simulate(load(f"{file}:ready")).telemetry.rows(0, 50).values.tobytes()
+    )
+
+
+def test_its_telemetry_names_the_law_and_its_file(file, tmp_path):
+    path = tmp_path / "run.parquet"
+    arguments = ["--controller.law", f"{file}:ComputedTorque", "--telemetry", str(path)]
+    assert cli.main(["simulate", "hold", "--duration", "0.05", *arguments]) == 0
+    assert f"{file}:ComputedTorque" in read_parquet(path)[1]["scenario"]
+    assert str(file) in read_parquet(path)[1]["files"]
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "part"),
+    [
+        (FILE, "ComputedTork", "did you mean ComputedTorque"),
+        (FILE, "number", "a subclass of LawParameters, a Law, or a function, received 3"),
+        ("import nothing_of_that_name", "mine", "expected a file of Python that runs"),
+        ("1 +", "mine", "SyntaxError in line 1"),
+        (None, "mine", "expected a readable file of Python"),
+        (FILE, "ComputedTorque", None),
+    ],
+)
+def test_what_cannot_be_had_is_told_in_one_line(tmp_path, capsys, text, name, part):
+    path = tmp_path / "theirs.py"
+    if text is not None:
+        path.write_text(text)
+    flags_ = ["--controller.law", f"{path}:{name}"] + ([] if part else ["--controller.stifness", "3"])
+    assert cli.main(["simulate", "hold", *flags_]) == 2
+    err = capsys.readouterr().err
+    assert (part or "in controller, received stifness; did you mean stiffness?") in err
+    assert err.count("\n") == 1
+
+
+def test_a_gain_out_of_range_names_its_field(file):
+    with pytest.raises(
+        InputError, match=r"controller\.stiffness\.1: expected a number greater than 0, received -2"
+    ):
+        load(f"{file}:ComputedTorque", "--controller.stiffness", "1", "-2", "3")
+
+
+def test_what_a_plain_law_raises_is_told_in_one_line_and_keeps_the_json_alone(tmp_path, capsys):
+    (path := tmp_path / "plain.py").write_text(
+        "def fails(t, reference, measurement, parameters, state, torque):\n"
+        "    print('here')\n    torque[:] = 1 / 0 if t > 0.05 else 0\n"
+    )
+    assert cli.main(["simulate", "hold", "--controller.law", f"{path}:fails", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    told = [line for line in err.splitlines() if line != "here"]
+    assert told == [
+        "spheretwin: law fails: expected a torque at 0 s, received ZeroDivisionError: division by zero"
+    ]
+
+
+def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):
+    def step(t, reference, measurement, parameters, state, torque):
+        torque[:] = 0.0
+
+    from spheretwin.run import facts_of
+    from spheretwin.viz.recording.recorder import Recorder
+
+    law = Law("odd", step, [], np.zeros(3), (Signal("a b", "1", 3, "odd", ANGLES),))
+    with Session(scenarios.load("hold"), law) as session:
+        path = tmp_path / "odd.rrd"
+        with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
+            recorder.write(session.advance(10))
+    assert capfd.readouterr().err == ""
+    assert os.path.getsize(path) > 0

@@ -1,0 +1,78 @@
+"""Damage at which Rerun's reader ends its process ends one beside it, and is told on one line."""
+
+import os
+import random
+import subprocess
+import sys
+
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.outputs import Outputs
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+from spheretwin.viz import rerun_internals
+
+FILES = 24
+
+
+def program(folder, text):
+    path = folder / "rerun"
+    path.write_text(f"#!{sys.executable}\nimport os, signal\n{text}\n", encoding="utf-8")
+    path.chmod(0o755)
+    return path
+
+
+@pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGABRT)", "os._exit(102)"])
+def test_a_reader_that_dies_is_damage(tmp_path, monkeypatch, end):
+    monkeypatch.setattr(rerun_internals, "PROGRAM", program(tmp_path, end))
+    with pytest.raises(InputError, match=r"recording run\.rrd: expected one of a run, .*so damaged"):
+        rerun_internals.check_readable(tmp_path / "copy.rrd", "run.rrd")
+
+
+@pytest.mark.parametrize("end", ["os._exit(0)", "os._exit(1)"])
+def test_what_a_reader_lives_through_is_left_to_it(tmp_path, monkeypatch, end):
+    monkeypatch.setattr(rerun_internals, "PROGRAM", program(tmp_path, end))
+    rerun_internals.check_readable(tmp_path / "run.rrd", "run.rrd")
+
+
+def test_a_reader_that_is_not_there_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(rerun_internals, "PROGRAM", tmp_path / "none")
+    with pytest.raises(SpheretwinError, match="expected Rerun at"):
+        rerun_internals.check_readable(tmp_path / "run.rrd", "run.rrd")
+
+
+READ = """
+import sys
+from spheretwin.twin import cli
+for path in sys.argv[1:]:
+    print(cli.main(["review", path, "--json"]), path, file=sys.stderr)
+"""
+
+
+def test_no_damage_ends_the_process_or_says_more_than_a_line(tmp_path):
+    """Bits, bytes, blocks, wherever they are; a damaged number may stay a number."""
+    whole = tmp_path / "whole.rrd"
+    with Session(scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 0.3})) as session:
+        files = Outputs(session, whole, None, live=False)
+        follow(session, session.scenario.ticks, files.sinks)
+        assert files.close() == []
+    content, draws, paths = whole.read_bytes(), random.Random(0), []
+    for number in range(FILES):
+        damaged = bytearray(content)
+        at = draws.randrange(12, len(damaged) - 5000)
+        size = (1, 1, 2000, 4)[number % 4]
+        damaged[at : at + size] = draws.randbytes(size) if number % 4 else bytes([damaged[at] ^ 8])
+        paths.append(tmp_path / f"{number}.rrd")
+        paths[-1].write_bytes(damaged)
+    done = subprocess.run(
+        [sys.executable, "-c", READ, *map(str, paths)], capture_output=True, text=True, timeout=120,
+        env={**os.environ, "RUST_BACKTRACE": "0"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.splitlines()
+    told = [[line for line in lines if str(path) in line] for path in paths]
+    for of_file in told:
+        assert (of_file[-1].split()[0], len(of_file)) in {("0", 1), ("2", 2)}
+    assert sum(map(len, told)) == len(lines)

@@ -1,0 +1,309 @@
+"""What is in force in a session: a scenario, what its files hold, and what its user put in their places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, TypeVar
+
+import mujoco
+import numpy as np
+from pydantic import BaseModel
+
+from spheretwin import assembly
+from spheretwin.control.law import Law
+from spheretwin.control.law_components.parameters import AROUND
+from spheretwin.control.laws import LAWS
+from spheretwin.electronics.data_sheet import drive_sheet, sensor_sheet
+from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
+from spheretwin.electronics.sensor_chain import SensorsSection
+from spheretwin.faults.fault import Fault
+from spheretwin.models import mjcf
+from spheretwin.models.actuator import Actuator, Group
+from spheretwin.models.base.errors import InputError, told_apart
+from spheretwin.models.base.user_code import is_reference
+from spheretwin.models.lagrangian import loaded_inertia
+from spheretwin.models.magnetics import disagreements
+from spheretwin.models.mjcf import Mjcf
+from spheretwin.models.mjcf_reader import HINGES
+from spheretwin.models.telemetry.run_record import Change
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.plant.mujoco_rotor import integrator_name
+from spheretwin.scenario.changes import changed, first_tick, planned
+from spheretwin.scenario.files import Files, files_again, files_of, nominal_curve
+from spheretwin.scenario.sections import (
+    OwnController,
+    OwnPath,
+    ResolvedNominal,
+    ResolvedPlant,
+    ResolvedScenario,
+    Scenario,
+)
+from spheretwin.scenario.sections import Plant as PlantSection
+from spheretwin.trajectories import SHAPES
+from spheretwin.trajectories.rounding import Triple
+from spheretwin.trajectories.trajectory import OwnTrajectory, Sampled, checked
+
+# What the engine's compiler takes where a file says nothing.
+UNWRITTEN_STEP_s = 0.002
+UNWRITTEN_INTEGRATOR = "Euler"
+UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
+
+
+def resolved(
+    scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None
+) -> ResolvedScenario:
+    """Return a scenario with every default filled in, from its files, its trajectory and its hardware.
+
+    Raises
+    ------
+    InputError
+        The first pose is outside the hinges' range, a list does not fit the actuator, or the law is made for
+        another control period.
+    """
+    actuator, section = files.actuator, scenario.plant
+    _check_groups(scenario, actuator)
+    drive = _drive(scenario.drive, actuator.group)
+    plant = _with(
+        ResolvedPlant,
+        section,
+        initial_rad=section.initial_rad or _first_pose(trajectory or scenario.trajectory),
+        gravity_m_s2=_gravity(section, files.model),
+        group_gain=section.group_gain or (1.0,) * len(actuator.groups),
+    )
+    made = _with(
+        ResolvedScenario, scenario, drive=drive, plant=plant, nominal=_nominal(scenario, drive, actuator)
+    )
+    if law:
+        law.check_period(scenario.controller.period_s)
+        controller = OwnController(
+            law=name_of_own(law.name),
+            period_s=scenario.controller.period_s,
+            parameters=tuple(law.parameters.tolist()),
+            **scenario.controller.around,
+        )
+        made = made.model_copy(update={"controller": controller})
+    if trajectory:
+        made = made.model_copy(update={"trajectory": OwnPath(shape=name_of_own(trajectory.name))})
+    _check_pose(plant.initial_rad, actuator)
+    _check_faults(made.fault, actuator)
+    return made
+
+
+Section = TypeVar("Section", bound=BaseModel)
+
+
+def _with(kind: type[Section], section: BaseModel, **values: Any) -> Section:
+    """Section of a resolved kind: the fields of one that is checked, some of them with other values."""
+    return kind.model_construct(**{**dict(section), **values})
+
+
+def _drive(section: DriveSection, group: Group) -> ResolvedDrive:
+    """Drive whose coils and limit are the model file's unless given, and so its lag without a supply."""
+    sheet = {
+        "resistance_ohm": group.resistance_ohm,
+        "inductance_H": group.inductance_H,
+        "current_limit_A": group.current_limit_A,
+    }
+    drive = _with(ResolvedDrive, section, **_given_or(section, sheet))
+    if drive.time_constant_s is not None or drive.supply_V is not None:
+        return drive
+    return drive.model_copy(update={"time_constant_s": drive.inductance_H / drive.resistance_ohm})
+
+
+def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> ResolvedNominal:
+    """Data sheet of the controller: a value that is not given is the model file's, or the true one."""
+    section = scenario.nominal
+    sheet = _truth(scenario, drive, actuator) if section.equals_truth else _model_sheet(actuator)
+    sheet["torque_curve"] = nominal_curve(scenario)
+    return _with(ResolvedNominal, section, **_given_or(section, sheet))
+
+
+def _given_or(section: BaseModel, sheet: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of a sheet, in place of each the value of the section where that is given."""
+    given = {name: getattr(section, name) for name in sheet}
+    return {name: sheet[name] if value is None else value for name, value in given.items()}
+
+
+def _model_sheet(actuator: Actuator) -> dict[str, Any]:
+    """Nominal values of a model file: ideal sensors, amplifiers and bearings, and the coils' lag."""
+    group, ideal = actuator.group, (0.0, 0.0, 0.0)
+    return {
+        "coulomb_Nm": ideal,
+        "viscous_Nm_s": ideal,
+        "inertia_kg_m2": tuple(actuator.inertia.tolist()),
+        **drive_sheet(_drive(DriveSection(), group)),
+        **sensor_sheet(SensorsSection()),
+    }
+
+
+def _truth(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> dict[str, Any]:
+    """Nominal values that are true: with the modelling error and the payload in the inertia."""
+    plant, height_m = scenario.plant, float(actuator.payload_mount_m[2])
+    inertia = loaded_inertia((1 + plant.modelling_error) * actuator.inertia, plant.payload_kg, height_m)
+    return {
+        "coulomb_Nm": plant.coulomb_Nm,
+        "viscous_Nm_s": plant.viscous_Nm_s,
+        "inertia_kg_m2": tuple(inertia.tolist()),
+        **drive_sheet(drive),
+        **sensor_sheet(scenario.sensors),
+    }
+
+
+def warnings_of(scenario: Scenario, files: Files) -> list[str]:
+    """What a user should know of model and scenario before believing the figures; one line each."""
+    late = [change for change in planned(scenario) if change.tick >= scenario.ticks]
+    return [
+        *files.model.warnings,
+        *disagreements(files.actuator),
+        *_overridden(scenario.plant, files.model.described.opt),
+        *(f"the event that sets {change.name} is not made: the run ends before" for change in late),
+        *_late_faults(scenario),
+    ]
+
+
+def _late_faults(scenario: Scenario) -> list[str]:
+    """Return a warning for each fault that starts after the last control tick of the run."""
+    period_s = scenario.controller.period_s
+    return [
+        f"the fault {fault.target} {fault.mode} does not occur: it starts at {fault.start_s:g} s,"
+        f" the run ends at {scenario.duration:g} s"
+        for fault in scenario.fault
+        if first_tick(fault.start_s / period_s) >= scenario.ticks
+    ]
+
+
+def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
+    """What a model file says and a scenario says otherwise; what a file does not say is not overridden."""
+    found = []
+    if option.timestep not in (section.step_s, UNWRITTEN_STEP_s):
+        own, used = told_apart(option.timestep, section.step_s)
+        found.append(f"the model's own timestep of {own} s is not used: plant.step_s is {used} s")
+    integrator = integrator_name(option.integrator)
+    if integrator not in (section.integrator, UNWRITTEN_INTEGRATOR):
+        found.append(
+            f"the model's own integrator {integrator} is not used: plant.integrator is {section.integrator}"
+        )
+    given, gravity = section.gravity_m_s2, mjcf.gravity(option)
+    if given is not None and gravity not in ((0.0, 0.0, -given), UNWRITTEN_GRAVITY_m_s2):
+        own = " ".join(f"{component:.10g}" for component in gravity)
+        found.append(
+            f"the model's own gravity of {own} m/s² is not used: plant.gravity_m_s2 is {given:.10g} m/s²"
+        )
+    return found
+
+
+def name_of_own(name: str) -> str:
+    """Name of a law or trajectory of the user's, where it must not be taken for one that can be had."""
+    return f"{name} of the user's" if name in LAWS or name in SHAPES or is_reference(name) else name
+
+
+def _first_pose(trajectory: Sampled) -> Triple:
+    return tuple(trajectory.sample(np.zeros(1))[0, 0].tolist())
+
+
+def _gravity(section: PlantSection, model: Mjcf) -> float | None:
+    """Gravity along -z; None where the model's is not along it, so that the model's stays in force."""
+    if section.gravity_m_s2 is not None:
+        return section.gravity_m_s2
+    own = mjcf.gravity(model.described.opt)
+    return None if any(own[:2]) or own[2] > 0 else 0.0 - own[2]  # none is 0, not -0
+
+
+def _check_pose(pose: Triple, actuator: Actuator) -> None:
+    for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
+        if not low <= angle <= high:
+            least, most, received = told_apart(low, high, angle)
+            raise InputError(
+                f"scenario: expected a first pose with {hinge} from {least} to {most} rad,"
+                f" received {received}"
+            )
+
+
+def _check_groups(scenario: Scenario, actuator: Actuator) -> None:
+    groups = len(actuator.groups)
+    lists = {"plant.group_gain": scenario.plant.group_gain, "manual.currents_A": scenario.manual.currents_A}
+    for name, given in lists.items():
+        if given is not None and len(given) != groups:
+            raise InputError(f"scenario: expected {name} for {groups} groups, received {len(given)}")
+
+
+def _check_faults(faults: tuple[Fault, ...], actuator: Actuator) -> None:
+    groups = len(actuator.groups)
+    for fault in faults:
+        if fault.kind.each_group and fault.place >= groups:
+            raise InputError(
+                f"scenario: expected a fault of a group from 0 to {groups - 1}, received {fault.target}"
+            )
+
+
+class InForce(NamedTuple):
+    """All that a machine is built from; a change gives another."""
+
+    scenario: ResolvedScenario
+    files: Files
+    own_law: Law | None
+    own_trajectory: OwnTrajectory | None
+
+    @property
+    def law(self) -> Law:
+        """Law that is asked for; one that a scenario names is made anew at each call."""
+        return self.own_law or assembly.law_of(self.scenario)
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """Columns that a run has."""
+        return assembly.signals_of(self.scenario, self.files.actuator, self.law)
+
+    def after(self, name: str, value: Any) -> InForce:
+        """With another value of one field, or another law.
+
+        Raises
+        ------
+        InputError
+            A field that is unknown, of the wrong type or out of range, or one of what the user replaced.
+        """
+        if isinstance(value, Law):
+            return _resolved(self.scenario, self.files, value, self.own_trajectory)
+        if self.own_trajectory and name.split(".")[0] == "trajectory":
+            raise InputError(
+                "session: expected no field of a scenario's trajectory, as"
+                f" {self.own_trajectory.name} is followed instead"
+            )
+        own_law = None if name == "controller.law" else self.own_law
+        of_the_law = name.startswith("controller.") and name.split(".")[1] not in AROUND
+        if own_law and of_the_law:
+            raise InputError(f"session: expected no field of a shipped law, as {own_law.name} is not one")
+        scenario = changed(self.scenario, name, value)
+        files = files_again(self.files, self.scenario, scenario)
+        return _resolved(scenario, files, own_law, self.own_trajectory)
+
+    def after_each(self, plan: tuple[Change, ...]) -> Iterator[InForce]:
+        """After each of some changes in turn.
+
+        Raises
+        ------
+        InputError
+            One of them cannot be made.
+        """
+        now = self
+        for change in plan:
+            now = now.after(change.name, change.value)
+            yield now
+
+
+def at_start(
+    scenario: Scenario, law: Law | None, trajectory: Sampled | None, files: Files | None = None
+) -> InForce:
+    """What a session begins with; its files are read unless given.
+
+    Raises
+    ------
+    InputError
+        The model file, the torque curve, the trajectory or a value of the scenario cannot be used.
+    """
+    own = None if trajectory is None else checked(trajectory)
+    return _resolved(scenario, files or files_of(scenario), law, own)
+
+
+def _resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None) -> InForce:
+    return InForce(resolved(scenario, files, law, trajectory), files, law, trajectory)

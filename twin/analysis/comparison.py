@@ -1,0 +1,385 @@
+"""How far the figures of runs are from those of the first."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spheretwin.analysis.recorded_run import Reviewed, events
+from spheretwin.analysis.run_summary import amplitudes, of_the_actuator, peaks
+from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.base.errors import InputError, shortened, shown
+from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.table import Table
+from spheretwin.scenario.sections import ResolvedScenario
+from spheretwin.viz.comparison.runs import Run, Spectrum, leaders
+from spheretwin.viz.pages import markdown
+from spheretwin.viz.pages import markdown as folder
+from spheretwin.viz.quantities import ComparedQuantity, Rows, compared_quantities
+from spheretwin.viz.terminal.runs import differences as table_rows
+
+# Numbers that count nothing.
+NAMES_ONLY = ("seed",)
+
+
+def differences(told: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Of each run but the first, every number that a review tells of both, less that of the first.
+
+    Axis by axis where there is one for each; None where one of the two has none.
+
+    Parameters
+    ----------
+    told : sequence of mapping
+        What a review tells of each run.
+    """
+    first, *others = told
+    return [
+        {
+            "path": other["path"],
+            **{
+                name: _difference(first[name], value)
+                for name, value in other.items()
+                if name in first and name not in NAMES_ONLY and _counts(first[name], value)
+            },
+        }
+        for other in others
+    ]
+
+
+def _counts(first: Any, value: Any) -> bool:
+    """Whether both are numbers, lists of numbers as long as each other, or one of these and nothing."""
+    if isinstance(first, list) and isinstance(value, list):
+        return len(first) == len(value) and all(map(_counts, first, value))
+    numbers = [each for each in (first, value) if each is not None]
+    of_lists = all(isinstance(each, list) and all(_is_number(entry) for entry in each) for each in numbers)
+    return bool(numbers) and (all(map(_is_number, numbers)) or (len(numbers) == 1 and of_lists))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _difference(first: Any, value: Any) -> Any:
+    if first is None or value is None:
+        return None
+    if isinstance(first, list):
+        return [_difference(*pair) for pair in zip(first, value, strict=True)]
+    return value - first
+
+
+# What a reader of the paper looks for first, and as it writes it.
+FIRST = {
+    "plant.modelling_error": "m",
+    "disturbance.load": "L",
+    "hardware": "hardware",
+    "fault": "fault",
+    "name": "scenario",
+    "seed": "seed",
+}
+MOST, LEGEND = 6, 48
+"""Differences that are told, and characters of a legend's line."""
+LONGEST, LONGEST_STEM = 24, 40
+"""Of a value that is told, and of a file's name."""
+
+# Fields that go with another one: where that differs, so do these, and say nothing more.
+GOES_WITH = {
+    "name": ("description", "duration", "trajectory."),
+    "controller.law": ("controller.",),
+    "plant.modelling_error": ("plant.modelling_torque_Nm",),
+    "hardware": ("sensors.", "estimator.", "drive.", "watchdog.", "plant.", "nominal."),
+}
+
+
+def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
+    """What is said of each run: its number, file and law, and in what they differ, as far as there is room.
+
+    A file that has the name of its law is told once.
+
+    Parameters
+    ----------
+    runs : sequence of Reviewed
+    longest : int
+        Characters of a label, but for number, file and law, which are always told.
+    """
+    told = differing([run.record.scenario for run in runs])
+    found = []
+    for place, (run, parts) in enumerate(zip(runs, told, strict=True), start=1):
+        stem, law = shortened(run.path.stem, LONGEST), _law_name(run)
+        label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
+        for part in parts:
+            if len(label) + len(part) + 2 > longest:
+                label += ", …"
+                break
+            label += f", {part}"
+        found.append(label)
+    return found
+
+
+def names(runs: Sequence[Reviewed]) -> list[str]:
+    """A word for each run that no other has, without a sign that means something in a path."""
+    stems = [shortened(re.sub(r"[^\w-]+", "_", run.path.stem), LONGEST_STEM) for run in runs]
+    return [f"run_{place}_{stem.replace('…', '_')}" for place, stem in enumerate(stems, start=1)]
+
+
+def differing(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Fields that are not the same in all scenarios, with their values in each, at most six."""
+    flat = [dict(_fields(scenario)) for scenario in scenarios]
+    of_any = list(dict.fromkeys([*FIRST, *(name for each in flat for name in each)]))
+    different = [name for name in of_any if len({each.get(name, "none") for each in flat}) > 1]
+    beside = [part for name, parts in GOES_WITH.items() if name in different for part in parts]
+    told = [name for name in different if name in FIRST or not any(map(name.startswith, beside))]
+    return [[f"{FIRST.get(name, name)} {each.get(name, 'none')}" for name in told[:MOST]] for each in flat]
+
+
+def _law_name(run: Reviewed) -> str:
+    return str(run.record.scenario["controller"]["law"])
+
+
+def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted names and values, each as a text."""
+    for name, inside in value.items():
+        if isinstance(inside, Mapping):
+            yield from _fields(inside, f"{before}{name}.")
+        else:
+            yield before + name, shortened(_text(inside), LONGEST)
+
+
+def _text(value: Any) -> str:
+    """As a person writes it: a whole number without a point, of entries of a list what they name."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, list) and all(isinstance(each, Mapping) for each in value):
+        words = [" ".join(word for word in each.values() if isinstance(word, str)) for each in value]
+        return " + ".join(words) or "none"
+    return f"{value:g}" if isinstance(value, float) and value == float(f"{value:g}") else json.dumps(value)
+
+
+SUFFIX = ".rrd"
+
+
+def check_merge(path: Path, runs: Sequence[Path]) -> None:
+    """Refuse a file of another kind, one that is there, and one of the runs.
+
+    Raises
+    ------
+    InputError
+        Its name does not end as a recording's, it is there, or it is what a run of which only parts are left
+        was to become.
+    """
+    if path.suffix != SUFFIX:
+        raise InputError(f"command line: expected --merge OUT{SUFFIX}, received {shown(str(path))}")
+    if path.exists():
+        raise InputError(f"command line: expected a new file for --merge, received {path}, which is there")
+    if path in runs:
+        raise InputError(f"command line: expected a new file for --merge, received {path}, which is a run")
+
+
+def merge(runs: Sequence[Reviewed], path: Path) -> None:
+    """Write one recording of several runs.
+
+    Raises
+    ------
+    InputError
+        One has no rows, another number of coil groups than the first, or a model that cannot be drawn.
+    SpheretwinError
+        The file cannot be written; what was there before is untouched.
+    """
+    from spheretwin.viz.comparison import merged_recording  # Rerun is slow to import
+    from spheretwin.viz.recording.part import Subject
+
+    compared = beside(runs)
+    groups = [run.table["current_A"].shape[1] for run in runs]
+    for run, count in zip(runs, groups, strict=True):
+        if count != groups[0]:
+            raise InputError(
+                f"review {run.path}: expected an actuator of {groups[0]} coil groups as the first run has,"
+                f" received one of {count}"
+            )
+    subjects = [
+        Subject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
+        for run, of in zip(runs, map(of_the_actuator, runs), strict=True)
+    ]
+    with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
+        merged_recording.write(path, compared, subjects, _told(runs))
+
+
+def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
+    """Runs as they are drawn beside each other.
+
+    Parameters
+    ----------
+    runs : sequence of Reviewed
+    every_tick : bool
+        With a row a tick, also where a file does not keep every one.
+
+    Raises
+    ------
+    InputError
+        One has no rows.
+    """
+    for run in runs:
+        if not len(run.table):
+            raise InputError(f"review {run.path}: expected a run of at least one tick to draw, received none")
+    told = zip(runs, names(runs), labels(runs, LEGEND), strict=True)
+    return [
+        Run(
+            name,
+            label,
+            _law(run),
+            run.period_s,
+            _rows(run, run.every_tick if every_tick else run.table),
+            run.metadata,
+            tuple(events(run)),
+        )
+        for run, name, label in told
+    ]
+
+
+def _rows(run: Reviewed, table: Table) -> Rows:
+    scenario, files, *_ = of_the_actuator(run)
+    return Rows(table, table.rows(0, 1), files.actuator, scenario.drive.current_limit_A)
+
+
+def _facts(scenario: ResolvedScenario, law: str) -> RunFacts:
+    return RunFacts(
+        name=scenario.name,
+        description=scenario.description,
+        law=law,
+        duration_s=scenario.duration,
+        current_limit_A=scenario.drive.current_limit_A,
+        payload_kg=scenario.plant.payload_kg,
+        gravity_m_s2=scenario.plant.gravity_m_s2,
+        mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
+        sections={},
+    )
+
+
+def _law(run: Reviewed) -> str:
+    return str(run.record.scenario["controller"]["law"])
+
+
+def _told(runs: Sequence[Reviewed]) -> str:
+    """What each run is, in Markdown; one that is named here is named so in every plot."""
+    status = (f"{run.record.status or 'not closed'} at {run.simulated_s:.3f} s" for run in runs)
+    lines = [f"- **{label}**, {ended}" for label, ended in zip(labels(runs), status, strict=True)]
+    return "\n".join([*lines, "", "What was asked for is the thin white line."])
+
+
+if TYPE_CHECKING:
+    from spheretwin.viz.figures.style import Drawing
+
+PAGE = "review.html"
+
+TITLES = {
+    "whole": "Tracking error as one angle",
+    "error": "Tracking error of each hinge",
+    "angle": "Hinge angles and what was asked for",
+    "sliding": "Sliding variables",
+    "effort": "Torque and current",
+    "more": "Torque that arrives",
+}
+"""Of the figure of each group of quantities."""
+
+
+def write_figures(runs: Sequence[Reviewed], told: Sequence[dict[str, Any]], into: Path) -> Path:
+    """Write figures and page into a folder; returns the page's path.
+
+    Parameters
+    ----------
+    runs : sequence of Reviewed
+    told : sequence of mapping
+        What a review tells of each.
+    into : Path
+        A folder that takes files.
+
+    Raises
+    ------
+    InputError
+        A run has no rows, or a file cannot be written there.
+    """
+    from spheretwin.viz.pages import interactive  # what draws is slow to import
+
+    compared = beside(runs, every_tick=True)
+    tables = [run.table for run in compared]
+    leading, quantities = leaders(tables), compared_quantities(tables)
+    spectra = [_spectra(run) for run in runs]
+    title = compared[0].label if len(runs) == 1 else f"{len(runs)} runs"
+    with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
+        folder.save_drawings(into, _drawings(compared, leading, quantities, spectra), vector=True)
+        over_time = interactive.over_time(compared, leading, quantities)
+    content = interactive.page(
+        title,
+        compared,
+        over_time,
+        interactive.of_errors(compared, spectra),
+        _above(title, compared, interactive.points_each(compared, leading, quantities)),
+        _below(compared, told),
+    )
+    return folder.save_text(into / PAGE, content)
+
+
+def check_figures(into: Path) -> None:
+    """Find out whether all can be drawn and written, and leave an empty folder.
+
+    Raises
+    ------
+    InputError
+        What draws is not installed, or the folder cannot be made or written to.
+    """
+    folder.prepare(into, "plotly")
+
+
+def _drawings(
+    runs: Sequence[Run],
+    leading: Sequence[int],
+    quantities: Sequence[ComparedQuantity],
+    spectra: Sequence[list[Spectrum]],
+) -> Iterator[Drawing]:
+    from spheretwin.viz.figures.comparison import currents, happened, over_time
+    from spheretwin.viz.figures.comparison import spectra as of_errors
+    from spheretwin.viz.figures.style import Drawing
+
+    for group, inside in groupby(quantities, key=lambda each: each.group):
+        title = TITLES[group]
+        yield Drawing(f"{group}.png", title, over_time(runs, leading, list(inside), title))
+    yield Drawing("currents.png", title := "Currents of all groups", currents(runs, title))
+    yield Drawing("spectra.png", title := "Spectra of the tracking errors", of_errors(runs, spectra, title))
+    yield Drawing("events.png", title := "What happened", happened(runs, title))
+
+
+def _spectra(run: Reviewed) -> list[Spectrum]:
+    return [
+        Spectrum(*amplitudes(column, run.period_s), [(peak.frequency_Hz, peak.amplitude) for peak in
+                 peaks(column, run.period_s)])
+        for column in 1e3 * run.every_tick["error_rad"].T
+    ]  # fmt: skip
+
+
+def _above(title: str, runs: Sequence[Run], most: int) -> str:
+    thin = any(len(run.table) > most for run in runs)
+    lines = [
+        f"# {_plain(title)}",
+        "",
+        "Drag to zoom, double-click to see all again; what is at the cursor is told in every plot. The"
+        " buttons switch runs. The wide grey line is what was asked for.",
+    ]
+    if thin:
+        lines.append("Long runs are drawn by the lowest and the highest of every few ticks.")
+    return "\n".join(lines)
+
+
+def _below(runs: Sequence[Run], told: Sequence[dict[str, Any]]) -> str:
+    head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in runs)]
+    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(told)]
+    return "\n".join(["## Figures", "", *markdown.table(head, rows, [False] + [True] * len(runs))])
+
+
+def _plain(text: str) -> str:
+    """Text in which no sign is markup."""
+    return "".join(f"\\{sign}" if sign in "\\`*_{}[]<>#|!" else sign for sign in text)

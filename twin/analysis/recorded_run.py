@@ -1,0 +1,246 @@
+"""A run as its own file tells it, whichever kind of file: telemetry, recording, or what was left of one."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spheretwin.analysis import recovery
+from spheretwin.analysis.recovery import held, ticks_of
+from spheretwin.faults.fault_injector import FaultLines
+from spheretwin.models.base.errors import InputError, shown
+from spheretwin.models.base.files import whole_file
+from spheretwin.models.telemetry.checksums import has_checksums
+from spheretwin.models.telemetry.run_record import Change, RunRecord
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.status import Event, Events, Level, Status
+from spheretwin.models.telemetry.table import Table, read_parquet
+from spheretwin.scenario.changes import first_tick, from_now_on
+from spheretwin.simulation import change_told
+
+_BETWEEN = " set to "
+
+
+def planned(scenario: Mapping[str, Any], period_s: float, ticks: int) -> Iterator[Change]:
+    """Changes that a scenario plans, as far as a run came."""
+    for event in scenario.get("event", ()):
+        if (tick := first_tick(event["t_s"] / period_s)) < ticks:
+            yield Change(tick, event["set"], from_now_on(event["set"], event["value"], event["t_s"]))
+
+
+def logged(
+    log: Sequence[Event], scenario: Mapping[str, Any], period_s: float, ticks: int
+) -> tuple[Change, ...]:
+    """Changes that a log tells of and no plan; what was set without a line of the log is not among them."""
+    expected = [(change.tick, change_told(change)) for change in planned(scenario, period_s, ticks)]
+    found = []
+    for t_s, _, text in log:
+        name, between, value = text.partition(_BETWEEN)
+        tick = round(t_s / period_s)
+        if (tick, text) in expected:
+            expected.remove((tick, text))
+        elif between and all(part.isidentifier() for part in name.split(".")):
+            found.append(Change(tick, name, _value(value)))
+    return tuple(found)
+
+
+def _value(text: str) -> Any:
+    """What Python writes so, or the text itself."""
+    try:
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        return text
+
+
+# In the metadata of columns that were exported of a recording that does not keep every row.
+_RATE = "record_rate_Hz"
+
+
+@dataclass(frozen=True)
+class Reviewed:
+    """What the file of a run says.
+
+    Attributes
+    ----------
+    path : Path
+        The file, or what a killed process left of it.
+    record : RunRecord
+        Scenario at the start, command journal, versions, and how it ended.
+    table : Table
+        Its telemetry, as the file has it.
+    log : tuple of Event
+        Lines that were logged; of a telemetry file, which has no log, none.
+    whole : bool
+        Whether the file was closed.
+    metadata : mapping of str
+        The record as a telemetry file keeps it.
+    rate_Hz : float or None
+        Rows a second that the file keeps beside those that stand out; None for every row.
+    checked : bool
+        True if the file has checksums; they were compared.
+    """
+
+    path: Path
+    record: RunRecord
+    table: Table
+    log: tuple[Event, ...]
+    whole: bool
+    metadata: Mapping[str, str]
+    rate_Hz: float | None = None
+    checked: bool = True
+
+    @property
+    def period_s(self) -> float:
+        """Control period, s."""
+        return float(self.record.scenario["controller"]["period_s"])
+
+    @property
+    def simulated_s(self) -> float:
+        """Time that its rows cover, s."""
+        return len(self.every_tick) * self.period_s
+
+    @cached_property
+    def every_tick(self) -> Table:
+        """A row a tick: where the file does not keep every one, each is held until the next."""
+        return held(self.table, self.period_s) if self.rate_Hz else self.table
+
+
+def read(path: Path) -> Reviewed:
+    """Read a telemetry file, a recording, or what a killed process left of either.
+
+    Raises
+    ------
+    InputError
+        There is none, it is none of these, or not a row of it is whole.
+    """
+    found = recovery.found(path)
+    try:
+        if found.suffix in recovery.RECORDINGS or recovery.is_recording(found):
+            return _of_recording(found)
+        if found.is_dir():
+            with recovery.joined(found) as joined:
+                table, metadata = read_parquet(joined)
+            return _of_telemetry(found, table, metadata, whole=False, checked=recovery.are_checked(found))
+        table, metadata = read_parquet(found)
+        return _of_telemetry(found, table, metadata, whole=True, checked=has_checksums(found))
+    except KeyError as error:
+        raise InputError(
+            f"review {found}: expected the file of a run, received one without {shown(error.args[0])}"
+        ) from None
+    except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise InputError(
+            f"review {found}: expected the file of a run, received one that cannot be read"
+        ) from None
+
+
+def _of_telemetry(
+    path: Path, table: Table, metadata: dict[str, str], *, whole: bool, checked: bool
+) -> Reviewed:
+    _check_times(path, table)
+    rate_Hz = float(metadata[_RATE]) if _RATE in metadata else None
+    try:
+        record = RunRecord.from_metadata(metadata)
+    except InputError as error:
+        raise InputError(f"review {path}: {error}") from None
+    return Reviewed(path, record, table, (), whole, metadata, rate_Hz, checked)
+
+
+def _of_recording(path: Path) -> Reviewed:
+    from spheretwin.viz.recording import reader  # Rerun is slow to import
+    from spheretwin.viz.recording.signals import RATE
+
+    facts, table, log, whole, checked = reader.read(path)
+    _check_times(path, table)
+    statuses = {status.told: status for status in Status}
+    scenario, status = _scenario(facts), statuses.get(log[-1][2] if log else "")
+    period_s = float(scenario["controller"]["period_s"])
+    ticks = int(ticks_of(table, period_s)[-1]) + 1 if len(table) else 0
+    journal = logged(log, scenario, period_s, ticks)
+    record = RunRecord(scenario, journal, ticks, {}, facts["versions"], status)
+    rate_Hz, metadata = facts.get(RATE), record.metadata()
+    if rate_Hz:
+        metadata = {**metadata, _RATE: repr(rate_Hz)}
+    return Reviewed(path, record, table, tuple(log), whole, metadata, rate_Hz, checked)
+
+
+def _check_times(path: Path, table: Table) -> None:
+    """Refuse rows out of their order: only damage makes them so."""
+    t_s = table["t_s"]
+    if not (np.all(np.isfinite(t_s)) and np.all(t_s[1:] > t_s[:-1])):
+        raise InputError(f"review {path}: expected rows whose times rise, received others: it is damaged")
+
+
+def _scenario(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Scenario by section, as JSON has it, from what a recording says of it."""
+    sections = json.loads(json.dumps(facts["sections"]))
+    return {"name": facts["name"], "description": facts["description"], **sections.pop("run"), **sections}
+
+
+def events(run: Reviewed) -> list[Event]:
+    """Events of a run in the order of time, its end last: the same from either of its files."""
+    ended = run.record.status
+    if run.log:
+        found, end = list(run.log[:-1] if ended else run.log), list(run.log[-1:] if ended else ())
+    else:
+        log = Events()
+        found = log.of(run.every_tick) if len(run.table) else []
+        found += [(t_s, Level.INFO, text) for t_s, text in FaultLines().of(run.every_tick)]
+        found += [(each.tick * run.period_s, Level.INFO, change_told(each)) for each in _changes(run)]
+        end = [log.end(ended)] if ended else []
+    return [*sorted(found, key=lambda event: (event[0], event[2])), *end]
+
+
+def _changes(run: Reviewed) -> Iterator[Change]:
+    """Changes that its scenario planned and that it came to, and those that were made by hand."""
+    yield from planned(run.record.scenario, run.period_s, len(run.every_tick))
+    yield from run.record.journal
+
+
+KINDS = (".csv", ".parquet")
+
+
+def check(path: Path) -> None:
+    """Refuse a file of another kind.
+
+    Raises
+    ------
+    InputError
+        Its name does not end in one that is known.
+    """
+    if path.suffix not in KINDS:
+        raise InputError(
+            f"command line: expected --export FILE.csv or FILE.parquet, received {shown(str(path))}"
+        )
+
+
+def export(run: Reviewed, path: Path) -> None:
+    """Write all columns of a run; each number in CSV as Python writes it, which no bit is lost by.
+
+    Raises
+    ------
+    InputError, SpheretwinError
+        The file cannot be written; what was there before is untouched.
+    """
+    if path.suffix == ".parquet":
+        run.table.write_parquet(path, run.metadata)
+        return
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([name for signal in run.table.signals for name in headings(signal)])
+        writer.writerows(map(repr, row) for row in run.table.values.tolist())
+
+
+def headings(signal: Signal) -> list[str]:
+    """Heading of each entry of a signal: its name, which ends in its unit, and its label or place."""
+    if signal.size == 1:
+        return [signal.name]
+    labels = signal.labels or tuple(map(str, range(signal.size)))
+    return [f"{signal.name}[{label}]" for label in labels]

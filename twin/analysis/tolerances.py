@@ -1,0 +1,197 @@
+"""How far a run may be from a reference, signal by signal, as a TOML file of the user's says it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from spheretwin.analysis.recorded_run import Reviewed
+from spheretwin.models.base.errors import InputError, did_you_mean, shown, without_breaks
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.scenario.fields import explain
+
+FOLDER = resources.files("spheretwin.analysis") / "shipped"
+
+Allowance = Annotated[float, Field(ge=0)]
+
+
+class Tolerance(BaseModel):
+    """What one signal is allowed; exactly the reference unless told otherwise."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    absolute: Allowance = Field(0.0, description="difference, in the unit of the signal")
+    relative: Allowance = Field(
+        0.0, description="difference over the reference's magnitude; adds to absolute"
+    )
+    time_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        0.0, description="how much earlier or later the reference may have the value, s"
+    )
+
+
+class Tolerances(BaseModel):
+    """What each signal is allowed; a signal that is not named may be anything."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    description: str = Field("", description="what it holds, and why so closely")
+    signals: Annotated[dict[str, Tolerance], Field(min_length=1)] = Field(
+        description="by the name of the telemetry column"
+    )
+
+
+def shipped() -> list[str]:
+    """Names of the tolerances that come with the package."""
+    return sorted(path.name.removesuffix(".toml") for path in FOLDER.iterdir() if path.name.endswith(".toml"))
+
+
+def load(source: str) -> Tolerances:
+    """Tolerances of a shipped name or of a TOML file.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, or a field is unknown, of the wrong type or out of range.
+    """
+    if not (source in shipped() or source.endswith(".toml")):
+        raise InputError(
+            f"tolerance: expected {', '.join(shipped())} or a .toml file,"
+            f" received {shown(source)}{did_you_mean(source, shipped())}"
+        )
+    path = FOLDER / f"{source}.toml" if source in shipped() else Path(source)
+    try:
+        fields = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(
+            f"tolerance {source}: expected a readable TOML file, {without_breaks(error)}"
+        ) from None
+    try:
+        return Tolerances.model_validate_json(json.dumps(fields, default=str))
+    except ValidationError as error:
+        raise InputError(f"tolerance {source}: {_complaint(error, fields)}") from None
+
+
+def _complaint(error: ValidationError, fields: dict[str, Any]) -> str:
+    """First complaint; of a signal's own table it is that of the table by itself, which knows its fields."""
+    match error.errors()[0]["loc"]:
+        case ("signals", str() as name, _, *_):
+            try:
+                Tolerance.model_validate_json(json.dumps(fields["signals"][name], default=str))
+            except ValidationError as inner:
+                return f"signals.{name}: {explain(inner, Tolerance)}"
+    return explain(error, Tolerances)
+
+
+Array = NDArray[np.float64]
+
+# A time in whole ticks is so to rounding only.
+WHOLE = 1e-9
+
+
+class Exceeded(NamedTuple):
+    """Where a signal first leaves what it is allowed."""
+
+    path: str
+    signal: str
+    axis: str
+    """Label of the entry; empty for a signal of one number."""
+    t_s: float
+    by: float
+    """Beyond the tolerance, in the unit of the signal; no number where one of the two has no value."""
+
+
+def exceeded(reference: Reviewed, run: Reviewed, tolerances: Tolerances) -> list[Exceeded]:
+    """First place of each signal that leaves its tolerance, the earliest first.
+
+    A value is allowed within ``absolute + relative · |reference|`` of what the reference has at that time,
+    or anywhere between its lowest and highest within ``time_s`` of it. Where one of the two has ended and the
+    other goes on, no signal is within any tolerance.
+
+    Raises
+    ------
+    InputError
+        One of the runs lacks a signal, or they have different control periods.
+    """
+    if run.period_s != reference.period_s:
+        raise InputError(
+            f"review {run.path}: expected a control period of {reference.period_s!r} s as the reference has,"
+            f" received {run.period_s!r} s"
+        )
+    found = []
+    for name, tolerance in tolerances.signals.items():
+        signal, other = _signal(reference, name), _signal(run, name)
+        if signal.size != other.size:
+            raise InputError(
+                f"review {run.path}: expected {name} of {signal.size} numbers, received {other.size}"
+            )
+        if place := _first(*_both(reference, run, name), tolerance, reference.period_s):
+            tick, entry, by = place
+            axis = signal.labels[entry] if signal.labels else ""
+            found.append(Exceeded(str(run.path), name, axis, tick * run.period_s, by))
+    return sorted(found, key=lambda each: each.t_s)
+
+
+def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: float) -> Array:
+    """How far values are beyond what a reference allows, (n, k): 0 within, infinite where one has no value.
+
+    Parameters
+    ----------
+    reference, values : (n, k) array
+        At the same ticks; a NaN is no value.
+    tolerance : Tolerance
+        What is allowed.
+    period_s : float
+        Time between rows, s.
+    """
+    allowed = tolerance.absolute + tolerance.relative * np.abs(reference)
+    ticks = min(int(tolerance.time_s / period_s + WHOLE), len(reference))
+    none = np.isnan(reference)
+    highest, lowest = (
+        np.where(none, -np.inf, reference + allowed),
+        np.where(none, np.inf, reference - allowed),
+    )
+    if ticks:
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d  # slow to import
+
+        window = 2 * ticks + 1
+        highest = maximum_filter1d(highest, window, axis=0, mode="nearest")
+        lowest = minimum_filter1d(lowest, window, axis=0, mode="nearest")
+    with np.errstate(invalid="ignore"):  # infinite from infinite, where a run has diverged
+        over = np.maximum(np.maximum(values - highest, lowest - values), 0.0)
+    return np.where(none & np.isnan(values), 0.0, np.where(np.isnan(over), np.inf, over))
+
+
+def _first(
+    reference: Array, values: Array, tolerance: Tolerance, period_s: float
+) -> tuple[int, int, float] | None:
+    """Tick, entry and amount of the first that is beyond, of those of its tick the farthest."""
+    rows = min(len(reference), len(values))
+    over = beyond(reference[:rows], values[:rows], tolerance, period_s)
+    if len(ticks := np.flatnonzero(over.any(axis=1))):
+        entry = int(np.argmax(over[ticks[0]]))
+        return int(ticks[0]), entry, float(over[ticks[0], entry])
+    return None if len(reference) == len(values) else (rows, 0, np.inf)
+
+
+def _both(reference: Reviewed, run: Reviewed, name: str) -> tuple[Array, Array]:
+    of_reference, of_run = (
+        each.every_tick[name].reshape(len(each.every_tick), -1) for each in (reference, run)
+    )
+    return of_reference, of_run
+
+
+def _signal(run: Reviewed, name: str) -> Signal:
+    signals = {signal.name: signal for signal in run.table.signals}
+    if name in signals:
+        return signals[name]
+    raise InputError(
+        f"tolerance: expected signals of {run.path}, received {name}{did_you_mean(name, signals)}"
+        f" (it has {', '.join(signals)})"
+    )

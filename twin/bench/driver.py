@@ -1,0 +1,291 @@
+"""The twin of a bench in one thread's hands: its session, its mode, and what is set."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple
+
+from spheretwin.bench import modes
+from spheretwin.bench.modes import Limits
+from spheretwin.models.base.errors import InputError, exception_text
+from spheretwin.models.telemetry.table import Table
+from spheretwin.run import record_of
+from spheretwin.scenario.changes import FAULT, changed, is_fixed
+from spheretwin.scenario.reading import override, validated
+from spheretwin.scenario.sections import Scenario, fields_of_set
+from spheretwin.session import Session
+from spheretwin.snapshot import Snapshot
+from spheretwin.trajectories.trajectory import Shape
+
+MODES_OWN = ("trajectory.approach", "manual")
+"""Fields that modes set."""
+
+
+def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
+    """Settings with another value of one field, checked as a whole.
+
+    A named set of hardware gives its fields their values, as it does in a file that does not say them; those
+    of the set before get their defaults.
+
+    Raises
+    ------
+    InputError
+        A field that is unknown, of the wrong type or out of range, or one that a mode sets.
+    """
+    if any(name == own or name.startswith(f"{own}.") for own in MODES_OWN):
+        raise InputError(f"bench: expected a mode instead of {name}, as manual or hold")
+    if name == "trajectory" and isinstance(value, dict) and value.get("approach") is not None:
+        raise InputError("bench: expected a trajectory without approach, which the bench makes")
+    after = changed(settings, name, value)
+    return after if name != "hardware" else _with_hardware(settings, after.hardware)
+
+
+def _with_hardware(settings: Scenario, hardware: str) -> Scenario:
+    fields = settings.model_dump(mode="json")
+    fields["hardware"] = hardware
+    untouched = Scenario(trajectory=settings.trajectory).model_dump(mode="json")
+    knows_truth = settings.nominal.equals_truth
+    plain = {dotted: _value(untouched, dotted) for dotted in fields_of_set(settings.hardware, knows_truth)}
+    for dotted, value in (plain | fields_of_set(hardware, knows_truth)).items():
+        if dotted == "estimator.kind":  # another member of a family has other fields
+            fields["estimator"] = {}
+        override(fields, dotted, value)
+    return validated(fields, settings.name)
+
+
+def _value(fields: Any, dotted: str) -> Any:
+    for part in dotted.split("."):
+        fields = fields[part]
+    return fields
+
+
+CURRENTS = "manual.currents_A"
+
+MOST_SNAPSHOTS = 16
+
+
+class Kept(NamedTuple):
+    """All that a desk goes on from."""
+
+    session: Snapshot
+    settings: Scenario
+    pending: dict[str, Any]
+    mode: str
+    row: Table | None
+
+
+class Desk:
+    """One twin, and what is done to it; every change of it is one of its session's journal.
+
+    Parameters
+    ----------
+    settings : Scenario
+        To begin with.
+    session : Session
+        Of these, at tick 0.
+
+    Attributes
+    ----------
+    settings : Scenario
+        What the next reset begins with: the modes are no part of it.
+    pending : dict
+        Fields of it that are not in force as yet.
+    mode : str
+    stopped : bool
+        Whether STOP is latched.
+    reason : str or None
+        Why the run can go on no further.
+    limits : Limits
+        Of the ways from mode to mode.
+    row : Table or None
+        The last row.
+    snapshots : dict
+        By name.
+    """
+
+    def __init__(self, settings: Scenario, session: Session) -> None:
+        self.limits = Limits()
+        self.snapshots: dict[str, Kept] = {}
+        self.begin(settings, session)
+
+    def begin(self, settings: Scenario, session: Session) -> None:
+        """Begin with a session at tick 0."""
+        self.settings, self.session = settings, session
+        self.begun = record_of(session)
+        self.pending: dict[str, Any] = {}
+        self.stopped = False
+        self.reason: str | None = None
+        self.row: Table | None = None
+        by_hand = session.scenario.manual.currents_A
+        self.mode = "trajectory" if by_hand is None else "manual" if any(by_hand) else "off"
+
+    def advance(self, ticks: int) -> Table | None:
+        """Run some control ticks; fewer where the columns change, none once the run has ended."""
+        if self.reason is not None:
+            return None
+        try:
+            rows = self.session.advance(ticks)
+        except Exception as error:  # a law of the user's may raise anything: the run ends
+            self.fail(error)
+            return None
+        if self.session.law_error:
+            self.reason = f"{self.session.law_error}"
+        elif self.session.ended:
+            why = f", {self.session.reason.told}" if self.session.reason else ""
+            self.reason = f"{self.session.status}: {self.session.status.told}{why}"
+        if len(rows):
+            self.row = rows.rows(len(rows) - 1, len(rows))
+        return rows
+
+    def fail(self, error: Exception) -> None:
+        """End the run by an error."""
+        self.reason = exception_text(error)
+
+    def stop(self) -> None:
+        """Take the currents away until the next reset."""
+        self.stopped = True
+        if self.reason is None:
+            self._by_hand("off", [0.0] * len(self.session.actuator.groups))
+
+    def off(self) -> None:
+        """No currents."""
+        self._check_free("off")
+        self._by_hand("off", [0.0] * len(self.session.actuator.groups))
+
+    def manual(self, currents_A: tuple[float, ...] | None, group: int | None, current_A: float) -> None:
+        """Stated currents, or one group alone."""
+        self._check_free("manual")
+        groups = len(self.session.actuator.groups)
+        if (currents_A is None) == (group is None):
+            raise InputError("bench: manual: expected either currents_A or group, received both or none")
+        if group is not None and group >= groups:
+            raise InputError(f"bench: manual: expected a group from 0 to {groups - 1}, received {group}")
+        alone = [current_A if each == group else 0.0 for each in range(groups)]
+        self._by_hand("manual", alone if currents_A is None else list(currents_A))
+
+    def hold(self) -> None:
+        """Come to rest here."""
+        self._check_free("hold")
+        begun = modes.motion_of(self.session)
+        self._fly("hold", modes.held(begun, self.limits, self._range))
+
+    def point(self, pose_rad: tuple[float, float, float]) -> None:
+        """Go to a pose."""
+        self._check_free("point")
+        self._fly("point", modes.pointed(pose_rad, self._range))
+
+    def jog(self, rates_rad_s: tuple[float, float, float]) -> None:
+        """Turn at steady rates."""
+        self._check_free("jog")
+        begun = modes.motion_of(self.session)
+        self._fly("jog", modes.jogged(begun, rates_rad_s, self.limits, self._range))
+
+    def trajectory(self, fields: dict[str, Any] | None) -> None:
+        """Follow a shape from its beginning; the last one unless given."""
+        self._check_free("trajectory")
+        after = self.settings if fields is None else with_field(self.settings, "trajectory", fields)
+        self._fly("trajectory", after.trajectory)
+        self.settings = after
+
+    def set(self, name: str, value: Any) -> None:
+        """Change a field: from the next tick on, or at the next reset where it is fixed for a run.
+
+        Raises
+        ------
+        InputError
+            A field that is unknown, of the wrong type or out of range, or one that a mode sets.
+        """
+        after = with_field(self.settings, name, value)
+        if self.reason is not None or is_fixed(name):
+            self.pending[name] = value
+        elif name.split(".")[0] == "trajectory":
+            self._reshape(name, after.trajectory)
+        else:
+            self.session.set(name, value)
+        self.settings = after
+
+    def clear_faults(self, place: int | None) -> None:
+        """Take back all faults, or one."""
+        planned = self.settings.model_dump(mode="json")[FAULT]
+        if place is not None and place >= len(planned):
+            raise InputError(f"bench: expected the place of a fault below {len(planned)}, received {place}")
+        after = with_field(self.settings, FAULT, _without(planned, place))
+        if self.reason is None:
+            self.session.set(FAULT, _without(self.session.scenario.model_dump(mode="json")[FAULT], place))
+        self.settings = after
+
+    def snapshot(self, name: str) -> None:
+        """Keep all that the twin goes on from."""
+        if name not in self.snapshots and len(self.snapshots) >= MOST_SNAPSHOTS:
+            raise InputError(f"bench: expected at most {MOST_SNAPSHOTS} snapshots, received one more")
+        if self.reason is not None:
+            raise InputError("bench: expected a run that goes on, received one that has ended")
+        state = self.session.snapshot()
+        self.snapshots[name] = Kept(state, self.settings, dict(self.pending), self.mode, self.row)
+
+    def restore(self, name: str) -> None:
+        """Go back to a snapshot.
+
+        Raises
+        ------
+        InputError
+            There is none of this name, it is of another model, or STOP is latched.
+        """
+        if self.stopped:
+            self._check_free("restore")
+        if name not in self.snapshots:
+            raise InputError(
+                f"bench: expected one of {', '.join(self.snapshots) or 'no snapshots'}, received {name}"
+            )
+        kept = self.snapshots[name]
+        self.session.restore(kept.session)
+        self.begun = record_of(self.session)
+        self.settings, self.pending, self.mode = kept.settings, dict(kept.pending), kept.mode
+        self.row, self.reason = kept.row, None
+
+    @property
+    def moves(self) -> bool:
+        """Whether the coils may move the rotor, other than to hold it."""
+        return not self.stopped and self.reason is None and self.mode not in ("off", "hold")
+
+    def pending_told(self) -> tuple[tuple[str, str], ...]:
+        """Fields that wait for a reset, and their values as JSON."""
+        return tuple((name, json.dumps(value, ensure_ascii=False)) for name, value in self.pending.items())
+
+    @property
+    def _range(self) -> modes.Array:
+        return self.session.actuator.hinge_range_rad
+
+    def _check_free(self, name: str) -> None:
+        if self.stopped:
+            raise InputError(f"bench: expected reset after STOP, received {name}")
+        if self.reason is not None:
+            raise InputError(f"bench: expected reset, as the run has ended, received {name}")
+
+    def _by_hand(self, mode: str, currents_A: list[float]) -> None:
+        self.session.set(CURRENTS, currents_A)
+        self.mode = mode
+
+    def _fly(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
+        """Go over to a shape, at a time of its own, from the motion that goes before."""
+        session, begun = self.session, modes.motion_of(self.session)
+        way = modes.approached(shape, begun, session.t_s, shape_s, self.limits, self._range)
+        session.set("trajectory", {**shape.model_dump(mode="json"), "approach": way})
+        if session.scenario.manual.on:
+            session.set(CURRENTS, None)
+        self.mode = mode
+
+    def _reshape(self, name: str, shape: Shape) -> None:
+        """Follow a shape with another field from where it is; another shape from its beginning."""
+        if self.mode != "trajectory":
+            return
+        present = self.session.scenario.trajectory
+        own_s = self.session.t_s
+        if present.approach:
+            own_s += present.approach.shape_s - present.approach.start_s
+        same = type(shape) is type(present) and name != "trajectory"
+        self._fly("trajectory", shape, own_s if same else 0.0)
+
+
+def _without(planned: list[Any], place: int | None) -> list[Any]:
+    return [] if place is None else [each for i, each in enumerate(planned) if i != place]

@@ -1,0 +1,283 @@
+"""What a bench shows: one picture of now, which never changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spheretwin.bench.bench_state import Works
+from spheretwin.faults.fault import Fault
+from spheretwin.models.telemetry.table import Table, rank_lost, saturated
+from spheretwin.session import Session
+
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class State:
+    """A bench at one moment; the latest alone, and whole.
+
+    Attributes
+    ----------
+    mode : str
+        ``off``, ``hold``, ``point``, ``trajectory``, ``jog``, ``manual``, ``replay`` or ``fault``.
+    running : bool
+        Whether time goes on.
+    stopped : bool
+        Whether STOP is latched; `reset` alone lets it go.
+    scenario, law, shape, allocation : str
+        Names of what is in force.
+    t_s : float
+        Simulated time, s; of a replay, that of its row.
+    tick : int
+        Control ticks done; of a replay, the row.
+    period_s : float
+        Control period, s.
+    speed : float
+        Wanted, as a multiple of the clock's; infinite for as fast as possible.
+    realtime_factor : float
+        Reached over the last second or so; 0 while time stands still.
+    chunks, missed : int
+        Chunks that had a deadline since the last reset, and those that were late.
+    missed_share : float
+        The latter over the former; 0 before the first.
+    q_rad, qdot_rad_s, q_ref_rad, qdot_ref_rad_s, error_rad : tuple of float
+        Hinge angles and rates, those desired, and q - q_ref, (3,).
+    error_mrad, error_deg : float
+        Length of the error.
+    torque_command_Nm, torque_Nm, disturbance_Nm : tuple of float
+        Generalised torque that the law asked for, torque of the coils on the rotor (stator frame), and
+        generalised load, (3,).
+    current_command_A, current_A : tuple of float
+        One for each coil group.
+    current_limit_A : float
+        Largest current that is asked of a group.
+    temperature_C : tuple of float or None
+        Of the windings, one for each group, where the hardware has them.
+    torque_margin : float
+        Share of the current limit that the group with the largest current asked for leaves, 0 to 1.
+    saturated : bool
+        Whether the current limit left less than the commanded torque.
+    rank_lost : bool
+        Whether the groups in use give no torque in one direction, so that no currents are commanded.
+    status : str
+        Of the session, as ``running`` or ``left_workspace``.
+    reason : str or None
+        Why the mode is ``fault``, in one line.
+    faults : tuple of str
+        Faults that are planned or at work, one line each, in the order of their places.
+    pending : tuple of (str, str)
+        Fields that the next reset will set, and their values as JSON.
+    journal : int
+        Changes so far in the present run.
+    snapshots : tuple of str
+        Names of those kept.
+    recording : tuple of str
+        Files that are being written.
+    kept : tuple of str
+        Files that were written last.
+    note : str or None
+        What happened last that nobody commanded, as why a recording ended.
+    operator : str or None
+        Client whose commands are taken; nobody unless one has come.
+    watching : tuple of str
+        The other clients.
+    asking : tuple of str
+        Those of them that ask to take over.
+    refused : str or None
+        The last command that was refused, and why, in one line.
+    waiting : int
+        Commands that wait for the next chunk.
+    """
+
+    mode: str
+    running: bool
+    stopped: bool
+    scenario: str
+    law: str
+    shape: str
+    allocation: str
+    t_s: float
+    tick: int
+    period_s: float
+    speed: float
+    realtime_factor: float
+    chunks: int
+    missed: int
+    missed_share: float
+    q_rad: Three
+    qdot_rad_s: Three
+    q_ref_rad: Three
+    qdot_ref_rad_s: Three
+    error_rad: Three
+    error_mrad: float
+    error_deg: float
+    torque_command_Nm: Three
+    torque_Nm: Three
+    disturbance_Nm: Three
+    current_command_A: tuple[float, ...]
+    current_A: tuple[float, ...]
+    current_limit_A: float
+    temperature_C: tuple[float, ...] | None
+    torque_margin: float
+    saturated: bool
+    rank_lost: bool
+    status: str
+    reason: str | None
+    faults: tuple[str, ...]
+    pending: tuple[tuple[str, str], ...]
+    journal: int
+    snapshots: tuple[str, ...]
+    recording: tuple[str, ...]
+    kept: tuple[str, ...]
+    note: str | None
+    operator: str | None
+    watching: tuple[str, ...]
+    asking: tuple[str, ...]
+    refused: str | None
+    waiting: int
+
+
+VECTORS = (
+    "q_rad",
+    "qdot_rad_s",
+    "q_ref_rad",
+    "qdot_ref_rad_s",
+    "error_rad",
+    "torque_command_Nm",
+    "torque_Nm",
+    "disturbance_Nm",
+    "current_command_A",
+    "current_A",
+)
+
+
+class Shown(NamedTuple):
+    """The row that is shown."""
+
+    row: Table | None
+    """None before the first."""
+    tick: int
+    period_s: float
+    current_limit_A: float
+
+
+def pictured(shown: Shown, session: Session, **others: Any) -> State:
+    """Picture of a row, and of what is told beside it; of a session before its first, where there is none."""
+    return State(
+        **others,
+        tick=shown.tick,
+        period_s=shown.period_s,
+        current_limit_A=shown.current_limit_A,
+        **(_at_start(session) if shown.row is None else _of_row(shown.row, shown.current_limit_A)),
+    )
+
+
+def _of_row(row: Table, limit_A: float) -> dict[str, Any]:
+    error_rad = float(np.linalg.norm(row["error_rad"][0]))
+    largest_A = float(np.abs(row["current_command_A"][0]).max())
+    lost = bool(rank_lost(row)[0])
+    warm = any(signal.name == "coil_temperature_degC" for signal in row.signals)
+    return {
+        "t_s": float(row["t_s"][0]),
+        **{name: tuple(row[name][0].tolist()) for name in VECTORS},
+        "error_mrad": 1e3 * error_rad,
+        "error_deg": float(np.degrees(error_rad)),
+        "temperature_C": tuple(row["coil_temperature_degC"][0].tolist()) if warm else None,
+        "torque_margin": 0.0 if lost else max(0.0, 1.0 - largest_A / limit_A) if limit_A else 1.0,
+        "saturated": bool(saturated(row)[0]),
+        "rank_lost": lost,
+    }
+
+
+def _at_start(session: Session) -> dict[str, Any]:
+    reference = session.scenario.trajectory.sample(np.array([session.t_s]))[0]
+    error = session.q_rad - reference[0]
+    groups = (0.0,) * len(session.actuator.groups)
+    none = (0.0, 0.0, 0.0)
+    return {
+        "t_s": session.t_s,
+        "q_rad": tuple(session.q_rad.tolist()),
+        "qdot_rad_s": tuple(session.qdot_rad_s.tolist()),
+        "q_ref_rad": tuple(reference[0].tolist()),
+        "qdot_ref_rad_s": tuple(reference[1].tolist()),
+        "error_rad": tuple(error.tolist()),
+        "error_mrad": float(1e3 * np.linalg.norm(error)),
+        "error_deg": float(np.degrees(np.linalg.norm(error))),
+        "torque_command_Nm": none,
+        "torque_Nm": none,
+        "disturbance_Nm": none,
+        "current_command_A": groups,
+        "current_A": groups,
+        "temperature_C": None,
+        "torque_margin": 1.0,
+        "saturated": False,
+        "rank_lost": False,
+    }
+
+
+def picture(works: Works) -> State:
+    """All that is shown, as it is now."""
+    desk, operators, pace, recording = works.desk, works.operators, works.pace, works.recording
+    session = desk.session
+    return pictured(
+        _shown(works),
+        session,
+        **_names(works),
+        running=works.moves,
+        stopped=desk.stopped,
+        speed=pace.speed,
+        realtime_factor=pace.reached(),
+        chunks=pace.chunks,
+        missed=pace.missed,
+        missed_share=pace.missed_share,
+        status=str(session.status),
+        reason=desk.reason,
+        faults=tuple(_fault_told(fault) for fault in session.scenario.fault),
+        pending=desk.pending_told(),
+        journal=len(session.journal),
+        snapshots=tuple(desk.snapshots),
+        recording=recording.paths,
+        kept=recording.kept,
+        note=works.note,
+        operator=operators.operator,
+        watching=operators.watching,
+        asking=operators.asking,
+        refused=works.refused,
+        waiting=len(works.queue),
+    )
+
+
+def _shown(works: Works) -> Shown:
+    player, desk = works.player, works.desk
+    if player:
+        return Shown(player.row, player.place, player.period_s, player.current_limit_A)
+    limit_A = desk.session.scenario.nominal.current_limit_A
+    return Shown(desk.row, desk.session.tick, works.period_s, limit_A)
+
+
+def _names(works: Works) -> dict[str, Any]:
+    """The mode, and what is in force: of the recorded run while one is played back."""
+    player, desk, scenario = works.player, works.desk, works.desk.session.scenario
+    if player:
+        return {
+            "mode": "replay",
+            "scenario": player.name,
+            "law": player.law,
+            "shape": player.shape,
+            "allocation": player.allocation,
+        }
+    return {
+        "mode": "fault" if desk.reason is not None else desk.mode,
+        "scenario": scenario.name,
+        "law": scenario.controller.law,
+        "shape": scenario.trajectory.shape,
+        "allocation": scenario.allocation,
+    }
+
+
+def _fault_told(fault: Fault) -> str:
+    until = f" to {fault.end_s:g} s" if fault.end_s is not None else ""
+    return f"{fault.target} {fault.mode} from {fault.start_s:g} s{until}"

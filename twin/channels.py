@@ -1,0 +1,276 @@
+"""Columns that a stage of the loop adds to the telemetry where it does something."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from spheretwin.control.supervision.enabled_groups import IN_USE, STATES
+from spheretwin.control.supervision.watchdog import REASONS
+from spheretwin.electronics.drive import tell
+from spheretwin.faults.fault import MODES
+from spheretwin.faults.schedule import part_names
+from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.scenario.sections import Scenario
+
+
+class Channel(NamedTuple):
+    """What one stage logs."""
+
+    signals: Callable[[int], tuple[Signal, ...]]
+    """For an actuator with a number of coil groups; the same tuple for the same number."""
+    logged: Callable[[Scenario], bool]
+    """Whether a run of a resolved scenario has them."""
+    write: Any
+    """``write(row, controller, sensors, plant)`` writes them into the beginning of `row`, once a tick, after
+    the plant has moved. Made with `part_of_its_caller`: it becomes a part of the loop's machine code."""
+
+
+@cache
+def signals(groups: int) -> tuple[Signal, ...]:
+    """Columns for a number of coil groups."""
+    each = tuple(f"group {j}" for j in range(groups))
+    return (Signal("current_measured_A", "A", groups, "group currents as measured at the tick", each),)
+
+
+@part_of_its_caller
+def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    measured_A = plant.current_sensors.measured_A
+    for j in range(measured_A.shape[0]):
+        row[j] = measured_A[j]
+
+
+COLUMNS = Channel(signals, lambda scenario: scenario.senses_currents, write)
+
+
+@cache
+def drive_signals(groups: int) -> tuple[Signal, ...]:
+    """Columns for a number of coil groups."""
+    each = tuple(f"group {j}" for j in range(groups))
+    return (
+        Signal("supply_power_W", "W", 1, "drawn from the supply, mean over the control period"),
+        Signal("coil_power_W", "W", groups, "at the ends of the coils, mean over the control period", each),
+        Signal("copper_loss_W", "W", groups, "heat of the coils, mean over the control period", each),
+        Signal("coil_temperature_degC", "°C", groups, "at the end of the control period", each),
+        Signal("voltage_limited", "1", groups, "share of the period with the voltage at its limit", each),
+        Signal("current_limited", "1", groups, "share of the period with the current at its limit", each),
+    )
+
+
+@part_of_its_caller
+def write_drive(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    tell(plant.driving, row)
+
+
+DRIVE = Channel(drive_signals, lambda scenario: scenario.drive.supply_V is not None, write_drive)
+
+
+NOT_YET = -1.0
+
+
+@cache
+def fault_signals(groups: int) -> tuple[Signal, ...]:
+    """Columns for a number of coil groups."""
+    each = tuple(f"group {j}" for j in range(groups))
+    names = part_names(groups)
+    return (
+        Signal("fault", "1", len(names), "how a part fails", names, ("works", *MODES)),
+        Signal("group_out", "1", groups, "whether the allocation leaves a group out", each, STATES),
+        Signal(
+            "time_to_detection_s",
+            "s",
+            groups,
+            "from the start of a group's fault until it was left out; -1 as long as it is not",
+            each,
+        ),
+    )
+
+
+@part_of_its_caller
+def write_faults(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    groups, parts = controller.supervision.groups, plant.marks.shape[0]
+    count = groups.out.shape[0]
+    for part in range(parts):
+        row[part] = plant.marks[part]
+    for j in range(count):
+        out = groups.out[j]
+        row[parts + j] = out
+        known = out != IN_USE and plant.began_s[j] >= 0.0
+        row[parts + count + j] = max(groups.out_s[j] - plant.began_s[j], 0.0) if known else NOT_YET
+
+
+def _logs_faults(scenario: Scenario) -> bool:
+    return scenario.supervises_groups
+
+
+FAULTS = Channel(fault_signals, _logs_faults, write_faults)
+
+
+FEED_FORWARD_SIGNALS = (
+    Signal("feed_forward_Nm", "N·m", 3, "part of torque_command_Nm that is fed forward, generalised", ANGLES),
+)
+
+
+@part_of_its_caller
+def write_feed_forward(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    for i in range(3):
+        row[i] = controller.around.feed.torque_q[i]
+
+
+def _logs_feed_forward(scenario: Scenario) -> bool:
+    return scenario.controller.feed_forward.on
+
+
+FEED_FORWARD = Channel(lambda groups: FEED_FORWARD_SIGNALS, _logs_feed_forward, write_feed_forward)
+
+
+FRICTION_SIGNALS = (
+    Signal("friction_Nm", "N·m", 3, "friction on the hinges, over the physics step that begins now", ANGLES),
+)
+
+
+@part_of_its_caller
+def write_friction(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    for i in range(3):
+        row[i] = plant.first_friction_q[i]
+
+
+def _logs_friction(scenario: Scenario) -> bool:
+    return any(scenario.plant.coulomb_Nm) or any(scenario.plant.viscous_Nm_s)
+
+
+FRICTION = Channel(lambda groups: FRICTION_SIGNALS, _logs_friction, write_friction)
+
+
+REFERENCE_GOVERNOR_SIGNALS = (
+    Signal("q_governed_rad", "rad", 3, "desired hinge angles as the governor has them", ANGLES),
+    Signal("qdot_governed_rad_s", "rad/s", 3, "desired hinge rates as the governor has them", ANGLES),
+    Signal(
+        "qddot_governed_rad_s2", "rad/s²", 3, "desired accelerations as the governor has them, held", ANGLES
+    ),
+)
+
+
+@part_of_its_caller
+def write_reference_governor(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    motion = controller.around.governor.motion
+    for part in range(3):
+        for i in range(3):
+            row[3 * part + i] = motion[part, i]
+
+
+def _logs_reference_governor(scenario: Scenario) -> bool:
+    return scenario.controller.governor.on
+
+
+REFERENCE_GOVERNOR = Channel(
+    lambda groups: REFERENCE_GOVERNOR_SIGNALS, _logs_reference_governor, write_reference_governor
+)
+
+
+SENSOR_SIGNALS = (
+    Signal("q_measured_rad", "rad", 3, "hinge angles as the controller has them", ANGLES),
+    Signal("qdot_estimated_rad_s", "rad/s", 3, "hinge rates as the controller has them", ANGLES),
+)
+
+
+@part_of_its_caller
+def write_sensors(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    for i in range(3):
+        row[i], row[3 + i] = controller.pose[i], controller.rates[i]
+
+
+def _logs_sensors(scenario: Scenario) -> bool:
+    return not scenario.measures_truth
+
+
+SENSORS = Channel(lambda groups: SENSOR_SIGNALS, _logs_sensors, write_sensors)
+
+
+PREDICTION_SIGNALS = (
+    Signal("q_predicted_rad", "rad", 3, "hinge angles predicted over the known delay", ANGLES),
+    Signal("qdot_predicted_rad_s", "rad/s", 3, "hinge rates predicted over the known delay", ANGLES),
+)
+
+
+@part_of_its_caller
+def write_prediction(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    prediction = controller.around.prediction
+    for i in range(3):
+        row[i], row[3 + i] = prediction.pose[i], prediction.rates[i]
+
+
+def _logs_prediction(scenario: Scenario) -> bool:
+    return scenario.controller.prediction.on
+
+
+PREDICTION = Channel(lambda groups: PREDICTION_SIGNALS, _logs_prediction, write_prediction)
+
+
+WATCHDOG_SIGNALS = (
+    Signal(
+        "failsafe_reason",
+        "1",
+        1,
+        "why the watchdog has taken the currents away",
+        states=tuple(reason.told for reason in REASONS.values()),
+    ),
+)
+
+
+@part_of_its_caller
+def write_watchdog(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    row[0] = controller.supervision.watchdog.reason[0]
+
+
+WATCHDOG = Channel(lambda groups: WATCHDOG_SIGNALS, lambda scenario: scenario.watchdog.on, write_watchdog)
+
+
+CHANNELS: tuple[Channel, ...] = (
+    SENSORS,
+    COLUMNS,
+    REFERENCE_GOVERNOR,
+    PREDICTION,
+    FEED_FORWARD,
+    FRICTION,
+    DRIVE,
+    FAULTS,
+    WATCHDOG,
+)
+
+
+def _chain(columns: tuple[Channel, ...], place: int = 0) -> Any:
+    """One compiled function that writes all columns that a run has, without a loop over functions."""
+    if not columns:
+        return _nothing
+    write, others = columns[0].write, _chain(columns[1:], place + 1)
+
+    @part_of_its_caller
+    def write_and_go_on(row: Any, places: Any, controller: Any, sensors: Any, plant: Any) -> None:
+        if places[place] >= 0:
+            write(row[places[place] :], controller, sensors, plant)
+        others(row, places, controller, sensors, plant)
+
+    return write_and_go_on
+
+
+@part_of_its_caller
+def _nothing(row: Any, places: Any, controller: Any, sensors: Any, plant: Any) -> None:
+    pass
+
+
+write_channels = _chain(CHANNELS)
+"""``write_columns(row, places, controller, sensors, plant)``; a place below 0 is that of none."""

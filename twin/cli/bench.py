@@ -1,0 +1,317 @@
+"""What a bench's page offers: every field of the run, read and shown as the command line does."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import shlex
+import sys
+import warnings
+import webbrowser
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from spheretwin import outputs
+from spheretwin import scenario as scenarios
+from spheretwin.bench import Bench
+from spheretwin.bench.modes import Limits
+from spheretwin.bench.operators import GONE_s, Operators
+from spheretwin.cli.common import interruptible
+from spheretwin.control.laws import LAWS
+from spheretwin.faults.targets import TARGETS
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.scenario import reading
+from spheretwin.scenario.fields import every_field, kind_of
+from spheretwin.scenario.reading import shipped
+from spheretwin.scenario.sections import Scenario
+from spheretwin.trajectories import SHAPES
+from spheretwin.viz.bench.protocols import Choices, Setting
+from spheretwin.viz.terminal import runs
+
+TRAJECTORY = "trajectory"
+
+# What tells the shapes apart, and the way to a shape, which the bench makes.
+NO_SHAPE = ("shape", "approach")
+
+
+def choices_of(bench: Bench) -> Choices:
+    """All that a page of a bench offers."""
+    groups = len(bench.actuator.groups)
+    return Choices(
+        settings=lambda: settings_of(bench.fields()),
+        shape=lambda name: shape_settings(name, bench),
+        read=read,
+        scenarios=shipped(),
+        shapes=tuple(SHAPES),
+        laws=tuple(LAWS),
+        limits=Limits(),
+        targets={name: tuple(target.modes) for target in TARGETS.values() for name in target.names(groups)},
+    )
+
+
+def settings_of(fields: list[tuple[str, Any, str]]) -> list[Setting]:
+    """Fields of a run, with what they may be."""
+    values = {name: value for name, value, _ in fields}
+    return [_setting(name, value, meaning, values) for name, value, meaning in fields]
+
+
+def shape_settings(name: str, bench: Bench) -> list[Setting]:
+    """Fields of a shape: those of the present one as they are, of another as they come."""
+    present = {
+        dotted.partition(".")[2]: value
+        for dotted, value, _ in bench.fields()
+        if dotted.startswith(f"{TRAJECTORY}.")
+    }
+    kind = SHAPES.get(name)
+    if kind is None:
+        return []
+    known = _gathered(present) if present.get("shape") == name else {}
+    return [
+        Setting(
+            field,
+            written(known.get(field, _default(info))),
+            written(_default(info)),
+            _meaning(info.description or "", info),
+            _literals(info.annotation),
+        )
+        for field, info in kind.model_fields.items()
+        if field not in NO_SHAPE
+    ]
+
+
+def written(value: Any) -> str:
+    """A value as the command line takes it, to its last digit; nothing for one that is not given."""
+    if isinstance(value, tuple) and not any(isinstance(each, tuple) for each in value):
+        return " ".join(map(written, value))
+    if isinstance(value, tuple | dict | list | bool):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return "" if value is None else str(value)
+
+
+def read(name: str, text: str) -> Any:
+    """Value of a text, as the command line reads it; None for an empty one.
+
+    Raises
+    ------
+    InputError
+        A quotation is not closed.
+    """
+    text = text.strip()
+    if not text:
+        return None
+    try:
+        tokens = [text] if text[0] in "[{" else shlex.split(text)
+    except ValueError as error:
+        raise InputError(f"{name}: expected a value, received {text}: {error}") from None
+    if any(token.startswith("--") for token in tokens):
+        raise InputError(f"{name}: expected a value, received {text}")
+    return reading.overrides([f"--{name}", *tokens])[name]
+
+
+def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a shape, those in lists of tables as one list each."""
+    found: dict[str, Any] = {}
+    for dotted, value in fields.items():
+        name, _, inside = dotted.partition(".")
+        place, _, last = inside.partition(".")
+        if not inside:
+            found[name] = value
+        elif place.isdigit():
+            rows = found.setdefault(name, [])
+            rows.extend({} for _ in range(int(place) + 1 - len(rows)))
+            rows[int(place)][last] = value
+    return found
+
+
+def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> Setting:
+    info = _field_of(name, values)
+    default = written(_default(info)) if info else None
+    choices = _families().get(_anywhere(name)) or (_literals(info.annotation) if info else ())
+    return Setting(name, written(value), default, _meaning(meaning, info), choices)
+
+
+@cache
+def _families() -> dict[str, tuple[str, ...]]:
+    return {
+        f"{name}.{kind.told_apart_by}": tuple(kind.members)
+        for name, field in every_field(Scenario)
+        if (kind := kind_of(field)) and kind.told_apart_by
+    }
+
+
+def _anywhere(name: str) -> str:
+    return ".".join("#" if part.isdigit() else part for part in name.split("."))
+
+
+def _field_of(name: str, values: Mapping[str, Any]) -> FieldInfo | None:
+    """Description of a field, of the member of each family that the values say; None for one that is own."""
+    members: list[type[BaseModel]] = [Scenario]
+    *inside, last = name.split(".")
+    prefix, kind = "", None
+    for part in inside:
+        prefix += f"{part}."
+        if not part.isdigit():
+            field = next((each.model_fields[part] for each in members if part in each.model_fields), None)
+            kind = kind_of(field) if field else None
+        if kind is None:
+            return None
+        tag = kind.told_apart_by
+        which = values.get(f"{prefix}{tag}", "") if tag else ""
+        if tag and which and which not in kind.members:
+            return None
+        members = kind.chosen({tag: which} if tag else {})
+    return next((each.model_fields[last] for each in members if last in each.model_fields), None)
+
+
+def _default(field: FieldInfo) -> Any:
+    default = field.get_default(call_default_factory=True, validated_data={})
+    return None if default is PydanticUndefined or isinstance(default, BaseModel) else default
+
+
+def _meaning(meaning: str, field: FieldInfo | None) -> str:
+    bounds = list(dict.fromkeys(_bounds(field))) if field else []
+    return ", ".join([meaning, *bounds])
+
+
+def _bounds(field: FieldInfo) -> Iterator[str]:
+    """Bounds of a field, or of the numbers in it."""
+    for mark in (*field.metadata, *_marks(field.annotation)):
+        match mark:
+            case Ge(ge=bound):
+                yield f"≥ {bound:g}"
+            case Gt(gt=bound):
+                yield f"> {bound:g}"
+            case Le(le=bound):
+                yield f"≤ {bound:g}"
+            case Lt(lt=bound):
+                yield f"< {bound:g}"
+
+
+def _marks(annotation: Any) -> Iterator[Any]:
+    for inside in (*get_args(annotation), *getattr(annotation, "__metadata__", ())):
+        yield from inside.metadata if isinstance(inside, FieldInfo) else _marks(inside)
+
+
+def _literals(annotation: Any) -> tuple[str, ...]:
+    if get_origin(annotation) is Literal:
+        return tuple(each for each in get_args(annotation) if isinstance(each, str))
+    return ()
+
+
+PORT = 8080
+
+EXAMPLE = "hold"
+
+LARGEST_PORT = 65_535
+
+# A page that is closed says so at once; this process may be silent itself while something is compiled.
+SILENCE_S = 10.0
+
+
+def add_to(verbs: Any) -> None:
+    """Add the verb to the command's parser."""
+    parser = verbs.add_parser(
+        "bench",
+        help="drive the running twin from a browser",
+        description="Drive the running twin from a browser. Any field of the scenario is a flag",
+        usage="spheretwin bench [SCENARIO] [options] [--section.field VALUE ...]",
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        nargs="?",
+        default=EXAMPLE,
+        help=f"{', '.join(shipped())}, or a .toml file; {EXAMPLE} unless given",
+    )
+    parser.add_argument(
+        "--port",
+        type=_port,
+        default=PORT,
+        metavar="P",
+        help=f"of the page, on 127.0.0.1; {PORT} unless given, 0 for any that is free",
+    )
+    parser.add_argument("--no-browser", action="store_true", help="only say where the page is")
+    parser.add_argument(
+        "--hold-after",
+        type=_seconds,
+        default=GONE_s,
+        metavar="S",
+        help=f"how long the twin goes on after the page that operates it is gone; {GONE_s:g} s unless given",
+    )
+    parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="record from the start")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the verb until it is interrupted; True when what was recorded is whole."""
+    if find_spec("viser") is None:
+        raise InputError(
+            "bench: expected viser, which the extra bench brings: pip install 'spheretwin[bench]'"
+        )
+    scenario = scenarios.load(options.scenario, reading.overrides(rest))
+    outputs.check([options.record] if options.record else [])
+    # Slow to import, and only a bench needs it.
+
+    from spheretwin.viz.bench import server
+    from spheretwin.viz.bench.page import Page
+
+    # It warns of what it has to say to pages that are gone.
+    warnings.filterwarnings("ignore", category=UserWarning, module=r"viser\b")
+    listening = server.listen(options.port)  # before anything is compiled
+    print(f"bench: preparing {scenario.name}", file=sys.stderr, flush=True)  # it may have to be compiled
+    with listening, interruptible() as stop_requested, contextlib.ExitStack() as stack:
+        stack.enter_context(timers_stopped())
+        bench = stack.enter_context(Bench(scenario, Operators(options.hold_after, SILENCE_S)))
+        page = stack.enter_context(Page(bench, choices_of(bench), listening))
+        bench.begin()
+        _record(bench, options.record)
+        print(f"bench: {page.address} (Ctrl-C ends it)", flush=True)
+        if not options.no_browser:
+            webbrowser.open(page.address)
+        page.show(stop_requested)
+    return _told(bench)
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdecimal()) or len(text) > 5 or int(text) > LARGEST_PORT:
+        raise argparse.ArgumentTypeError(f"expected a port from 0 to {LARGEST_PORT}, received {text}")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0 <= seconds < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a time from 0 s on, received {text}")
+    return seconds
+
+
+def _record(bench: Bench, recording: Path | None) -> None:
+    if recording and (refused := bench.command("record", recording=str(recording)).wait()):
+        raise InputError(refused)
+
+
+def _told(bench: Bench) -> bool:
+    """Name what was kept, and say what went wrong with a recording; True where nothing did."""
+    state = bench.state()
+    runs.print_written([Path(file) for file in state.kept])
+    if state.recording:
+        print(f"spheretwin: not completed: {', '.join(state.recording)}", file=sys.stderr)
+    return not state.recording

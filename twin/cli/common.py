@@ -1,0 +1,168 @@
+"""What the verbs share in telling their user: JSON, warnings, broken bounds, files."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import shlex
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from spheretwin.models import mjcf
+from spheretwin.models.base.checks import Check, broken
+from spheretwin.models.base.files import OPEN_FILES, PartialFile, whole_file
+
+
+def print_json(figures: Mapping[str, Any]) -> None:
+    """Print figures as JSON on stdout: checks as their rows, named tuples by name, null for no number."""
+    print(json.dumps(_plain(figures), allow_nan=False), flush=True)
+
+
+def warn(lines: Iterable[str]) -> None:
+    """Print warnings on stderr, one line each."""
+    for line in lines:
+        print(f"spheretwin: warning: {line}", file=sys.stderr)
+
+
+def warn_of_model(path: Path) -> None:
+    """Print what the engine warns of in a model file."""
+    warn(mjcf.read(path).warnings)
+
+
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """Add the flag of the verbs that have checks."""
+    parser.add_argument(
+        "--verbose", action="store_true", help="also say what each check compares, and why its bound"
+    )
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file, whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def kept(what: str, checks: Iterable[Check]) -> bool:
+    """Whether every check keeps its bound; those that do not are named on stderr."""
+    names = broken(checks)
+    if names:
+        print(f"spheretwin: {what}: broken: {'; '.join(names)}", file=sys.stderr)
+    return not names
+
+
+def _plain(value: Any) -> Any:
+    """What JSON can hold of a value; what is not finite becomes null."""
+    if isinstance(value, Check):
+        return value.row()
+    if hasattr(value, "_asdict"):
+        return _plain(value._asdict())
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+HINT_s = 1.0
+"""Time after the first signal until a line says what a second one does."""
+
+SALVAGE_s = 5.0
+"""Longest time that the second signal waits for files to be flushed."""
+
+SIGNAL_EXIT = 128
+"""Exit code of a process that a signal ended is this and the number of the signal, as shells have it."""
+
+
+@contextlib.contextmanager
+def interruptible(remark: str = "") -> Iterator[Callable[[], bool]]:
+    """Yield a function that is True once Ctrl-C, or the end of the session, has requested a stop.
+
+    A second signal ends the process at once, with exit code 130 after Ctrl-C and 143 after SIGTERM, also
+    while compiled code runs: a law may never return. Rows that wait in memory are flushed before, and each
+    partial file is named with the command that recovers it.
+
+    Parameters
+    ----------
+    remark : str
+        What else to say then.
+    """
+    requests: list[int] = []
+    # What the parent has it ignore, as nohup a lost terminal, stays ignored.
+    heeded = [number for number in _ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, lambda number, _: requests.append(number)) for number in heeded}
+    try:
+        with _watched(heeded, remark):
+            yield lambda: bool(requests)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+_ENDINGS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
+]
+
+
+@contextlib.contextmanager
+def _watched(heeded: Collection[int], remark: str) -> Iterator[None]:
+    """Count signals in a thread, as the main thread runs no Python while it is in compiled code."""
+    reading, writing = socket.socketpair()  # on Windows, signals are written to sockets alone
+    writing.setblocking(False)
+    before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+    thread = threading.Thread(target=_watch, args=(reading, heeded, remark), name="signals", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        writing.close()
+        thread.join()
+
+
+def _watch(reading: socket.socket, heeded: Collection[int], remark: str) -> None:
+    """Read the numbers of signals until the other end is closed."""
+    count = 0
+    with reading:
+        while True:
+            try:
+                numbers = reading.recv(64)
+            except TimeoutError:
+                _print("a stop is requested; a second Ctrl-C or SIGTERM ends the process at once")
+                reading.settimeout(None)
+                continue
+            if not numbers:
+                return
+            for number in filter(heeded.__contains__, numbers):
+                count += 1
+                if count == 1:
+                    reading.settimeout(HINT_s)
+                else:
+                    _end(number, remark)
+
+
+def _end(number: int, remark: str) -> None:
+    """End the process at once."""
+    partial: list[PartialFile] = []
+    salvage = threading.Thread(target=lambda: partial.extend(OPEN_FILES.partial()), daemon=True)
+    salvage.start()
+    salvage.join(SALVAGE_s)
+    lines = [f"ended at once by a second signal, {signal.Signals(number).name}"]
+    for file in partial:
+        command = shlex.join(["spheretwin", "recover", str(file.path), "--out", str(file.target)])
+        lines.append(f"not complete: {file.target}; {file.rows} rows can be recovered: {command}")
+    _print(*lines, *filter(None, [remark]))
+    os._exit(SIGNAL_EXIT + number)
+
+
+def _print(*lines: str) -> None:
+    """Write lines to stderr, past the lock of a stream that the main thread may hold."""
+    with contextlib.suppress(OSError):
+        os.write(2, "".join(f"spheretwin: {line}\n" for line in lines).encode(errors="backslashreplace"))

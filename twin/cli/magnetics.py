@@ -1,0 +1,319 @@
+"""``spheretwin magnetics``: the magnetic model by itself."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from spheretwin.cli.common import add_verbose, kept, print_json, warn, warn_of_model, write_text
+from spheretwin.models import actuator as actuators
+from spheretwin.models import torque_curve
+from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import check_writable, make_folder
+from spheretwin.models.design import curve_check, field_check, torque_map
+from spheretwin.models.design.curve_check import ComputedCurve
+from spheretwin.models.design.torque_map import Survey
+from spheretwin.models.design.workspace import LARGEST_TILT_DEG
+from spheretwin.viz.terminal import magnetics, runs
+from spheretwin.viz.terminal.progress import tracked
+from spheretwin.viz.terminal.tables import print_checks
+
+CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
+
+MOST_POSES = 10_000  # some four hours
+
+# At 90 degrees the shaft's azimuth no longer tells a pose, and the hinges lock.
+STEEPEST_DEG = 85.0
+
+
+def add_to(verbs: Any) -> None:
+    """Add the verb to the command's parser."""
+    parser = verbs.add_parser("magnetics", help="the magnetic model by itself", allow_abbrev=False)
+    parts = parser.add_subparsers(metavar="PART", required=True)
+    curve = _part(
+        parts,
+        "curve",
+        "compute the torque curve of a pole and a coil, or judge your own",
+        "Compute the torque curve f_t(φ) from the geometry of the model file, with magpylib; or compare"
+        " your own finite-element or bench data with it.",
+    )
+    curve.add_argument("--out", type=Path, metavar="FILE.csv", help="write the curve here, not to stdout")
+    curve.add_argument("--csv", type=Path, metavar="FILE.csv", help=f"judge this {CURVE}")
+    curve.set_defaults(run=_run_curve)
+
+    check = _part(
+        parts,
+        "check",
+        "check the torque matrix against the summed field of all poles on all windings",
+        "Compare G_t(q)·I with the exact field of all magnets on the current of all windings"
+        " (magpylib), in random poses and for random currents.",
+    )
+    _add_curve(check)
+    check.add_argument("--poses", type=_count, default=15, metavar="N", help="number of poses (default: 15)")
+    check.add_argument(
+        "--seed", type=_seed, default=0, metavar="N", help="of poses and currents (default: 0)"
+    )
+    check.set_defaults(run=_run_check)
+
+    capability = _part(
+        parts,
+        "map",
+        "map the torque that is available in every direction over the workspace",
+        "Map, over tilt, its direction and spin: the torque available in every direction at the current"
+        " limit, the torque matrix's smallest singular value and condition number, and the copper loss.",
+    )
+    _add_curve(capability)
+    capability.add_argument("--out", type=Path, metavar="DIR", help="write figures into this folder")
+    capability.add_argument(
+        "--need", type=_positive, metavar="NM", help="fail where less torque (N·m) is available"
+    )
+    capability.add_argument(
+        "--largest-tilt",
+        type=_tilt,
+        default=LARGEST_TILT_DEG,
+        metavar="DEG",
+        help=f"of the shaft, degrees (default: {LARGEST_TILT_DEG:g})",
+    )
+    capability.set_defaults(run=_run_map)
+
+
+# Each part is imported when it runs: numba and scipy are slow to import.
+
+
+def _run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+
+    return run_curve(options, rest)
+
+
+def _run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+
+    return run_check(options, rest)
+
+
+def _run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+
+    return run_map(options, rest)
+
+
+def _part(parts: Any, name: str, summary: str, description: str) -> argparse.ArgumentParser:
+    part: argparse.ArgumentParser = parts.add_parser(
+        name, help=summary, description=description, allow_abbrev=False
+    )
+    part.add_argument("--mjcf", type=Path, default=MJCF_PATH, metavar="FILE.xml", help="model file")
+    part.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
+    add_verbose(part)
+    return part
+
+
+def _add_curve(part: argparse.ArgumentParser) -> None:
+    part.add_argument(
+        "--csv",
+        type=Path,
+        default=TORQUE_CURVE_PATH,
+        metavar="FILE.csv",
+        help=f"{CURVE} (default: the shipped one)",
+    )
+
+
+def _count(text: str) -> int:
+    if not _digits(text) or not 1 <= int(text) <= MOST_POSES:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to {MOST_POSES}, received {text}")
+    return int(text)
+
+
+def _seed(text: str) -> int:
+    if not _digits(text):
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0 to 10^18, received {text}")
+    return int(text)
+
+
+def _digits(text: str) -> bool:
+    return text.isdecimal() and len(text) <= 18
+
+
+def _positive(text: str) -> float:
+    value = _number(text)
+    if not (0 < value < math.inf):
+        raise argparse.ArgumentTypeError(f"expected a number above 0, received {text}")
+    return value
+
+
+def _tilt(text: str) -> float:
+    value = _number(text)
+    if not 0 <= value <= STEEPEST_DEG:
+        raise argparse.ArgumentTypeError(f"expected degrees from 0 to {STEEPEST_DEG:g}, received {text}")
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the part; True when every bound is kept."""
+    if rest:
+        raise InputError(
+            "command line: expected --csv, --mjcf, --poses, --seed, --json or --verbose,"
+            f" received {' '.join(rest)}"
+        )
+    actuator = actuators.load(options.mjcf, options.csv)
+    verdict = field_check.judge(actuator, options.poses, options.seed, tracked("direct sums"))
+    warn_of_model(options.mjcf)
+    warn(verdict.warnings)
+    if options.json:
+        print_json(verdict._asdict())
+    else:
+        magnetics.print_field(verdict)
+        print_checks("magnetics check", verdict.checks, options.verbose)
+    if verdict.curve_is_of_another_geometry:
+        distance = 100 * verdict.sources.curve_between_samples_of_peak
+        warn(
+            [
+                f"the torque curve is {distance:.2g} % of its peak away from the model file's geometry:"
+                " `spheretwin magnetics curve` remakes it"
+            ]
+        )
+    return kept("magnetics check", verdict.checks)
+
+
+def run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the part; True when every bound is kept."""
+    if rest:
+        raise InputError(
+            f"command line: expected --out, --csv, --mjcf, --json or --verbose, received {' '.join(rest)}"
+        )
+    if options.csv and options.out:
+        raise InputError("command line: expected --out or --csv, received both")
+    if options.csv:
+        return _judge(options.csv, options.mjcf, options.json)
+    if options.out:
+        check_writable(options.out)
+    return _compute(options)
+
+
+def _compute(options: argparse.Namespace) -> bool:
+    """Compute the curve, check it, write it."""
+    computed = curve_check.compute(options.mjcf, tracked("torque curve"))
+    warn_of_model(options.mjcf)
+    warn(computed.warnings)
+    if options.out:
+        write_text(options.out, computed.csv)
+    if options.json:
+        print_json(
+            {
+                **computed.peak._asdict(),
+                "doubled_mesh_moves_peak": computed.doubled_mesh.peak,
+                "doubled_mesh_moves_worst_sample": computed.doubled_mesh.worst,
+                "lookup_error": computed.lookup_error,
+                "checks": computed.checks,
+                "warnings": computed.warnings,
+            }
+        )
+    elif options.out:
+        magnetics.print_computed_curve(computed)
+        print_checks("magnetics curve", computed.checks, options.verbose)
+        runs.print_written([options.out])
+    else:
+        _print_text(computed)
+    return kept("magnetics curve", computed.checks)
+
+
+def _print_text(computed: ComputedCurve) -> None:
+    """The curve itself on stdout; what there is to say of it beside that, on stderr."""
+    print(computed.csv, end="")
+    print(
+        f"peak {computed.peak.peak_Nm_per_A:.5f} N·m/A at {computed.peak.peak_deg:.2f}°;"
+        f" a doubled mesh moves it by {computed.doubled_mesh.peak:.0e} of itself",
+        file=sys.stderr,
+    )
+
+
+def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
+    """Tell how smooth a user's curve is, and how far it is from the geometry's."""
+    judged = curve_check.judge(torque_curve.read(csv), mjcf, tracked("the geometry's own curve"))
+    warn_of_model(mjcf)
+    warn(judged.warnings)
+    if as_json:
+        print_json(
+            {
+                "path": str(csv),
+                "rows": judged.rows,
+                **judged.peak._asdict(),
+                "leave_one_out": judged.leave_one_out,
+                "geometry": {
+                    "difference": judged.geometry.as_given,
+                    "scale": judged.geometry.scale,
+                    "difference_after_scaling": judged.geometry.scaled,
+                },
+                "lookup_error": judged.lookup_error,
+                "checks": [],
+                "warnings": judged.warnings,
+            }
+        )
+    else:
+        magnetics.print_judged_curve(csv, judged)
+    return True  # data is judged by its owner: nothing here is bounded
+
+
+def run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the part; True when every bound is kept."""
+    if rest:
+        raise InputError(
+            "command line: expected --csv, --mjcf, --out, --need, --largest-tilt or --json,"
+            f" received {' '.join(rest)}"
+        )
+    plots = _plots() if options.out else None
+    actuator = actuators.load(options.mjcf, options.csv)
+    if options.out:
+        make_folder(options.out)
+    surveyed = torque_map.survey(actuator, options.largest_tilt, tracked("torque capability"))
+    verdict = torque_map.judge(surveyed, options.need)
+    warn_of_model(options.mjcf)
+    warn(verdict.warnings)
+    files = _draw(plots, options.out, surveyed) if plots else []
+    if options.json:
+        print_json({**verdict._asdict(), "figures": [str(path) for path in files]})
+    else:
+        magnetics.print_workspace(verdict)
+        print_checks("magnetics map", verdict.checks, options.verbose)
+        runs.print_written(files)
+    return kept("magnetics map", verdict.checks)
+
+
+def _plots() -> ModuleType:
+    try:
+        return import_module("spheretwin.viz.figures.torque_maps")
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "magnetics map: expected the extra `spheretwin[plots]` to draw figures,"
+            f" received an installation without {error.name}"
+        ) from None
+
+
+def _draw(plots: ModuleType, folder: Path, surveyed: Survey) -> list[Path]:
+    from spheretwin.viz.figures.crosscheck import save  # Matplotlib is optional
+
+    workspace, on_grid, worst = surveyed.workspace, surveyed.on_grid, surveyed.worst
+    limit_A = surveyed.actuator.group.current_limit_A
+    by_tilt = {
+        "least_norm_Nm": worst["least_norm"].capability.least_norm_Nm,
+        "best_Nm": worst["best"].capability.best_Nm,
+        "copper_W_per_Nm2": worst["singular_value"].capability.copper_W_per_Nm2,
+    }
+    drawn = {
+        "capability_map.png": plots.capability_map(workspace, on_grid, limit_A),
+        "capability_by_tilt.png": plots.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
+    }
+    for name, figure in drawn.items():
+        save(figure, folder / name)
+    return [folder / name for name in drawn]

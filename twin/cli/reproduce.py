@@ -1,0 +1,153 @@
+"""``spheretwin reproduce``: what the paper shows, run again and set beside it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from spheretwin.cli.common import print_json
+from spheretwin.models.base.errors import InputError, did_you_mean, shown
+from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.telemetry.run_record import versions
+from spheretwin.paper import EXPERIMENTS, page
+from spheretwin.paper.cases import Known, Memory, Plan, carried_out, checked, failed, known, planned, sample
+from spheretwin.paper.experiment import Outcomes
+from spheretwin.paper.page import Chapter
+from spheretwin.paper.rows import plants_told, rows
+from spheretwin.plant.step import ENGINES
+from spheretwin.viz.pages.markdown import prepare
+from spheretwin.viz.terminal import runs as tables
+from spheretwin.viz.terminal.progress import runs
+
+SEEDS, MOST = 20, 1000
+ALL = "all"
+
+
+def add_to(verbs: Any) -> None:
+    """Add the verb to the command's parser."""
+    names = ", ".join(EXPERIMENTS)
+    parser = verbs.add_parser(
+        "reproduce",
+        help="run what the paper shows, and set it beside the paper",
+        description="Run the paper's experiments over several seeds: tables, figures, one page."
+        " Exit code 1 when a run ended as it should not.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("names", metavar="NAME", nargs="+", help=f"{names}, or {ALL}")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write a page with figures into this folder")
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON, alone on stdout")
+    parser.add_argument(
+        "--seeds", type=_count, default=SEEDS, metavar="N", help=f"runs of each case, {SEEDS} unless given"
+    )
+    parser.add_argument(
+        "--limit", type=_count, metavar="N", help="only the first N cases of each, to see how it goes"
+    )
+    parser.add_argument(
+        "--plant",
+        choices=tuple(ENGINES),
+        help="of rows that do not name theirs; lagrangian where the model allows it unless given, and a"
+        " sample of them on mujoco too",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the verb; True when every run ended as it should."""
+    if rest:
+        raise InputError(
+            f"command line: expected --out, --json, --seeds, --limit or --plant, received {' '.join(rest)}"
+        )
+    plans = [
+        planned(EXPERIMENTS[name], options.seeds, options.limit, options.plant)
+        for name in _named(options.names)
+    ]
+    of_cases = [known(plan) for plan in plans]
+    if options.out:
+        prepare(options.out)
+    started = time.perf_counter()
+    count = sum(plan.runs + len(sample(plan)) for plan in plans)
+    with runs("reproduce", count) as done, timers_stopped():
+        found = [_found(plan, cases, done) for plan, cases in zip(plans, of_cases, strict=True)]
+    wall_s = time.perf_counter() - started
+    told = [
+        rows(plan, outcomes, cases) for plan, cases, (outcomes, _) in zip(plans, of_cases, found, strict=True)
+    ]
+    chapters = [_chapter(plan, each, of_plan) for plan, each, of_plan in zip(plans, found, told, strict=True)]
+    written = page.write(options.out, chapters, _command(options), versions()) if options.out else []
+    if options.json:
+        every = [row for of_plan in told for row in of_plan]
+        print_json({"rows": every, "seeds": options.seeds, "wall_s": wall_s, "versions": versions()})
+    else:
+        _print(chapters)
+        tables.print_written(written)
+    bad = [
+        f"{plan.experiment.name}: {each}"
+        for plan, (outcomes, _) in zip(plans, found, strict=True)
+        for each in failed(plan, outcomes)
+    ]
+    if bad:
+        print(f"spheretwin: reproduce: ended early: {'; '.join(bad)}", file=sys.stderr)
+    return not bad
+
+
+def _found(
+    plan: Plan, of_cases: Mapping[str, Known], done: Callable[[str], None]
+) -> tuple[Outcomes, list[float]]:
+    """Outcomes of a plan, and how far the sample is apart that ran on both plants."""
+    memory = Memory(plan.experiment.name, {name: case.key for name, case in of_cases.items()})
+    outcomes = carried_out(plan, done, memory=memory)
+    return outcomes, checked(plan, outcomes, done, memory)
+
+
+def _chapter(plan: Plan, found: tuple[Outcomes, list[float]], told: Sequence[Mapping[str, Any]]) -> Chapter:
+    outcomes, apart = found
+    return Chapter(
+        plan.experiment,
+        plan.experiment.tell(outcomes),
+        plan.experiment.findings(outcomes),
+        [row["command"] for row in told],
+        plants_told([row["plant"] for row in told], apart),
+        plan.experiment.side_by_side(outcomes),
+    )
+
+
+def _named(names: Sequence[str]) -> list[str]:
+    """Experiments that are asked for, each once, in the order of the registry.
+
+    Raises
+    ------
+    InputError
+        A name is none of an experiment.
+    """
+    for name in names:
+        if name != ALL and name not in EXPERIMENTS:
+            valid = [*EXPERIMENTS, ALL]
+            raise InputError(
+                f"reproduce: expected {', '.join(valid)}, received {shown(name)}{did_you_mean(name, valid)}"
+            )
+    return [name for name in EXPERIMENTS if name in names or ALL in names]
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What makes the same page again."""
+    limit = f" --limit {options.limit}" if options.limit else ""
+    plant = f" --plant {options.plant}" if options.plant else ""
+    return f"spheretwin reproduce {' '.join(_named(options.names))} --seeds {options.seeds}{limit}{plant}"
+
+
+def _print(chapters: Sequence[Chapter]) -> None:
+    for chapter in chapters:
+        for section in chapter.sections:
+            for table in section.tables:
+                title = f"{chapter.experiment.name}, {section.title}. {table.title}"
+                tables.print_rows(title, table.head, table.rows, table.texts)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or len(text) > 9 or not 1 <= int(text) <= MOST:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to {MOST}, received {text}")
+    return int(text)

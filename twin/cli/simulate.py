@@ -1,0 +1,265 @@
+"""``spheretwin simulate SCENARIO``: run one scenario, headless or live."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spheretwin import outputs, replay
+from spheretwin import scenario as scenarios
+from spheretwin.cli.common import interruptible, print_json, warn
+from spheretwin.loop import is_own
+from spheretwin.metrics import Planned
+from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
+from spheretwin.models.base.mujoco_library import timers_stopped
+from spheretwin.models.base.user_code import load_function
+from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
+from spheretwin.models.telemetry.status import Status
+from spheretwin.models.telemetry.table import KeptTelemetry
+from spheretwin.outputs import Outputs
+from spheretwin.replay import Plan
+from spheretwin.run import Figures, OwnMetric, check_names, own_value, summary
+from spheretwin.scenario import reading
+from spheretwin.scenario.reading import shipped
+from spheretwin.session import Session
+from spheretwin.simulation import Run, Sink, follow
+from spheretwin.viz.layout.view import OVERVIEW, VIEW_NAMES
+from spheretwin.viz.terminal import runs
+from spheretwin.viz.terminal.progress import Progress
+
+
+class OwnMetrics:
+    """Keeps what functions of the user's are to be handed, and asks them when the run is over.
+
+    Parameters
+    ----------
+    specs : sequence of str
+        Each ``path/to/file.py:name``; the name is that of the figure too.
+
+    Attributes
+    ----------
+    faults : list of str
+        Why a figure is missing; one line each.
+
+    Raises
+    ------
+    InputError
+        A function cannot be loaded, or has the name of another figure.
+    """
+
+    def __init__(self, specs: Sequence[str]) -> None:
+        self._functions: dict[str, OwnMetric] = {}
+        self._kept: KeptTelemetry | None = None
+        self.faults: list[str] = []
+        for spec in specs:
+            name = spec.rpartition(":")[2]
+            if name in self._functions:
+                raise InputError(f"metric: expected a name of its own for each, received {name} twice")
+            self._functions[name] = load_function(spec, f"metric {name}")
+        check_names(self._functions)
+
+    def sinks(self, session: Session, ticks: int) -> list[KeptTelemetry]:
+        """What is to follow a run of so many ticks: nothing where there is no function.
+
+        Raises
+        ------
+        InputError
+            The telemetry does not fit in memory.
+        """
+        self._kept = KeptTelemetry(session.signals, ticks) if self._functions else None
+        return [self._kept] if self._kept else []
+
+    def values(self, session: Session, status: Status) -> dict[str, Any]:
+        """Figure by name; None where a function failed: the run's other figures must not be lost by it."""
+        if self._kept is None:
+            return {}
+        run = Run(session.begun_as, status, self._kept.table, session.loop_s, session.actuator)
+        return {name: self._value(name, metric, run) for name, metric in self._functions.items()}
+
+    def _value(self, name: str, metric: OwnMetric, run: Run) -> Any:
+        try:
+            with contextlib.redirect_stdout(sys.stderr):  # stdout is for the figures alone
+                return own_value(name, metric, run)
+        except InputError as error:
+            self.faults.append(f"{error}")
+            return None
+
+
+EXAMPLE = "nutation"
+
+
+def add_to(verbs: Any) -> None:
+    """Add the verb to the command's parser."""
+    names = ", ".join(shipped())
+    parser = verbs.add_parser(
+        "simulate",
+        help="run a scenario",
+        description="Run a scenario. Any field of it is a flag: --controller.law pd --disturbance.load 1",
+        usage="spheretwin simulate SCENARIO [options] [--section.field VALUE ...]",
+        add_help=False,
+        allow_abbrev=False,
+    )
+    parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help=f"{names}, or a .toml file")
+    parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="write a Rerun recording")
+    parser.add_argument(
+        "--record-rate",
+        type=outputs.rate_Hz,
+        metavar="HZ",
+        help="rows a second that the recording keeps, and besides all that stand out in any 20 s; every one"
+        " unless given",
+    )
+    parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
+    parser.add_argument(
+        "--live", action="store_true", help="run at the pace of the clock, with a viewer on 127.0.0.1"
+    )
+    parser.add_argument(
+        "--view",
+        choices=VIEW_NAMES,
+        help=f"the tab of the recording that is open at first; {OVERVIEW} unless given",
+    )
+    parser.add_argument(
+        "--replay", type=Path, metavar="RUN.parquet", help="run again what a telemetry file says of itself"
+    )
+    parser.add_argument(
+        "--metric",
+        action="append",
+        default=[],
+        metavar="FILE.py:NAME",
+        help="one more figure: a function of the whole run (`spheretwin.simulation.Run`) to what JSON"
+        " holds; may be given again; the telemetry is kept in memory for it",
+    )
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
+    parser.add_argument("-h", "--help", action="store_true", help="show this help and the scenario's fields")
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Run the verb; True when the run completed."""
+    if options.help:
+        options.parser.print_help()
+        scenario = scenarios.load(options.scenario or EXAMPLE, reading.overrides(rest))
+        runs.print_fields(scenario.name, reading.described(scenario))
+        return True
+    if _is_bare(options, rest):
+        runs.print_scenarios({name: scenarios.load(name).description for name in shipped()})
+    plan = _planned(options, rest)
+    if options.view and not (options.record or options.live):
+        raise InputError(
+            f"command line: expected --view with --record or --live, received {options.view} alone"
+        )
+    own = OwnMetrics(options.metric)
+    outputs.check([path for path in (options.record, options.telemetry) if path])
+    outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
+    with interruptible() as stop_requested, Session(plan.scenario) as session:
+        figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
+        progress = Progress(plan.scenario.name, plan.ticks)
+        sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
+        files = Outputs(
+            session,
+            options.record,
+            options.telemetry,
+            options.live,
+            options.view or OVERVIEW,
+            options.record_rate,
+            plan.first_tick,
+        )
+        try:
+            with progress, timers_stopped(), _code_of_the_user(session, options.json):
+                status = follow(
+                    session,
+                    plan.ticks,
+                    [*sinks, *files.sinks],
+                    journal=plan.journal,
+                    live=options.live,
+                    stop_requested=stop_requested,
+                )
+            values = own.values(session, status)
+            warnings = [*session.warnings(), *figures.warnings(), *own.faults]
+            told = summary(session, status, {**figures.values(), **values}, warnings)
+            _report(session, plan, status, told, tuple(values), options.json)
+            if options.live and sys.stderr.isatty():
+                print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
+                while not stop_requested():
+                    time.sleep(0.1)
+        finally:
+            faults = files.close()
+            _report_files(files, faults, options.json)
+    return status == Status.COMPLETED and not faults and not own.faults
+
+
+def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+    """Whether nothing was given but the verb."""
+    chosen = (options.record, options.telemetry, options.replay, options.metric, options.live, options.json)
+    return options.scenario is None and not any(chosen) and not rest
+
+
+def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
+    """What to run, from a scenario and flags or from a run's own file."""
+    if options.replay:
+        if options.scenario or rest:
+            received = " ".join([*filter(None, [options.scenario]), *rest])
+            raise InputError(
+                f"command line: expected --replay without scenario and fields, received {received}"
+            )
+        plan = replay.read(options.replay)
+        if not has_checksums(options.replay):
+            warn([f"{options.replay} {NO_CHECKSUMS}"])
+        return plan
+    if options.scenario is None:
+        raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
+    scenario = scenarios.load(options.scenario, reading.overrides(rest))
+    return Plan(scenario, scenario.ticks, ())
+
+
+def _report(
+    session: Session, plan: Plan, status: Status, told: dict[str, Any], own: Sequence[str], as_json: bool
+) -> None:
+    """Print the figures, and how the run ended where it did not complete."""
+    scenario = session.begun_as
+    planned_s = plan.ticks * scenario.controller.period_s
+    if as_json:
+        print_json(told)
+    else:
+        runs.print_run(scenario.controller.law, planned_s, told, own)
+    if status != Status.COMPLETED:
+        print(f"spheretwin: {_ending(session, status, planned_s)}", file=sys.stderr, flush=True)
+
+
+def _report_files(files: Outputs, faults: Sequence[SpheretwinError], as_json: bool) -> None:
+    """Print where the files are that were written whole, and why others were not."""
+    if not as_json:
+        runs.print_files(files.record, files.telemetry)
+    for fault in faults:
+        print(f"spheretwin: {fault}", file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
+    """Tell on one line what a plain law of the user's raises; keep what it prints away from the JSON."""
+    try:
+        with contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext():
+            yield
+    except SpheretwinError:
+        raise
+    except Exception as error:  # the user's code may raise anything
+        if not is_own(session.law):
+            raise
+        raise LawError.of(session.law.name, session.t_s, error) from error
+    if session.law_error:
+        raise session.law_error
+
+
+def _ending(session: Session, status: str, planned_s: float) -> str:
+    if session.tick == 0:
+        return f"the run ended before its first tick was complete: {status}"
+    angles = np.degrees(session.q_rad)
+    pose = ", ".join(f"{name} {angle:.1f}°" for name, angle in zip("αβγ", angles, strict=True))
+    why = f", {session.reason.told}" if session.reason else ""
+    return f"the run ended at {session.t_s:.3f} s of {planned_s:g} s: {status}{why} ({pose})"

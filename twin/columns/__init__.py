@@ -1,1 +1,0 @@
-"""Columns of the telemetry that not every run has, one stage a file, and their list."""

@@ -1,1 +1,0 @@
-"""The verb `bench`, and what its page has to choose from."""

@@ -1,1 +1,0 @@
-"""The verbs below ``spheretwin magnetics``, one a file."""

@@ -1,1 +1,0 @@
-"""What is drawn of the cross-check, one figure a file."""

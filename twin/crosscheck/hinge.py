@@ -1,0 +1,343 @@
+"""One hinge with friction, three ways: our stage of it, MuJoCo's own, and the ideal that both stand for.
+
+The hinge is γ of the upright rotor, whose inertia is J3 and which no other hinge pulls along; gravity is off.
+Ideal friction opposes a motion by ``coulomb + viscous v`` and holds whatever is pushed by less than the
+Coulomb level. Neither way can: what is to hold at rest has to follow from a rate. Both creep below the level.
+
+Our stage is smooth over a stated rate and acts by halves around each step (`plant.friction`). MuJoCo's
+friction loss is a soft constraint on the rate, without a position: where its force F is below the level, it
+is that which leaves the acceleration ``a = (1 - d) a0 - d b v``, with a0 that without the constraint, the
+impedance d at no violation and the damping b of its reference, which is ``2 / (dmax timeconst)``. With a0 =
+(T - viscous v) / J the hinge relaxes at the rate ``d b + (1 - d) viscous / J`` to the creep at which
+``F = d b J v / (1 - d)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import copy
+from dataclasses import replace
+from math import ceil, inf, log1p
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.compiled import compiled
+from spheretwin.models.mjcf import Mjcf, read
+from spheretwin.plant.friction import Friction, friction, slow_down
+from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.step import step
+
+Array = NDArray[np.float64]
+
+STEP_s = 5e-4  # the default physics step
+BISECTIONS = 100  # a double has 52 bits; the bracket is up to a few thousand rates wide
+
+# What MuJoCo gives a friction loss that says nothing else: time constant and damping ratio of its reference;
+# impedance at no violation and at a large one, and how it rises between.
+TIME_CONSTANT_s, DAMPING_RATIO = 0.02, 1.0
+IMPEDANCE, LARGEST_IMPEDANCE = 0.9, 0.95
+RISE = (0.001, 0.5, 2.0)
+
+REFERENCE_DAMPING_1_s = 2 / (LARGEST_IMPEDANCE * TIME_CONSTANT_s)
+
+
+class Hinge(NamedTuple):
+    """A hinge and its bearing."""
+
+    inertia_kgm2: float
+    coulomb_Nm: float
+    viscous_Nm_s: float
+    smoothing_rad_s: float
+    """Rate over which our stage changes sign."""
+
+    def ideal_time_s(self, rate_rad_s: float, to_rad_s: float = 0.0) -> float:
+        """Time in which ideal friction slows the hinge from one rate to another."""
+        C, c = self.coulomb_Nm, self.viscous_Nm_s
+        return self.inertia_kgm2 / c * (log1p(c * rate_rad_s / C) - log1p(c * to_rad_s / C))
+
+    def ideal_angle_rad(self, rate_rad_s: float) -> float:
+        """Angle over which ideal friction stops the hinge, the integral of its equation of motion."""
+        momentum = self.inertia_kgm2 * rate_rad_s
+        return (momentum - self.coulomb_Nm * self.ideal_time_s(rate_rad_s)) / self.viscous_Nm_s
+
+    def ideal_coast_rad_s(self, t_s: Array, rate_rad_s: float) -> Array:
+        """(n,) rate under ideal friction alone."""
+        final = self.coulomb_Nm / self.viscous_Nm_s
+        decay = self.viscous_Nm_s / self.inertia_kgm2
+        return np.maximum((rate_rad_s + final) * np.exp(-decay * t_s) - final, 0.0)
+
+    def factor_at_rest_Nm_s(self) -> float:
+        """Our stage over the rate, at rest."""
+        return self.viscous_Nm_s + self.coulomb_Nm / self.smoothing_rad_s
+
+    def slowed_rad_s(self, rate_rad_s: Array) -> Array:
+        """Rate after half a step of our stage alone."""
+        share = 0.5 * STEP_s / self.inertia_kgm2
+        middle = rate_rad_s / (1 + 0.5 * share * self._factor_Nm_s(rate_rad_s))
+        x = share * self._factor_Nm_s(middle)
+        slowed: Array = rate_rad_s / (1 + x + 0.5 * x**2)
+        return slowed
+
+    def stage_Nm(self, rate_rad_s: Array) -> Array:
+        """Torque under which our stage creeps at a rate, from the end of one step to that of the next.
+
+        Half a step of friction takes the rate v to P(v), the torque adds h T/J, and the other half takes that
+        back to v. P rises with the rate; bisection inverts it.
+        """
+        x = 0.5 * STEP_s / self.inertia_kgm2 * self.factor_at_rest_Nm_s()
+        low, high = rate_rad_s, rate_rad_s * (1 + x + 0.5 * x**2)
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            too_low = self.slowed_rad_s(middle) < rate_rad_s
+            low, high = np.where(too_low, middle, low), np.where(too_low, high, middle)
+        torque: Array = self.inertia_kgm2 / STEP_s * (high - self.slowed_rad_s(rate_rad_s))
+        return torque
+
+    def _factor_Nm_s(self, rate_rad_s: Array) -> Array:
+        factor: Array = self.viscous_Nm_s + self.coulomb_Nm / np.hypot(rate_rad_s, self.smoothing_rad_s)
+        return factor
+
+    def stage_loss_rad_s(self) -> float:
+        """Rate that Coulomb friction takes in half a step."""
+        return 0.5 * STEP_s * self.coulomb_Nm / self.inertia_kgm2
+
+    def mujoco_Nm(self, rate_rad_s: Array) -> Array:
+        """Torque that creeps at a rate under MuJoCo's friction loss and damping."""
+        level = np.minimum(self.coulomb_Nm, self.mujoco_soft_Nm_s() * rate_rad_s)
+        held: Array = self.viscous_Nm_s * rate_rad_s + level
+        return held
+
+    def mujoco_soft_Nm_s(self) -> float:
+        """MuJoCo's friction loss over the rate of its creep, below the level."""
+        return REFERENCE_DAMPING_1_s * IMPEDANCE / (1 - IMPEDANCE) * self.inertia_kgm2
+
+    def mujoco_relaxation_1_s(self) -> float:
+        """Rate at which a motion dies out within MuJoCo's friction loss."""
+        viscous = self.viscous_Nm_s / self.inertia_kgm2
+        return IMPEDANCE * REFERENCE_DAMPING_1_s + (1 - IMPEDANCE) * viscous
+
+    def mujoco_grip_rad_s(self) -> float:
+        """Rate from which on MuJoCo's friction loss no longer brakes by its level, where nothing else acts.
+
+        There ``a = -mujoco_relaxation_1_s v``, so that the force is ``d (b J - viscous) v``.
+        """
+        gained = REFERENCE_DAMPING_1_s * self.inertia_kgm2 - self.viscous_Nm_s
+        return self.coulomb_Nm / (IMPEDANCE * gained) if gained > 0 else inf
+
+    def relaxation_s(self) -> float:
+        """Time in which a third is left of a motion below the level, either way.
+
+        A step of ours leaves ``1 / (1 + x + x**2 / 2)**2`` of a rate, ``x = h k / 2J``: less than an implicit
+        Euler step, ``1 / (1 + h k / J)``, whose time is J/k + h.
+        """
+        own = self.inertia_kgm2 / self.factor_at_rest_Nm_s() + STEP_s
+        return max(own, 1 / self.mujoco_relaxation_1_s())
+
+
+GAMMA = 2  # the hinge, among (alpha, beta, gamma)
+
+
+class Motion(NamedTuple):
+    """A motion of the hinge, a row a step, and its start."""
+
+    q_rad: Array  # (n + 1,)
+    qdot_rad_s: Array  # (n + 1,)
+
+
+Mover = Callable[[Hinge, float, Array], Motion]
+"""Moves a hinge from a rate, rad/s, by torques, N·m, each held over a step."""
+
+
+def by_stage(actuator: Actuator, hinge: Hinge, rate_rad_s: float, torque_Nm: Array) -> Motion:
+    """Motion of the Lagrangian plant under our stage of friction.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Its inertia is the rotor's.
+    hinge : Hinge
+    rate_rad_s : float, rad/s
+        At the start.
+    torque_Nm : (n,) array, N·m
+        On the hinge, held over each step.
+    """
+    rotor = LagrangianRotor(actuator, STEP_s)
+    bearing = friction(
+        _on_gamma(hinge.coulomb_Nm),
+        _on_gamma(hinge.viscous_Nm_s),
+        hinge.smoothing_rad_s,
+        rotor.inertia,
+        STEP_s,
+    )
+    return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), bearing, torque_Nm)
+
+
+def by_mujoco(mjcf: Path, hinge: Hinge, rate_rad_s: float, torque_Nm: Array) -> Motion:
+    """Motion of MuJoCo under its own friction loss and damping; as in `by_stage`.
+
+    Raises
+    ------
+    InputError
+        The model cannot be read.
+    """
+    kept = read(mjcf)
+    rotor = Rotor(_with_bearing(kept, hinge), STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
+    none = friction(np.zeros(3), np.zeros(3), hinge.smoothing_rad_s, np.ones(3), STEP_s)
+    return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), none, torque_Nm)
+
+
+def _with_bearing(kept: Mjcf, hinge: Hinge) -> Mjcf:
+    """A model with MuJoCo's friction on γ, under MuJoCo's own defaults whatever the file's options are."""
+    model = copy(kept.bare)
+    model.dof_frictionloss[GAMMA], model.dof_damping[GAMMA] = hinge.coulomb_Nm, hinge.viscous_Nm_s
+    model.dof_solref[GAMMA] = TIME_CONSTANT_s, DAMPING_RATIO
+    model.dof_solimp[GAMMA] = IMPEDANCE, LARGEST_IMPEDANCE, *RISE
+    model.opt.disableflags, model.opt.enableflags = int(mujoco.mjtDisableBit.mjDSBL_CONTACT), 0
+    model.opt.solver, model.opt.iterations = mujoco.mjtSolver.mjSOL_NEWTON, 100
+    model.opt.noslip_iterations = 0
+    # One constraint is solved in two steps of Newton's, without any: a tolerance would end it before.
+    model.opt.tolerance = 0.0
+    return replace(kept, bare=model)
+
+
+def _motion(plant: Any, bearing: Friction, torque_Nm: Array) -> Motion:
+    q, qdot = np.empty((2, len(torque_Nm) + 1))
+    _follow(plant, bearing, torque_Nm, q, qdot)
+    return Motion(q, qdot)
+
+
+@compiled
+def _follow(plant: Any, bearing: Friction, torque_Nm: Array, q: Array, qdot: Array) -> None:
+    on_hinges = np.zeros(3)
+    q[0], qdot[0] = plant.q[GAMMA], plant.qdot[GAMMA]
+    for row in range(torque_Nm.shape[0]):
+        plant.torque_q[GAMMA] = torque_Nm[row]
+        if bearing.acts:
+            slow_down(bearing, plant.q, plant.qdot, on_hinges)
+        step(plant)
+        if bearing.acts:
+            slow_down(bearing, plant.q, plant.qdot, on_hinges)
+        q[row + 1], qdot[row + 1] = plant.q[GAMMA], plant.qdot[GAMMA]
+
+
+def _on_gamma(value: float) -> Array:
+    return np.array([0.0, 0.0, value])
+
+
+RAMP_s = 5.0  # from nothing to the level
+START_rad_s = 2.0
+PUSH = 0.5  # share of the level
+SETTLING = 60  # relaxation times at rest: half a level makes them 1.54 times as long, and leaves exp(-39)
+
+
+class Ramp(NamedTuple):
+    """A slow ramp of torque up and back, from rest; a row a step."""
+
+    torque_Nm: Array  # (n,) held over the step
+    rates_rad_s: dict[str, Array]  # (n,) at its end
+    ideal_rad_s: Array  # (n,)
+
+
+class Coast(NamedTuple):
+    """Coasting to rest; a row a step."""
+
+    t_s: Array  # (n,)
+    motions: dict[str, Motion]
+    ideal_rad_s: Array  # (n,)
+
+
+class Bearing(NamedTuple):
+    """All runs of one bearing."""
+
+    hinge: Hinge
+    ramp: Ramp
+    coast: Coast
+    creep_rad_s: dict[str, float]  # pushed by `PUSH`
+    settling: int  # steps until it was taken
+
+
+def run(hinge: Hinge, movers: Mapping[str, Mover]) -> Bearing:
+    """All runs of one bearing.
+
+    Parameters
+    ----------
+    hinge : Hinge
+    movers : mapping of str to Mover
+        By name.
+    """
+    settling = ceil(SETTLING * hinge.relaxation_s() / STEP_s)
+    push = np.full(settling, PUSH * hinge.coulomb_Nm)
+    creep = {name: float(move(hinge, 0.0, push).qdot_rad_s[-1]) for name, move in movers.items()}
+    return Bearing(hinge, _ramp(hinge, movers), _coast(hinge, movers, settling), creep, settling)
+
+
+def _ramp(hinge: Hinge, movers: Mapping[str, Mover]) -> Ramp:
+    up = ramp_up(hinge)
+    torque = np.concatenate([up, up[-2::-1]])
+    rates = {name: move(hinge, 0.0, torque).qdot_rad_s[1:] for name, move in movers.items()}
+    return Ramp(torque, rates, ideal_ramp(hinge, len(up)))
+
+
+def _coast(hinge: Hinge, movers: Mapping[str, Mover], settling: int) -> Coast:
+    still = np.zeros(ceil(hinge.ideal_time_s(START_rad_s) / STEP_s) + settling)
+    motions = {name: move(hinge, START_rad_s, still) for name, move in movers.items()}
+    t_s = STEP_s * np.arange(len(still) + 1, dtype=np.float64)
+    return Coast(t_s, motions, hinge.ideal_coast_rad_s(t_s, START_rad_s))
+
+
+def breakaway_rate_rad_s(hinge: Hinge) -> float:
+    """Rate that is called sliding: ten times whatever either way creeps at, or loses in one step."""
+    step = STEP_s * hinge.coulomb_Nm / hinge.inertia_kgm2
+    return 10 * max(hinge.smoothing_rad_s, step, hinge.coulomb_Nm / hinge.mujoco_soft_Nm_s())
+
+
+def slope_Nm_s(hinge: Hinge) -> float:
+    """Rate of the ramp."""
+    return hinge.coulomb_Nm / RAMP_s
+
+
+def inertia_torque_Nm(hinge: Hinge, rates_rad_s: Array | float) -> Array:
+    """How far a ramp gets above what holds the hinge until the hinge has gained a rate."""
+    above: Array = np.sqrt(2 * hinge.inertia_kgm2 * slope_Nm_s(hinge) * np.asarray(rates_rad_s))
+    return above
+
+
+def latest_breakaway_Nm(hinge: Hinge) -> float:
+    """Torque at which a hinge that is held by no more than ideal friction slides at the latest."""
+    rate = breakaway_rate_rad_s(hinge)
+    return hinge.coulomb_Nm + hinge.viscous_Nm_s * rate + float(inertia_torque_Nm(hinge, rate))
+
+
+def ramp_up(hinge: Hinge) -> Array:
+    """(n,) torque of the rising half: twice as far above the level as breaking away can take."""
+    peak = hinge.coulomb_Nm + 2 * (latest_breakaway_Nm(hinge) - hinge.coulomb_Nm)
+    rise = slope_Nm_s(hinge) * STEP_s
+    return rise * np.arange(1, ceil(peak / rise) + 1, dtype=np.float64)
+
+
+def ideal_ramp(hinge: Hinge, rising: int) -> Array:
+    """(2n - 1,) rate under ideal friction after each step of a ramp up and back: at rest, sliding, at rest.
+
+    Sliding is linear, ``J dv/dt = T - coulomb - viscous v``, and has a closed form on either side.
+    """
+    time = hinge.inertia_kgm2 / hinge.viscous_Nm_s
+    slope = slope_Nm_s(hinge)
+
+    def sliding(t: Array, above_Nm: float, slope_Nm_s: float, from_rad_s: float) -> Array:
+        gone = -np.expm1(-t / time)
+        pushed = above_Nm * gone + slope_Nm_s * (t - time * gone)
+        rate: Array = from_rad_s * (1 - gone) + pushed / hinge.viscous_Nm_s
+        return rate
+
+    t = STEP_s * np.arange(1, rising + 1, dtype=np.float64)
+    begun = hinge.coulomb_Nm / slope
+    up = np.where(t > begun, sliding(np.maximum(t - begun, 0), 0.0, slope, 0.0), 0.0)
+    above = slope * t[-1] - hinge.coulomb_Nm
+    down = sliding(t[:-1], above, -slope, float(up[-1]))
+    return np.concatenate([up, np.where(np.cumsum(down <= 0) > 0, 0.0, down)])

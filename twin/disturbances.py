@@ -1,0 +1,298 @@
+"""A torque that stays."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+
+from spheretwin.models.telemetry.csv_series import TIME, LONGEST_s, Series, check_rising, read
+
+Array = NDArray[np.float64]
+
+# The generator counts in blocks of four numbers, of which a tick takes the first.
+NUMBERS_A_COUNT = 4
+
+
+class Draws(NamedTuple):
+    """Uniform numbers from 0 to 1 at some control ticks, (n,) each."""
+
+    paper: Array
+    """What the paper's r is made of."""
+    of_term: Callable[[int], Array]
+    """Those of a term, by its place among the terms."""
+
+
+def term_draws(seed: int, first: int, ticks: int, place: int) -> Array:
+    """Draws of one term at consecutive control ticks.
+
+    A stream of its own for each seed and place, whose numbers are counted by tick: they are the same in any
+    order and any block, and leave no state behind.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the run.
+    first : int
+        First tick.
+    ticks : int
+        How many.
+    place : int
+        Place of the term among the terms.
+
+    Returns
+    -------
+    (ticks,) array
+        Uniform numbers from 0 to 1.
+    """
+    counted = np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place,))).advance(first)
+    numbers = np.random.Generator(counted).random(NUMBERS_A_COUNT * ticks)
+    return numbers[::NUMBERS_A_COUNT].copy()
+
+
+CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+# Thousands of times what the coils can hold; beyond it only the engine's range is tested.
+LARGEST_Nm = 1000.0
+
+Torque = Annotated[float, Field(ge=-LARGEST_Nm, le=LARGEST_Nm)]
+Torques = tuple[Torque, Torque, Torque]
+Time = Annotated[float, Field(ge=0, le=LONGEST_s)]
+
+ZERO: Torques = (0.0, 0.0, 0.0)
+
+
+class Term(BaseModel):
+    """A kind that a scenario can name: its parameters, and the torque that they make."""
+
+    model_config = CONFIG
+
+    @abstractmethod
+    def sample(self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Torque at control ticks, each held for a control period.
+
+        Parameters
+        ----------
+        t : (n,) array, s
+            Times of the ticks.
+        draws : callable
+            Gives the term's own random numbers at these ticks, (n,) from 0 to 1.
+
+        Returns
+        -------
+        (n, 3) array, N·m
+            Generalised torque on (α, β, γ), subtracted in (1).
+        """
+
+
+class Constant(Term):
+    """The same torque throughout."""
+
+    kind: Literal["constant"] = Field("constant", description="kind of disturbance")
+    torque_Nm: Torques = Field(ZERO, description="torque on each axis, N·m")
+
+    def sample(  # noqa: D102
+        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        return np.tile(self.torque_Nm, (len(t), 1))
+
+
+Envelope = Literal["decaying", "growing"]
+Bound = Annotated[float, Field(ge=0, le=LARGEST_Nm)]
+
+
+class Random(Term):
+    """A uniform random factor a tick, the same on all axes, times ``cos πt``, ``-sin πt`` and ``exp ∓πt``."""
+
+    kind: Literal["random"] = Field("random", description="kind of disturbance")
+    bound_Nm: tuple[Bound, Bound, Bound] = Field(
+        (0.05, 0.05, 0.05), description="bound of the random factor on each axis, N·m"
+    )
+    gamma_envelope: Envelope = Field(
+        "decaying", description="exp(-πt) or, as printed, exp(πt) on the third axis"
+    )
+
+    def sample(self, t: Array, draws: Callable[[], Array]) -> Array:  # noqa: D102
+        return random_torque(t, draws(), np.array(self.bound_Nm), self.gamma_envelope)
+
+
+def random_torque(t: Array, draws: Array, bound_Nm: Array, gamma_envelope: Envelope) -> Array:
+    """Random torque (56) at control ticks.
+
+    Parameters
+    ----------
+    t : (n,) array, s
+        Times of the ticks.
+    draws : (n,) array
+        Uniform random numbers from 0 to 1.
+    bound_Nm : (3,) array, N·m
+        Bound of the random factor on each axis.
+    gamma_envelope : "decaying" or "growing"
+        Sign of the exponent on the third axis.
+
+    Returns
+    -------
+    (n, 3) array, N·m
+        Not finite where the growing envelope overflows.
+    """
+    r = -bound_Nm + 2 * bound_Nm * draws[:, None]  # (n, 3)
+    growth = np.pi if gamma_envelope == "growing" else -np.pi
+    with np.errstate(over="ignore", invalid="ignore"):  # infinity, and its product with a factor of 0
+        third = np.exp(growth * t) if bound_Nm[2] else np.zeros_like(t)
+        return r * np.stack([np.cos(np.pi * t), np.sin(-np.pi * t), third], axis=1)
+
+
+# Far above what a control period can follow.
+LARGEST_Hz, LARGEST_rad = 1e6, 1e4
+
+Frequency = Annotated[float, Field(ge=0, le=LARGEST_Hz)]
+Phase = Annotated[float, Field(ge=-LARGEST_rad, le=LARGEST_rad)]
+
+
+class Sinusoidal(Term):
+    """``amplitude sin(2 pi f t + phase)`` on each axis."""
+
+    kind: Literal["sinusoidal"] = Field("sinusoidal", description="kind of disturbance")
+    amplitude_Nm: Torques = Field(ZERO, description="amplitude on each axis, N·m")
+    frequency_Hz: tuple[Frequency, Frequency, Frequency] = Field(
+        (1.0, 1.0, 1.0), description="frequency on each axis, Hz"
+    )
+    phase_rad: tuple[Phase, Phase, Phase] = Field(
+        (0.0, 0.0, 0.0), description="phase on each axis at 0 s, rad"
+    )
+
+    def sample(  # noqa: D102
+        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        w = 2 * np.pi * np.array(self.frequency_Hz)
+        swing: NDArray[np.float64] = np.sin(t[:, None] * w + np.array(self.phase_rad))
+        return np.array(self.amplitude_Nm) * swing
+
+
+class Steps(Term):
+    """No torque, and others from stated times on."""
+
+    kind: Literal["steps"] = Field("steps", description="kind of disturbance")
+    times_s: Annotated[tuple[Time, ...], Field(min_length=1)] = Field(
+        (1.0,), description="times of the steps, rising, s"
+    )
+    torques_Nm: tuple[Torques, ...] = Field(
+        (ZERO,), description="torque on each axis from each of these times on, N·m"
+    )
+
+    def sample(  # noqa: D102
+        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        return Series(np.array(self.times_s), np.array(self.torques_Nm)).held(t, ZERO)
+
+    @model_validator(mode="after")
+    def _usable(self) -> Steps:
+        if len(self.times_s) != len(self.torques_Nm):
+            raise ValueError(
+                f"expected as many torques_Nm as times_s, received {len(self.torques_Nm)}"
+                f" for {len(self.times_s)} times"
+            )
+        check_rising(self.times_s)
+        return self
+
+
+COLUMNS = ("alpha_Nm", "beta_Nm", "gamma_Nm")
+
+
+class Table(Term):
+    """Torques of a CSV file at their times; the first before, the last after them.
+
+    The file is read when the term is made: what becomes of it later changes nothing.
+
+    Raises
+    ------
+    InputError
+        The file is no series of torques.
+    """
+
+    kind: Literal["table"] = Field("table", description="kind of disturbance")
+    file: Annotated[str, Field(min_length=1)] = Field(
+        description=f"CSV of the torques, with the columns {', '.join((TIME, *COLUMNS))}",
+        json_schema_extra={"path": True},
+    )
+    between: Literal["linear", "held"] = Field(
+        "linear", description="torque between two rows: on a straight line, or the earlier one"
+    )
+
+    _torques: Series = PrivateAttr()
+
+    def sample(  # noqa: D102
+        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        if self.between == "held":
+            return self._torques.held(t, self._torques.values[0])
+        return self._torques.linear(t)
+
+    @model_validator(mode="after")
+    def _read(self) -> Table:
+        self._torques = read("disturbance", Path(self.file), COLUMNS, LARGEST_Nm)
+        return self
+
+
+AnyDisturbance = Annotated[
+    Constant  # one row each
+    | Steps
+    | Sinusoidal
+    | Table
+    | Random,
+    Field(discriminator="kind"),
+]
+
+KINDS: dict[str, type[Term]] = {
+    kind.model_fields["kind"].default: kind for kind in get_args(get_args(AnyDisturbance)[0])
+}
+
+
+LOAD_UNIT_Nm = 0.05  # paper: torque of L = 1 on each axis
+
+# A hundred times what the coils can hold.
+LARGEST_LOAD = 1000.0
+
+
+class Disturbance(BaseModel):
+    """What acts on the hinges beside the coils."""
+
+    model_config = CONFIG
+
+    load: Annotated[float, Field(ge=-LARGEST_LOAD, le=LARGEST_LOAD)] = Field(
+        0.0, description="L, constant load in units of 0.05 N·m on each axis"
+    )
+    random_bound_Nm: Bound = Field(0.0, description="bound of the uniform random factor r, N·m (paper: 0.05)")
+    gamma_envelope: Envelope = Field(
+        "decaying", description="exp(-πt) or, as printed, exp(πt) on the third axis"
+    )
+    terms: tuple[AnyDisturbance, ...] = Field(
+        (), description="what adds to these: constant, steps, sinusoidal, table, random"
+    )
+
+    def sample(self, t: NDArray[np.float64], draws: Draws) -> NDArray[np.float64]:
+        """Disturbance at the control ticks, each held for a control period.
+
+        Parameters
+        ----------
+        t : (n,) array, s
+            Times of the ticks.
+        draws : Draws
+            Random numbers of these ticks.
+
+        Returns
+        -------
+        (n, 3) array, N·m
+            Generalised torque, subtracted in (1); not finite where a growing envelope overflows.
+        """
+        bound = np.full(3, self.random_bound_Nm)
+        torque = self.load * LOAD_UNIT_Nm + random_torque(t, draws.paper, bound, self.gamma_envelope)
+        for place, term in enumerate(self.terms):
+            torque += term.sample(t, partial(draws.of_term, place))
+        return torque

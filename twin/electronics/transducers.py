@@ -1,0 +1,276 @@
+"""Potentiometers of α and β: from the angle of a joint to the voltage of a wiper."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, model_validator
+
+from spheretwin.electronics.random_streams import uniforms
+from spheretwin.electronics.sensor_stage import Numbers, SensorSetup, SensorStage
+from spheretwin.electronics.stages import FaultLine, fault_line, through
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.trajectories.rounding import CONFIG
+
+CHANNELS = 2
+"""Angles that are voltages on their way: α and β."""
+
+HARMONICS = 4
+
+# The slope of the residual stays below 1, and the voltage rises with the angle everywhere, up to here: with
+# amplitudes of 1/k² the slope is at most 2π/E·Σ 1/k, and the peak at least π/4, as |∫f·cos| ≤ 4 max|f| for
+# the first harmonic. Of the electrical angle E that leaves 1/(8·Σ 1/k).
+LARGEST_SHARE = 0.06
+
+
+class PotentiometerSection(SensorStage):
+    """Potentiometers of α and β; ideal while residual and noise are 0."""
+
+    electrical_angle_rad: Annotated[float, Field(ge=1e-2, le=100)] = Field(
+        5 * pi / 3,
+        description="angle of the track, centred on 0, at whose ends the wiper stops, rad (assumed: 300°)",
+    )
+    supply_V: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
+        5.0, description="voltage across the track, centred on 0, V (assumed: the ADC's ±2.5 V)"
+    )
+    nonlinearity_rad: Annotated[float, Field(ge=0, le=6)] = Field(
+        0.0,
+        description="largest residual after calibration, four harmonics of the track drawn from the seed, rad"
+        " (assumed for the prototype: 0.02°; uncalibrated 5 % of the track, as comparable parts state)",
+    )
+    noise_rad: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0, description="noise of the wiper, white from conversion to conversion, rad rms (assumed: 0.02°)"
+    )
+
+    @model_validator(mode="after")
+    def _rises(self) -> PotentiometerSection:
+        largest = LARGEST_SHARE * self.electrical_angle_rad
+        if not self.nonlinearity_rad < largest:
+            raise ValueError(
+                f"expected nonlinearity_rad below {largest:.4g} rad, {LARGEST_SHARE:.0%} of"
+                " electrical_angle_rad, so that the voltage rises with the angle,"
+                f" received {self.nonlinearity_rad:.10g}"
+            )
+        return self
+
+    @property
+    def ideal(self) -> bool:
+        """True if the angle comes out as it goes in."""
+        return self.nonlinearity_rad == 0 and self.noise_rad == 0
+
+    def build(self, setup: SensorSetup) -> Potentiometers:
+        """Potentiometers with residuals of their own; with ends, too, if the converter is not ideal."""
+        converts = not (self.ideal and setup.sensors.adc.ideal)
+        phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
+        return Potentiometers(
+            converts or setup.faults,
+            converts,
+            self.volts_per_rad,
+            (potentiometer(self, phases[0]), potentiometer(self, phases[1])),
+            fault_line(CHANNELS),
+        )
+
+    @classmethod
+    def function(cls) -> Any:
+        """Compiled function that takes α and β to the wipers."""
+        return pass_potentiometers
+
+    @property
+    def volts_per_rad(self) -> float:
+        """Slope of the line that the controller takes the track for."""
+        return self.supply_V / self.electrical_angle_rad
+
+
+class Potentiometers(NamedTuple):
+    """Both potentiometers, for compiled code."""
+
+    on: bool
+    converts: bool  # whether they are more than a line
+    volts_per_rad: float
+    channels: tuple[Potentiometer, Potentiometer]
+    line: FaultLine  # of the wipers, in rad of the nominal slope
+
+
+@allocation_free
+def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64], numbers: Numbers) -> None:
+    """Replace α and β by the angles, rad, that the voltages of the wipers stand for."""
+    for channel in range(CHANNELS):
+        angle = measurement[0, channel]
+        if stage.converts:
+            angle = wiper_voltage(stage.channels[channel], angle) / stage.volts_per_rad
+        measurement[0, channel] = through(stage.line, channel, angle, numbers.faults)
+
+
+class Potentiometer(NamedTuple):
+    """One potentiometer, for compiled code."""
+
+    volts_per_rad: float
+    half_angle_rad: float
+    half_supply_V: float
+    turns: float  # of the first harmonic for a radian of the joint, in rad
+    cosine_rad: tuple[float, ...]  # (HARMONICS,) of the residual, from the first harmonic on
+    sine_rad: tuple[float, ...]  # (HARMONICS,)
+
+
+def potentiometer(section: PotentiometerSection, shares: NDArray[np.float64]) -> Potentiometer:
+    """Potentiometer with a residual of its own.
+
+    The residual is a sum of the first harmonics of the track, the k-th with an amplitude of 1/k² and a phase
+    drawn at random, scaled so that its largest magnitude on the track is the stated one.
+
+    Parameters
+    ----------
+    section : PotentiometerSection
+    shares : (HARMONICS,) array
+        Phases of the harmonics as shares of a turn, 0 to 1, drawn for this channel.
+    """
+    order = np.arange(1, HARMONICS + 1)
+    shape = np.exp(1j * (2 * pi * shares)) / order**2
+    residual = section.nonlinearity_rad / _peak(shape) * shape
+    return Potentiometer(
+        section.volts_per_rad,
+        section.electrical_angle_rad / 2,
+        section.supply_V / 2,
+        2 * pi / section.electrical_angle_rad,
+        tuple(residual.real.tolist()),
+        tuple((-residual.imag).tolist()),
+    )
+
+
+@allocation_free
+def wiper_voltage(potentiometer: Potentiometer, angle_rad: float) -> float:
+    """Voltage of the wiper (V), without its noise, at an angle of the joint (rad).
+
+    Beyond an end of the track the wiper stands at that end; what is no number stays none.
+    """
+    half = potentiometer.half_angle_rad
+    if angle_rad > half:
+        angle_rad = half
+    elif angle_rad < -half:
+        angle_rad = -half
+    # Each harmonic is the first one's turn further than the last.
+    first_cosine, first_sine = cos(potentiometer.turns * angle_rad), sin(potentiometer.turns * angle_rad)
+    cosine, sine, residual = 1.0, 0.0, 0.0
+    for k in range(HARMONICS):
+        cosine, sine = cosine * first_cosine - sine * first_sine, sine * first_cosine + cosine * first_sine
+        residual += potentiometer.cosine_rad[k] * cosine + potentiometer.sine_rad[k] * sine
+    volts = potentiometer.volts_per_rad * (angle_rad + residual)
+    if volts > potentiometer.half_supply_V:
+        volts = potentiometer.half_supply_V
+    elif volts < -potentiometer.half_supply_V:
+        volts = -potentiometer.half_supply_V
+    return volts
+
+
+def _peak(shape: NDArray[np.complex128]) -> float:
+    """Largest magnitude of ``Re Σ shape[k-1]·exp(ikθ)``: exact, at the roots of its slope.
+
+    With z = exp(iθ) the slope times zⁿ is a polynomial of degree 2n. Roots off the unit circle are no
+    extrema, but the sum is taken at their angle, where it is no larger than its peak.
+    """
+    order = np.arange(1, len(shape) + 1)
+    slope = 1j * order * shape
+    roots = np.roots(np.concatenate([slope[::-1], [0], slope.conj()]))
+    return float(np.abs((np.exp(1j * np.outer(np.angle(roots), order)) @ shape).real).max())
+
+
+class EncoderSection(SensorStage):
+    """Incremental encoder of γ; ideal while it has no counts.
+
+    Its counter is set from the pose at the start, rounded to the grid of the disc, and no count is ever lost:
+    what it holds is then the angle to the nearest line of the grid, over any number of turns. The index, once
+    a turn where γ is a multiple of 2π, lies on that grid. It would find lost counts, and where in a turn a
+    rotor of unknown pose stands, neither of which happens here; it could not tell how many turns were missed.
+    """
+
+    counts: Annotated[int, Field(ge=0, le=2**31)] = Field(
+        0,
+        description="counts a turn, rounded to the nearest; 0 for none"
+        " (assumed: OME-500-2MCA read as 500 pulses × 4 = 2000, 0.18°)",
+    )
+
+    @property
+    def ideal(self) -> bool:
+        """True if the angle comes out as it goes in."""
+        return self.counts == 0
+
+    def build(self, setup: SensorSetup) -> Encoder:
+        """Encoder without errors of its own: a line is where it should be."""
+        return Encoder(not self.ideal or setup.faults, float(self.counts), fault_line(1))
+
+    @classmethod
+    def function(cls) -> Any:
+        """Compiled function that counts γ."""
+        return pass_encoder
+
+
+class Encoder(NamedTuple):
+    """The encoder, for compiled code."""
+
+    on: bool
+    counts_per_turn: float  # 0 for none
+    line: FaultLine  # of the angle, rad, before it is counted
+
+
+@allocation_free
+def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], numbers: Numbers) -> None:
+    """Count γ, rad, behind its fault line."""
+    turned = through(encoder.line, 0, measurement[0, 2], numbers.faults)
+    measurement[0, 2] = counted(encoder, turned)
+
+
+@allocation_free
+def counted(encoder: Encoder, angle_rad: float) -> float:
+    """Angle (rad) of the count nearest to an angle (rad), half-way to the even one.
+
+    What is no number stays none, and an angle of more counts than a number can hold is infinite.
+    """
+    if encoder.counts_per_turn == 0:
+        return angle_rad
+    count = np.rint(angle_rad * (encoder.counts_per_turn / (2 * pi)))
+    return count * (2 * pi / encoder.counts_per_turn)
+
+
+class CurrentSection(BaseModel):
+    """Sensors of the group currents; a detector of faults reads them, and the telemetry has what they say.
+
+    There are such sensors if they have noise, or if a detector needs them.
+    """
+
+    model_config = CONFIG
+
+    noise_A: Annotated[float, Field(ge=0, le=1e3)] = Field(
+        0.0, description="noise of a sample, A rms (assumed for the prototype: 0.02, a Hall sensor's)"
+    )
+
+
+class CurrentSensors(NamedTuple):
+    """Sensors of the group currents, for compiled code."""
+
+    on: bool
+    noise_A: float  # standard deviation
+    measured_A: NDArray[np.float64]  # (n,) at the last control tick
+
+
+@allocation_free
+def sense_currents(sensors: CurrentSensors, current: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+    """Measure the currents at a control tick.
+
+    Parameters
+    ----------
+    sensors : CurrentSensors
+        The measured currents are written.
+    current : (n,) array, A
+        True.
+    draws : array
+        Standard normal numbers, of which the last n are used; none without noise.
+    """
+    groups, measured = current.shape[0], sensors.measured_A
+    first = draws.shape[0] - groups
+    for j in range(groups):
+        measured[j] = current[j]
+        if sensors.noise_A > 0.0:
+            measured[j] += sensors.noise_A * draws[first + j]

@@ -1,1 +1,0 @@
-"""Parts that can fail, one a file, each with the modes in which it does, and their list."""

@@ -1,1 +1,0 @@
-"""The actuator about a pose at rest, as linear control has it."""

@@ -1,1 +1,0 @@
-"""What the motion took of coils and amplifiers, one metric a file."""

@@ -1,1 +1,0 @@
-"""How well the rotor followed, one metric a file."""

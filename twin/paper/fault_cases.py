@@ -1,0 +1,274 @@
+"""The cases of the fault study: the nutation with m = 0.2 and L = 1, healthy and with every fault."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from itertools import chain, combinations, zip_longest
+from math import tau
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spheretwin import scenario as scenarios
+from spheretwin.electronics.prototype import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
+from spheretwin.faults.targets import TARGETS
+from spheretwin.models import actuator
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper.experiment import Case
+from spheretwin.scenario.sections import Scenario
+
+COUNT_rad = tau / PROTOTYPE_SENSORS["sensors.encoder.counts"]
+SUPPLY_V = PROTOTYPE_DRIVE["drive.supply_V"]
+
+# What wants a value has one that a laboratory may meet, large beside what the healthy part does.
+VALUES: dict[tuple[str, str], tuple[float, str]] = {
+    ("pot", "offset"): (0.02, " rad"),  # a slip of a degree on the shaft, some 60 times the nonlinearity
+    ("pot", "gain"): (0.9, ""),  # a tenth of the supply of the track is gone
+    ("pot", "noise"): (0.01, " rad"),  # a worn track, some 30 times the healthy noise
+    ("encoder", "offset"): (10 * COUNT_rad, " rad"),  # ten lost counts
+    ("encoder", "gain"): (0.5, ""),  # every second line is missed
+    ("encoder", "noise"): (COUNT_rad, " rad"),  # a count
+    ("adc", "offset"): (0.1, " V"),  # a drift of its reference, 100 times the healthy offset; 0.1 rad
+    ("adc", "gain"): (0.9, ""),  # a tenth of its reference
+    ("adc", "noise"): (0.01, " V"),  # an open shield, some 130 times the healthy noise; 0.01 rad
+    ("adc", "delay"): (5e-3, " s"),  # five control periods
+    ("supply", "offset"): (-SUPPLY_V / 2, " V"),
+    ("supply", "gain"): (0.5, ""),  # half of the cells
+    ("supply", "noise"): (SUPPLY_V / 10, " V"),  # a dry capacitor
+    ("controller", "delay"): (5e-3, " s"),  # five control periods
+}
+"""With their units."""
+
+
+class Failure(NamedTuple):
+    """One mode of one part."""
+
+    part: str
+    mode: str
+    value: float | None
+    """None where the mode has none, or has one by itself."""
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """Part, mode and value."""
+        return f"{self.part} {self.mode}" + ("" if self.value is None else f" {self.value:.3g}{self.unit}")
+
+
+def failures() -> list[Failure]:
+    """Every mode of every part that is not of a group, but modes that need a value and have none in `VALUES`."""
+    return [
+        Failure(part, mode, *VALUES.get((target.name, mode), (None, "")))
+        for target in TARGETS.values()
+        if not target.each_group
+        for part in target.names(0)
+        for mode, what in target.modes.items()
+        if (target.name, mode) in VALUES or what.value is None or what.value.default is not None
+    ]
+
+
+Groups = tuple[int, ...]
+"""Numbers of the open groups, rising."""
+
+DRAWN = 2000
+SIZES = tuple(range(3, 10))
+"""Of the drawn sets; each has as many sets as any other, but for one."""
+SEED = 18
+
+
+@cache
+def drawn() -> tuple[Groups, ...]:
+    """The drawn sets, size after size in turn; no two are the same."""
+    random = np.random.default_rng(SEED)
+    found: dict[Groups, None] = {}
+    while len(found) < DRAWN:
+        size = SIZES[len(found) % len(SIZES)]
+        chosen = random.choice(count(), size, replace=False)
+        found[tuple(sorted(int(group) for group in chosen))] = None
+    return tuple(found)
+
+
+@cache
+def singles() -> tuple[Groups, ...]:
+    """Every group alone."""
+    return tuple((group,) for group in range(count()))
+
+
+@cache
+def pairs() -> tuple[Groups, ...]:
+    """Every two groups."""
+    return tuple(combinations(range(count()), 2))
+
+
+@cache
+def count() -> int:
+    """Coil groups of the actuator."""
+    return len(actuator.load().groups)
+
+
+class Way(NamedTuple):
+    """One way to meet a fault."""
+
+    name: str
+    of_fault: Mapping[str, Any] = {}
+    """Fields of every fault."""
+    fields: Mapping[str, Any] = {}
+    """Fields of the scenario."""
+
+
+NOT_TOLD = Way("not told")
+TOLD = Way("told", {"known": True})
+DETECTING = Way("detecting", {"detect": True})
+BOUNDED = Way("told, bounded", {"known": True}, {"allocation": "bounded"})
+
+OF_GROUPS = (NOT_TOLD, TOLD, DETECTING, BOUNDED)
+"""For open groups: nobody says so, the allocation is told, or the detector finds them. And told once
+more, with the allocation that uses all that the current limit allows."""
+
+ALONE = Way("no watchdog", fields={"watchdog.on": False})
+RELEASE = Way("release", fields={"watchdog.on": True, "watchdog.action": "release"})
+BRAKE = Way("short", fields={"watchdog.on": True, "watchdog.action": "short"})
+
+OF_PARTS = (ALONE, RELEASE, BRAKE)
+"""For parts that all groups share there is nothing to leave out: no watchdog, or one by what it does."""
+
+
+SCENARIO = "nutation"
+BASE: dict[str, Any] = {"disturbance.load": 1.0, "plant.engine": "lagrangian"}
+"""m = 0.2 is the scenario's own."""
+
+# Sensors, supply and watchdog are there on the prototype alone.
+PROTOTYPE: dict[str, Any] = {**BASE, "hardware": "prototype"}
+OTHER_ENGINE: dict[str, Any] = {"plant.engine": "mujoco"}
+
+SAMPLE = 100
+"""One set in so many runs on MuJoCo too."""
+
+# Every end but that of numbers that are none.
+ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.FAILSAFE)
+
+HEALTHY = Case("healthy", SCENARIO, BASE, {"kind": "healthy", "groups": [], "way": None})
+HEALTHY_PROTOTYPE = Case(
+    "healthy prototype", SCENARIO, PROTOTYPE, {"kind": "healthy", "groups": [], "way": None}
+)
+
+
+def cases() -> list[Case]:
+    """The healthy ones, then one of each kind in turn, in all its ways, as long as there are any."""
+    kinds = [
+        [[of_groups(groups, way) for way in OF_GROUPS] for groups in singles()],
+        [[of_groups(groups, way) for way in OF_GROUPS] for groups in pairs()],
+        [[of_groups(groups, way) for way in OF_GROUPS] for groups in drawn()],
+        [[of_part(failure, way) for way in OF_PARTS] for failure in failures()],
+        [[shorted(groups, DETECTING)] for groups in singles()],
+        [[on_other_engine(groups, way) for way in OF_GROUPS] for groups in sample()],
+    ]
+    return [HEALTHY, HEALTHY_PROTOTYPE, *_in_turn(kinds)]
+
+
+def of_groups(groups: Groups, way: Way) -> Case:
+    """Open groups in one way."""
+    kind = {1: "single", 2: "pair"}.get(len(groups), "drawn")
+    return _of_coils(groups, way, "open", kind)
+
+
+def shorted(groups: Groups, way: Way) -> Case:
+    """Groups shorted at their ends in one way."""
+    return _of_coils(groups, way, "short", "short")
+
+
+def on_other_engine(groups: Groups, way: Way) -> Case:
+    """The same on MuJoCo."""
+    case = of_groups(groups, way)
+    return case._replace(
+        name=f"{case.name}, MuJoCo",
+        fields={**case.fields, **OTHER_ENGINE},
+        told={**case.told, "kind": "MuJoCo"},
+        once=True,
+    )
+
+
+def of_part(failure: Failure, way: Way) -> Case:
+    """A failure of what all groups share, in one way."""
+    fault: dict[str, Any] = {"target": failure.part, "mode": failure.mode}
+    if failure.value is not None:
+        fault["value"] = failure.value
+    return Case(
+        name=f"{failure.name}, {way.name}",
+        scenario=SCENARIO,
+        fields={**PROTOTYPE, **way.fields, **_planned([fault])},
+        told={
+            "kind": "part",
+            "groups": [],
+            "way": way.name,
+            "part": failure.part,
+            "mode": failure.mode,
+            "value": failure.value,
+        },
+        ends=ENDS,
+        drawn=lambda seed: _starts(1, start_s(failure.name, seed)),
+    )
+
+
+def sets() -> list[Groups]:
+    """Every single group, every pair, every drawn set."""
+    return [*singles(), *pairs(), *drawn()]
+
+
+def sample() -> list[Groups]:
+    """Sets that run on MuJoCo too."""
+    return sets()[::SAMPLE]
+
+
+def start_s(what: str, seed: int) -> float:
+    """Return the start of a fault: a control tick of the run, drawn evenly from the seed.
+
+    Parameters
+    ----------
+    what : str
+        What fails. All ways and both engines share its start, so that they can be compared run by run.
+    seed : int
+    """
+    scenario = _healthy()
+    tick = np.random.default_rng([zlib.crc32(what.encode()), seed]).integers(scenario.ticks)
+    return round(float(tick) * scenario.controller.period_s, 9)
+
+
+@cache
+def _healthy() -> Scenario:
+    return scenarios.load(SCENARIO, BASE)
+
+
+def _of_coils(groups: Groups, way: Way, mode: str, kind: str) -> Case:
+    faults = [{"target": f"coil.{group:02d}", "mode": mode, **way.of_fault} for group in groups]
+    return Case(
+        name=f"{_named(groups)} {mode}, {way.name}",
+        scenario=SCENARIO,
+        fields={**BASE, **way.fields, **_planned(faults)},
+        told={"kind": kind, "groups": list(groups), "way": way.name},
+        once=kind == "drawn",
+        ends=ENDS,
+        drawn=lambda seed: _starts(len(groups), start_s(_named(groups), seed)),
+    )
+
+
+def _planned(faults: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Fields of faults whose starts are drawn."""
+    return {f"fault.{i}.{name}": value for i, fault in enumerate(faults) for name, value in fault.items()}
+
+
+def _starts(faults: int, time_s: float) -> dict[str, Any]:
+    """Start of each fault of a run."""
+    return {f"fault.{i}.start_s": time_s for i in range(faults)}
+
+
+def _named(groups: Groups) -> str:
+    return f"group{'s' if len(groups) > 1 else ''} {' '.join(map(str, groups))}"
+
+
+def _in_turn(kinds: Sequence[Sequence[list[Case]]]) -> Iterator[Case]:
+    """A limit leaves some of each kind."""
+    for blocks in zip_longest(*kinds, fillvalue=[]):
+        yield from chain.from_iterable(blocks)

@@ -1,0 +1,197 @@
+"""Detection latency of failed groups as a distribution, and the tracking error that the delay costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import fault_sections
+from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.fault_cases import DETECTING, TOLD, Groups, drawn, of_groups, pairs, shorted, singles
+from spheretwin.paper.fault_outcomes import tracks
+from spheretwin.paper.fault_sections import percent
+
+HOW = (
+    "*Latency* is the time from the start of a fault to the tick from which on the allocation leaves the"
+    " group out. Faults that are not detected before the run ends count as infinite in the quantiles. The"
+    " *driven ticks* of an open group are the control ticks after the fault at which its commanded current"
+    " is above the threshold of the detector. At all others it is idle: within the threshold an open group"
+    " carries what a healthy one does, and cannot be told from it. An idle group cannot be observed, so"
+    " the latency is the wait for driven ticks.\n\n"
+    "The *cost* of the delay is the error after the fault (as above) less that of the run that is told,"
+    " with the same groups, seed and start."
+)
+HEAD = (
+    "groups", "faults", "latency, ms: median", "90 %", "95 %", "99 %", "longest detected", "not detected",
+    "driven ticks: median", "longest", "not detected: most",
+)  # fmt: skip
+COST = (
+    "slowest latency, ms", "runs", "cost, mrad: median", "95 %", "99 %", "largest",
+    "healthy error, mrad: median", "track",
+)  # fmt: skip
+QUANTILES = (0.5, 0.9, 0.95, 0.99)
+
+EDGES_ms = (0.0, 6.5, 20.5, 100.5, inf)
+"""Between intervals of latency, halfway between control ticks."""
+
+
+class Detection(NamedTuple):
+    """Detection of one failed group."""
+
+    latency_s: float
+    """Infinite if it is not detected."""
+    driven_ticks: int
+
+
+def section(outcomes: Outcomes) -> Section:
+    """Distribution of the latency, its reason, and its cost."""
+    by_kind = {name: found for name, found in _detections(outcomes).items() if found}
+    rows = [_row(name, found) for name, found in by_kind.items()]
+    compared = _compared(outcomes)
+    costs = [row for first, end in _intervals() if (row := _cost_row(compared, first, end))]
+    title = "Detection latency of failed groups"
+    cost_title = "One or two open groups: cost of the delay, by the latency of the slower group"
+    curves = {name: [each.latency_s for each in found] for name, found in by_kind.items()}
+    return Section(
+        "Detection latency",
+        f"{HOW}{_why(by_kind)}{_verdict(compared)}",
+        [ResultTable(title, HEAD, rows), ResultTable(cost_title, COST, costs)],
+        [lambda: fault_sections.latencies(curves)] if curves else [],
+    )
+
+
+def _detections(outcomes: Outcomes) -> dict[str, list[Detection]]:
+    """Detections by the kind of fault."""
+    sets: Mapping[str, Sequence[str]] = {
+        "one open": [of_groups(groups, DETECTING).name for groups in singles()],
+        "two open": [of_groups(groups, DETECTING).name for groups in pairs()],
+        "three to nine open": [of_groups(groups, DETECTING).name for groups in drawn()],
+        "one shorted": [shorted(groups, DETECTING).name for groups in singles()],
+    }
+    return {
+        kind: [each for name in names for run in outcomes.get(name, ()) for each in _of_run(run)]
+        for kind, names in sets.items()
+    }
+
+
+def _of_run(run: Outcome) -> list[Detection]:
+    return [
+        Detection(inf if latency_s is None else latency_s, ticks)
+        for latency_s, ticks in zip(run.kept.found_s, run.kept.driven_ticks, strict=True)
+    ]
+
+
+def _row(name: str, found: Sequence[Detection]) -> tuple[str, ...]:
+    latencies_ms = [1e3 * each.latency_s for each in found]
+    known = [each for each in found if each.latency_s < inf]
+    missed = [each for each in found if each.latency_s == inf]
+    # A shorted group is observed by the current that its back-EMF drives as well.
+    ticks = ["–"] * 3
+    if "open" in name and known:
+        driven = [each.driven_ticks for each in known]
+        ticks[:2] = f"{np.median(driven):.0f}", str(max(driven))
+    if "open" in name and missed:
+        ticks[2] = str(max(each.driven_ticks for each in missed))
+    return (
+        name, str(len(found)), *(_ms(value) for value in _quantiles(latencies_ms)),
+        _ms(1e3 * max((each.latency_s for each in known), default=inf)),
+        f"{len(missed)} ({percent([each.latency_s == inf for each in found])})", *ticks,
+    )  # fmt: skip
+
+
+def _quantiles(values: Sequence[float]) -> list[float]:
+    """Return the smallest values that the stated shares do not exceed; infinity is a value."""
+    return [float(value) for value in np.quantile(values, QUANTILES, method="inverted_cdf")]
+
+
+def _ms(value: float) -> str:
+    return f"{value:.0f}" if value < inf else "not detected"
+
+
+def _why(by_kind: Mapping[str, Sequence[Detection]]) -> str:
+    """State how many driven ticks detected and undetected open groups had."""
+    found = [each for name, detections in by_kind.items() if "open" in name for each in detections]
+    known = [each.driven_ticks for each in found if each.latency_s < inf]
+    missed = [each for each in found if each.latency_s == inf]
+    if not known:
+        return ""
+    text = (
+        f"\n\nThe {len(known)} open groups that were detected had {min(known)} driven ticks at least until"
+        f" then, {np.median(known):.0f} as the median."
+    )
+    if not missed:
+        return text
+    fewer = sum(each.driven_ticks < min(known) for each in missed)
+    return (
+        f"{text} Of the {len(missed)} that were not, {fewer} had fewer than {min(known)} until the run ended."
+    )
+
+
+def _compared(outcomes: Outcomes) -> list[tuple[Outcome, Outcome]]:
+    """Completed runs with one or two open groups, detecting and told, with the same seed and start."""
+    groups: list[Groups] = [*singles(), *pairs()]
+    names = [(of_groups(each, DETECTING).name, of_groups(each, TOLD).name) for each in groups]
+    return [
+        (detecting, told)
+        for one, other in names
+        for detecting, told in zip(outcomes.get(one, ()), outcomes.get(other, ()), strict=False)
+        if detecting.status == told.status == Status.COMPLETED
+    ]
+
+
+def _intervals() -> list[tuple[float, float]]:
+    """Intervals of the latency in ms, then not detected, then all."""
+    return [*pairwise(EDGES_ms), (inf, inf), (0.0, inf)]
+
+
+def _cost_row(
+    compared: Sequence[tuple[Outcome, Outcome]], first: float, end: float
+) -> tuple[str, ...] | None:
+    chosen = [pair for pair in compared if _within(1e3 * _slowest_s(pair[0]), first, end)]
+    if not chosen:
+        return None
+    costs = np.quantile([1e3 * cost_rad(*pair) for pair in chosen], [0.5, 0.95, 0.99, 1.0])
+    healthy = np.median([1e3 * detecting.kept.healthy_rad for detecting, _ in chosen])
+    return (
+        _named(first, end), str(len(chosen)), *(f"{cost:.3f}" for cost in costs), f"{healthy:.1f}",
+        percent([tracks(detecting) for detecting, _ in chosen]),
+    )  # fmt: skip
+
+
+def cost_rad(detecting: Outcome, told: Outcome) -> float:
+    """Return what the delay of the detection adds to the largest error after the fault."""
+    return float(detecting.kept.after_rad - told.kept.after_rad)
+
+
+def _slowest_s(run: Outcome) -> float:
+    return max(each.latency_s for each in _of_run(run))
+
+
+def _within(latency_ms: float, first: float, end: float) -> bool:
+    if (first, end) == (0.0, inf):
+        return True
+    return latency_ms == inf if first == inf else first <= latency_ms < end
+
+
+def _named(first: float, end: float) -> str:
+    if first == inf:
+        return "not detected"
+    if end == inf:
+        return f"above {first:.0f}" if first else "all"
+    return f"up to {end:.0f}" if first == 0.0 else f"above {first:.0f}, up to {end:.0f}"
+
+
+def _verdict(compared: Sequence[tuple[Outcome, Outcome]]) -> str:
+    if not compared:
+        return ""
+    costs = [1e3 * cost_rad(*pair) for pair in compared]
+    free = sum(cost <= 0 for cost in costs)
+    return (
+        f" With one or two groups open the delay costs {np.median(costs):.3f} mrad as the median and"
+        f" {max(costs):.2f} mrad at most; in {free} of {len(costs)} pairs of runs it costs nothing."
+    )

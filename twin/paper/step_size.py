@@ -1,0 +1,187 @@
+"""Table of the error over the physics step, for every law and scenario, from 0.05 to 2 ms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from spheretwin.control.laws import LAWS
+from spheretwin.models.telemetry.status import Status
+from spheretwin.paper.experiment import (
+    Array,
+    Case,
+    Experiment,
+    Finding,
+    Outcome,
+    Outcomes,
+    ResultTable,
+    Section,
+)
+from spheretwin.scenario.sections import Plant
+from spheretwin.simulation import Run
+
+SCENARIOS = ("sinusoid", "nutation", "tilt", "hold")
+SAMPLE_s = 0.01
+FINE_s = 1.25e-5
+DEFAULT_s: float = Plant.model_fields["step_s"].default
+
+ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
+
+HOW = (
+    "Largest difference of any hinge angle, in mrad, between a run and the same run with a physics step of"
+    f" {1e3 * FINE_s:g} ms, compared every {1e3 * SAMPLE_s:g} ms; one seed, the law's default gains. A"
+    " physics step cannot be longer than the control period: at 2 ms the control period is 2 ms too, in both"
+    " runs, so that the law is another one there. The last column is the largest tracking error at"
+    f" {1e3 * DEFAULT_s:g} ms, for comparison. *Left at* is the time at which a run left the workspace; the"
+    " difference is then taken up to there."
+)
+
+
+class Step(NamedTuple):
+    """A physics step, and the control period that it is compared at."""
+
+    step_s: float
+    period_s: float
+
+
+class Trace(NamedTuple):
+    """Motion of a run, sampled."""
+
+    q_rad: Array  # (n, 3)
+    ended_s: float
+
+
+class Cost(NamedTuple):
+    """What a step changes in one run."""
+
+    difference_rad: float
+    step_s: float
+    law: str
+    scenario: str
+
+
+STEPS = tuple(Step(step_s, 1e-3) for step_s in (5e-5, 1e-4, 2.5e-4, 5e-4, 1e-3))
+LONGEST = Step(2e-3, 2e-3)
+
+
+def cases() -> list[Case]:
+    """Every law in every scenario at every step; the default step first."""
+    by_default = sorted((*STEPS, LONGEST), key=lambda step: step.step_s != DEFAULT_s)
+    steps = [each for step in by_default for each in (step, fine(step))]
+    return list(
+        {
+            made.name: made
+            for scenario in SCENARIOS
+            for law in LAWS
+            for step in steps
+            for made in [case(law, scenario, step)]
+        }.values()
+    )
+
+
+def fine(step: Step) -> Step:
+    """Reference of a step."""
+    return Step(FINE_s, step.period_s)
+
+
+def case(law: str, scenario: str, step: Step) -> Case:
+    """A law in a scenario at a step."""
+    return Case(
+        name=f"{law}, {scenario}: {1e3 * step.step_s:g} ms, control {1e3 * step.period_s:g} ms",
+        scenario=scenario,
+        fields={
+            "controller.law": law,
+            "controller.period_s": step.period_s,
+            "plant.step_s": step.step_s,
+        },
+        told={"step_s": step.step_s, "period_s": step.period_s},
+        once=True,
+        ends=ENDS,
+    )
+
+
+def keep(run: Run) -> Trace:
+    """Sample the motion of a run."""
+    table = run.telemetry
+    every = round(SAMPLE_s / run.scenario.controller.period_s)
+    return Trace(table["q_rad"][::every].copy(), float(table["t_s"][-1]) if len(table) else 0.0)
+
+
+def difference_rad(outcomes: Outcomes, law: str, scenario: str, step: Step) -> float:
+    """Largest difference of any hinge angle from the run at the fine step; NaN where either was not run."""
+    names = [case(law, scenario, each).name for each in (step, fine(step))]
+    if not all(name in outcomes for name in names):
+        return float("nan")
+    coarse, reference = (outcomes[name][0].kept.q_rad for name in names)
+    rows = min(len(coarse), len(reference))
+    return float(np.max(np.abs(coarse[:rows] - reference[:rows]))) if rows else float("nan")
+
+
+def tell(outcomes: Outcomes) -> list[Section]:
+    """A table for each scenario."""
+    return [Section("Error over the physics step", HOW, [_table(outcomes, each) for each in SCENARIOS])]
+
+
+def findings(outcomes: Outcomes) -> list[Finding]:
+    """What the default step and twice that step cost, in runs that complete."""
+    steps = [step for step in STEPS if step.step_s in (DEFAULT_s, 2 * DEFAULT_s)]
+    costs = [cost for step in steps if (cost := _largest(outcomes, step))]
+    if len(costs) < len(steps):
+        return []
+    texts = [
+        f"{1e3 * cost.difference_rad:.2g} mrad at {1e3 * cost.step_s:g} ms ({cost.law} in {cost.scenario})"
+        for cost in costs
+    ]
+    return [Finding(None, f"the physics step changes a motion by at most {' and '.join(texts)}")]
+
+
+def _largest(outcomes: Outcomes, step: Step) -> Cost | None:
+    costs = [
+        Cost(difference_rad(outcomes, law, scenario, step), step.step_s, law, scenario)
+        for law in LAWS
+        for scenario in SCENARIOS
+        if _completed(outcomes.get(case(law, scenario, step).name, ()))
+    ]
+    return max((cost for cost in costs if np.isfinite(cost.difference_rad)), default=None)
+
+
+def _completed(runs: Sequence[Outcome]) -> bool:
+    return bool(runs) and all(run.status == Status.COMPLETED for run in runs)
+
+
+def _table(outcomes: Outcomes, scenario: str) -> ResultTable:
+    head = [f"{1e3 * step.step_s:g} ms" for step in (*STEPS, LONGEST)]
+    return ResultTable(
+        f"Difference in mrad: {scenario}",
+        ("law", *head, f"tracking error at {1e3 * DEFAULT_s:g} ms"),
+        [_row(outcomes, law, scenario) for law in LAWS],
+    )
+
+
+def _row(outcomes: Outcomes, law: str, scenario: str) -> tuple[str, ...]:
+    cells = [_cell(outcomes, law, scenario, step) for step in (*STEPS, LONGEST)]
+    runs = outcomes.get(case(law, scenario, Step(DEFAULT_s, STEPS[0].period_s)).name, ())
+    error = f"{1e3 * np.max(runs[0].max_abs_error):.3g}" if runs else "not run"
+    return (law, *cells, error)
+
+
+def _cell(outcomes: Outcomes, law: str, scenario: str, step: Step) -> str:
+    difference = difference_rad(outcomes, law, scenario, step)
+    if not np.isfinite(difference):
+        return "not run"
+    run = outcomes[case(law, scenario, step).name][0]
+    end = "" if run.status == Status.COMPLETED else f" (left at {run.kept.ended_s:.2f} s)"
+    return f"{1e3 * difference:.2g}{end}"
+
+
+EXPERIMENT = Experiment(
+    name="step_size",
+    title="Error over the physics step",
+    shows="Every law in every scenario at physics steps from 0.05 to 2 ms, compared with 0.0125 ms.",
+    cases=cases,
+    tell=tell,
+    keep=keep,
+    findings=findings,
+)

@@ -1,0 +1,152 @@
+"""MuJoCo as the plant: the rotor on its joint, stepped from compiled code."""
+
+from __future__ import annotations
+
+import ctypes
+from copy import copy
+from typing import Any, NamedTuple
+
+import llvmlite.binding
+import mujoco
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from spheretwin.models.base.compiled import COMPILES, compiled
+from spheretwin.models.base.mujoco_library import library
+from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf, idle_stages
+from spheretwin.plant.rotor import EngineKind
+
+INTEGRATORS = {
+    "RK4": mujoco.mjtIntegrator.mjINT_RK4,
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+}
+
+
+def integrator_name(number: int) -> str:
+    """Name of one of MuJoCo's integrators, as MJCF has it."""
+    names = {int(each): name for name, each in INTEGRATORS.items()}
+    return names.get(number, mujoco.mjtIntegrator(number).name.removeprefix("mjINT_").lower())
+
+
+class Engine(NamedTuple):
+    """The engine as compiled code sees it: two addresses, and views of MuJoCo's own arrays."""
+
+    model_address: int
+    data_address: int
+    q: NDArray[np.float64]  # (3,) rad
+    qdot: NDArray[np.float64]  # (3,) rad/s
+    torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
+    warnings: NDArray[np.int32]  # how often the engine has warned, of each kind
+
+
+class Rotor:
+    """The rotor in MuJoCo, set up for one run.
+
+    Parameters
+    ----------
+    mjcf : Mjcf
+        Model file, as it is kept.
+    step_s : float, s
+        Physics step.
+    integrator : str
+        One of `INTEGRATORS`.
+    modelling_error : float
+        m: the rotor's inertia is (1 + m) times that of the MJCF (11), (54).
+    payload_kg : float, kg
+        Point mass at the payload mount; 0 for none.
+    gravity_m_s2 : float, m/s²
+        Gravity along -z; the model's own unless given.
+    """
+
+    def __init__(
+        self,
+        mjcf: Mjcf,
+        step_s: float,
+        integrator: str,
+        modelling_error: float,
+        payload_kg: float,
+        gravity_m_s2: float | None = None,
+    ) -> None:
+        # Without a payload its empty body is left out: it would be a twentieth of a step.
+        self.model = copy(mjcf.loaded if payload_kg else mjcf.bare)
+        self.model.opt.timestep = step_s
+        self.model.opt.integrator = INTEGRATORS[integrator]
+        # A diverged state must stay visible: automatic reset would hide it behind a state of zeros.
+        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(self.model)
+        if gravity_m_s2 is not None:
+            self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+            self.model.opt.gravity[:] = 0.0, 0.0, -gravity_m_s2
+        self.model.body_inertia[self.model.body(ROTOR).id] *= 1 + modelling_error
+        if payload_kg:
+            payload = self.model.body(PAYLOAD).id
+            self.model.body_mass[payload] = payload_kg
+            self.model.body_ipos[payload] = 0.0  # the compiler leaves it elsewhere for a body without mass
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_setConst(self.model, self.data)
+
+    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Engine:
+        """Set pose and rates at time 0; return what compiled code steps.
+
+        Parameters
+        ----------
+        q : (3,) array, rad
+            Hinge angles.
+        qdot : (3,) array, rad/s
+            Their rates.
+        """
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:], self.data.qvel[:] = q, qdot
+        return Engine(
+            self.model._address,
+            self.data._address,
+            self.data.qpos,
+            self.data.qvel,
+            self.data.qfrc_applied,
+            self.data.warning.number,
+        )
+
+    def state(self) -> NDArray[np.float64]:
+        """Everything that the next steps depend on, the solver's warm start included."""
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        return state
+
+    def restore(self, state: NDArray[np.float64]) -> None:
+        """Go on from a state of a rotor with the same model; what `start` returned stays valid."""
+        mujoco.mj_setState(self.model, self.data, state, _STATE)
+
+
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+
+
+_address = ctypes.cast(library().mj_step, ctypes.c_void_p).value or 0
+_mj_step: Any
+if COMPILES:
+    # A symbol that LLVM resolves by name can be cached; a ctypes function inside compiled code cannot.
+    llvmlite.binding.add_symbol("mj_step", _address)
+    _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
+else:
+    _mj_step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(_address)
+
+
+@compiled
+def step(engine: Engine) -> None:
+    """One physics step of MuJoCo, from compiled code or from Python."""
+    _mj_step(engine.model_address, engine.data_address)
+
+
+MUJOCO = EngineKind(
+    "mujoco",
+    lambda setting: Rotor(
+        setting.model,
+        setting.step_s,
+        setting.integrator,
+        setting.modelling_error,
+        setting.payload_kg,
+        setting.gravity_m_s2,
+    ),
+    Engine,
+    step,
+)

@@ -1,0 +1,180 @@
+"""One control period of the true plant: from the currents asked for to where the rotor is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from spheretwin.electronics.drive import Stages, advance_currents, begin, end
+from spheretwin.electronics.transducers import CurrentSensors
+from spheretwin.models.base.compiled import copy_into, part_of_its_caller
+from spheretwin.models.kinematics import generalised_torque
+from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
+from spheretwin.plant import lagrangian_rotor, mujoco_rotor
+from spheretwin.plant.friction import Friction, slow_down
+from spheretwin.plant.rotor import EngineKind
+
+ENGINES: dict[str, EngineKind] = {
+    row.name: row
+    for row in (
+        mujoco_rotor.MUJOCO,
+        lagrangian_rotor.LAGRANGIAN,
+    )
+}
+
+
+_STEPS: dict[type, Callable[[Any], None]] = {row.stepped: row.step for row in ENGINES.values()}
+
+
+def step(rotor: Any) -> None:
+    """One physics step of what `Rotor.start` returned, from compiled code or from Python."""
+    _STEPS[type(rotor)](rotor)
+
+
+@overload(step)
+def _compiled_step(rotor: Any) -> Callable[[Any], None] | None:
+    """Tell numba, which knows a named tuple by its class, what `step` does."""
+    kind: Any = getattr(rotor, "instance_class", None)
+    if kind not in _STEPS:
+        return None
+    step_of_kind = _STEPS[kind]
+
+    def call(rotor: Any) -> None:
+        step_of_kind(rotor)
+
+    return call
+
+
+GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
+
+# The rotor's fastest move within the workspace is some hundred rad/s; far above it, and far below the
+# engine's own bound of 1e10, the motion is no longer one.
+FASTEST_RATE_rad_s = 1e6
+
+
+class Plant(NamedTuple):
+    """The far side of the wires: nothing of it is known to the controller."""
+
+    rotor: Any  # what compiled code steps, as the engine's row says
+    magnetics: TorqueModel  # true
+    G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
+    scratch: NDArray[np.float64]  # of `fill_torque_matrix`
+    driving: Stages
+    friction: Friction
+    group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
+    unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
+    hinge_range: NDArray[np.float64]  # (3, 2) rad
+    substeps: int
+    step_s: float
+    middle_q: NDArray[np.float64]  # (3,) rad, predicted pose in the middle of the physics step
+    middle_qdot: NDArray[np.float64]  # (3,) rad/s, predicted rates there
+    last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
+    current: NDArray[np.float64]  # (n,) A, now
+    mean_current: NDArray[np.float64]  # (n,) A, over the physics step
+    pulling: NDArray[np.float64]  # (n,) A, the same times the gain
+    torque_S: NDArray[np.float64]  # (3,) N·m of the coils, stator frame, in the physics step
+    friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, mean over the physics step
+    first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
+    draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and of sensors of currents
+    current_sensors: CurrentSensors
+    marks: NDArray[np.float64]  # of every part that may fail: the number of its mode, or 0
+    began_s: NDArray[np.float64]  # (n,) when the last fault of each group began, s; below 0 where none has
+
+
+class Delivered(NamedTuple):
+    """Currents and torque in a control period: the plant's part of a telemetry row."""
+
+    current: NDArray[np.float64]  # (n,) A, mean over the first physics step
+    mean_current: NDArray[np.float64]  # (n,) A, mean over all physics steps taken
+    torque_S: NDArray[np.float64]  # (3,) N·m, in the first physics step
+
+
+@part_of_its_caller
+def plant_tick(
+    plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: Delivered
+) -> int:
+    """Advance the plant by one control period.
+
+    Each physics step: half of the friction, coil currents and their torque, rotor, other half of friction.
+    The torque matrix and the back-EMF are those of the predicted pose and rates in the middle of the step.
+    With friction split symmetrically around the rotor's step, the whole step is of second order.
+
+    Parameters
+    ----------
+    plant : Plant
+        Changed in place.
+    command : (n,) array, A
+        Group currents asked for, held over the period.
+    disturbance : (3,) array, N·m
+        Generalised, subtracted in (1), held over the period.
+    delivered : Delivered
+        Result.
+
+    Returns
+    -------
+    int
+        `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, or `FAILSAFE` where a coil is too hot.
+    """
+    # Taken out of the tuple once: each time costs a count of references.
+    rotor, magnetics, G, scratch = plant.rotor, plant.magnetics, plant.G, plant.scratch
+    q, qdot, torque_q, torque_S = rotor.q, rotor.qdot, rotor.torque_q, plant.torque_S
+    middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
+    hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
+    current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
+    gain, unmodelled, friction, friction_q = (
+        plant.group_gain,
+        plant.unmodelled_torque,
+        plant.friction,
+        plant.friction_q,
+    )
+    driving = plant.driving
+    begin(driving, command)
+    for substep in range(plant.substeps):
+        for i in range(3):
+            middle_q[i] = q[i] + half_step_s * qdot[i]
+            middle_qdot[i] = qdot[i] + 0.5 * (qdot[i] - last_qdot[i])
+            last_qdot[i] = qdot[i]
+            friction_q[i] = 0.0
+        if friction.acts:
+            slow_down(friction, q, qdot, friction_q)
+        fill_torque_matrix(middle_q, magnetics, G, scratch)
+        advance_currents(driving, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
+        log_mean_current(mean_current, substep, delivered.mean_current)
+        for j in range(pulling.shape[0]):
+            pulling[j] = gain[j] * mean_current[j]
+        rotor_torque(G, pulling, torque_S)
+        generalised_torque(middle_q, torque_S, torque_q)
+        for i in range(3):
+            torque_q[i] -= disturbance[i] + unmodelled[i]
+        step(rotor)
+        if friction.acts:
+            slow_down(friction, q, qdot, friction_q)
+        if substep == 0:
+            copy_into(delivered.current, 0, mean_current, mean_current.shape[0])
+            copy_into(delivered.torque_S, 0, torque_S, 3)
+            copy_into(plant.first_friction_q, 0, friction_q, 3)
+        for i in range(3):
+            if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
+                return DIVERGED
+        for i in range(3):  # at every step: beyond its range a hinge would meet a stop that is not computed
+            if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
+                return LEFT_WORKSPACE
+    if not end(driving):
+        return FAILSAFE
+    for kind in range(rotor.warnings.shape[0]):
+        if rotor.warnings[kind] > 0:
+            return DIVERGED
+    return GOING
+
+
+@part_of_its_caller
+def log_mean_current(current: NDArray[np.float64], substep: int, mean: NDArray[np.float64]) -> None:
+    """Update the mean (n,) over the physics steps of a control period with the one of number `substep`."""
+    share = 1.0 / (substep + 1)
+    for j in range(mean.shape[0]):
+        before = mean[j] if substep else 0.0
+        mean[j] = before + share * (current[j] - before)

@@ -1,0 +1,76 @@
+"""A run told by its own telemetry file: scenario at its start, command journal, ticks, model and curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from spheretwin import run
+from spheretwin import scenario as scenarios
+from spheretwin.control.laws import LAWS
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.user_code import is_reference
+from spheretwin.models.telemetry.run_record import Change, RunRecord
+from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.scenario.sections import Scenario
+
+
+class Plan(NamedTuple):
+    """What to run."""
+
+    scenario: Scenario
+    ticks: int
+    journal: tuple[Change, ...]
+    first_tick: int = 0
+    """Of the first row that is kept."""
+
+
+def read(path: Path) -> Plan:
+    """Read from a telemetry file what was run; run again, it gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        The file is no telemetry of a run, was made under a law that it does not hold, or a model or curve
+        is no longer what it was.
+    """
+    _, metadata = read_parquet(path, rows=False)
+    try:
+        record = RunRecord.from_metadata(metadata)
+    except InputError as error:
+        raise InputError(f"replay {path}: {error}") from None
+    try:
+        return _plan(record, str(path))
+    except (KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise InputError(
+            f"replay {path}: expected scenario, journal and ticks of a run, received others"
+        ) from None
+
+
+def _plan(record: RunRecord, source: str) -> Plan:
+    scenario = scenarios.from_record(record.scenario, source)
+    for change in record.journal:
+        if change.name == "controller.law" and change.value not in LAWS and not is_reference(change.value):
+            raise InputError(
+                f"replay {source}: expected changes to {', '.join(LAWS)}, received one to {change.value}"
+                f" at tick {change.tick}, a law that the file does not hold"
+            )
+    if record.ticks <= record.first_tick:
+        raise InputError(
+            f"replay {source}: expected a run of at least one tick, received"
+            f" {record.ticks - record.first_tick};"
+            " the parts of a run that was killed do not say how far it went"
+        )
+    named = run.files_of(scenario.model_dump(mode="json"), record.journal)
+    _check_files(named, record.files, source)
+    return Plan(scenario, record.ticks, record.journal, record.first_tick)
+
+
+def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | None], source: str) -> None:
+    for path, dotted in named:
+        if path in digests and run.digest(dotted, path) != digests[path]:  # older files hold none
+            raise InputError(
+                f"replay {source}: expected {dotted} {path} as it was when the run was made,"
+                " received one that is missing or was changed since"
+            )

@@ -1,1 +1,0 @@
-"""What the paper shows, run again: one experiment a file or folder, and the page of what they found."""

@@ -1,1 +1,0 @@
-"""What is run: sets of groups, parts that all share, the ways to meet them, and the cases that they make."""

@@ -1,1 +1,0 @@
-"""Error that the physics step makes, for every law and scenario."""

@@ -1,1 +1,0 @@
-"""Runs beside each other: named apart, merged into one recording, drawn, and their figures subtracted."""

@@ -1,0 +1,157 @@
+"""What an axis is: a field, and its values, listed or drawn."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, field_validator, model_validator
+
+# A grid beyond this is a slip of the pen: at a millisecond a row it would take weeks.
+MOST_VALUES = 1_000_000
+
+LARGEST = 1e9
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Count = Annotated[int, Field(ge=1, le=MOST_VALUES)]
+
+
+class Axis(BaseModel):
+    """A field that differs from row to row.
+
+    A kind of which every value is known says them in `listed`; one that is drawn turns uniform numbers from
+    0 to 1 into values in `drawn`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    kind: str
+    field: Annotated[str, Field(min_length=1)] = Field(
+        description="dotted name of the field; with a place behind it, an entry of a list"
+    )
+    zip: str | None = Field(
+        None, description="axes of the same name go together, value by value; all others are crossed"
+    )
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether its values are drawn."""
+        return False
+
+
+class ListedAxis(Axis):
+    """An axis of which every value is known."""
+
+    @abstractmethod
+    def listed(self) -> list[Any]:
+        """Its values."""
+
+
+class DrawnAxis(Axis):
+    """An axis whose values are drawn."""
+
+    @property
+    def is_drawn(self) -> bool:
+        """It is."""
+        return True
+
+    @abstractmethod
+    def drawn(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (n,) of uniform numbers (n,), above 0 and below 1."""
+
+
+class Linspace(ListedAxis):
+    """From one value to another, both included."""
+
+    kind: Literal["linspace"] = Field("linspace", description="how the values are chosen")
+    first: Number = Field(description="first value")
+    last: Number = Field(description="last value")
+    count: Count = Field(description="how many")
+
+    def listed(self) -> list[Any]:
+        """At equal distances."""
+        return list(np.linspace(self.first, self.last, self.count).tolist())
+
+
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+
+
+class Logspace(ListedAxis):
+    """From one value to another, both included."""
+
+    kind: Literal["logspace"] = Field("logspace", description="how the values are chosen")
+    first: Positive = Field(description="first value, not its exponent")
+    last: Positive = Field(description="last value")
+    count: Count = Field(description="how many")
+
+    def listed(self) -> list[Any]:
+        """At equal ratios."""
+        return list(np.geomspace(self.first, self.last, self.count).tolist())
+
+
+class Normal(DrawnAxis):
+    """Normal, cut off at some standard deviations: what lies beyond is not drawn, and piles up nowhere."""
+
+    kind: Literal["normal"] = Field("normal", description="how the values are chosen")
+    mean: Number = Field(description="mean")
+    deviation: Annotated[float, Field(gt=0, le=LARGEST)] = Field(description="standard deviation, uncut")
+    most_deviations: Annotated[float, Field(gt=0, le=8)] = Field(
+        3.0, description="where it is cut off, in standard deviations"
+    )
+
+    def drawn(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By the inverse of its distribution."""
+        from scipy.special import ndtr, ndtri  # slow to import
+
+        least = ndtr(-self.most_deviations)
+        return self.mean + self.deviation * ndtri(least + (1 - 2 * least) * uniform)
+
+
+class Uniform(DrawnAxis):
+    """Evenly between two bounds."""
+
+    kind: Literal["uniform"] = Field("uniform", description="how the values are chosen")
+    low: Number = Field(description="lower bound")
+    high: Number = Field(description="upper bound")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Uniform:
+        if not self.low < self.high:
+            raise ValueError(f"expected low below high, received {self.low!r} and {self.high!r}")
+        return self
+
+    def drawn(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By the inverse of its distribution."""
+        return self.low + (self.high - self.low) * uniform
+
+
+class Values(ListedAxis):
+    """Listed."""
+
+    kind: Literal["values"] = Field("values", description="how the values are chosen")
+    values: Annotated[tuple[JsonValue, ...], Field(max_length=MOST_VALUES)] = Field(
+        description="the values, one after the other"
+    )
+
+    @field_validator("values")
+    @classmethod
+    def _not_none(cls, values: tuple[JsonValue, ...]) -> tuple[JsonValue, ...]:
+        if not values:
+            raise ValueError("expected one value at least, received none")
+        return values
+
+    def listed(self) -> list[Any]:
+        """As they are."""
+        return list(self.values)
+
+
+AnyAxis = Annotated[
+    Values  # one row each
+    | Linspace
+    | Logspace
+    | Uniform
+    | Normal,
+    Field(discriminator="kind"),
+]

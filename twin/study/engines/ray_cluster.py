@@ -1,0 +1,274 @@
+"""Ray: rows in batches over all cores of a cluster, a process a core.
+
+A process a core, and not threads within fewer: a third of a short row is Python, which threads run one at a
+time. Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
+study names must be on every node, under the same paths, and so must the same sources and versions: a node
+that has others is refused by `spheretwin.study.engines.ray_worker`. Rows whose telemetry is kept are run by
+the driver, beside whose journal it belongs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Generator, Iterator
+from typing import Any
+
+from spheretwin.models.base.errors import InputError, SpheretwinError, shown, without_breaks
+from spheretwin.study.engines import ray_worker, threads
+from spheretwin.study.engines.engine import Batches, Engine, Order
+from spheretwin.study.grid import Row
+from spheretwin.study.row import Result
+
+# Whoever runs a sweep hears of it from the sweep; nobody else does.
+QUIET = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # else it warns of accelerators, which nothing here uses
+}
+
+# What makes Ray take 127.0.0.1 for its own address, and let in none but its own processes.
+ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
+
+PORT = 6379
+
+OBJECTS_BYTES = 100_000_000
+"""Store of a local cluster: results are small, and go with the messages."""
+
+AHEAD = 2
+"""Batches a core: one runs, one waits."""
+
+LOOK_S = 1.0
+"""How often to look whether there is still a cluster to wait for."""
+
+MOST_SILENCES = 3
+"""Looks in a row that find no cluster, or no core in it, before it is given up."""
+
+REACH_S = 5.0
+
+CONNECT_S = 60.0
+
+# Where what answers is no cluster, or one that has another address for itself, Ray asks it again for ever.
+PROBE = "import ray, sys; ray.init(address=sys.argv[1], log_to_driver=False, configure_logging=False)"
+
+
+def carried_out(order: Order) -> Generator[tuple[Row, Result | None]]:
+    """Results of rows, each batch as it is finished.
+
+    Raises
+    ------
+    InputError
+        Ray is not installed, or there is no cluster at the address.
+    SpheretwinError
+        The cluster was lost, or a row took its process along again and again.
+    """
+    if order.rows == 0:
+        return
+    ray = _ray(local=order.address is None)
+    here: list[int] = []
+    with _connected(ray, order):
+        yield from _Cluster(ray, order, here).results()
+    yield from threads.carried_out(
+        (order.grid[number] for number in here), order.work, order.threads, order.stop_requested
+    )
+
+
+class _Cluster:
+    """The driver's side: which batches are under way, and what comes back of them."""
+
+    def __init__(self, ray: Any, order: Order, here: list[int]) -> None:
+        self._ray, self._order = ray, order
+        kept_here = set(order.work.rows.study.telemetry)
+        self._batches = Batches(_without(order.numbers, kept_here, here), order.rows)
+        self._job = ray.put(ray_worker.job_of(order.work.rows))
+        # What is lost comes back to `Batches`, which knows how often; Ray itself repeats nothing.
+        self._task = ray.remote(num_cpus=1, max_retries=0)(ray_worker.carried_out)
+        self._flying: dict[Any, list[int]] = {}
+        self._silences, self._looked_s = 0, time.monotonic()
+        self._cores = self._most()
+        context = ray.get_runtime_context()
+        (ours,) = (node for node in ray.nodes() if node["NodeID"] == context.get_node_id())
+        self._lifelines = (
+            context.gcs_address,
+            f"{ours['NodeManagerAddress']}:{ours['NodeManagerPort']}",
+        )
+
+    def results(self) -> Iterator[tuple[Row, Result | None]]:
+        while True:
+            if not self._order.stop_requested():
+                self._take_off()
+            if not self._flying:
+                return
+            ready, _ = self._ray.wait(list(self._flying), timeout=LOOK_S)
+            if time.monotonic() - self._looked_s >= LOOK_S:
+                self._look()
+            for task in ready:
+                yield from self._land(task)
+
+    def _take_off(self) -> None:
+        # A batch of one row may take long: none is begun that an interruption would have to wait for.
+        most = self._cores * (AHEAD if self._batches.rows > 1 else 1)
+        while len(self._flying) < max(most, 1):
+            batch = self._batches.next(max(most, 1))
+            if not batch:
+                return
+            self._flying[self._task.remote(self._job, batch)] = batch
+
+    def _land(self, task: Any) -> Iterator[tuple[Row, Result | None]]:
+        batch, errors = self._flying.pop(task), self._ray.exceptions
+        try:
+            landed: ray_worker.Landed = self._ray.get(task)
+        except errors.RayTaskError as error:  # sources so different that they cannot even say so
+            raise SpheretwinError(
+                f"study {self._order.work.rows.study.name}: expected every node to run its rows,"
+                f" received {type(error.cause).__name__}: {without_breaks(error.cause)}"
+            ) from None
+        except errors.RayError as error:  # node, process or memory is gone
+            self._lose(batch, error)
+            return
+        self._batches.landed(len(batch), landed.wall_s)
+        self._order.work.checked += landed.checked
+        for number, result in landed.results:
+            yield self._order.grid[number], result
+        if landed.fault is not None:
+            self._order.work.faults.append(SpheretwinError(landed.fault))
+
+    def _lose(self, batch: list[int], error: Exception) -> None:
+        self._cores = self._most()
+        if not self._batches.lost(batch):
+            raise SpheretwinError(
+                f"study {self._order.work.rows.study.name}: expected row {batch[0]} to leave its process"
+                f" alive, received {type(error).__name__} again and again; what is finished is kept"
+            )
+
+    def _look(self) -> None:
+        """See whether head and own node are still there.
+
+        Raises
+        ------
+        SpheretwinError
+            One is gone. Ray itself would end this process for it some time later, without a word.
+        """
+        self._looked_s = time.monotonic()
+        is_there = all(map(_answers, self._lifelines))
+        self._cores = self._most() if is_there else 0
+        self._silences = 0 if self._cores else self._silences + 1
+        if self._silences >= MOST_SILENCES:
+            raise SpheretwinError(
+                f"study {self._order.work.rows.study.name}: expected the cluster to stay,"
+                f" received {'one without a core' if is_there else 'no answer from it any more'};"
+                " what is finished is kept"
+            )
+
+    def _most(self) -> int:
+        """Rows that may run at a time."""
+        cores = int(self._ray.cluster_resources().get("CPU", 0))
+        return min(cores, self._order.threads or cores)
+
+
+def _without(numbers: Iterator[int], kept_here: set[int], here: list[int]) -> Iterator[int]:
+    for number in numbers:
+        if number in kept_here:
+            here.append(number)
+        else:
+            yield number
+
+
+def _ray(local: bool) -> Any:
+    for name, value in (QUIET | ALONE if local else QUIET).items():
+        os.environ.setdefault(name, value)
+    if local:
+        os.environ.setdefault("RAY_AUTH_TOKEN", secrets.token_hex(32))
+    try:
+        import ray
+    except ImportError:
+        raise InputError(
+            "sweep: expected the extra `spheretwin[cluster]` for the engine ray,"
+            " received an installation without Ray"
+        ) from None
+    return ray
+
+
+@contextlib.contextmanager
+def _connected(ray: Any, order: Order) -> Iterator[None]:
+    """A cluster: the one at the address, or one on this machine that ends with the sweep."""
+    quiet = {"log_to_driver": False, "configure_logging": False}
+    logging.getLogger("ray").setLevel(logging.CRITICAL)
+    ray._private.worker._worker_logs_enabled = False  # what a lost node had to say, on the driver's stdout
+    if order.address is not None:
+        _check_reachable(order.address)
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        if order.address is None:
+            ray.init(
+                address="local",
+                num_cpus=order.threads or os.cpu_count(),
+                include_dashboard=False,
+                object_store_memory=OBJECTS_BYTES,
+                **quiet,
+            )
+        else:
+            ray.init(address=order.address, **quiet)
+    except Exception as error:  # Ray has no root for what fails as it starts: gRPC, sockets raise their own
+        # None of our code runs in here, so that no fault of ours is hidden.
+        raise InputError(
+            f"sweep: expected a Ray cluster {_where(order.address)}, received {without_breaks(error)}"
+        ) from None
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, before)  # Ray takes it, to leave at once
+    try:
+        yield
+    finally:
+        ray.shutdown()
+
+
+def _where(address: str | None) -> str:
+    return "on this machine" if address is None else f"at {address}"
+
+
+def _check_reachable(address: str) -> None:
+    """Find out within a minute what Ray finds out in many, or never.
+
+    Raises
+    ------
+    InputError
+        Nobody answers there.
+    """
+    if "://" in address:
+        raise InputError(
+            "sweep: expected auto, HOST or HOST:PORT, of a cluster that this machine is a node of, as its"
+            f" address, received {shown(address)}"
+        )
+    if address != "auto" and not _answers(address):
+        raise InputError(f"sweep: expected a Ray cluster at {address}, received no answer")
+    command = [sys.executable, "-c", PROBE, address]
+    try:
+        probe = subprocess.run(command, capture_output=True, text=True, timeout=CONNECT_S, check=False)
+    except subprocess.TimeoutExpired:
+        raise InputError(
+            f"sweep: expected a Ray cluster at {address}, received an answer, but none of Ray's within"
+            f" {CONNECT_S:g} s"
+        ) from None
+    if probe.returncode:
+        last = (probe.stderr.strip().splitlines() or ["nothing"])[-1]
+        raise InputError(f"sweep: expected a Ray cluster at {address}, received {last}")
+
+
+def _answers(address: str) -> bool:
+    host, _, port = address.rpartition(":") if ":" in address else (address, "", str(PORT))
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=REACH_S):
+            return True
+    except (OSError, ValueError, OverflowError):
+        return False
+
+
+ENGINE = Engine(carried_out, takes_address=True)

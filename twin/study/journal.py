@@ -1,0 +1,262 @@
+"""What the results of a study stand on: the study, its files, the sources, the versions; each by a digest."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin import run
+from spheretwin.models.base.cache import sources_digest
+from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
+from spheretwin.models.base.user_code import file_of, is_reference
+from spheretwin.models.telemetry.run_record import versions
+from spheretwin.scenario import reading
+from spheretwin.study.grid import Row
+from spheretwin.study.row import Result, Rows
+
+
+def basis_of(rows: Rows) -> dict[str, str]:
+    """Digests of study, files and sources, and the version of each package.
+
+    Of a file, what is in it, not where it is: a study may be run from anywhere, and its folder may be moved.
+    """
+    study = rows.study.model_dump(mode="json", exclude={"description"})
+    return {
+        "study": _digest(study),
+        "files": _digest(list(_contents(rows))),
+        "sources": sources_digest(),
+        **versions(),
+    }
+
+
+def digest_of(rows: Rows) -> str:
+    """Digest of all that results depend on."""
+    return _digest(basis_of(rows))
+
+
+def _digest(told: Any) -> str:
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+
+
+def _contents(rows: Rows) -> Iterator[Any]:
+    """Values of the base and of what differs from row to row, with the content of each file for its path."""
+    study = rows.study
+    yield reading.with_files(rows.base.model_dump(mode="json"), _content)
+    named = [(axis.field, value) for axis in study.axis for value in getattr(axis, "values", ())]
+    named += [("controller", dict(law)) for law in study.law]
+    for dotted, value in named:
+        if isinstance(value, str | list | dict):  # a number names no file
+            found = reading.alone(dotted, reading.value_beside(study.folder, dotted, value))
+            yield reading.with_files(found, _content)
+    for name in study.metrics:
+        if is_reference(name):
+            yield _content(study.beside(name), "metrics")
+
+
+def _content(path: str, dotted: str) -> str:
+    if is_reference(path):
+        return f"{run.digest(dotted, file_of(path))}:{path.rpartition(':')[2]}"
+    return str(run.digest(dotted, path))
+
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+BEYOND = 1 << 62
+"""Byte that is locked where a lock keeps others from reading: one that no file has."""
+
+
+def lock(file: BinaryIO) -> None:
+    """Take the lock of a file until it is closed.
+
+    Raises
+    ------
+    OSError
+        Another process has it.
+    """
+    if sys.platform == "win32":
+        place = file.tell()
+        file.seek(BEYOND)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        finally:
+            file.seek(place)
+    else:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+NAME = "journal.jsonl"
+
+NOT_YET = 0
+"""Place of no row: the first line is there. Zeros take no memory until they are written over."""
+
+
+class Journal:
+    """Results of a study, by the numbers of its rows.
+
+    Parameters
+    ----------
+    path : Path
+        Made, or gone on with.
+    digest : str
+        Of all that results depend on.
+    rows : int
+        Of the study.
+
+    Attributes
+    ----------
+    torn : bool
+        Whether a torn last line was dropped.
+    damaged : int
+        Lines that were passed over.
+
+    Raises
+    ------
+    InputError
+        It is that of another study, another process writes it, or it is no journal.
+    SpheretwinError
+        It could not be begun, as on a full disk.
+    """
+
+    def __init__(self, path: Path, digest: str, rows: int) -> None:
+        self.path, self.torn, self.damaged = path, False, 0
+        self._head = json.dumps({"journal": 1, "digest": digest}).encode() + b"\n"
+        self._places: NDArray[np.int64] = np.zeros(rows, dtype=np.int64)
+        self._end = 0
+        self._file = _opened(path)
+        try:
+            self._begin(digest)
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def done(self, below: int | None = None) -> int:
+        """Number of finished rows below a number; of all unless given."""
+        return int(np.count_nonzero(self._places[:below]))
+
+    def has(self, number: int) -> bool:
+        """Whether a row is finished."""
+        return bool(self._places[number] != NOT_YET)
+
+    def add(self, row: Row, result: Result) -> None:
+        """Keep a result.
+
+        Raises
+        ------
+        SpheretwinError
+            It could not be written, as on a full disk; what was written before is kept.
+        """
+        place = self._end
+        self._write(_line([row.number, row.key, *result]))
+        self._places[row.number] = place
+
+    def results(self) -> Iterator[tuple[int, Result]]:
+        """Finished rows in the order of the study: the number of each, and its result."""
+        with self.path.open("rb") as file:
+            for number in np.flatnonzero(self._places):
+                file.seek(int(self._places[number]))
+                yield int(number), _result(json.loads(file.readline()))
+
+    def _begin(self, digest: str) -> None:
+        with self.path.open("rb") as file:
+            head = file.readline()
+            if self._head.startswith(head) and head != self._head:  # new, or torn before it was one
+                self._write(self._head)
+                return
+            found = _parsed(head)
+            if not isinstance(found, dict) or "journal" not in found:
+                raise InputError(f"study: expected a journal of a study, received {self.path}")
+            if found.get("digest") != digest:
+                raise InputError(
+                    f"study: expected {self.path} to be a journal of this study with these sources and"
+                    " versions, received one of others; remove it, or write into another folder"
+                )
+            self._end = len(head)
+            for line in file:
+                self._take(line)
+        self._file.truncate(self._end)
+
+    def _take(self, line: bytes) -> None:
+        if not line.endswith(b"\n"):
+            self.torn = True
+            return
+        number = _number(line)
+        if number is None or not 0 <= number < len(self._places):
+            self.damaged += 1
+        else:
+            self._places[number] = self._end
+        self._end += len(line)
+
+    def _write(self, line: bytes) -> None:
+        """Put a line at the end, whole or not at all."""
+        try:
+            self._file.seek(self._end)
+            left = memoryview(line)
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            with suppress(OSError):  # what is left of the line is dropped when it is read
+                self._file.truncate(self._end)
+            raise SpheretwinError(
+                f"study: {self.path} could not be written, {error.strerror or error};"
+                " the rows before are kept"
+            ) from None
+        self._end += len(line)
+
+
+def _opened(path: Path) -> BinaryIO:
+    """The file, without a buffer: what is written is written, and what failed is not tried again."""
+    try:
+        file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b", 0)
+    except OSError as error:
+        raise InputError(f"study: expected a folder for its journal, {without_breaks(error)}") from None
+    try:
+        lock(file)
+    except OSError:
+        file.close()
+        raise InputError(
+            f"study: expected one process at a time, received {path}, which another one writes"
+        ) from None
+    return file
+
+
+def _line(record: list[Any]) -> bytes:
+    """A line of JSON, the last entry of which is a check of all before it."""
+    body = json.dumps(record).encode()[:-1]
+    return body + b', "%08x"]\n' % zlib.crc32(body)
+
+
+def _number(line: bytes) -> int | None:
+    """Row of a line; None where it is damaged."""
+    body = line[: -len(', "00000000"]\n')]
+    parsed = _parsed(line) if line[len(body) :] == b', "%08x"]\n' % zlib.crc32(body) else None
+    return parsed[0] if isinstance(parsed, list) else None
+
+
+def _parsed(line: bytes) -> Any:
+    try:
+        return json.loads(line)
+    except ValueError:
+        return None
+
+
+def _result(parsed: list[Any]) -> Result:
+    return Result(*parsed[2:-1])

@@ -1,0 +1,353 @@
+"""Which figures suit a study: over one axis lines, over two a map, over more what the worst goes with."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import shown
+from spheretwin.study.statistics import Array, Rows, ranked, strongest
+from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages import html
+from spheretwin.viz.pages import markdown as pieces
+from spheretwin.viz.pages.markdown import save_drawings, save_text
+
+if TYPE_CHECKING:
+    from spheretwin.viz.figures.maps import MapPanel, StudyLine
+
+MOST_BARS, MOST_SCATTERS = 20, 8
+
+# A map of more is no map: where each row has a value of its own, nothing stands beside anything.
+MOST_SQUARES = 60
+
+LEAST_SPREAD = 10
+"""Completed rows from which on their distribution is one."""
+
+
+def drawings(rows: Rows) -> Iterator[Drawing]:
+    """Figures of a study, in the order of its page; none where no row was completed."""
+    varied = {field: values for field, values in rows.axes.items() if len(_distinct(values)) > 1}
+    if rows.main is None or not np.any(rows.completed):
+        return
+    listed = all(len(_distinct(values)) <= MOST_SQUARES for values in varied.values())
+    if len(varied) == 1 and listed:
+        yield _lines(rows, *next(iter(varied.items())))
+    elif len(varied) == 2 and listed:
+        yield _map(rows, varied)
+    elif numbers := {field: values for field, values in varied.items() if values.dtype == np.float64}:
+        yield from _many(rows, numbers)
+    if np.count_nonzero(rows.completed) >= LEAST_SPREAD:
+        yield _distributions(rows)
+
+
+def _lines(rows: Rows, field: str, values: NDArray[Any]) -> Drawing:
+    from spheretwin.viz.figures import maps
+
+    x, places = _placed(values)
+    figure = maps.lines(
+        {law: _line(rows, law, places, len(x)) for law in rows.law_names},
+        x if x.dtype == np.float64 else list(x),
+        field,
+        _quantity(rows),
+        f"{rows.study['name']}: {_quantity(rows)}",
+    )
+    caption = (
+        f"{_quantity(rows)} by {field}: the median of the completed rows a line, their whole range a band."
+    )
+    return Drawing("report_axis.png", caption, figure)
+
+
+def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
+    from spheretwin.viz.figures import maps
+
+    (first, down), (second, across) = ((field, _placed(values)) for field, values in varied.items())
+    panels = {law: _panel(rows, law, down[1], across[1]) for law in rows.law_names}
+    figure = maps.maps(
+        panels,
+        (first, second),
+        ([_told(each) for each in down[0]], [_told(each) for each in across[0]]),
+        _quantity(rows),
+        f"{rows.study['name']}: {_quantity(rows)}",
+    )
+    caption = (
+        f"{_quantity(rows)} by {first} and {second}, a panel a law: the median of the completed rows."
+        " A cross is where a row did not come to its end."
+    )
+    return Drawing("report_map.png", caption, figure)
+
+
+def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
+    from spheretwin.viz.figures import distributions
+
+    whole = {law: _whole(rows, law) for law in rows.law_names}
+    whole = {law: chosen for law, chosen in whole.items() if np.count_nonzero(chosen) >= LEAST_SPREAD}
+    if not whole:
+        return
+    y: Array = rows.figures[str(rows.main)]
+    found = {
+        law: ranked([each[chosen] for each in numbers.values()], y[chosen]) for law, chosen in whole.items()
+    }
+    order, names = strongest(found.values()), list(numbers)
+    bars = order[:MOST_BARS]
+    figure = distributions.ranks(
+        [names[place] for place in bars],
+        {law: rank._replace(by_value=rank.by_value[bars], by_distance=rank.by_distance[bars])
+         for law, rank in found.items()},
+        f"{rows.study['name']}: what {_quantity(rows)} goes with",
+    )  # fmt: skip
+    partial = all(rank.is_partial for rank in found.values())
+    left = ", when what goes with the other axes is taken away" if partial else ""
+    caption = (
+        f"Spearman's rank correlation of {_quantity(rows)} with the value of each axis, and, as a ring, with"
+        f" its distance from the middle one{left}: the {len(bars)} strongest of {len(names)} axes, over the"
+        " completed rows. What does not matter is in the grey band 95 times of a hundred."
+    )
+    yield Drawing("report_ranks.png", caption, figure)
+    shown = [names[place] for place in order[:MOST_SCATTERS]]
+    figure = distributions.scatters(
+        {name: {law: numbers[name][chosen] for law, chosen in whole.items()} for name in shown},
+        {law: y[chosen] for law, chosen in whole.items()},
+        _quantity(rows),
+        f"{rows.study['name']}: {_quantity(rows)} over its {len(shown)} strongest axes",
+    )
+    caption = (
+        f"{_quantity(rows)} of the completed rows over the {len(shown)} axes that it goes with most:"
+        " a dot a row, a line the median of each tenth."
+    )
+    yield Drawing("report_strongest.png", caption, figure)
+
+
+def _distributions(rows: Rows) -> Drawing:
+    from spheretwin.viz.figures import distributions
+
+    figures = {
+        name: {law: values[(rows.laws == law) & rows.completed] for law in rows.law_names}
+        for name, values in rows.figures.items()
+    }
+    numbers = {
+        name: {law: values[np.isfinite(values)] for law, values in by_law.items()}
+        for name, by_law in figures.items()
+    }
+    numbers = {name: by_law for name, by_law in numbers.items() if _differ(by_law.values())}
+    totals = {law: int(np.count_nonzero(rows.laws == law)) for law in rows.law_names}
+    figure = distributions.distributions(numbers, totals, f"{rows.study['name']}: distributions")
+    caption = (
+        "Share of all rows that were completed with at most this: a curve ends below 1 by the rows that were"
+        " not, or that never settled. Of a figure of each hinge, the largest of the three."
+    )
+    return Drawing("report_spread.png", caption, figure)
+
+
+def _quantity(rows: Rows) -> str:
+    return f"{rows.main}"
+
+
+def _whole(rows: Rows, law: str) -> NDArray[np.bool_]:
+    """Completed rows of a law that have the main figure."""
+    return (rows.laws == law) & rows.completed & np.isfinite(rows.figures[str(rows.main)])
+
+
+def _differ(several: Iterable[Array]) -> bool:
+    """Whether there are two different numbers at all."""
+    return len(np.unique(np.concatenate(list(several)))) > 1
+
+
+def _distinct(values: NDArray[Any]) -> list[Any]:
+    return list(dict.fromkeys(values.tolist()))
+
+
+def _placed(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    """Different values, numbers in their order, names in that of the study; and which each row has."""
+    if values.dtype == np.float64:
+        distinct, places = np.unique(values, return_inverse=True)
+        return distinct, places
+    names = _distinct(values)
+    return np.array(names, dtype=object), np.array([names.index(each) for each in values])
+
+
+def _panel(rows: Rows, law: str, down: NDArray[np.int64], across: NDArray[np.int64]) -> MapPanel:
+    from spheretwin.viz.figures.maps import MapPanel
+
+    shape = (int(down.max()) + 1, int(across.max()) + 1)
+    line = _line(rows, law, down * shape[1] + across, shape[0] * shape[1])
+    return MapPanel(line.median.reshape(shape), line.lost.reshape(shape))
+
+
+def _line(rows: Rows, law: str, places: NDArray[np.int64], count: int) -> StudyLine:
+    from spheretwin.viz.figures.maps import StudyLine
+
+    of_law, whole = rows.laws == law, _whole(rows, law)
+    values = rows.figures[str(rows.main)]
+    spread = np.full((3, count), np.nan)
+    for place in np.unique(places[whole]):
+        spread[:, place] = np.quantile(values[whole & (places == place)], [0.5, 0, 1])
+    lost = np.bincount(places[of_law & ~rows.completed], minlength=count) > 0
+    return StudyLine(spread[0], spread[1], spread[2], lost)
+
+
+def _told(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+MARKDOWN, HTML = "report.md", "report.html"
+
+MOST_NAMED = 5
+"""Rows that are named one by one, the worst of them and those that failed."""
+
+
+def can_be_drawn() -> bool:
+    """Whether there is what figures are drawn with."""
+    return find_spec("matplotlib") is not None
+
+
+def write(
+    folder: Path,
+    rows: Rows,
+    told: Mapping[str, Any],
+    wanted: tuple[int, int],
+    source: str,
+    versions: Mapping[str, str],
+) -> list[Path]:
+    """Write the page and its figures into a folder; returns both forms of the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    rows : Rows
+    told : mapping
+        Their summary.
+    wanted : two int
+        Rows that were wanted, and all that the study has.
+    source : str
+        The study as the command line names it.
+    versions : mapping
+        Version by package, for the foot.
+
+    Raises
+    ------
+    SpheretwinError
+        A file cannot be written there.
+    """
+    drawn = list(drawings(rows))
+    save_drawings(folder, drawn)
+    text = markdown(rows, told, wanted, drawn, source, versions)
+    title = str(rows.study["name"])
+    return [save_text(folder / MARKDOWN, text), save_text(folder / HTML, html.page(title, text))]
+
+
+def markdown(
+    rows: Rows,
+    told: Mapping[str, Any],
+    wanted: tuple[int, int],
+    drawn: Sequence[Drawing],
+    source: str,
+    versions: Mapping[str, str],
+) -> str:
+    """Text of the page."""
+    study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
+    used = ", ".join(f"{name} {version}" for name, version in versions.items())
+    lines = [f"# {study['name']}", "", study["description"], "", _ends(rows, *wanted), ""]
+    lines += ["## Figures of the rows", "", *_summary(told), ""]
+    lines += [pieces.figure(drawing) for drawing in drawn]
+    lines += _worst(rows, command)
+    lines += _failures(rows)
+    lines += ["## What differs from row to row", "", *_axes(study, rows), ""]
+    limit = f" --limit {wanted[0]}" if wanted[0] < wanted[1] else ""
+    lines += [f"Made by `{command}{limit}` with {used}.", ""]
+    return "\n".join(lines)
+
+
+def _ends(rows: Rows, of: int, whole: int) -> str:
+    """How many rows there are, and how they ended."""
+    count = len(rows.laws)
+    ends = ", ".join(f"{number} {status}" for status, number in Counter(rows.statuses.tolist()).items())
+    missing = f" The other {of - count} are still to be run: the same command goes on." if count < of else ""
+    first = f" Only {of} of the study's {whole} rows were requested." if of < whole else ""
+    return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
+
+
+def _summary(told: Mapping[str, Any]) -> list[str]:
+    """Median and 95 % range of each figure, a column a law; below them the statuses."""
+    figures = [name for name in next(iter(told.values()), {}) if name != "statuses"]
+    statuses = sorted({status for of_law in told.values() for status in of_law["statuses"]})
+    body = [[name, *(_spread(of_law[name]) for of_law in told.values())] for name in figures]
+    body += [[name, *(str(of_law["statuses"].get(name, 0)) for of_law in told.values())] for name in statuses]
+    head = ["median (95 % range) of the completed rows", *told]
+    return pieces.table(head, body, [False, *(True for _ in told)])
+
+
+def _spread(figure: Mapping[str, Any]) -> str:
+    if figure["median"] is None:
+        return "–"
+    low, high = figure["range_95"]
+    return f"{figure['median']:.4g} ({low:.4g} to {high:.4g})"
+
+
+def _worst(rows: Rows, command: str) -> list[str]:
+    """Completed rows with the largest main figure, and how each is run alone."""
+    if rows.main is None:
+        return []
+    values = np.where(rows.completed, rows.figures[rows.main], np.nan)
+    order = [place for place in np.argsort(-values, kind="stable") if np.isfinite(values[place])]
+    if not order:
+        return []
+    body = [
+        [str(rows.numbers[place]), f"`{rows.keys[place]}`", rows.laws[place], f"{values[place]:.4g}"]
+        for place in order[:MOST_NAMED]
+    ]
+    head = ["row", "key", "law", rows.main]
+    table = pieces.table(head, body, [True, False, False, True])
+    alone = f"`{command} --row KEY` runs one alone, and prints the command line that does."
+    return ["## The worst that were completed", "", *table, "", alone, ""]
+
+
+def _failures(rows: Rows) -> list[str]:
+    """Rows by how they ended, where that was not their end, with the first of each kind."""
+    found: dict[tuple[str, str, str], list[int]] = {}
+    for place in np.flatnonzero(~rows.completed).tolist():
+        found.setdefault((rows.laws[place], rows.statuses[place], rows.complaints[place]), []).append(place)
+    if not found:
+        return []
+    kinds = sorted(found.items(), key=lambda each: -len(each[1]))
+    body = [
+        [
+            law,
+            status,
+            complaint and shown(complaint).strip("'\""),
+            str(len(places)),
+            f"`{rows.keys[places[0]]}`",
+        ]
+        for (law, status, complaint), places in kinds[: 2 * MOST_NAMED]
+    ]
+    table = pieces.table(
+        ["law", "status", "why", "rows", "the first"], body, [False, False, False, True, False]
+    )
+    rest = [f"And {len(kinds) - len(body)} other reasons.", ""] if len(kinds) > len(body) else []
+    return ["## Rows that did not come to their end", "", *table, "", *rest]
+
+
+def _axes(study: Mapping[str, Any], rows: Rows) -> list[str]:
+    """Axes, as they are in the rows that there are."""
+    if not study["axis"]:
+        return ["Nothing but the seed."]
+    body = [[f"`{axis['field']}`", axis["kind"], _range(rows.axes[axis["field"]])] for axis in study["axis"]]
+    return pieces.table(["field", "values", ""], body, [False, False, False])
+
+
+def _range(values: Any) -> str:
+    """What an axis has in the table, in a few words."""
+    distinct = list(dict.fromkeys(values.tolist()))
+    if values.dtype != np.float64:
+        listed = ", ".join(str(each) for each in distinct[:MOST_NAMED])
+        return shown(listed).strip("'\"") + (", …" if len(distinct) > MOST_NAMED else "")
+    if len(distinct) <= MOST_NAMED:
+        return ", ".join(f"{each:.6g}" for each in distinct)
+    return f"{len(distinct)} from {np.nanmin(values):.6g} to {np.nanmax(values):.6g}"

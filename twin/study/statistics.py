@@ -1,0 +1,255 @@
+"""The table of a study as arrays: a number a row for each figure, values of the axes, laws and statuses."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.metrics import METRICS
+from spheretwin.models.telemetry import checksums
+from spheretwin.models.telemetry.status import Status
+from spheretwin.study.row import FAILED
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.parquet
+
+Array = NDArray[np.float64]
+Texts = NDArray[np.object_]
+
+MAIN = "max_abs_error_rad"
+
+TEXTS = ("key", "law", "status", "reason", "error")
+BESIDE = ("row", "key", "seed", "law", "repeat", "status", "reason", "error")
+
+
+class Rows(NamedTuple):
+    """All rows of a table.
+
+    Attributes
+    ----------
+    study : dict
+        As its TOML says it.
+    numbers : (n,) array
+        Of the rows, in the study.
+    keys, laws, statuses, complaints : (n,) object arrays
+        A complaint is the reason of an end, or the error; empty where there is none.
+    axes : mapping of field to (n,) array
+        Numbers, or text.
+    figures : mapping of name to (n,) array
+        Of a figure of each hinge, the largest of the three; NaN where there is none.
+    """
+
+    study: dict[str, Any]
+    numbers: NDArray[np.int64]
+    keys: Texts
+    laws: Texts
+    statuses: Texts
+    complaints: Texts
+    axes: Mapping[str, NDArray[Any]]
+    figures: Mapping[str, Array]
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """Which rows came to their end."""
+        return self.statuses == str(Status.COMPLETED)
+
+    @property
+    def failures(self) -> NDArray[np.int64]:
+        """Places of rows that a watchdog ended, or in which a law or a metric of the user's raised."""
+        failed = np.isin(self.statuses, [FAILED, str(Status.FAILSAFE)])
+        return np.flatnonzero(failed | (self.completed & (self.complaints != "")))
+
+    @property
+    def law_names(self) -> list[str]:
+        """Laws, in the order in which they come first."""
+        return list(dict.fromkeys(self.laws.tolist()))
+
+    @property
+    def main(self) -> str | None:
+        """The figure that others are held against: the largest error, else the first that is kept."""
+        return MAIN if MAIN in self.figures else next(iter(self.figures), None)
+
+
+def read(table: Path) -> Rows:
+    """Read the rows of a table.
+
+    Raises
+    ------
+    InputError
+        The table is missing or damaged.
+    """
+    import pyarrow as pa  # slow to import
+
+    try:
+        with checksums.open_parquet(table) as file:
+            return _rows(file)
+    except (OSError, pa.ArrowException) as error:
+        raise checksums.unreadable(table, error, "the table of a study") from None
+
+
+def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
+    import pyarrow as pa
+
+    schema = file.schema_arrow
+    study = json.loads(schema.metadata[b"study"])
+    axes = [axis["field"] for axis in study["axis"]]
+    figures = [
+        field.name
+        for field in schema
+        if field.name not in (*BESIDE, *axes) and not pa.types.is_string(field.type)
+    ]
+    found = file.read(columns=[*TEXTS, "row", *axes, *figures], use_threads=False)
+    texts = {name: np.array(found[name].to_pylist(), dtype=object) for name in TEXTS}
+    return Rows(
+        study,
+        found["row"].to_numpy(),
+        texts["key"],
+        np.array([_label(law) for law in texts["law"]], dtype=object),
+        texts["status"],
+        np.array(
+            [error or reason or "" for error, reason in zip(texts["error"], texts["reason"], strict=True)],
+            dtype=object,
+        ),
+        {field: _values(found[field]) for field in axes},
+        {name: largest(found[name]) for name in sorted(figures, key=_place)},
+    )
+
+
+def largest(column: pa.ChunkedArray) -> Array:
+    """One number a row: of a list, the largest; NaN where there is none, or a part of it."""
+    import pyarrow as pa
+
+    if not pa.types.is_list(column.type):
+        return column.to_numpy().astype(np.float64)
+    lists = column.combine_chunks()
+    lengths = np.nan_to_num(lists.value_lengths().to_numpy(zero_copy_only=False)).astype(int)
+    numbers = np.full(len(lists), np.nan)
+    if np.any(lengths):
+        flat = lists.flatten().to_numpy(zero_copy_only=False).astype(np.float64)
+        starts = np.cumsum(lengths) - lengths
+        numbers[lengths > 0] = np.maximum.reduceat(flat, starts[lengths > 0])
+    return numbers
+
+
+def _label(law: str) -> str:
+    """A law as people read it: its name, then its gains."""
+    if not law.startswith("{"):
+        return law
+    told = json.loads(law)
+    gains = (f"{name} = {value}" for name, value in told.items() if name != "law")
+    return ", ".join([told["law"], *gains])
+
+
+def _values(column: pa.ChunkedArray) -> NDArray[Any]:
+    import pyarrow as pa
+
+    if pa.types.is_string(column.type) or pa.types.is_boolean(column.type):
+        texts = [each if isinstance(each, str) else json.dumps(each) for each in column.to_pylist()]
+        return np.array(texts, dtype=object)
+    return column.to_numpy().astype(np.float64)
+
+
+def _place(name: str) -> int:
+    """Metrics in their own order, the user's behind them."""
+    return list(METRICS).index(name) if name in METRICS else len(METRICS)
+
+
+if TYPE_CHECKING:  # Matplotlib is slow to import, and need not be there
+    from spheretwin.viz.figures.distributions import Rank
+
+NORMAL_95 = 1.96
+
+ENOUGH = 4
+"""Rows a column from which on the others can be taken away."""
+
+SINGULAR = 1e6
+
+
+def ranked(axes: Sequence[NDArray[np.float64]], figure: NDArray[np.float64]) -> Rank:
+    """Spearman's rank correlations of a figure, partial where there are rows enough.
+
+    An error does not care for the sign of what shifts it: such an axis has no rank correlation with it, and
+    shows by its distance from its middle. Where one axis outweighs all others, these show only when what
+    goes with it is taken away: the partial correlation is that of what a linear fit of the ranks of all
+    other columns leaves of both.
+
+    Parameters
+    ----------
+    axes : sequence of (n,) arrays
+    figure : (n,) array
+    """
+    columns = [*axes, *(np.abs(axis - np.median(axis)) for axis in axes)]
+    ranks = np.stack([_ranks(column) for column in (*columns, figure)])
+    plain = ranks @ ranks.T
+    differ = np.flatnonzero(np.diag(plain) > 0)
+    inner = plain[np.ix_(differ, differ)]
+    rows, among = len(figure), len(differ)
+    is_partial = (
+        rows >= ENOUGH * among
+        and differ[-1] == len(columns)
+        and bool(np.linalg.cond(inner) < SINGULAR)  # else some axes go together, as those of a zip
+    )
+    if is_partial:
+        inverse = np.linalg.inv(inner)
+        size = np.sqrt(np.diag(inverse))
+        found = np.zeros(len(columns))
+        found[differ[:-1]] = -inverse[-1, :-1] / (size[-1] * size[:-1])
+    else:
+        found = plain[-1, :-1]
+    free = rows - among if is_partial else rows - 1
+    from spheretwin.viz.figures.distributions import Rank
+
+    return Rank(found[: len(axes)], found[len(axes) :], NORMAL_95 / np.sqrt(free), is_partial)
+
+
+def strongest(ranks: Iterable[Rank]) -> list[int]:
+    """Places of the axes by their largest correlation of either kind, under any law, the strongest first."""
+    sizes = [np.maximum(np.abs(rank.by_value), np.abs(rank.by_distance)) for rank in ranks]
+    return np.argsort(-np.max(sizes, axis=0), kind="stable").tolist()
+
+
+def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ranks about their mean, of length 1; zeros where nothing differs."""
+    from scipy.stats import rankdata  # slow to import
+
+    about = rankdata(values) - (len(values) + 1) / 2
+    size = np.sqrt(np.sum(about * about))
+    return about / size if size > 0 else about
+
+
+LEVELS = (2.5, 50.0, 97.5)
+
+
+def summary(rows: Rows) -> dict[str, Any]:
+    """What a study says as a whole.
+
+    Returns
+    -------
+    dict
+        By law: ``statuses`` with their counts, and for each figure of the completed rows ``median`` and
+        ``range_95``; of a figure of each hinge, the largest of the three is taken.
+    """
+    found: dict[str, Any] = {}
+    for law in rows.law_names:
+        of_law = rows.laws == law
+        found[law] = {
+            "statuses": dict(Counter(rows.statuses[of_law].tolist())),
+            **{name: _spread(values[of_law & rows.completed]) for name, values in rows.figures.items()},
+        }
+    return found
+
+
+def _spread(values: NDArray[np.float64]) -> dict[str, Any]:
+    """Median and range of the numbers among some values; None where there is none."""
+    numbers = values[np.isfinite(values)]
+    if not len(numbers):
+        return {"median": None, "range_95": None}
+    low, median, high = np.percentile(numbers, LEVELS).tolist()
+    return {"median": median, "range_95": [low, high]}

@@ -1,0 +1,273 @@
+"""What is drawn of a tuning: its objectives over the trials, and the front of two."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spheretwin.study.optimise import ON, SWITCH, Gain, Objective, Optimise, best_within
+from spheretwin.study.study import Study
+from spheretwin.study.tuning.gains import section_of
+from spheretwin.study.tuning.trials import Ended
+from spheretwin.study.tuning.tuning import Chosen, Found, OfLaw
+from spheretwin.viz.figures import fronts
+from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages import html
+from spheretwin.viz.pages import markdown as pieces
+from spheretwin.viz.pages.markdown import save_drawings, save_text
+
+
+def drawings(name: str, found: Found, objectives: Sequence[Objective]) -> list[Drawing]:
+    """Figures of a tuning; none of one without a trial."""
+    by_label = {law.law: _trials(law, objectives) for law in found.laws if law.kept}
+    if not by_label:
+        return []
+    names = [each.called for each in objectives]
+    drawn = [
+        Drawing(
+            "trials.png",
+            "Objectives trial by trial: rings were pruned, and are at least that; crosses lost.",
+            fronts.progress(by_label, names, f"{name}: trials"),
+        )
+    ]
+    if len(objectives) == 2:
+        caption = "The front: no trial is as good in both objectives and better in one."
+        drawn.append(Drawing("front.png", caption, fronts.front(by_label, names, f"{name}: front")))
+    return drawn
+
+
+def _trials(law: OfLaw, objectives: Sequence[Objective]) -> fronts.Trials:
+    signs = np.array([each.sign for each in objectives])
+    best = {each.kept.number for each in law.best}
+    lost = [np.nan] * len(objectives)
+    values = [lost if each.tried.ended == Ended.LOST else each.tried.values for each in law.kept]
+    fresh = [each.fresh.values for each in law.best if each.fresh and each.fresh.values]
+    return fronts.Trials(
+        law=law.law,
+        numbers=np.array([float(each.number) for each in law.kept]),
+        values=signs * np.array(values, dtype=float),
+        completed=np.array([each.tried.ended == Ended.COMPLETED for each in law.kept]),
+        best=np.array([each.number in best for each in law.kept]),
+        signs=signs,
+        has_start=law.start is not None,
+        fresh=signs * np.array(fresh, dtype=float).reshape(-1, len(objectives)),
+    )
+
+
+KEPT = ("trial", "gains", "fields", "values")
+"""What the file of the gains found has of a trial."""
+
+
+def told(found: Found, objectives: Sequence[Objective]) -> dict[str, Any]:
+    """What was found: of each law how its trials ended, its start, and its best or its front."""
+    return {
+        "objectives": [each.model_dump(mode="json") for each in objectives],
+        "laws": {law.law: _of_law(law, objectives) for law in found.laws},
+        "trials": found.trials,
+        "of": found.of,
+        "resumed": found.resumed,
+        "wall_s": found.wall_s,
+        "table": str(found.table),
+    }
+
+
+def best(found: Found, objectives: Sequence[Objective]) -> dict[str, Any]:
+    """Gains found: of each law its best trial, that within each limit, or the trials of the front."""
+    return {"laws": {law.law: _best_of(law, objectives) for law in found.laws}}
+
+
+def _best_of(law: OfLaw, objectives: Sequence[Objective]) -> list[dict[str, Any]]:
+    by_number = {each.kept.number: each for each in law.best}
+    values = {number: each.kept.tried.values for number, each in by_number.items()}
+    limits = objectives[-1].limits
+    numbers: list[tuple[float | None, int | None]] = [(limit, best_within(values, limit)) for limit in limits]
+    return [
+        {"limit": limit, **{name: _chosen_figures(by_number[number], objectives)[name] for name in KEPT}}
+        for limit, number in (numbers if limits else [(None, number) for number in by_number])
+        if number is not None
+    ]
+
+
+def _of_law(law: OfLaw, objectives: Sequence[Objective]) -> dict[str, Any]:
+    counts = Counter(each.tried.ended for each in law.kept)
+    lost = [each.tried.reason for each in law.kept if each.tried.ended == Ended.LOST]
+    return {
+        "ended": {str(each): counts[each] for each in Ended},
+        "lost": lost[0] if lost else None,
+        "rows": sum(len(each.tried.each) for each in law.kept),
+        "start": _chosen_figures(law.start, objectives) if law.start else None,
+        "best": [_chosen_figures(each, objectives) for each in law.best],
+    }
+
+
+def _chosen_figures(chosen: Chosen, objectives: Sequence[Objective]) -> dict[str, Any]:
+    tried, fresh = chosen.kept.tried, chosen.fresh
+    completed = tried.ended == Ended.COMPLETED
+    return {
+        "trial": chosen.kept.number,
+        "ended": str(tried.ended),
+        "reason": tried.reason or None,
+        "gains": _gains(chosen.kept.chosen),
+        "fields": dict(chosen.fields),
+        "values": _signed(tried.values, objectives) if completed else None,
+        "fresh": _signed(fresh.values, objectives) if fresh and fresh.values else None,
+        "fresh_reason": (fresh.reason or None) if fresh else None,
+        "command": chosen.command,
+    }
+
+
+def _gains(chosen: Mapping[str, float]) -> dict[str, float | None]:
+    """Values by gain; None of an optional one that is off."""
+    is_on = {
+        name.removesuffix(SWITCH): value >= ON for name, value in chosen.items() if name.endswith(SWITCH)
+    }
+    return {
+        name: value if is_on.get(name, True) else None
+        for name, value in chosen.items()
+        if not name.endswith(SWITCH)
+    }
+
+
+def _signed(values: Sequence[float], objectives: Sequence[Objective]) -> dict[str, float]:
+    pairs = zip(objectives, values, strict=True)
+    return {objective.called: objective.sign * value for objective, value in pairs}
+
+
+MARKDOWN, HTML, GAINS = "tuning.md", "tuning.html", "gains.json"
+
+HOW = {
+    "tpe": "proposed by a tree-structured Parzen estimator",
+    "nsga2": "proposed by NSGA-II",
+    "random": "drawn at random",
+    "local": "points of a Sobol sequence, then perturbations of the best within each limit",
+}
+ALIGNED = [False, False, True, True, False, False]
+"""Whether the columns of the ranges are numbers."""
+
+
+def write(folder: Path, study: Study, found: Found, command: str, versions: Mapping[str, str]) -> list[Path]:
+    """Write the page, and its figures where matplotlib is, into a folder; returns both forms of the page.
+
+    Parameters
+    ----------
+    folder : Path
+        Exists.
+    study : Study
+    found : Found
+    command : str
+        What makes the page again.
+    versions : mapping
+        Version by package, for the foot.
+
+    Raises
+    ------
+    SpheretwinError
+        A file cannot be written there.
+    """
+    drawn: list[Drawing] = []
+    if find_spec("matplotlib") is not None:
+        # slow to import
+
+        drawn = drawings(study.name, found, section_of(study).objective)
+        save_drawings(folder, drawn)
+    text = markdown(study, found, drawn, command, versions)
+    gains = json.dumps(best(found, section_of(study).objective), indent=1, ensure_ascii=False)
+    return [
+        save_text(folder / MARKDOWN, text),
+        save_text(folder / HTML, html.page(study.name, text)),
+        save_text(folder / GAINS, f"{gains}\n"),
+    ]
+
+
+def markdown(
+    study: Study, found: Found, drawn: Sequence[Drawing], command: str, versions: Mapping[str, str]
+) -> str:
+    """Text of the page."""
+    optimise = section_of(study)
+    whole = told(found, optimise.objective)
+    used = ", ".join(f"{name} {version}" for name, version in versions.items())
+    lines = [f"# {study.name}", "", study.description, "", *_what(study), ""]
+    lines += [pieces.figure(each) for each in drawn]
+    for law, of_law in whole["laws"].items():
+        lines += [f"## {law}", "", _counted(of_law), "", *_chosen(of_law), ""]
+    lines += [f"Made by `{command}` with {used}.", ""]
+    return "\n".join(lines)
+
+
+def _what(study: Study) -> list[str]:
+    """What was looked for, and how."""
+    optimise = section_of(study)
+    ranges = [
+        [each.called, each.law or "all", *_range(each), _sets(each.settings), each.reason]
+        for each in optimise.gain
+    ]
+    objectives = " and ".join(f"*{each.called}*, to {each.direction}" for each in optimise.objective)
+    fresh = (
+        f" *Fresh* are {optimise.fresh} further seeds, which no trial was chosen by."
+        if optimise.fresh
+        else ""
+    )
+    return [
+        f"Objectives: {objectives}, over {study.seeds} seeds of each point."
+        f" Trials are {HOW[optimise.sampler]}, {optimise.together} at a time."
+        + (" One that can no longer be among the best is pruned." if optimise.prune else "")
+        + _limits(optimise)
+        + fresh,
+        "",
+        *pieces.table(["gain", "law", "from", "to", "sets", "why"], ranges, ALIGNED),
+    ]
+
+
+def _limits(optimise: Optimise) -> str:
+    if not optimise.limits:
+        return ""
+    listed = ", ".join(f"{limit:g}" for limit in optimise.limits)
+    return f" The best trial within each limit on *{optimise.objective[1].called}* is chosen: {listed}."
+
+
+def _range(gain: Gain) -> list[str]:
+    return [f"{gain.low:g}", f"{gain.high:g}{', or off' if gain.optional else ''}"]
+
+
+def _sets(settings: Sequence[Any]) -> str:
+    return ", ".join(
+        f"{each.field}"
+        + (f" · {each.factor:g}" if each.factor != 1 else "")
+        + (f" (power {each.power:g})" if each.power != 1 else "")
+        for each in settings
+    )
+
+
+def _counted(of_law: Mapping[str, Any]) -> str:
+    ended = ", ".join(f"{count} {how}" for how, count in of_law["ended"].items() if count)
+    lost = f" The first that lost: {of_law['lost']}." if of_law["lost"] else ""
+    return f"Trials: {ended or 'none'}; {of_law['rows']} rows were run.{lost}"
+
+
+def _chosen(of_law: Mapping[str, Any]) -> list[str]:
+    """The start, and the best or the front: gains, fields, objectives."""
+    labelled = [("start", of_law["start"])] if of_law["start"] else []
+    labelled += [(str(each["trial"]), each) for each in of_law["best"]]
+    values = next((list(each["values"]) for _, each in labelled if each["values"]), None)
+    if values is None:
+        return ["No trial completed."]
+    columns = dict.fromkeys(
+        [*labelled[0][1]["gains"], *(field for _, each in labelled for field in each["fields"])]
+    )
+    is_fresh = any(each["fresh"] or each["fresh_reason"] for _, each in labelled)
+    head = ["trial", *columns, *values, *(f"{each}, fresh" for each in values if is_fresh)]
+    body = []
+    for label, each in labelled:
+        numbers = {**each["gains"], **each["fields"]}
+        values_of = map(numbers.get, columns)
+        cells = ["off" if value is None else f"{value:.4g}" for value in values_of]
+        for told_of in [each["values"], *([each["fresh"]] if is_fresh else [])]:
+            cells += [f"{told_of[name]:.4g}" if told_of else "lost" for name in values]
+        body.append([label, *cells])
+    return pieces.table(head, body, [False, *(True for _ in head[1:])])

@@ -1,1 +1,0 @@
-"""What is told of a tuning: as JSON, as figures, as one page."""

@@ -1,1 +1,0 @@
-"""The shapes of reference trajectories, one a file."""

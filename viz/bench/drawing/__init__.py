@@ -1,1 +1,0 @@
-"""The actuator in few triangles, for a browser without a GPU."""

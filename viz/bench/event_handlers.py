@@ -1,0 +1,213 @@
+"""What a person does to a page becomes one command each; a refusal is shown beside what was touched."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from html import escape
+from typing import Any, NamedTuple
+
+import viser
+
+from spheretwin.viz.bench.protocols import Bench, Ticket
+
+# How long a refusal that belongs to no field stays.
+SHOWN_S = 8.0
+
+# What waits for so long is said to: the first time, a law or a fault may have to be compiled.
+LONG_S = 0.5
+
+# A way to a pose takes the loop a fifth of a chunk to make: a slider that slides makes ten a second.
+STEERED_S = 0.1
+
+# Somebody who floods the bench sees no more than this of what becomes of it.
+MOST_TICKETS = 200
+
+Event = Any
+"""Of viser's: it has the number of the page that it comes from."""
+
+
+class Note:
+    """A line under a field that says why its value was refused; nothing unless there is something to say.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        In the container of the field.
+    order : float
+        Of the field.
+    """
+
+    def __init__(self, gui: viser.GuiApi, order: float) -> None:
+        self._html = gui.add_html("", order=order, visible=False)
+
+    def say(self, text: str | None) -> None:
+        """Show a text, or take it away."""
+        if text:
+            self._html.content = f'<div style="{_REFUSED}">{escape(text)}</div>'
+        self._html.visible = bool(text)
+
+    def remove(self) -> None:
+        """Take its place away."""
+        self._html.remove()
+
+
+_REFUSED = "color:#ff8787;font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em;overflow-wrap:anywhere"
+
+
+class Asked(NamedTuple):
+    """A command that waits."""
+
+    name: str
+    ticket: Ticket
+    beside: Note | None
+    since_s: float
+
+
+class Hand:
+    """Passes commands on, and follows what becomes of them.
+
+    Parameters
+    ----------
+    bench : Bench
+        Whom it tells.
+    """
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._lock = threading.Lock()
+        self._open: list[Asked] = []
+        self._refused, self._until_s = "", 0.0
+        self._warned_s: dict[int, float] = {}
+        self._steered: dict[str, tuple[Event, Note | None, dict[str, Any]]] = {}
+        self._steered_s: dict[str, float] = {}
+
+    @property
+    def refused(self) -> str:
+        """What was refused last and belongs to no field; empty after a while."""
+        return self._refused if time.monotonic() < self._until_s else ""
+
+    @property
+    def waits_for(self) -> str:
+        """The command that has waited for longest, where that is long enough to be seen; else nothing."""
+        since_s = time.monotonic() - LONG_S
+        return next((each.name for each in self._open if each.since_s < since_s), "")
+
+    def tell(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
+        """Tell the bench one thing in the name of an event's page; False where that may not."""
+        if name not in ANYONES and not self._operates(event):
+            self._warn(event)
+            return False
+        self.flush(0.0)  # what was steered before it comes before it
+        self._send(event, name, beside, arguments)
+        return True
+
+    def steer(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
+        """Tell the bench something of which only the latest matters, as often as it can be of use."""
+        if not self._operates(event):
+            self._warn(event)
+            return False
+        with self._lock:
+            self._steered[name] = (event, beside, arguments)
+        return True
+
+    def flush(self, apart_s: float = STEERED_S) -> None:
+        """Tell the latest of what is steered, where the last one is long enough ago."""
+        now = time.monotonic()
+        with self._lock:
+            due = [name for name in self._steered if now - self._steered_s.get(name, 0.0) >= apart_s]
+            steered = {name: self._steered.pop(name) for name in due}
+            self._steered_s |= dict.fromkeys(due, now)
+        for name, (event, beside, arguments) in steered.items():
+            self._send(event, name, beside, arguments)
+
+    def _send(self, event: Event, name: str, beside: Note | None, arguments: dict[str, Any]) -> None:
+        ticket = self._bench.command(name, client=client_name(event.client_id), **arguments)
+        with self._lock:
+            self._open = [*self._open[-MOST_TICKETS:], Asked(name, ticket, beside, time.monotonic())]
+
+    def tell_chosen(self, event: Event) -> None:
+        """Tell the bench what a group of buttons has as its value."""
+        if event.target.value in event.target.options:
+            self.tell(event, event.target.value)
+
+    def complain(self, text: str, beside: Note | None = None) -> None:
+        """Show why something never became a command."""
+        if beside:
+            beside.say(text)
+        else:
+            self._refused, self._until_s = text, time.monotonic() + SHOWN_S
+
+    def settle(self) -> None:
+        """Show what became of commands since."""
+        with self._lock:
+            settled = [each for each in self._open if each.ticket.done]
+            self._open = [each for each in self._open if not each.ticket.done]
+        for each in settled:
+            if each.ticket.refused:
+                self.complain(each.ticket.refused, each.beside)
+            elif each.beside:
+                each.beside.say(None)
+
+    def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> Any:
+        """Add a button that is one command without arguments."""
+        button = gui.add_button(label, **more)
+        on_press(button, lambda event: self.tell(event, name))
+        return button
+
+    def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
+        """Take what the operator writes or moves; give anybody else's page back what it was.
+
+        Parameters
+        ----------
+        line : viser's handle
+            Of a field, a slider or a box, which all pages share.
+        act : callable, optional
+            Called with the event of each change.
+        """
+        accepted = line.value
+
+        @line.on_update
+        async def _(event: Event) -> None:
+            nonlocal accepted
+            if event.client_id is not None and not self._operates(event):
+                line.value = accepted
+                self._warn(event)
+                return
+            accepted = line.value
+            if act and event.client_id is not None:
+                act(event)
+
+    def _operates(self, event: Event) -> bool:
+        state, name = self._bench.state(), client_name(event.client_id)
+        # The picture may be older than the page: who is in none of it is let through, and the bench decides.
+        return state.operator == name or (state.operator is None and name not in state.watching)
+
+    def _warn(self, event: Event) -> None:
+        """Tell a page that only watches, and no other, why nothing happens; not at every key."""
+        now = time.monotonic()
+        if now - self._warned_s.get(event.client_id, -SHOWN_S) >= SHOWN_S:
+            self._warned_s[event.client_id] = now
+            told = "Nobody operates; take over, above."
+            if self._bench.state().operator is not None:
+                told = "Another one operates; ask it, above."
+            event.client.add_notification("This page watches", told, auto_close_seconds=SHOWN_S)
+
+
+ANYONES = ("stop", "ask", "hello", "leave", "beat")
+"""Commands that the bench takes from pages that watch too."""
+
+
+def on_press(button: Any, act: Callable[[Event], object]) -> None:
+    """Call a function at each press of a button, on the server's own thread, in order."""
+
+    @button.on_click
+    async def _(event: Event) -> None:
+        if event.client_id is not None:
+            act(event)
+
+
+def client_name(number: int) -> str:
+    """What the bench calls a page."""
+    return f"page {number}"

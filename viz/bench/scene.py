@@ -1,0 +1,295 @@
+"""The actuator as a browser draws it: it moves, its coils have the colours of their currents."""
+
+from __future__ import annotations
+
+from collections import deque
+from math import pi
+
+import numpy as np
+import viser
+from numpy.typing import ArrayLike, NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.viz import theme
+from spheretwin.viz.bench.actuator import parts_of, quaternions_along
+from spheretwin.viz.scene.solids import Solid
+
+LIGHT = 1.6
+"""Light of a surface that is seen in its own colour, as a multiple of what a white one needs to be white."""
+
+# The curve comes to its end far away: nobody sees the difference, and a bright colour stays a colour.
+BRIGHTEST = 0.9
+
+_EXPOSURE = 1 / 0.6
+_INTO = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])
+_OUT_OF = np.array(
+    [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]]
+)
+
+
+def of_instances(colours: ArrayLike) -> NDArray[np.uint8]:
+    """Colours of many copies of a solid, (..., 3), which a page takes for shares of light."""
+    return np.round(255 * _albedo(colours)).astype(np.uint8)
+
+
+def of_one(colour: ArrayLike) -> tuple[int, int, int]:
+    """Colour of one solid, which a page takes as a screen does."""
+    red, green, blue = np.round(255 * _encoded(_albedo(colour))).astype(int).tolist()
+    return red, green, blue
+
+
+def _albedo(colours: ArrayLike) -> NDArray[np.float64]:
+    """Share of the light that a surface gives back, (..., 3)."""
+    shown = np.clip(_linear(np.asarray(colours) / 255) @ np.linalg.inv(_OUT_OF).T, 0.0, BRIGHTEST)
+    # v (v + 0.0245786) - 0.000090537 = shown (v (0.983729 v + 0.4329510) + 0.238081)
+    a, b, c = (
+        1 - 0.983729 * shown,
+        0.0245786 - 0.4329510 * shown,
+        -0.000090537 - 0.238081 * shown,
+    )
+    before = (-b + np.sqrt(b**2 - 4 * a * c)) / (2 * a)
+    return np.clip(before @ np.linalg.inv(_INTO).T / (_EXPOSURE * LIGHT), 0.0, 1.0)
+
+
+def _linear(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Light of a screen's numbers (sRGB), 0 to 1."""
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
+
+def _encoded(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+STEEL = (150, 156, 166)
+FRAME = (70, 76, 86)
+BALL = (196, 200, 206)
+# Muted, beside the colours of the currents.
+NORTH, SOUTH = (120, 72, 70), (72, 82, 112)
+GHOST_OPACITY = 0.3
+
+# Of the ball's radius.
+TIP_RADIUS = 0.12
+
+TRAIL_POINTS = 80
+
+SMALLEST_M = 1e-9
+
+
+class Scene:
+    """What moves, and what can be taken hold of.
+
+    Parameters
+    ----------
+    api : viser.SceneApi
+        Where it is drawn, in metres.
+    actuator : Actuator
+        What is drawn.
+
+    Attributes
+    ----------
+    coils : viser.BatchedMeshHandle
+        One instance a coil, in the order of the actuator's.
+    handle : viser.IcosphereHandle
+        The tip of the desired pose, to be dragged.
+    """
+
+    def __init__(self, api: viser.SceneApi, actuator: Actuator) -> None:
+        self._actuator = actuator
+        parts = parts_of(actuator)
+        _light(api)
+        api.world_axes.visible = False
+        _mesh(api, "/stator", parts.stator, FRAME)
+        self._hinges = [api.add_frame(name, show_axes=False) for name in _HINGES]
+        _mesh(api, f"{_HINGES[0]}/ring", parts.outer_ring, STEEL)
+        _mesh(api, f"{_HINGES[1]}/ring", parts.inner_ring, STEEL)
+        rotor = _HINGES[2]
+        _mesh(api, f"{rotor}/ball", parts.rotor, BALL)
+        shaft = quaternions_along(_unit(actuator.shaft_tip_m))[0]
+        _mesh(api, f"{rotor}/shaft", parts.shaft, STEEL, wxyz=shaft)
+        api.add_batched_meshes_simple(
+            f"{rotor}/poles",
+            parts.pole.vertices,
+            parts.pole.faces,
+            batched_wxyzs=quaternions_along(actuator.pole_axes),
+            batched_positions=np.zeros((len(actuator.pole_axes), 3)),
+            batched_colors=of_instances(np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH)),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self.coils = api.add_batched_meshes_simple(
+            "/coils",
+            parts.coil.vertices,
+            parts.coil.faces,
+            batched_wxyzs=quaternions_along(actuator.coil_axes),
+            batched_positions=actuator.coil.distance_m * actuator.coil_axes,
+            batched_colors=self._coil_colours(np.zeros(len(actuator.groups)), 1.0),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._ghost = api.add_frame("/desired", show_axes=False)
+        _mesh(api, "/desired/shaft", parts.shaft, theme.TRACE, wxyz=shaft, opacity=GHOST_OPACITY)
+        self.handle = api.add_icosphere(
+            "/tip",
+            radius=TIP_RADIUS * actuator.magnet.front_m,
+            subdivisions=2,
+            color=of_one(theme.TRACE),
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._trail: deque[NDArray[np.float64]] = deque(maxlen=TRAIL_POINTS)
+        self._line = api.add_line_segments(
+            "/trail",
+            np.zeros((1, 2, 3), dtype=np.float32),
+            theme.TRACE,
+            thickness=2.0,
+            thickness_units="screen",
+        )
+
+    def move(
+        self,
+        q_rad: NDArray[np.float64],
+        desired_rad: NDArray[np.float64] | None,
+        current_A: NDArray[np.float64],
+        limit_A: float,
+    ) -> None:
+        """Show a pose, the desired one beside it, and the currents.
+
+        Parameters
+        ----------
+        q_rad : (3,) array, rad
+            Hinge angles.
+        desired_rad : (3,) array, rad, optional
+            Where they should be; nothing is shown of it unless given.
+        current_A : (n,) array, A
+            Of the groups.
+        limit_A : float, A
+            Current of the full colour.
+        """
+        for axis, hinge in enumerate(self._hinges):
+            hinge.wxyz = _about(axis, q_rad[axis])
+        coloured = self._coil_colours(current_A, limit_A)
+        if not np.array_equal(coloured, self.coils.batched_colors):
+            self.coils.batched_colors = coloured
+        self._ghost.visible = self.handle.visible = desired_rad is not None
+        if desired_rad is not None:
+            w = _pose(desired_rad)
+            self._ghost.wxyz = w
+            self.handle.position = _turned(w, self._actuator.shaft_tip_m)
+
+    def trail(self, q_rad: NDArray[np.float64]) -> None:
+        """Draw the tip's way a little further."""
+        self._trail.append(_turned(_pose(q_rad), self._actuator.shaft_tip_m))
+        points = np.array(self._trail, dtype=np.float32)
+        if len(points) > 1:
+            self._line.points = np.stack([points[:-1], points[1:]], axis=1)
+
+    def pose_under(
+        self, point_m: tuple[float, float, float], eye_m: NDArray[np.float64], gamma_rad: float
+    ) -> list[float]:
+        """Hinge angles, rad, that bring the tip under a pointer; for a tip on the rotor's z.
+
+        Parameters
+        ----------
+        point_m : (3,) floats, m
+            Where the pointer is, at any depth.
+        eye_m : (3,) array, m
+            Of the one who sees it.
+        gamma_rad : float, rad
+            The angle about the shaft, which a pointer does not say.
+        """
+        ahead = np.array(point_m) - eye_m
+        ahead /= max(float(np.linalg.norm(ahead)), SMALLEST_M)
+        reach_m = float(np.linalg.norm(self._actuator.shaft_tip_m))
+        middle = float(eye_m @ ahead)
+        # Where the line of sight meets the sphere of the tip first; beside it, where it comes closest.
+        half = np.sqrt(max(0.0, middle**2 - float(eye_m @ eye_m) + reach_m**2))
+        met = eye_m + (-middle - half if middle < -half else half - middle) * ahead
+        x, y, z = met / max(float(np.linalg.norm(met)), SMALLEST_M)
+        return [float(np.arctan2(-y, z)), float(np.arcsin(np.clip(x, -1.0, 1.0))), gamma_rad]
+
+    def group_of(self, coil: int | None) -> int | None:
+        """Group of a coil that was clicked, by its place; None where there is none."""
+        found = np.flatnonzero((self._actuator.groups == coil).any(axis=1))
+        return int(found[0]) if len(found) else None
+
+    def forget(self) -> None:
+        """Begin the tip's way anew."""
+        self._trail.clear()
+        self._line.points = np.zeros((1, 2, 3), dtype=np.float32)
+
+    def _coil_colours(self, current_A: NDArray[np.float64], limit_A: float) -> NDArray[np.uint8]:
+        of_group = of_instances(theme.current_colours(current_A, limit_A))
+        coloured = np.empty((len(self._actuator.coil_axes), 3), dtype=np.uint8)
+        coloured[self._actuator.groups] = of_group[:, None, :]
+        return coloured
+
+
+_HINGES = ("/alpha", "/alpha/beta", "/alpha/beta/gamma")
+
+
+def _light(api: viser.SceneApi) -> None:
+    """Few lights, no shadows and no mirrored surroundings: these cost half the frames without a GPU."""
+    api.configure_default_lights(enabled=False)
+    api.configure_environment_map(None)
+    api.add_light_ambient("/light/all", intensity=AMBIENT * pi * LIGHT)
+    for name, intensity, position in _LAMPS:
+        api.add_light_directional(
+            f"/light/{name}", intensity=intensity * pi * LIGHT, position=position, cast_shadow=False
+        )
+
+
+# Shares of the light in which a surface has its own colour; a matt one gives a π-th of light back each way.
+AMBIENT = 0.45
+_LAMPS = (("key", 0.75, (0.6, -0.8, 1.0)), ("fill", 0.3, (-1.0, 0.3, 0.4)))
+
+
+def _mesh(
+    api: viser.SceneApi,
+    name: str,
+    solid: Solid,
+    colour: theme.Colour,
+    wxyz: NDArray[np.float64] | tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+    opacity: float | None = None,
+) -> None:
+    api.add_mesh_simple(
+        name,
+        solid.vertices,
+        solid.faces,
+        color=of_one(colour),
+        wxyz=wxyz,
+        opacity=opacity,
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+
+
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    return vector[None] / np.linalg.norm(vector)
+
+
+def _about(axis: int, angle_rad: float) -> NDArray[np.float64]:
+    """Quaternion of a turn about x, y or z, scalar first."""
+    quaternion = np.zeros(4)
+    quaternion[0], quaternion[1 + axis] = np.cos(angle_rad / 2), np.sin(angle_rad / 2)
+    return quaternion
+
+
+def _pose(q_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion of three hinge angles, scalar first: about x, then the turned y, then the turned z."""
+    alpha, beta, gamma = (_about(axis, angle) for axis, angle in enumerate(q_rad))
+    return _product(_product(alpha, beta), gamma)
+
+
+def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion product: first b, then a."""
+    vector = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+    return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
+
+
+def _turned(quaternion: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A vector, turned."""
+    w, axis = quaternion[0], quaternion[1:]
+    across = 2 * np.cross(axis, vector)
+    return vector + w * across + np.cross(axis, across)

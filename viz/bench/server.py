@@ -1,0 +1,329 @@
+"""The page's server, which lets in nothing but the page: this machine alone, and only what a page sends.
+
+viser serves to whoever asks and believes what it is told, and a message may have it open a tunnel elsewhere.
+So its server is made with a door of ours: hosts and origins that are not this machine are refused (a foreign
+page cannot reach it, nor by a name that it has turned to 127.0.0.1), so is every message that is not a page's
+in form, and the page may load nothing from elsewhere.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import http
+import io
+import logging
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from typing import Annotated, Any
+
+import msgspec
+import viser
+import websockets.asyncio.server as servers
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from spheretwin.models.base.errors import InputError, without_breaks
+
+HOST = "127.0.0.1"
+
+MOST_PAGES = 64
+
+# What a person does to a page is far less; a flood waits in its own socket.
+MOST_MESSAGES_PER_S = 300.0
+
+LARGEST_MESSAGE = 16_384
+
+POLICY = (
+    "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval'; "
+    "connect-src 'self' ws://{host} data: blob:; frame-ancestors 'none'; form-action 'none'"
+)
+
+# A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
+# viser's camera listens to keys too, at the document, after its commands: an arrow steers the twin alone.
+# Notices stand below, where they hide nothing.
+HEAD = """<style>.mantine-Notifications-root { top: auto !important; bottom: 8px !important; }</style>
+<script>
+for (const kind of ["keydown", "keyup"]) addEventListener(kind, (event) => {
+  if (event.code == "Space" && !/INPUT|TEXTAREA/.test(event.target.tagName)) event.preventDefault();
+}, true);
+document.documentElement.addEventListener("keydown", (event) => {
+  if (/^(Arrow|Key[WASDQE]$)/.test(event.code)) event.stopPropagation();
+});
+</script>"""
+
+
+def listen(port: int) -> socket.socket:
+    """Take a port of this machine, for itself alone.
+
+    Parameters
+    ----------
+    port : int
+        Where; 0 for any that is free.
+
+    Raises
+    ------
+    InputError
+        The port is taken, or is none.
+    """
+    listening = socket.socket()
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((HOST, port))
+        listening.listen()  # now, not by the server: until then another may take a port that is bound alone
+    except (OSError, OverflowError) as error:
+        listening.close()
+        raise InputError(
+            f"bench: expected a port that is free, received {port}: {without_breaks(error)}"
+        ) from None
+    return listening
+
+
+def serve(listening: socket.socket, title: str) -> viser.ViserServer:
+    """Start the server.
+
+    Parameters
+    ----------
+    listening : socket.socket
+        Where, from `listen`; it is the server's from now on.
+    title : str
+        Of the page.
+    """
+    with _as_door(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser tells its address
+        server = viser.ViserServer(host=HOST, port=listening.getsockname()[1], verbose=False)
+    server.get_event_loop().set_exception_handler(_unheard)
+    return server
+
+
+def stop(server: viser.ViserServer) -> None:
+    """End it."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def address(server: viser.ViserServer) -> str:
+    """Where its page is."""
+    return f"http://{HOST}:{server.get_port()}"
+
+
+class _Door(servers.serve):
+    """What viser takes for the function that makes a server."""
+
+    def __init__(
+        self,
+        listening: socket.socket,
+        title: str,
+        handler: Any,
+        process_request: Callable[[Any, Request], Response | None],
+        subprotocols: Any,
+        select_subprotocol: Any,
+    ) -> None:
+        port = listening.getsockname()[1]
+        self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
+        self._title, self._serve_file = title, process_request
+        self._pages = 0
+        super().__init__(
+            self._counted(handler),
+            sock=listening,
+            process_request=self._answer,
+            subprotocols=subprotocols,
+            select_subprotocol=select_subprotocol,
+            create_connection=_Visitor,
+            max_size=LARGEST_MESSAGE,
+            compression=None,
+            # A browser opens sockets to be ready, and says nothing: these shall not hold up the end.
+            open_timeout=1.0,
+            close_timeout=1.0,
+            logger=_SILENT,
+            server_header=None,
+        )
+
+    def _counted(self, handler: Any) -> Any:
+        async def counted(connection: Any) -> None:
+            self._pages += 1
+            try:
+                await handler(connection)
+            finally:
+                self._pages -= 1
+
+        return counted
+
+    def _answer(self, connection: Any, request: Request) -> Response | None:
+        hosts = request.headers.get_all("Host")
+        if len(hosts) != 1 or hosts[0] not in self._hosts:
+            return _refusal(http.HTTPStatus.MISDIRECTED_REQUEST)
+        if any(origin not in self._origins() for origin in request.headers.get_all("Origin")):
+            return _refusal(http.HTTPStatus.FORBIDDEN)
+        if request.headers.get_all("Upgrade"):
+            return self._admission(request)
+        return self._file(connection, request, hosts[0])
+
+    def _origins(self) -> set[str]:
+        return {f"http://{host}" for host in self._hosts}
+
+    def _admission(self, request: Request) -> Response | None:
+        """None where a socket is let in: for a page that is as old as its server."""
+        if request.headers.get_all("Sec-WebSocket-Protocol") != [f"viser-v{viser.__version__}"]:
+            return _refusal(http.HTTPStatus.BAD_REQUEST)
+        return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE) if self._pages >= MOST_PAGES else None
+
+    def _file(self, connection: Any, request: Request, host: str) -> Response:
+        plain = Request(request.path, Headers())
+        try:
+            found = self._serve_file(connection, plain)
+        except (ValueError, OSError):  # no file can have the name that was asked for
+            found = None
+        if found is None or found.status_code != http.HTTPStatus.OK:
+            return _refusal(http.HTTPStatus.NOT_FOUND)
+        if found.headers["Content-Type"].startswith("text/html"):
+            head = f"<head><title>{self._title}</title>{HEAD}".encode()
+            found.body = found.body.replace(b"<title>Viser</title>", b"").replace(b"<head>", head, 1)
+            del found.headers["Content-Length"]
+            found.headers["Content-Length"] = str(len(found.body))
+        found.headers["Content-Security-Policy"] = POLICY.format(host=host)
+        found.headers["X-Content-Type-Options"] = "nosniff"
+        found.headers["Referrer-Policy"] = "no-referrer"
+        found.headers["Cache-Control"] = "no-store"
+        return found
+
+
+class _Visitor(servers.ServerConnection):
+    """A page's socket, which hands over only messages of the forms below, and not too many at once."""
+
+    _due = 0.0
+
+    async def recv(self, decode: bool | None = None) -> Any:
+        while True:
+            raw = await super().recv(decode)
+            now = asyncio.get_running_loop().time()
+            self._due = max(self._due + 1 / MOST_MESSAGES_PER_S, now - 1.0)
+            if self._due > now:
+                await asyncio.sleep(self._due - now)
+            if isinstance(raw, bytes) and _is_a_pages(raw):
+                return raw
+
+
+Name = Annotated[str, msgspec.Meta(max_length=256)]
+# No number of a page's is without end, and none is not a number.
+Number = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
+Two = tuple[Number, Number]
+Three = tuple[Number, Number, Number]
+Four = tuple[Number, Number, Number, Number]
+
+
+class _Message(msgspec.Struct, tag_field="type", forbid_unknown_fields=True):
+    pass
+
+
+class _Camera(_Message, tag="ViewerCameraMessage"):
+    wxyz: Four
+    position: Three
+    fov: Number
+    near: Number
+    far: Number
+    image_height: int
+    image_width: int
+    look_at: Three
+    up_direction: Three
+
+
+class _Value(msgspec.Struct, forbid_unknown_fields=True):
+    value: (
+        bool
+        | Number
+        | Annotated[str, msgspec.Meta(max_length=4096)]
+        | Annotated[list[Number], msgspec.Meta(max_length=3)]
+    )
+
+
+class _Update(_Message, tag="GuiUpdateMessage"):
+    uuid: Name
+    updates: _Value
+
+
+class _Command(_Message, tag="CommandTriggerMessage"):
+    uuid: Name
+
+
+class _Submission(_Message, tag="GuiFormSubmitMessage"):
+    uuid: Name
+
+
+class _Edit(_Message, tag="GuiFormDirtyMessage"):
+    uuid: Name
+
+
+class _Click(_Message, tag="SceneNodeClickMessage"):
+    name: Name
+    instance_index: int | None
+    ray_origin: Three
+    ray_direction: Three
+    screen_pos: Two
+    modifier: Name | None
+    owner: Name = ""
+
+
+class _Drag(_Message, tag="SceneNodeDragMessage"):
+    phase: Name
+    name: Name
+    instance_index: int | None
+    start_position: Three
+    start_screen_pos: Two
+    end_position: Three
+    end_screen_pos: Two
+    button: Name
+    modifier: Name | None
+    owner: Name = ""
+
+
+_PAGES: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(
+    _Camera | _Update | _Command | _Submission | _Edit | _Click | _Drag
+)
+
+
+def _is_a_pages(raw: bytes) -> bool:
+    try:
+        _PAGES.decode(raw)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return False
+    return True
+
+
+def _refusal(status: http.HTTPStatus) -> Response:
+    body = f"{status.phrase}\n".encode()
+    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body)), "Connection": "close"})
+    return Response(status, status.phrase, headers, body)
+
+
+_SILENT = logging.getLogger("spheretwin.bench")
+_SILENT.addHandler(logging.NullHandler())
+_SILENT.propagate = False
+
+_making = threading.Lock()
+
+
+@contextlib.contextmanager
+def _as_door(listening: socket.socket, title: str) -> Iterator[None]:
+    """Have viser make its server with our door: it asks the library for one, and cannot be told which."""
+
+    def door(handler: Any, host: str, port: int, *, process_request: Any, **options: Any) -> _Door:
+        return _Door(
+            listening,
+            title,
+            handler,
+            process_request,
+            options["subprotocols"],
+            options["select_subprotocol"],
+        )
+
+    with _making:
+        plain, servers.serve = servers.serve, door  # type: ignore[misc, assignment]
+        try:
+            yield
+        finally:
+            servers.serve = plain  # type: ignore[misc]
+
+
+def _unheard(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """What a page's message made viser stumble over ends with that message."""

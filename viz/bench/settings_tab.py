@@ -1,0 +1,231 @@
+"""Forms of settings: a line for each field, taken when a person says so, refused beside the field."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.viz.bench.event_handlers import Event, Hand, Note, on_press
+from spheretwin.viz.bench.protocols import Choices, Setting
+
+ApplyFields = Callable[[Event, dict[str, str]], None]
+
+
+class Form:
+    """Lines of text, one for each setting.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        In the container it is to be in.
+    hand : Hand
+        Who takes what is written.
+    apply : str
+        What its button says.
+    whole : bool
+        Whether all of the fields are handed over, or those that a person has changed.
+
+    Attributes
+    ----------
+    note : Note
+        Under all of them.
+    """
+
+    def __init__(self, gui: viser.GuiApi, hand: Hand, apply: str, whole: bool = False) -> None:
+        self._gui, self._hand, self._whole = gui, hand, whole
+        self._settings: list[Setting] = []
+        self._lines: dict[str, Any] = {}
+        self._notes: dict[str, Note] = {}
+        self._act: ApplyFields = lambda event, fields: None
+        self._form = gui.add_form(None)
+        with self._form:
+            self._button = gui.add_button(apply, order=1e9)
+            self.note = Note(gui, 2e9)
+
+        @self._form.on_submit
+        async def _(event: Event) -> None:
+            if event.client_id is not None:
+                self._apply(event)
+
+        @self._button.on_click
+        async def _(event: Event) -> None:
+            self._apply(event)
+            self._form.submit()  # no line is marked as changed any more
+
+    def on_apply(self, act: ApplyFields) -> None:
+        """Say what is done with the fields: texts by name."""
+        self._act = act
+
+    def note_of(self, name: str) -> Note:
+        """The line under a field."""
+        return self._notes.get(name, self.note)
+
+    def show(self, settings: list[Setting]) -> None:
+        """Show these fields; what a person is about to change in one of them stays."""
+        names = [(each.name, each.choices) for each in settings]
+        if names == [(each.name, each.choices) for each in self._settings]:
+            self._refresh(settings)
+        else:
+            self._make(settings)
+        self._settings = settings
+
+    def _apply(self, event: Event) -> None:
+        changed = {
+            each.name: _written(line)
+            for each, line in zip(self._settings, self._lines.values(), strict=True)
+            if self._whole or _written(line) != each.text
+        }
+        for note in self._notes.values():
+            note.say(None)
+        self._act(event, changed)
+
+    def _refresh(self, settings: list[Setting]) -> None:
+        for before, now, line in zip(self._settings, settings, self._lines.values(), strict=True):
+            if now.text != before.text and _written(line) == before.text:
+                line.value = now.text == "true" if isinstance(line.value, bool) else now.text
+
+    def _make(self, settings: list[Setting]) -> None:
+        for line in self._lines.values():
+            line.remove()
+        for note in self._notes.values():
+            note.remove()
+        with self._form:
+            self._lines = {each.name: self._line(each) for each in settings}
+            for line in self._lines.values():
+                self._hand.on_change(line)
+            self._notes = {name: Note(self._gui, line.order + 0.5) for name, line in self._lines.items()}
+
+    def _line(self, setting: Setting) -> Any:
+        label = setting.name.partition(".")[2] or setting.name
+        hint = setting.meaning
+        if setting.default is not None:
+            hint += f"; {setting.default or 'none'} unless set"
+        if setting.choices:
+            options = list(dict.fromkeys([*setting.choices, setting.text]))
+            return self._gui.add_dropdown(label, options, initial_value=setting.text, hint=hint)
+        if setting.text in ("true", "false"):
+            return self._gui.add_checkbox(label, setting.text == "true", hint=hint)
+        return self._gui.add_text(label, setting.text, hint=hint)
+
+
+class Settings:
+    """The tabs of the law and of all other sections of the scenario.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        Of the server.
+    hand : Hand
+        Whom it tells.
+    choices : Choices
+        Fields and laws.
+    law, twin : viser.GuiTabHandle
+        The tabs.
+    """
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        hand: Hand,
+        choices: Choices,
+        law: viser.GuiTabHandle,
+        twin: viser.GuiTabHandle,
+    ) -> None:
+        self._gui, self._hand, self._choices = gui, hand, choices
+        self._showing = threading.Lock()
+        self._known_law = ""
+        self._laws: Any
+        self._gains: Form
+        with law:
+            self._law(gui)
+        with twin:
+            self._twin(gui)
+        self.show()
+
+    def show(self) -> None:
+        """Show what is in force now; called by the page, and by a person's choice of a section."""
+        with self._showing:
+            self._show(self._choices.settings())
+
+    def _show(self, settings: list[Setting]) -> None:
+        law = next(each for each in settings if each.name == LAW)
+        if self._known_law != law.text:
+            self._known_law = law.text
+            self._laws.options = list(dict.fromkeys([*self._choices.laws, law.text]))
+            self._laws.value = law.text
+        self._gains.show([each for each in settings if _section(each.name) == "controller" and each != law])
+        self._often.show([each for each in settings if each.name in OFTEN])
+        section = self._sections.value
+        self._fields.show(
+            [each for each in settings if _section(each.name) == section and each.name not in OFTEN]
+        )
+
+    def _law(self, gui: viser.GuiApi) -> None:
+        self._laws = gui.add_dropdown("law", self._choices.laws)
+        own = gui.add_text("or your own", "", hint="FILE.py:NAME, on this machine")
+        self._hand.on_change(own)
+        take = gui.add_button("Take your own")
+        note = Note(gui, take.order + 0.5)
+        self._hand.on_change(self._laws, lambda event: self._set(event, LAW, event.target.value, note))
+        on_press(take, lambda event: self._set(event, LAW, own.value, note))
+        self._gains = self._form(gui, "Set gains")
+        defaults = gui.add_button("Gains as they come")
+        on_press(defaults, self._reset_gains)
+
+    def _twin(self, gui: viser.GuiApi) -> None:
+        self._often = self._form(gui, "Set")
+        gui.add_divider()
+        settings = self._choices.settings()
+        sections = list(dict.fromkeys(_section(each.name) for each in settings if each.name not in OFTEN))
+        sections = [each for each in sections if each not in ELSEWHERE]
+        self._sections = gui.add_dropdown("section", sections, initial_value=FIRST_SECTION)
+        self._hand.on_change(self._sections, lambda event: self.show())
+        self._fields = self._form(gui, "Set these")
+
+    def _form(self, gui: viser.GuiApi, apply: str) -> Form:
+        form = Form(gui, self._hand, apply)
+
+        def set_all(event: Event, fields: dict[str, str]) -> None:
+            for name, text in fields.items():
+                self._set(event, name, text, form.note_of(name))
+
+        form.on_apply(set_all)
+        return form
+
+    def _reset_gains(self, event: Event) -> None:
+        for each in self._choices.settings():
+            if _section(each.name) != "controller" or each.name == LAW:
+                continue
+            if each.default is not None and each.text != each.default:
+                self._set(event, each.name, each.default, self._gains.note_of(each.name))
+
+    def _set(self, event: Event, name: str, text: str, note: Note) -> None:
+        try:
+            value = self._choices.read(name, text)
+        except InputError as error:
+            self._hand.complain(str(error), note)
+        else:
+            self._hand.tell(event, "set", note, name=name, value=value)
+
+
+LAW = "controller.law"
+
+OFTEN = ("allocation", "disturbance.load", "plant.payload_kg", "plant.modelling_error", "hardware")
+
+FIRST_SECTION = "plant"
+
+# The law and its gains, the shape and the faults have tabs of their own; the rest is no setting.
+ELSEWHERE = ("controller", "trajectory", "fault", "event", "manual", "name", "description")
+
+
+def _section(name: str) -> str:
+    return name.partition(".")[0]
+
+
+def _written(line: Any) -> str:
+    value = line.value
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,225 @@
+"""The tab of the faults: add one, see them, take them back."""
+
+from __future__ import annotations
+
+from collections import deque
+from html import escape
+from typing import Any
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.viz import theme
+from spheretwin.viz.bench.event_handlers import Event, Hand, Note, on_press
+from spheretwin.viz.bench.protocols import Bench, Choices
+
+
+class Faults:
+    """What fails, from now on.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        In the tab.
+    hand : Hand
+        Whom it tells.
+    choices : Choices
+        Targets and modes.
+    """
+
+    def __init__(self, gui: viser.GuiApi, hand: Hand, choices: Choices) -> None:
+        targets = choices.targets
+        first = next(iter(targets))
+        target = gui.add_dropdown("target", list(targets), initial_value=first)
+        mode: Any = gui.add_dropdown("mode", list(targets[first]), initial_value=targets[first][0])
+        value = gui.add_text("value", "", hint="where the mode has one")
+        detect = gui.add_checkbox("look for it", False, hint="the controller looks for it by itself")
+        known = gui.add_checkbox("told of it", False, hint="the controller is told")
+        add = gui.add_button("Add from now on", color="orange")
+        note = Note(gui, add.order + 0.5)
+
+        def retarget(event: Event) -> None:
+            mode.options = list(targets[target.value]) if target.value in targets else []
+            mode.value = mode.options[0] if mode.options else ""
+
+        def add_fault(event: Event) -> None:
+            fault: dict[str, Any] = {"target": target.value, "mode": mode.value}
+            if value.value.strip():
+                try:
+                    fault["value"] = choices.read("fault.0.value", value.value)
+                except InputError as error:
+                    hand.complain(str(error), note)
+                    return
+            fault |= {name: True for name, box in (("detect", detect), ("known", known)) if box.value}
+            hand.tell(event, "add_fault", note, fault=fault)
+
+        hand.on_change(target, retarget)
+        for line in (mode, value, detect, known):
+            hand.on_change(line)
+        on_press(add, add_fault)
+        self._list = gui.add_html("")
+        self._shown: tuple[str, ...] | None = None
+        place = gui.add_number("place", 0, min=0, step=1)
+        hand.on_change(place)
+        one = gui.add_button("Clear the one at this place")
+        on_press(one, lambda event: hand.tell(event, "clear_faults", note, place=int(place.value)))
+        hand.button(gui, "Clear all", "clear_faults")
+
+    def show(self, state: Any) -> None:
+        """List what is planned or at work."""
+        if state.faults != self._shown:
+            self._shown = state.faults
+            lines = "".join(f"<li>{escape(fault)}</li>" for fault in state.faults)
+            told = f'<ol start="0" style="margin:0;padding-left:1.6em">{lines}</ol>' if lines else "no faults"
+            self._list.content = f'<div style="padding:0.3em 0.8em;font-size:0.85em">{told}</div>'
+
+
+class Keeping:
+    """Files and snapshots.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        In the tab.
+    hand : Hand
+        Whom it tells.
+    bench : Bench
+        Whose command line is shown.
+    choices : Choices
+        Scenarios.
+    """
+
+    def __init__(self, gui: viser.GuiApi, hand: Hand, bench: Bench, choices: Choices) -> None:
+        with gui.add_folder("record"):
+            recording = gui.add_text("recording", "bench.rrd", hint="for Rerun; empty for none")
+            telemetry = gui.add_text("telemetry", "bench.parquet", hint="runs again from it; empty for none")
+            record = gui.add_button("Record from now on", color="red")
+            for line in (recording, telemetry):
+                hand.on_change(line)
+            told = Note(gui, record.order + 0.5)
+
+            def begin(event: Event) -> None:
+                files = {"recording": recording.value.strip(), "telemetry": telemetry.value.strip()}
+                hand.tell(event, "record", told, **{kind: file for kind, file in files.items() if file})
+
+            on_press(record, begin)
+            hand.button(gui, "End it, and complete the files", "keep")
+        with gui.add_folder("scenario"):
+            source = gui.add_dropdown("begin anew with", choices.scenarios)
+            load = gui.add_button("Load it")
+            file = gui.add_text("save as", "bench.toml")
+            save = gui.add_button("Save the present settings")
+            hand.on_change(source)
+            hand.on_change(file)
+            saved = Note(gui, save.order + 0.5)
+            on_press(load, lambda event: hand.tell(event, "load", saved, source=source.value))
+            on_press(save, lambda event: hand.tell(event, "save", saved, file=file.value))
+        with gui.add_folder("as a command line"):
+            shown: Any = gui.add_text("copy", "", multiline=True)
+
+            def tell_line(event: Event) -> None:
+                shown.value = bench.command_line()
+
+            on_press(gui.add_button("Show it as it is now"), tell_line)
+        with gui.add_folder("snapshot"):
+            name = gui.add_text("name", "last")
+            hand.on_change(name)
+            keep = gui.add_button("Take one")
+            self._kept: Any = gui.add_button_group("back to", NONE_YET, visible=False)
+            note = Note(gui, self._kept.order + 0.5)
+            on_press(keep, lambda event: hand.tell(event, "snapshot", note, name=name.value))
+
+            def go_back(event: Event) -> None:
+                if event.target.value in event.target.options:
+                    hand.tell(event, "restore", note, name=event.target.value)
+
+            on_press(self._kept, go_back)
+
+    def show(self, state: Any) -> None:
+        """List the snapshots."""
+        if state.snapshots and tuple(self._kept.options) != state.snapshots:
+            self._kept.options = state.snapshots
+        if self._kept.visible != bool(state.snapshots):
+            self._kept.visible = bool(state.snapshots)
+
+
+# A group of buttons has to have one.
+NONE_YET = ("",)
+
+
+HEIGHT = 125
+
+# Points of a curve: what a narrow panel can show.
+MOST_POINTS = 150
+
+_INK, _LINES = "#adb5bd", "#343a40"
+
+
+class Plots:
+    """Curves that follow the bench.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+        In the container they are to be in.
+    """
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._error = _plot(gui, "error, mrad", ("α", "β", "γ"))
+        self._torque = _plot(gui, "torque asked for, N·m", ("α", "β", "γ"))
+        self._temperature = _plot(gui, "warmest winding, °C", ("T",))
+        self._temperature.visible = False
+        self._warmest: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)
+
+    def warm(self, t_s: float, temperature_C: tuple[float, ...] | None) -> None:
+        """Draw the warmest winding, where the hardware has any that warm."""
+        if temperature_C is None:
+            self._temperature.visible = False
+            return
+        if self._warmest and t_s <= self._warmest[-1][0]:  # another run
+            self._warmest.clear()
+        self._warmest.append((t_s, max(temperature_C)))
+        if len(self._warmest) > 1:
+            self._temperature.data = tuple(np.array(self._warmest).T.copy())
+            self._temperature.visible = True
+
+    def show(self, rows: dict[str, NDArray[np.float64]]) -> None:
+        """Draw rows, as a bench's history has them."""
+        if not rows or len(rows["t_s"]) < 2:
+            return
+        stride = -(-len(rows["t_s"]) // MOST_POINTS)
+        t_s = rows["t_s"][::-stride][::-1]
+        for plot, values in (
+            (self._error, 1e3 * rows["error_rad"]),
+            (self._torque, rows["torque_command_Nm"]),
+        ):
+            plot.data = (t_s, *(np.ascontiguousarray(column[::-stride][::-1]) for column in values.T))
+
+
+def _plot(gui: viser.GuiApi, title: str, names: tuple[str, ...]) -> viser.GuiUplotHandle:
+    nothing = np.array([0.0, 1.0])
+    colours = ["rgb({},{},{})".format(*colour) for colour in theme.AXIS_COLOURS[: len(names)]]
+    curves: Any = tuple(
+        {"label": name, "stroke": colour, "width": 1.5, "points": {"show": False}}
+        for name, colour in zip(names, colours, strict=True)
+    )
+    axis = {
+        "stroke": _INK,
+        "grid": {"stroke": _LINES, "width": 1},
+        "ticks": {"stroke": _LINES},
+        "font": "10px sans-serif",
+    }
+    axes: Any = tuple({**axis, "size": size} for size in (32, 44))
+    return gui.add_uplot(
+        data=(nothing, *(np.zeros(2) for _ in names)),
+        series=({"label": "s"}, *curves),
+        title=title,
+        scales={"x": {"time": False}},
+        axes=axes,
+        legend={"show": True, "live": False},
+        cursor={"show": False},
+        height=HEIGHT,
+        padding=(2, 8, 0, 0),
+    )

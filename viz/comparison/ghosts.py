@@ -1,0 +1,156 @@
+"""The actuator once, the rotor of every run in it: the first's as it is, the others' as tinted ghosts."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz import theme
+from spheretwin.viz.recording.part import Part, Subject, scalars, strips, time_index
+from spheretwin.viz.recording.recorder import MOST_ROWS
+from spheretwin.viz.recording.scene3d import Frames, MovingActuator
+from spheretwin.viz.scene.meshes import WORLD, read_meshes
+from spheretwin.viz.scene.motion import body_quaternions, shaft_tip
+
+Array = NDArray[np.float64]
+
+
+def send_line(
+    recording: rr.RecordingStream,
+    entity: str,
+    label: str,
+    t_s: Array,
+    values: Array,
+    colour: theme.Colour,
+    width: float = 1.5,
+) -> None:
+    """Send one line of a plot, (n,); of ticks that share a pixel, the lowest and the highest are drawn."""
+    look = rr.SeriesLines(
+        names=[label],
+        colors=[colour],
+        widths=[width],
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
+    recording.log(entity, look, static=True)
+    for first in range(0, len(t_s), MOST_ROWS):
+        rows = slice(first, first + MOST_ROWS)
+        recording.send_columns(entity, time_index(t_s[rows]), [scalars(values[rows], 1)])
+
+
+def style_point(recording: rr.RecordingStream, entity: str, label: str, colour: theme.Colour) -> None:
+    """Say how a point looks that is sent later."""
+    thick = rr.Radius.ui_points(6.0)
+    recording.log(entity, rr.Points3D.from_fields(labels=[label], colors=[colour], radii=thick), static=True)
+
+
+def send_point(recording: rr.RecordingStream, entity: str, t_s: Array, positions: Array) -> None:
+    """Send where a point is, (n, 3) in m."""
+    recording.send_columns(entity, time_index(t_s), rr.Points3D.columns(positions=positions))
+
+
+def style_path(recording: rr.RecordingStream, entity: str, colour: theme.Colour) -> None:
+    """Say how a path looks that is sent later."""
+    style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.5))
+    recording.log(entity, style, static=True)
+
+
+def send_path(
+    recording: rr.RecordingStream, entity: str, t_s: Array, positions: Array, before: Array
+) -> None:
+    """Send the path of a point as a short segment a row.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+    entity : str
+    t_s : (n,) array, s
+    positions : (n, 3) array, m
+    before : (1, 3) or (0, 3) array, m
+        Where it was before, if it was.
+    """
+    starts = np.concatenate([before if len(before) else positions[:1], positions[:-1]])
+    segments = strips(np.stack([starts, positions], axis=1))
+    recording.send_columns(entity, time_index(t_s), rr.LineStrips3D.columns(strips=segments))
+
+
+ROTOR = f"{WORLD}/rotor"
+
+# Of 255: through a ghost the rotor within it is seen, and its colour still.
+GHOST_ALPHA = 90
+
+_TINT = rr.Asset3D.descriptor_albedo_factor()
+
+
+class Ghost(Part):
+    """A rotor alone, in one colour, that what is behind it is seen through.
+
+    Parameters
+    ----------
+    subject : Subject
+    colour : Colour
+    """
+
+    def __init__(self, subject: Subject, colour: theme.Colour) -> None:
+        super().__init__(subject)
+        self._colour, self._frames = colour, Frames()
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log the rotor's meshes."""
+        for entity, piece in read_meshes(self.subject.facts.mjcf).others.items():
+            if entity.startswith(f"{ROTOR}/"):
+                asset, *places = piece.archetypes()
+                tint = rr.Asset3D.from_fields(albedo_factor=[*self._colour, GHOST_ALPHA])
+                shape = [
+                    each for each in asset.as_component_batches() if each.component_descriptor() != _TINT
+                ]
+                recording.log(entity, [*shape, *tint.as_component_batches()], *places, static=True)
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the ticks that fall on a frame."""
+        new = self._frames.of(rows)
+        if np.any(new):
+            pose = rr.Transform3D.columns(quaternion=body_quaternions(rows["q_rad"][new])["rotor"])
+            recording.send_columns(ROTOR, time_index(rows["t_s"][new]), pose)
+
+
+class Tip(Part):
+    """The end of the shaft, or where it should be: the path behind it, and it itself where it has a label.
+
+    Parameters
+    ----------
+    subject : Subject
+    entity : str
+    signal : str
+        Hinge angles, rad.
+    label : str
+        Beside the point; empty without one.
+    colour : Colour
+    """
+
+    def __init__(self, subject: Subject, entity: str, signal: str, label: str, colour: theme.Colour) -> None:
+        super().__init__(subject)
+        self._entity, self._signal, self._label, self._colour = entity, signal, label, colour
+        self._frames, self._last = Frames(), np.empty((0, 3))
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log how both look."""
+        if self._label:
+            style_point(recording, f"{self._entity}/point", self._label, self._colour)
+        style_path(recording, f"{self._entity}/path", self._colour)
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the ticks that fall on a frame."""
+        new = self._frames.of(rows)
+        if np.any(new):
+            t_s, tips = rows["t_s"][new], shaft_tip(rows[self._signal][new], self.subject.actuator)
+            if self._label:
+                send_point(recording, f"{self._entity}/point", t_s, tips)
+            send_path(recording, f"{self._entity}/path", t_s, tips, self._last)
+            self._last = tips[-1:]
+
+
+def body(subject: Subject, colour: theme.Colour, *, ghost: bool) -> Part:
+    """What of a run is drawn: the whole actuator, or its rotor as a ghost."""
+    return Ghost(subject, colour) if ghost else MovingActuator(subject)

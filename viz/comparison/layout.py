@@ -1,0 +1,136 @@
+"""How a recording of several runs is laid out: all in one actuator, and each quantity of all in one plot."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import NamedTuple
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from spheretwin.viz import theme
+from spheretwin.viz.comparison.ghosts import ROTOR
+from spheretwin.viz.layout.view import EVENTS, STATES, TIMELINE
+from spheretwin.viz.layout.views import eye
+from spheretwin.viz.scene.meshes import WORLD
+from spheretwin.viz.scene.motion import TRAIL_S
+
+COMPARE, RUNS, TIP = "compare", "runs", "tip"
+"""Parts of the paths of entities, behind the name of a run but for `RUNS`."""
+
+ASKED = "what_was_asked"
+"""Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
+
+# Plots that share a row are too narrow for names; the one that has a row of its own tells them.
+NAMED, BESIDE_TEXTS = "whole", "more"
+
+
+class Plot(NamedTuple):
+    """One quantity of all runs."""
+
+    name: str
+    title: str
+    group: str
+    desired: bool
+    """Whether what was asked for is drawn with it."""
+    limits: tuple[float, float]
+
+
+class View(NamedTuple):
+    """What a layout is made for."""
+
+    runs: tuple[str, ...]
+    """Names."""
+    leaders: tuple[str, ...]
+    """Names of those that show what was asked for."""
+    plots: tuple[Plot, ...]
+    duration_s: float
+    states: tuple[str, ...]
+    """Names of those that have parts whose states change."""
+    logs: tuple[str, ...]
+    """Names of those in which something happens."""
+    size: float
+    """Of the actuator of the first, which is drawn whole."""
+
+
+def application(view: View) -> str:
+    """Application id of recordings with one layout: a viewer keeps one for each."""
+    return f"spheretwin-runs-{hashlib.sha256(repr(view).encode()).hexdigest()[:12]}"
+
+
+def layout(view: View) -> rrb.Blueprint:
+    """Blueprint of a recording of several runs."""
+    groups = dict.fromkeys(plot.group for plot in view.plots if plot.group != BESIDE_TEXTS)
+    rows = [rrb.Horizontal(*_plots(view, group)) for group in groups]
+    texts = rrb.Tabs(
+        rrb.TextDocumentView(origin=f"/{RUNS}", name="runs"),
+        rrb.TextLogView(origin="/", contents=[f"/{run}/{EVENTS}" for run in view.logs], name="events"),
+        *([_states(view)] if view.states else []),
+        *_plots(view, BESIDE_TEXTS),
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(_bodies(view), texts, row_shares=[3, 1]),
+            rrb.Vertical(*rows, row_shares=[4 if group == NAMED else 3 for group in groups]),
+            column_shares=[2, 3],
+            name="compare",
+        ),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def time_axis(duration_s: float) -> rrb.TimeAxis:
+    """Axis that shows all of some runs."""
+    boundary = rrb.TimeRangeBoundary
+    whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=duration_s))
+    return rrb.TimeAxis(view_range=whole)
+
+
+def trail_behind() -> rrb.VisibleTimeRanges:
+    """What of a path is seen: the last seconds of it."""
+    boundary = rrb.TimeRangeBoundary
+    start, end = boundary.cursor_relative(seconds=-TRAIL_S), boundary.cursor_relative()
+    return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
+
+
+def _plots(view: View, group: str) -> list[rrb.TimeSeriesView]:
+    return [_plot(view, plot, legend=group == NAMED) for plot in view.plots if plot.group == group]
+
+
+def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
+    wanted = [f"/{ASKED}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=[*wanted, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
+        name=plot.title,
+        axis_x=time_axis(view.duration_s),
+        axis_y=rrb.ScalarAxis(range=plot.limits),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        interaction=rrb.PlotInteraction(tooltip_mode="All"),
+    )
+
+
+def _bodies(view: View) -> rrb.Spatial3DView:
+    first, *ghosts = view.runs
+    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{ASKED}/{run}/{TIP}" for run in view.leaders]
+    drawn = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=[*drawn, *(f"{tip}/**" for tip in tips)],
+        name="run 1 in the actuator, the others as ghosts",
+        background=list(theme.BACKGROUND),
+        line_grid=False,
+        eye_controls=eye(view.size),
+        overrides={f"{tip}/path": trail_behind() for tip in tips},
+    )
+
+
+def _states(view: View) -> rrb.StateTimelineView:
+    contents = [f"/{run}/{STATES}/**" for run in view.states]
+    return rrb.StateTimelineView(
+        origin="/", contents=contents, name="states", time_view=time_axis(view.duration_s)
+    )

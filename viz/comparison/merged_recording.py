@@ -1,0 +1,206 @@
+"""Several runs as one recording."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from spheretwin.models.base.files import whole_file
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz import theme
+from spheretwin.viz.comparison.ghosts import Tip, body, send_line
+from spheretwin.viz.comparison.layout import ASKED, COMPARE, RUNS, TIP, Plot, View, application, layout
+from spheretwin.viz.comparison.runs import Run, leaders, on_dark, run_colours
+from spheretwin.viz.layout.extents import labelled
+from spheretwin.viz.layout.plots import MIDDLE, THICK, THIN
+from spheretwin.viz.layout.view import SCENARIO
+from spheretwin.viz.quantities import ComparedQuantity, compared_quantities
+from spheretwin.viz.recording.part import Part, Subject
+from spheretwin.viz.recording.recorder import MOST_ROWS
+from spheretwin.viz.recording.signals import Signals
+from spheretwin.viz.recording.status import StateChanges, States, log_lines
+from spheretwin.viz.rerun_internals import PIPE_PATHS, FilePipe
+from spheretwin.viz.scene.meshes import read_meshes
+from spheretwin.viz.scene.static import size_of
+
+
+class Below:
+    """A recording in which all that is logged stands below one path.
+
+    Parameters
+    ----------
+    recording : RecordingStream
+    path : str
+        Without a slash at its end.
+    """
+
+    def __init__(self, recording: rr.RecordingStream, path: str) -> None:
+        self._recording, self._path = recording, path
+
+    def log(self, entity: str, *values: Any, **options: Any) -> None:
+        """Log below the path."""
+        self._recording.log(f"{self._path}/{entity}", *values, **options)
+
+    def send_columns(self, entity: str, indexes: Any, columns: Any) -> None:
+        """Send many rows below the path."""
+        self._recording.send_columns(f"{self._path}/{entity}", indexes, columns)
+
+    def flush(self) -> None:
+        """Send what is not yet sent."""
+        self._recording.flush()
+
+
+@contextmanager
+def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
+    """Give a stream whose recording takes the name `path` when the block ends well.
+
+    Parameters
+    ----------
+    path : Path
+    application : str
+        A viewer keeps one layout for each.
+    layout : Blueprint
+
+    Raises
+    ------
+    InputError
+        No file can be made there.
+    SpheretwinError
+        Writing failed; what was at `path` before is untouched.
+    """
+    rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
+    with whole_file(path) as temporary:
+        pipe = FilePipe(temporary) if PIPE_PATHS.is_dir() else None
+        stream = rr.RecordingStream(application)
+        try:
+            stream.set_log_time_enabled(False)  # simulated time is the only one that means anything
+            stream.set_sinks(rr.FileSink(pipe.path if pipe else temporary), default_blueprint=layout)
+            yield stream
+            stream.flush()
+        finally:
+            stream.disconnect()
+            if pipe:
+                pipe.close()
+        if pipe and pipe.error:
+            raise pipe.error
+
+
+# Of a range of what hardly differs from zero; and steps for which the lowest of the plots is high enough.
+LEAST, STEPS = 1e-3, 6
+
+
+def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: str) -> Path:
+    """Write a recording of several runs; returns its path.
+
+    Below the name of each stands what its own recording holds, and what is drawn beside the others'.
+
+    Parameters
+    ----------
+    path : Path
+    runs : sequence of Run
+        Two at least, of names that tell them apart.
+    subjects : sequence of Subject
+        Of each run.
+    text : str
+        What the runs are, in Markdown.
+
+    Raises
+    ------
+    InputError
+        No file can be made there, or a mesh of a model cannot be read.
+    SpheretwinError
+        Writing failed; what was there before is untouched.
+    """
+    for subject in subjects:
+        read_meshes(subject.facts.mjcf)  # found missing before there is a file
+    tables = [run.table for run in runs]
+    quantities, leading = compared_quantities(tables), leaders(tables)
+    view = View(
+        tuple(run.name for run in runs),
+        tuple(runs[place].name for place in leading),
+        tuple(
+            Plot(each.name, each.heading, each.group, each.desired is not None, _limits(each, runs))
+            for each in quantities
+        ),
+        max(float(table["t_s"][-1]) for table in tables),
+        tuple(run.name for run in runs if StateChanges().of(run.table)),
+        tuple(run.name for run in runs if run.events),
+        size_of(subjects[0].actuator),
+    )
+    colours = [on_dark(colour) for colour in run_colours([run.law for run in runs])]
+    with recorded(path, application(view), layout(view)) as recording:
+        recording.send_recording_name(f"{len(runs)} runs")
+        recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+        for place, (run, subject, colour) in enumerate(zip(runs, subjects, colours, strict=True)):
+            below = cast(rr.RecordingStream, Below(recording, run.name))
+            parts = [
+                Signals(subject),
+                body(subject, colour, ghost=place > 0),
+                Tip(subject, TIP, "q_rad", f"{place + 1}", colour),
+                States(subject),
+            ]
+            _write_run(below, run, parts)
+            for each in quantities:
+                entity, t_s, values = f"{COMPARE}/{each.name}", run.table["t_s"], each.of(run.rows)
+                width = THICK if each.desired else MIDDLE  # what was asked for lies over it
+                send_line(below, entity, run.label, t_s, values, colour, width)
+        for place in leading:
+            run, asked = runs[place], Below(recording, f"{ASKED}/{runs[place].name}")
+            _write_asked(
+                cast(rr.RecordingStream, asked), run, subjects[place], quantities, alone=len(leading) == 1
+            )
+    return path
+
+
+def _write_run(recording: rr.RecordingStream, run: Run, parts: Sequence[Part]) -> None:
+    """What a recording of the run alone has, but for the text of its scenario."""
+    recording.log(SCENARIO, rr.AnyValues(record=json.dumps(dict(run.record))), static=True)
+    log_lines(recording, list(run.events))
+    for part in parts:
+        _write_part(recording, run, part)
+
+
+def _write_asked(
+    recording: rr.RecordingStream,
+    run: Run,
+    subject: Subject,
+    quantities: Sequence[ComparedQuantity],
+    *,
+    alone: bool,
+) -> None:
+    """What was asked for: lines, and the path of the tip."""
+    colour, label = theme.DESIRED_TRACE, "asked for" if alone else f"asked for in {run.label}"
+    _write_part(recording, run, Tip(subject, TIP, "q_ref_rad", "", colour))
+    for each in quantities:
+        if each.desired:
+            send_line(
+                recording, each.name, label, run.table["t_s"], each.desired(run.rows), theme.ASKED, THIN
+            )
+
+
+def _limits(quantity: ComparedQuantity, runs: Sequence[Run]) -> tuple[float, float]:
+    """Range of all values of all runs, in which numbers can be read."""
+    if quantity.limits:
+        return quantity.limits
+    values = np.concatenate([quantity.of(run.rows) for run in runs])
+    told = values[np.isfinite(values)]
+    return labelled(float(np.min(told, initial=0.0)), float(np.max(told, initial=0.0)), LEAST, STEPS)
+
+
+def _write_part(recording: rr.RecordingStream, run: Run, part: Part) -> None:
+    part.begin(recording)
+    for rows in _chunks(run.table):
+        part.write(recording, rows)
+
+
+def _chunks(table: Table) -> Iterator[Table]:
+    """Rows as many as one chunk of a recording has."""
+    for first in range(0, len(table), MOST_ROWS):
+        yield table.rows(first, first + MOST_ROWS)

@@ -1,0 +1,320 @@
+"""Columns of many rows as few numbers, in which nothing that stands out is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.telemetry.status import QUIET_S
+from spheretwin.models.telemetry.table import Table
+
+Array = NDArray[np.float64]
+
+
+class Thinned(NamedTuple):
+    """Numbers at equal distances."""
+
+    values: Array  # (m,)
+    rows_each: float
+    """Rows that one of them stands for; 1 where none was left out."""
+
+
+def thinned(values: Array, most: int) -> Thinned:
+    """A column as it is, or of every so many rows the lowest and the highest, the earlier first.
+
+    Parameters
+    ----------
+    values : (n,) array
+        A NaN is no value.
+    most : int
+        Numbers that are wanted, at least 2.
+    """
+    if len(values) <= most:
+        return Thinned(values, 1.0)
+    blocks, size = _blocks(values[:, None], most // 2)
+    block = blocks[:, :, 0]
+    none = np.isnan(block)
+    low, high = np.argmin(np.where(none, np.inf, block), 1), np.argmax(np.where(none, -np.inf, block), 1)
+    places = np.sort(np.stack([low, high], axis=1), axis=1)
+    return Thinned(np.take_along_axis(block, places, axis=1).ravel(), size / 2)
+
+
+def strongest(values: Array, most: int) -> Thinned:
+    """Columns (n, k) as at most so many rows (m, k): of every so many rows the value farthest from zero."""
+    if len(values) <= most:
+        return Thinned(values, 1.0)
+    blocks, size = _blocks(values, most)
+    places = np.argmax(np.where(np.isnan(blocks), -1.0, np.abs(blocks)), axis=1)
+    return Thinned(np.take_along_axis(blocks, places[:, None], axis=1)[:, 0], float(size))
+
+
+def highest_by_octave(frequency: Array, values: Array, each: int) -> tuple[Array, Array]:
+    """Lines of a spectrum, of which each so many-th part of an octave keeps its highest.
+
+    Parameters
+    ----------
+    frequency : (n,) array
+        Above zero, rising.
+    values : (n,) array
+    each : int
+        Lines of an octave that are kept.
+    """
+    if not len(frequency):
+        return frequency, values
+    part = np.floor(each * np.log2(frequency / frequency[0])).astype(np.int64)
+    starts = np.flatnonzero(np.diff(part, prepend=part[0] - 1))
+    ends = np.append(starts[1:], len(values))
+    rows = [first + int(np.argmax(values[first:last])) for first, last in zip(starts, ends, strict=True)]
+    return frequency[rows], values[rows]
+
+
+def _blocks(values: Array, most: int) -> tuple[Array, int]:
+    """Rows (n, k) in blocks (b, size, k) of one size; the last is filled up with its own last row."""
+    size = -(-len(values) // most)
+    missing = -len(values) % size
+    filled = np.concatenate([values, np.repeat(values[-1:], missing, axis=0)])
+    return filled.reshape(-1, size, values.shape[1]), size
+
+
+Places = NDArray[np.intp]
+
+# Rows of so long a time are looked at together for what stands out in them.
+WINDOW_S = 20.0
+
+# Rows whose bounds are found before the place of the bound is looked for in one such block: a bound takes a
+# fourth of the time of its place.
+_BLOCK = 64
+
+# Of a bin or a window: times are products of whole numbers, right to some 1e-16 of themselves.
+_ROUNDING = 1e-6
+
+
+class Thinning:
+    """Keeps every row."""
+
+    def take(self, rows: Table) -> list[Table]:
+        """Rows to keep, as far as that is known after these."""
+        return [rows]
+
+    def rest(self) -> list[Table]:
+        """Rows to keep of those that nothing was known of yet."""
+        return []
+
+
+class Firsts(Thinning):
+    """Keeps the first row of each bin of time.
+
+    Parameters
+    ----------
+    rate_Hz : float
+        Bins a second.
+    """
+
+    def __init__(self, rate_Hz: float) -> None:
+        self._rate_Hz = rate_Hz
+        self._bin = -1
+
+    def take(self, rows: Table) -> list[Table]:
+        """Rows to keep."""
+        kept = rows.values[self.firsts(rows["t_s"])]
+        return [Table(rows.signals, kept)] if len(kept) else []
+
+    def firsts(self, t_s: Array) -> Places:
+        """Places of the next rows that are the first of their bins."""
+        bins = np.floor(t_s * self._rate_Hz + _ROUNDING)
+        new = np.flatnonzero(np.diff(bins, prepend=self._bin) > 0)
+        self._bin = bins[-1]
+        return new
+
+
+class FirstsAndExtremes(Thinning):
+    """Keeps whole rows, bit for bit: the first of each bin of time, and all that stand out.
+
+    Those are, of every window of 20 s, the rows in which an entry of a signal is at its largest or smallest;
+    where a state changes; where the current limit begins and ceases to cut the torque; and the last row.
+    Windows go by time, and end besides where the columns change: how the rows come in chunks does not show.
+
+    Parameters
+    ----------
+    rate_Hz : float
+        Bins a second.
+    """
+
+    def __init__(self, rate_Hz: float) -> None:
+        self._firsts = Firsts(rate_Hz)
+        self._window = -1.0
+        self._waiting: list[Table] = []
+        self._states: dict[str, Array] = {}
+        self._last_saturated_s = -np.inf
+
+    def take(self, rows: Table) -> list[Table]:
+        """Rows to keep of the windows that are over."""
+        windows = np.floor(rows["t_s"] / WINDOW_S + _ROUNDING)
+        begins = np.flatnonzero(np.diff(windows, prepend=self._window) > 0)
+        kept = []
+        if self._waiting and rows.signals != self._waiting[0].signals:
+            kept += self.rest()
+        for first, last in zip([0, *begins], [*begins, len(rows)], strict=True):
+            if last > first:
+                self._waiting.append(rows.rows(first, last))
+            if last < len(rows):
+                kept += self.rest()
+        self._window = windows[-1]
+        return kept
+
+    def rest(self) -> list[Table]:
+        """Rows to keep of the window at hand, which ends here."""
+        if not self._waiting:
+            return []
+        rows = Table(self._waiting[0].signals, np.concatenate([waiting.values for waiting in self._waiting]))
+        self._waiting = []
+        places = np.concatenate(
+            [
+                self._firsts.firsts(rows["t_s"]),
+                _places_of(np.max, np.argmax, rows.values),
+                _places_of(np.min, np.argmin, rows.values),
+                self._changes_of_state(rows),
+                self._saturation(rows),
+                [len(rows) - 1],
+            ]
+        )
+        return [Table(rows.signals, rows.values[np.unique(places.astype(np.intp))])]
+
+    def _changes_of_state(self, rows: Table) -> Places:
+        """Places of the first rows in which a part has another state."""
+        changed = [np.empty(0, np.intp)]
+        for signal in rows.signals:
+            if signal.states:
+                values = rows[signal.name].reshape(len(rows), -1)
+                before = self._states.get(signal.name, values[0])
+                changed.append(
+                    np.flatnonzero((np.diff(values, axis=0, prepend=before[None]) != 0).any(axis=1))
+                )
+                self._states[signal.name] = values[-1].copy()
+        return np.concatenate(changed)
+
+    def _saturation(self, rows: Table) -> Places:
+        """Places of the first and the last row of each saturation; short pauses are part of one."""
+        places = np.flatnonzero(rows["allocation_scale"] < 1)
+        if not len(places):
+            return places
+        t_s = rows["t_s"][places]
+        begins = np.diff(t_s, prepend=self._last_saturated_s) > QUIET_S
+        ends = np.diff(t_s, append=np.inf) > QUIET_S
+        self._last_saturated_s = t_s[-1]
+        return places[begins | ends]
+
+
+def _places_of(bound: Callable[..., Array], place: Callable[..., Places], values: Array) -> Places:
+    """Place of the first bound of each column, as ``place(values, axis=0)`` finds it."""
+    ends = len(values) // _BLOCK * _BLOCK
+    bounds = bound(values[:ends].reshape(-1, _BLOCK, values.shape[1]), axis=1)
+    if ends < len(values):
+        bounds = np.concatenate([bounds, bound(values[ends:], axis=0, keepdims=True)])
+    starts = _BLOCK * place(bounds, axis=0)
+    within = [place(values[start : start + _BLOCK, column]) for column, start in enumerate(starts)]
+    return np.asarray(starts + within)
+
+
+FIRST_S = 2.0
+"""Time of the bins in the first chunk."""
+
+MOST = 4096
+"""Bins that a chunk need not exceed."""
+
+
+class Binned(NamedTuple):
+    """Bins that are complete."""
+
+    t_s: Array
+    """Time of the first row of each."""
+    low: Array
+    """Least value of each column: (bins, columns)."""
+    high: Array
+    """Greatest value."""
+    first: Array
+    """Value in the first row."""
+    last: Array
+    """Value in the last row."""
+    mean: Array
+    last_s: Array
+    """Time of the last row of each."""
+
+    def extremes(self) -> Array:
+        """Value of the largest magnitude of each column: what is seldom must not be lost."""
+        return np.where(self.high >= -self.low, self.high, self.low)
+
+    def pairs(self) -> tuple[Array, Array]:
+        """Times and values of two rows a bin: its bounds, in the order in which the bin rises or falls.
+
+        They stand at its ends, so that what rises or falls steadily is drawn as it is.
+        """
+        rises = self.last >= self.first
+        values = np.stack(
+            [np.where(rises, self.low, self.high), np.where(rises, self.high, self.low)], axis=1
+        )
+        return np.stack([self.t_s, self.last_s], axis=1).ravel(), values.reshape(-1, values.shape[2])
+
+
+class Bins:
+    """Gathers rows into bins of one width, and bins into chunks.
+
+    A file has some bytes for every chunk of every entity. Chunks therefore grow with what was handed over
+    before them; what a killed process has not handed over is less than half of that, or two seconds.
+
+    Parameters
+    ----------
+    rate_Hz : float
+        Bins a second.
+    at_once : bool
+        Hand over every bin once it is complete.
+    """
+
+    def __init__(self, rate_Hz: float, *, at_once: bool = False) -> None:
+        self._rate_Hz, self._at_once = rate_Hz, at_once
+        self._t_s: Array = np.empty(0)
+        self._values: Array = np.empty((0, 0))
+        self._held: list[Binned] = []
+        self._handed_over = 0
+
+    def add(self, t_s: Array, values: Array) -> Binned | None:
+        """Add rows (n, columns); returns complete bins, once there are enough."""
+        if len(self._t_s):
+            t_s, values = np.concatenate([self._t_s, t_s]), np.concatenate([self._values, values])
+        # A tick that falls on the edge of a bin is in it, whatever its last bit.
+        starts = np.flatnonzero(np.diff(np.floor(t_s * self._rate_Hz + 1e-6), prepend=-1.0))
+        last = int(starts[-1])
+        self._t_s, self._values = t_s[last:].copy(), values[last:].copy()
+        if last:
+            self._held.append(_binned(t_s[:last], values[:last], starts[:-1]))
+        due = 1 if self._at_once else max(FIRST_S * self._rate_Hz, min(self._handed_over // 2, MOST))
+        return self._hand_over() if sum(len(each.t_s) for each in self._held) >= due else None
+
+    def rest(self) -> Binned | None:
+        """All that is left, with the last bin, which no row is added to any more."""
+        if len(self._t_s):
+            self._held.append(_binned(self._t_s, self._values, np.zeros(1, dtype=np.int64)))
+            self._t_s = np.empty(0)
+        return self._hand_over() if self._held else None
+
+    def _hand_over(self) -> Binned:
+        whole = Binned(*(np.concatenate(parts) for parts in zip(*self._held, strict=True)))
+        self._held = []
+        self._handed_over += len(whole.t_s)
+        return whole
+
+
+def _binned(t_s: Array, values: Array, starts: NDArray[np.int64]) -> Binned:
+    ends = np.append(starts[1:], len(t_s))
+    return Binned(
+        t_s[starts],
+        np.minimum.reduceat(values, starts, axis=0),
+        np.maximum.reduceat(values, starts, axis=0),
+        values[starts],
+        values[ends - 1],
+        np.add.reduceat(values, starts, axis=0) / (ends - starts)[:, None],
+        t_s[ends - 1],
+    )

@@ -1,1 +1,0 @@
-"""Figures of runs beside each other, drawn with Matplotlib: a colour and a dash a run."""

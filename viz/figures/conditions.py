@@ -1,0 +1,263 @@
+"""Figure of errors over a condition: a panel a hinge, a line a law, and what the paper prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.crosscheck import FAINT, INK, SERIES, WIDTH_in, save
+from spheretwin.viz.figures.style import Style, on_errors, styles
+
+Array = NDArray[np.float64]
+
+MARGIN = 1.25
+SHIFT = 0.035
+"""Of the steps of x, between the laws: their ranges do not lie upon each other."""
+
+
+class Series(NamedTuple):
+    """Largest errors of one law over the condition."""
+
+    law: str
+    values: Array  # (n,)
+    error_rad: Array  # (3, n, hinges) lowest, median and highest over the seeds
+    whole: NDArray[np.bool_]  # (n,) whether every run came to its end
+    paper_rad: Mapping[float, Sequence[float]]  # printed, by the value of the condition
+
+
+def by_condition(
+    by_label: Mapping[str, Series], hinges: Sequence[str], x: str, quantity: str, title: str
+) -> Figure:
+    """Draw it; hollow where a run did not come to its end, bars where the paper prints a number.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Series
+    hinges : sequence of str
+    x, quantity, title : str
+    """
+    figure = Figure(figsize=(1.2 * WIDTH_in, 4.6), layout="constrained")
+    panels = figure.subplots(1, len(hinges), sharey=True, squeeze=False)[0]
+    looks = styles([series.law for series in by_label.values()])
+    for hinge, (panel, name) in enumerate(zip(panels, hinges, strict=True)):
+        for place, (label, series) in enumerate(by_label.items()):
+            shift = SHIFT * (place - (len(by_label) - 1) / 2)
+            _series(panel, label, series, looks[series.law], hinge, shift)
+        panel.set_title(name, fontsize="medium")
+        panel.set_xlabel(x)
+        panel.set_xticks(next(iter(by_label.values())).values)
+    every = [np.ravel(series.error_rad) for series in by_label.values()]
+    every += [np.ravel(list(series.paper_rad.values())) for series in by_label.values()]
+    errors = 1e3 * np.concatenate(every)
+    errors = errors[np.isfinite(errors)]
+    on_errors(panels, errors.min() / MARGIN, errors.max() * MARGIN)
+    panels[0].set_ylabel(f"{quantity}, mrad")
+    _legend(figure, panels[0], by_label)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _series(panel: Axes, label: str, series: Series, style: Style, hinge: int, shift: float) -> None:
+    step = np.min(np.diff(series.values)) if len(series.values) > 1 else 1.0
+    x = series.values + shift * step
+    low, middle, high = 1e3 * series.error_rad[:, :, hinge]
+    panel.plot(x, middle, label=label, linewidth=1.5, **style.line())
+    panel.errorbar(x, middle, [middle - low, high - middle], fmt="none", ecolor=style.colour, capsize=2.5,
+                   elinewidth=1)  # fmt: skip
+    for whole, inside in ((True, style.colour), (False, "white")):
+        chosen = series.whole == whole
+        panel.plot(x[chosen], middle[chosen], style.marker, color=style.colour, markerfacecolor=inside,
+                   markersize=6)  # fmt: skip
+    for value, printed in series.paper_rad.items():
+        at = value + shift * step
+        ours = middle[np.isclose(series.values, value)]
+        paper = 1e3 * printed[hinge]
+        panel.plot([at, at], [paper, *ours], color=style.colour, linewidth=0.9, linestyle=":")
+        panel.plot(at, paper, "_", color=INK, markersize=17, markeredgewidth=4.2)
+        panel.plot(at, paper, "_", color=style.colour, markersize=15, markeredgewidth=2.4)
+        panel.plot(at, paper, style.marker, color="white", markersize=4.5, markeredgecolor=INK)
+
+
+def _legend(figure: Figure, panel: Axes, by_label: Mapping[str, Series]) -> None:
+    looks = styles([series.law for series in by_label.values()])
+    handles = [
+        panel.plot([], [], style.marker, markersize=6, label=label, **style.line())[0]
+        for label, style in zip(by_label, looks.values(), strict=True)
+    ]
+    if any(series.paper_rad for series in by_label.values()):
+        handles += panel.plot([], [], "_", color=INK, markersize=15, markeredgewidth=3, label="printed")
+    if not all(series.whole.all() for series in by_label.values()):
+        hollow: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "linestyle": "", "marker": "o"}
+        handles += panel.plot([], [], label="ended early", markersize=6, **hollow)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6), frameon=False,
+                  handlelength=3.2)  # fmt: skip
+
+
+WIDE = 9.0
+"""Ratio of largest to smallest step from which on a scale is logarithmic."""
+
+
+class Panel(NamedTuple):
+    """One thing that is made worse."""
+
+    name: str
+    by_law: Mapping[str, Array]  # (n, 3) step, error in rad, whether the law holds
+
+
+def margins(
+    panels: Sequence[Panel], labels: Mapping[str, str], bound_rad: float, quantity: str, title: str
+) -> Figure:
+    """Draw them on one scale of errors.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    labels : mapping of law to label
+    bound_rad : float, rad
+        Below which a law holds.
+    quantity, title : str
+    """
+    across = min(3, len(panels))
+    down = -(-len(panels) // across)
+    figure = Figure(figsize=(1.2 * WIDTH_in, 1.2 + 2.7 * down), layout="constrained")
+    grid = figure.subplots(down, across, sharey=True, squeeze=False)
+    looks = styles(list(labels))
+    for spare in grid.flat[len(panels) :]:
+        spare.set_visible(False)
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        for law, values in panel.by_law.items():
+            step, error_mrad, held = values[:, 0], 1e3 * values[:, 1], values[:, 2] > 0
+            style = looks[law]
+            axes.plot(step, error_mrad, linewidth=1.4, **style.line())
+            for chosen, inside in ((held, style.colour), (~held, "white")):
+                axes.plot(step[chosen], error_mrad[chosen], style.marker, color=style.colour,
+                          markerfacecolor=inside, markersize=6)  # fmt: skip
+        axes.axhline(1e3 * bound_rad, color=INK, linestyle="--", linewidth=1)
+        axes.set_yscale("log")
+        steps = np.concatenate([values[:, 0] for values in panel.by_law.values()])
+        if steps.min() > 0 and steps.max() > WIDE * steps.min():
+            axes.set_xscale("log")
+            axes.xaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.set_xlabel(panel.name)
+        axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.supylabel(quantity, fontsize="medium")
+    handles = [
+        grid.flat[0].plot([], [], style.marker, markersize=6, label=labels[law], **style.line())[0]
+        for law, style in looks.items()
+    ]
+    handles += grid.flat[0].plot([], [], "o", color=INK, markerfacecolor="white", label="does not hold")
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False, handlelength=3.2)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+ROW_in = 0.5
+
+
+class Row(NamedTuple):
+    """One reading."""
+
+    label: str
+    by_law: Mapping[str, Array]  # (n,) ratios of each law
+
+
+def ratios(rows: Sequence[Row], labels: Mapping[str, str], quantity: str, title: str) -> Figure:
+    """Draw them on a logarithmic axis, the laws of a row below each other.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    labels : mapping of law to label
+    quantity, title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 1.5 + ROW_in * len(rows)), layout="constrained")
+    axes = figure.subplots()
+    looks = styles(list(labels))
+    for y, row in enumerate(rows):
+        for place, (law, values) in enumerate(row.by_law.items()):
+            style = looks[law]
+            at = y + 0.22 * (place - (len(row.by_law) - 1) / 2)
+            axes.plot([values.min(), values.max()], [at, at], color=style.colour, linewidth=1.2)
+            axes.plot(values, np.full(len(values), at), style.marker, color=style.colour, markersize=5,
+                      alpha=0.8, label=labels[law] if y == 0 else None)  # fmt: skip
+    axes.axvline(1.0, color=INK, linewidth=1.2, linestyle="--", label="the paper")
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(rows)), [row.label for row in rows])
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_xlabel(quantity)
+    axes.set_title(title, fontsize="medium")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.grid(visible=True, axis="x", color=FAINT, alpha=0.35, linewidth=0.6)
+    for y in range(1, len(rows)):
+        axes.axhline(y - 0.5, color=FAINT, linewidth=0.4)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+__all__ = ["Curve", "estimators", "save"]
+
+
+LEAST_LAG_s = 1e-5  # less is drawn as this much: beside a period of 1 ms it is none
+
+
+class Curve(NamedTuple):
+    """One estimator over the bandwidths."""
+
+    rms_error_rad_s: Array  # (b,)
+    lag_s: Array  # (b,) below zero where it is ahead
+    lag_deviation_s: Array  # (b,)
+    derived_rms_error_rad_s: Array  # (b,)
+    derived_lag_s: Array  # (b,)
+    default_rad_s: float
+
+
+def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str) -> Figure:
+    """RMS error of the rate above, lag below: a colour an estimator, dots measured, lines derived.
+
+    Each estimator's default is a dashed line of its colour. A lag that the noise does not let be told from
+    none is drawn hollow, at the largest that it may be.
+
+    Parameters
+    ----------
+    bandwidths_rad_s : (b,) array, rad/s
+    curves : mapping of estimator to Curve
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 6.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True)
+    for colour, marker, (name, curve) in zip(SERIES, "osD^v", curves.items(), strict=False):
+        dots = {"linestyle": "", "marker": marker, "color": colour, "markersize": 5}
+        above.plot(bandwidths_rad_s, curve.rms_error_rad_s, label=name, **dots)
+        above.plot(bandwidths_rad_s, curve.derived_rms_error_rad_s, color=colour, linewidth=1)
+        told = curve.lag_s > 2 * curve.lag_deviation_s
+        lag_s = np.where(told, curve.lag_s, np.maximum(curve.lag_s, 0) + 2 * curve.lag_deviation_s)
+        lag_ms = 1e3 * np.maximum(lag_s, LEAST_LAG_s)
+        below.plot(bandwidths_rad_s[told], lag_ms[told], label=name, **dots)
+        if not np.all(told):
+            below.plot(bandwidths_rad_s[~told], lag_ms[~told], markerfacecolor="none",
+                       label=f"{name}: at most", **dots)  # fmt: skip
+        if np.any(curve.derived_lag_s > 0):
+            below.plot(bandwidths_rad_s, 1e3 * curve.derived_lag_s, color=colour, linewidth=1)
+    for axes, quantity in ((above, "RMS error of the rate, rad/s"), (below, "lag of the rate, ms")):
+        for colour, curve in zip(SERIES, curves.values(), strict=False):
+            axes.axvline(curve.default_rad_s, color=colour, linestyle="--", linewidth=1.2)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylabel(quantity)
+        axes.grid(visible=True, which="both", color=FAINT, alpha=0.35, linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    above.set_title(f"{title}\ndots measured, lines derived, dashed the defaults", fontsize="medium")
+    below.set_xlabel("bandwidth, rad/s")
+    return figure

@@ -1,0 +1,405 @@
+"""Figures for a page: matplotlib without its global state, one function a figure.
+
+Axes have the colours of the recordings; every series is named, every axis has its unit, and a bound is
+drawn as a dashed line beside what it bounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from spheretwin.models.base.files import whole_file
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.theme import AXIS_COLOURS
+
+Array = NDArray[np.float64]
+
+AXES = tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in AXIS_COLOURS)
+# Okabe and Ito's: told apart by the colour-blind too.
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00")
+INK, FAINT, BROKEN = "#30343a", "#a4aab3", "#c8102e"
+
+WIDTH_in = 8.0
+DPI = 150
+LEAST_SHARE = 1e-14  # of a bound: less is drawn as this much
+NOTHING = 1e-18  # what a difference of exactly zero is drawn as, on a logarithmic axis
+
+
+class Slope(NamedTuple):
+    """A method's error at several steps, and the power of the step it goes with."""
+
+    steps_s: Array
+    errors: Array
+    order: float
+
+
+class Bounded(NamedTuple):
+    """A series that should stay below a bound; None for one without."""
+
+    values: Array
+    bound: float | None
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG, or as SVG under that suffix; the same figure gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written there.
+    """
+    with whole_file(path) as temporary:
+        if path.suffix == ".svg":
+            with rc_context({"svg.hashsalt": path.name}):
+                figure.savefig(temporary, format="svg", metadata={"Date": None})
+        else:
+            figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
+
+
+def margins(values: Mapping[str, float], title: str) -> Figure:
+    """How much of its bound each figure takes up: a dot a figure, the bound a line.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        Value over bound.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 0.8 + 0.26 * len(values)), layout="constrained")
+    axes = figure.subplots()
+    rows = np.arange(len(values))
+    shares = np.clip(list(values.values()), LEAST_SHARE, 1 / LEAST_SHARE)
+    for kept, colour, label in ((True, SERIES[0], "kept"), (False, BROKEN, "broken")):
+        chosen = (shares <= 1) == kept
+        if np.any(chosen):
+            axes.plot(shares[chosen], rows[chosen], "o", color=colour, markersize=6, label=label)
+            axes.hlines(rows[chosen], LEAST_SHARE, shares[chosen], color=colour, linewidth=1, alpha=0.5)
+    axes.axvline(1.0, color=INK, linestyle="--", linewidth=1.2, label="bound")
+    axes.set_xscale("log")
+    axes.set_xlim(LEAST_SHARE, 10 * max(1.0, *shares))
+    axes.set_yticks(rows, list(values))
+    axes.set_ylim(len(values) - 0.4, -0.6)
+    _finish(axes, "value over bound", "", title)
+    axes.grid(visible=False, axis="y")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def spreads(
+    differences: Mapping[str, Mapping[str, Array]], bounds: Mapping[str, float], title: str
+) -> Figure:
+    """Spread of relative differences: a row a quantity, a bar a source, a tick for the bound.
+
+    Parameters
+    ----------
+    differences : mapping of source to mapping of quantity to (n,) array
+        Relative differences.
+    bounds : mapping of quantity to float
+    title : str
+    """
+    quantities = list(bounds)
+    figure = Figure(figsize=(WIDTH_in, 1.3 + 0.62 * len(quantities)), layout="constrained")
+    axes = figure.subplots()
+    offsets = np.linspace(-0.16, 0.16, len(differences)) if len(differences) > 1 else np.zeros(1)
+    for colour, offset, (source, by_quantity) in zip(SERIES, offsets, differences.items(), strict=False):
+        for row, quantity in enumerate(quantities):
+            values = np.maximum(by_quantity[quantity], NOTHING)
+            low, middle, high = np.quantile(values, [0.01, 0.5, 0.99])
+            y, named = row + offset, f"{source}: 1 to 99 %" if row == 0 else None
+            axes.plot([low, high], [y, y], color=colour, linewidth=7, alpha=0.45, solid_capstyle="butt",
+                      label=named)  # fmt: skip
+            axes.plot(middle, y, "|", color=colour, markersize=11, markeredgewidth=2,
+                      label="median" if row == 0 else None)  # fmt: skip
+            axes.plot(values.max(), y, "o", color=colour, markersize=5, label="worst" if row == 0 else None)
+    for row, bound in enumerate(bounds.values()):
+        axes.plot([bound, bound], [row - 0.36, row + 0.36], color=INK, linewidth=1.6, linestyle="--",
+                  label="bound" if row == 0 else None)  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(quantities)), quantities)
+    axes.set_ylim(len(quantities) - 0.5, -0.5)
+    _finish(axes, "relative difference", "", title)
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=4)
+    return figure
+
+
+def motion(t_s: Array, q_rad: Array, difference_rad: Array, bound_rad: float, title: str) -> Figure:
+    """Hinge angles over time, and below them how far two ways of computing them are apart.
+
+    Parameters
+    ----------
+    t_s : (n,) array, s
+    q_rad, difference_rad : (n, 3) array, rad
+    bound_rad : float, rad
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
+    tilt, spin, apart = figure.subplots(3, 1, sharex=True, height_ratios=[2, 1, 2])
+    for axis, (colour, name) in enumerate(zip(AXES, ANGLES, strict=True)):
+        where = spin if axis == 2 else tilt
+        where.plot(t_s, q_rad[:, axis], color=colour, label=name)
+        apart.plot(t_s, _positive(difference_rad[:, axis]), color=colour, linewidth=1, label=name)
+    apart.set_yscale("log")
+    _draw_bound(apart, bound_rad, "rad")
+    _finish(tilt, "", "tilt, rad", title)
+    _finish(spin, "", "spin, rad", "")
+    _finish(apart, "time, s", "|difference|, rad", "")
+    for axes in (tilt, spin, apart):
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def convergence(slopes: Mapping[str, Slope], title: str) -> Figure:
+    """Error against step, both logarithmic, with the fitted power of the step as a dashed line.
+
+    Parameters
+    ----------
+    slopes : mapping of method to Slope
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 4.6), layout="constrained")
+    axes = figure.subplots()
+    for colour, marker, size, (name, slope) in zip(
+        SERIES, "osDx^", (8, 9, 5, 6, 6), slopes.items(), strict=False
+    ):
+        factor = np.exp(np.mean(np.log(slope.errors / slope.steps_s**slope.order)))
+        ends = np.array([slope.steps_s.min(), slope.steps_s.max()])
+        hollow = "none" if marker in "os" else colour
+        axes.plot(slope.steps_s * 1e3, slope.errors, marker, color=colour, markersize=size,
+                  markerfacecolor=hollow, label=f"{name}: order {slope.order:.2f}")  # fmt: skip
+        axes.plot(ends * 1e3, factor * ends**slope.order, "--", color=colour, linewidth=1)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    steps_ms = 1e3 * np.unique(np.concatenate([slope.steps_s for slope in slopes.values()]))
+    axes.set_xticks(steps_ms, [f"{step:g}" for step in steps_ms])
+    axes.minorticks_off()
+    _finish(axes, "step, ms", "largest error of a hinge angle, rad", title)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) -> Figure:
+    """What should stay at zero, over time: a panel a quantity, each series with its own bound.
+
+    Parameters
+    ----------
+    t_s : (n,) array, s
+    panels : mapping of quantity (with its unit) to mapping of series to Bounded
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 2.1 * len(panels)), layout="constrained")
+    for axes, (quantity, series) in zip(_column(figure, len(panels)), panels.items(), strict=True):
+        for colour, (name, drift) in zip(SERIES, series.items(), strict=False):
+            axes.plot(t_s, _positive(drift.values), color=colour, linewidth=1, label=name)
+            _draw_bound(axes, drift.bound, "", colour)
+        axes.set_yscale("log")
+        _finish(axes, "", quantity, title)
+        title = ""
+        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axes.set_xlabel("time, s")
+    return figure
+
+
+def closed_loops(
+    t_s: Array,
+    errors: Mapping[str, tuple[Array, Array]],
+    apart: Mapping[str, Bounded],
+    sources: tuple[str, str],
+    title: str,
+) -> Figure:
+    """Tracking errors of the same run on two plants, a column a law, and below how far they are apart.
+
+    Parameters
+    ----------
+    t_s : (n,) array, s
+    errors : mapping of law to two (n, 3) arrays, rad
+        Tracking errors on either plant; a run that ended early has fewer rows.
+    apart : mapping of law to Bounded, rad
+        Largest difference of any hinge angle.
+    sources : two str
+        Names of the plants.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 4.8), layout="constrained")
+    above, below = figure.subplots(2, len(errors), sharex=True, squeeze=False)
+    for top, bottom, (law, pair) in zip(above, below, errors.items(), strict=True):
+        for axis, (colour, name) in enumerate(zip(AXES, ANGLES, strict=True)):
+            top.plot(t_s[: len(pair[0])], pair[0][:, axis], color=colour, label=f"{name}, {sources[0]}")
+            top.plot(t_s[: len(pair[1])], pair[1][:, axis], color=INK, linewidth=0.9, linestyle=(0, (4, 6)),
+                     label=sources[1] if axis == 2 else None)  # fmt: skip
+        values = _positive(apart[law].values)
+        bottom.plot(t_s[: len(values)], values, color=SERIES[0], linewidth=1, label="worst hinge")
+        bottom.set_yscale("log")
+        _draw_bound(bottom, apart[law].bound, "rad")
+        _finish(top, "", "tracking error, rad", law)
+        _finish(bottom, "time, s", "|difference|, rad", "")
+    named: dict[str, Artist] = {}
+    for axes in (above[0], below[0]):
+        handles, labels = axes.get_legend_handles_labels()
+        named |= dict(zip(labels, handles, strict=True))
+    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=4)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _positive(values: Array) -> Array:
+    """Sizes for a logarithmic axis, with gaps where they are zero."""
+    return np.where(values == 0, np.nan, np.abs(values))
+
+
+def _column(figure: Figure, count: int) -> Iterator[Axes]:
+    yield from figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+
+
+def _draw_bound(axes: Axes, bound: float | None, unit: str, colour: str = INK) -> None:
+    if bound is not None:
+        name = f"bound {bound:.1e} {unit}".strip()
+        axes.axhline(bound, color=colour, linestyle="--", linewidth=1.2, label=name)
+
+
+def _finish(axes: Axes, x: str, y: str, title: str) -> None:
+    """Labels, a faint grid behind, no box."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.set_title(title, fontsize="medium")
+    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+__all__ = ["Ramped", "Resting", "hinge_friction", "save"]
+
+
+SLOWEST_rad_s, FASTEST_rad_s, FASTEST_AT_STOP_rad_s = 1e-4, 2.0, 0.3  # of the logarithmic axes
+UP, BACK = 0.06, 0.8  # shares of the largest rate at which arrows on the ideal curve say where the ramp goes
+AROUND_STOP_ms = 60.0
+
+
+class Ramped(NamedTuple):
+    """A ramp of torque up and back, a row a step, and the creep under a constant torque below the level."""
+
+    torque_Nm: Array  # (n,)
+    rates_rad_s: Mapping[str, Array]  # (n,) by way
+    ideal_rad_s: Array  # (n,)
+    level_Nm: float
+    push_Nm: float
+    creep_rad_s: Mapping[str, float]
+
+
+class Resting(NamedTuple):
+    """Coasting to rest; a row a step."""
+
+    t_s: Array  # (m,)
+    rates_rad_s: Mapping[str, Array]  # (m,) by way
+    ideal_rad_s: Array  # (m,)
+    ideal_stop_s: float
+
+
+def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -> Figure:
+    """A column a bearing: rate against a slow torque, coasting beside ideal friction, coming to rest.
+
+    Each way has one colour; ideal friction is dashed.
+
+    Parameters
+    ----------
+    bearings : mapping of bearing to Ramped and Resting
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 8.6), layout="constrained")
+    rows = figure.subplots(3, len(bearings), squeeze=False, sharey="row")
+    for (above, middle, below), (name, (ramped, resting)) in zip(rows.T, bearings.items(), strict=True):
+        _ramp(above, ramped)
+        _coast(middle, resting)
+        _stop(below, resting)
+        above.set_title(f"{name}\nslow torque, up and back", fontsize="medium")
+        middle.set_title(f"coasting from {resting.ideal_rad_s[0]:g} rad/s", fontsize="medium")
+        below.set_title("coming to rest", fontsize="medium")
+    for axes, quantity in zip(
+        rows[:, 0], ("rate, rad/s", "rate less ideal, mrad/s", "rate, rad/s"), strict=True
+    ):
+        axes.set_ylabel(quantity)
+    named: dict[str, Artist] = {}
+    for axes in rows[0]:
+        handles, labels = axes.get_legend_handles_labels()
+        named |= dict(zip(labels, handles, strict=True))
+    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=3)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _ramp(axes: Axes, ramped: Ramped) -> None:
+    torque_mNm = 1e3 * ramped.torque_Nm
+    for colour, way, rate in _ways(ramped.rates_rad_s):
+        axes.plot(torque_mNm, _drawn(rate), color=colour, label=way)
+        axes.plot(1e3 * ramped.push_Nm, ramped.creep_rad_s[way], "o", color=colour, markersize=5)
+    _ideal(axes, torque_mNm, _drawn(ramped.ideal_rad_s))
+    axes.axvline(1e3 * ramped.level_Nm, color=FAINT, linewidth=1.2, label="Coulomb level")
+    axes.plot([], [], "o", color=INK, markersize=5, label="settled at half the level")
+    ideal, fastest = ramped.ideal_rad_s, int(np.argmax(ramped.ideal_rad_s))
+    _arrow(axes, torque_mNm, ideal, int(np.argmax(ideal >= UP * ideal[fastest])))
+    _arrow(axes, torque_mNm, ideal, fastest + int(np.argmax(ideal[fastest:] <= BACK * ideal[fastest])))
+    _slow_rates(axes, FASTEST_rad_s)
+    _label_axes(axes, "torque, mN·m")
+
+
+def _coast(axes: Axes, resting: Resting) -> None:
+    for colour, _, rate in _ways(resting.rates_rad_s):
+        axes.plot(resting.t_s, 1e3 * (rate - resting.ideal_rad_s), color=colour)
+    axes.axhline(0, color=INK, linewidth=1.1, linestyle=(0, (4, 4)))
+    axes.axvline(resting.ideal_stop_s, color=FAINT, linewidth=0.8, linestyle=":")
+    _label_axes(axes, "time, s")
+
+
+def _stop(axes: Axes, resting: Resting) -> None:
+    after_ms = 1e3 * (resting.t_s - resting.ideal_stop_s)
+    shown = np.abs(after_ms) <= AROUND_STOP_ms
+    for colour, _, rate in _ways(resting.rates_rad_s):
+        axes.plot(after_ms[shown], _drawn(rate[shown]), color=colour)
+    _ideal(axes, after_ms[shown], _drawn(resting.ideal_rad_s[shown]))
+    _slow_rates(axes, FASTEST_AT_STOP_rad_s)
+    _label_axes(axes, "time after the ideal stop, ms")
+
+
+def _slow_rates(axes: Axes, fastest_rad_s: float) -> None:
+    axes.set_yscale("log")
+    axes.set_ylim(SLOWEST_rad_s, fastest_rad_s)
+
+
+def _arrow(axes: Axes, x: Array, y: Array, row: int) -> None:
+    """An arrow's head on a curve, towards the rows that follow."""
+    ahead = row + max(1, len(x) // 100)
+    axes.annotate(
+        "",
+        xy=(x[ahead], y[ahead]),
+        xytext=(x[row], y[row]),
+        arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 0, "mutation_scale": 14},
+    )
+
+
+def _ways(rates_rad_s: Mapping[str, Array]) -> Iterator[tuple[str, str, Array]]:
+    for colour, (way, rate) in zip(SERIES, rates_rad_s.items(), strict=False):
+        yield colour, way, rate
+
+
+def _ideal(axes: Axes, x: Array, rate_rad_s: Array) -> None:
+    axes.plot(x, rate_rad_s, color=INK, linewidth=1.1, linestyle=(0, (4, 4)), label="ideal friction")
+
+
+def _drawn(rate_rad_s: Array) -> Array:
+    """Rates for a logarithmic axis: what is less than it shows lies on its edge, and rest below it."""
+    return np.maximum(rate_rad_s, 0.1 * SLOWEST_rad_s)
+
+
+def _label_axes(axes: Axes, x: str) -> None:
+    axes.set_xlabel(x)
+    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,153 @@
+"""Figures of a study over many axes: how figures are spread, and what the worst of them goes with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
+from spheretwin.viz.figures.maps import fit_scale
+from spheretwin.viz.theme import law_colours
+
+Array = NDArray[np.float64]
+
+ACROSS = 3
+MOST_DOTS = 2000  # of a law in a panel: more only blacken it
+BINS = 10
+
+
+class Rank(NamedTuple):
+    """What a figure goes with, under one law."""
+
+    by_value: Array  # (axes,) rank correlation with the value
+    by_distance: Array  # (axes,) and with its distance from the middle one
+    chance: float  # below this, 95 % of what does not matter
+    is_partial: bool  # whether what goes with the other axes was taken away before
+
+
+def distributions(
+    figures: Mapping[str, Mapping[str, Array]], totals: Mapping[str, int], title: str
+) -> Figure:
+    """Share of the rows at or below each value: a panel a figure, a colour a law.
+
+    What has no figure, as a run that was lost or never settled, is missing from the share.
+
+    Parameters
+    ----------
+    figures : mapping of figure to mapping of law to (n,) array
+        Numbers alone.
+    totals : mapping of law to int
+        All rows.
+    title : str
+    """
+    down, colours = -(-len(figures) // ACROSS), law_colours(list(totals))
+    sheet = Figure(figsize=(1.15 * WIDTH_in, 1.0 + 2.1 * down), layout="constrained")
+    grid = sheet.subplots(down, ACROSS, sharey=True, squeeze=False)
+    for spare in grid.flat[len(figures) :]:
+        spare.set_visible(False)
+    for axes, (name, by_law) in zip(grid.flat, figures.items(), strict=False):
+        for law, values in by_law.items():
+            numbers = np.sort(values)
+            share = np.arange(1, len(numbers) + 1) / totals[law]
+            axes.step(numbers, share, where="post", color=colours[law], linewidth=1.3)
+        fit_scale(axes, "x", np.concatenate(list(by_law.values())))
+        axes.set_ylim(0, 1.02)
+        _plain(axes, name, "")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("share of rows", fontsize="small")
+    for law in totals:
+        grid.flat[0].plot([], [], color=colours[law], label=law)
+    sheet.legend(loc="outside lower center", ncols=min(len(totals), 5), frameon=False)
+    sheet.suptitle(title, fontsize="medium")
+    return sheet
+
+
+def ranks(names: Sequence[str], by_law: Mapping[str, Rank], title: str) -> Figure:
+    """Rank correlations, a row an axis: bars with the value, rings with its distance from the middle one.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Axes, the strongest first.
+    by_law : mapping of law to Rank
+        In the same order.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 1.4 + len(names) * (0.14 + 0.13 * len(by_law))), layout="constrained")
+    axes = figure.subplots()
+    thick, colours = 0.76 / len(by_law), law_colours(list(by_law))
+    for place, (law, rank) in enumerate(by_law.items()):
+        y = np.arange(len(names)) + (place - (len(by_law) - 1) / 2) * thick
+        axes.barh(y, rank.by_value, height=0.85 * thick, color=colours[law], alpha=0.75, label=law)
+        axes.plot(rank.by_distance, y, "o", color=INK, markerfacecolor="white", markersize=4.5)
+    chance = max(rank.chance for rank in by_law.values())
+    axes.axvspan(-chance, chance, color=FAINT, alpha=0.25, linewidth=0, zorder=0, label="by chance, 95 %")
+    axes.plot([], [], "o", color=INK, markerfacecolor="white", markersize=4.5,
+              label="with the distance from its middle")  # fmt: skip
+    axes.axvline(0, color=INK, linewidth=0.8)
+    axes.set_yticks(range(len(names)), list(names))
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    partial = all(rank.is_partial for rank in by_law.values())
+    _plain(axes, "partial rank correlation" if partial else "rank correlation", title)
+    figure.legend(loc="outside lower center", ncols=min(len(by_law) + 2, 4), frameon=False, fontsize="small")
+    return figure
+
+
+def scatters(
+    axes_values: Mapping[str, Mapping[str, Array]],
+    figure_values: Mapping[str, Array],
+    quantity: str,
+    title: str,
+) -> Figure:
+    """A figure against the value of each of some axes: dots the rows, a line their median.
+
+    Parameters
+    ----------
+    axes_values : mapping of axis to mapping of law to (n,) array
+    figure_values : mapping of law to (n,) array
+    quantity, title : str
+    """
+    across, colours = min(4, len(axes_values)), law_colours(list(figure_values))
+    down = -(-len(axes_values) // across)
+    figure = Figure(figsize=(max(2.6 * across, WIDTH_in / 2), 1.1 + 2.2 * down), layout="constrained")
+    grid = figure.subplots(down, across, sharey=True, squeeze=False)
+    for spare in grid.flat[len(axes_values) :]:
+        spare.set_visible(False)
+    for axes, (name, by_law) in zip(grid.flat, axes_values.items(), strict=False):
+        for law, x in by_law.items():
+            _scatter(axes, x, figure_values[law], colours[law], law)
+        fit_scale(axes, "y", np.concatenate(list(figure_values.values())))
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+        _plain(axes, name, "")
+    for axes in grid[:, 0]:
+        axes.set_ylabel(quantity, fontsize="small")
+    named, labels = grid.flat[0].get_legend_handles_labels()
+    figure.legend(named, labels, loc="outside lower center", ncols=4, frameon=False, fontsize="small")
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _scatter(axes: Axes, x: Array, y: Array, colour: str, law: str) -> None:
+    step = -(-len(x) // MOST_DOTS) if len(x) else 1
+    axes.plot(x[::step], y[::step], ".", color=colour, markersize=4, alpha=0.35, markeredgewidth=0)
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
+    if len(edges) > 2:
+        inside = [(x >= low) & (x <= high) for low, high in pairwise(edges)]
+        middles = [(np.median(x[each]), np.median(y[each])) for each in inside]
+        axes.plot(*zip(*middles, strict=True), color=colour, linewidth=2, label=f"{law}, median")
+
+
+def _plain(axes: Axes, x: str, title: str) -> None:
+    axes.set_xlabel(x, fontsize="small")
+    axes.set_title(title, fontsize="medium")
+    axes.tick_params(labelsize="small")
+    axes.grid(visible=True, color=FAINT, alpha=0.3, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,214 @@
+"""Figure of errors over what they cost: a panel a condition, a line a law, both axes logarithmic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
+from spheretwin.viz.figures.style import Style, styles
+from spheretwin.viz.theme import law_colour
+
+Array = NDArray[np.float64]
+
+MARGIN = 1.15
+SIZES = {"*": 9.0}
+"""Of markers that look smaller than others."""
+
+MOST = 40.0
+"""Largest error that is drawn, over the least."""
+
+
+class Panel(NamedTuple):
+    """One condition."""
+
+    title: str
+    error: str
+    by_law: Mapping[str, Array]  # (n, 2) cost and error
+    marked: Mapping[str, tuple[str, float, float]]  # by name: law, cost and error
+    floors: Sequence[float] = ()  # errors that no cost avoids
+
+
+def fronts(panels: Sequence[Panel], labels: Mapping[str, str], cost: str) -> Figure:
+    """Draw the panels side by side.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    labels : mapping of law to label
+    cost : str
+        Label of the axis.
+    """
+    figure = Figure(figsize=(0.65 * WIDTH_in * max(len(panels), 2), 5.2), layout="constrained")
+    grid = figure.subplots(1, max(len(panels), 1), squeeze=False)
+    looks = styles(list(labels))
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        _panel(axes, panel, looks)
+        axes.set_xlabel(cost)
+    handles = [
+        grid.flat[0].plot([], [], style.marker, markersize=_size(style), label=labels[law], **style.line())[0]
+        for law, style in looks.items()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False, handlelength=3.2)
+    return figure
+
+
+def _panel(axes: Axes, panel: Panel, looks: Mapping[str, Style]) -> None:
+    for floor in panel.floors:
+        axes.axhline(floor, color=FAINT, linewidth=1.0, zorder=1)
+    for law, values in panel.by_law.items():
+        style = looks[law]
+        axes.plot(*values[np.argsort(values[:, 0])].T, style.marker, markersize=_size(style), linewidth=1.3,
+                  markeredgewidth=0.4, markeredgecolor="white", zorder=3, **style.line())  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    _set_limits(axes, panel)
+    for name, (law, x, y) in panel.marked.items():
+        if x <= axes.get_xlim()[1] and y <= axes.get_ylim()[1]:
+            style = looks[law]
+            axes.plot(x, y, style.marker, color=style.colour, markersize=1.5 * _size(style),
+                      markerfacecolor="white", zorder=5)  # fmt: skip
+            axes.annotate(name, (x, y), (-9, -1), textcoords="offset points", ha="right", va="center",
+                          fontsize="small", zorder=5)  # fmt: skip
+    axes.set_ylabel(panel.error)
+    axes.set_title(panel.title, fontsize="medium")
+    axes.grid(visible=True, color=FAINT, alpha=0.25, linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _set_limits(axes: Axes, panel: Panel) -> None:
+    """Show everything within `MOST` times the least error."""
+    marked = np.array([(x, y) for _, x, y in panel.marked.values()]).reshape(-1, 2)
+    points = np.concatenate([marked, *panel.by_law.values()])
+    if not len(points):
+        return
+    near = points[points[:, 1] <= MOST * points[:, 1].min()]
+    least = min([near[:, 1].min(), *panel.floors])
+    axes.set_xlim(near[:, 0].min() / MARGIN, near[:, 0].max() * MARGIN)
+    axes.set_ylim(least / MARGIN, near[:, 1].max() * MARGIN)
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        steps = (1, 2, 5) if high > 10 * low else (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9)
+        ticks = [step * 10.0**power for power in range(-4, 5) for step in steps]
+        axis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_locator(NullLocator())
+
+
+def _size(style: Style) -> float:
+    return SIZES.get(style.marker, 6.0)
+
+
+# Beyond this many times the best a figure of a bad trial would leave no room for the good ones.
+DECADES_ON = 30.0
+
+
+class Trials(NamedTuple):
+    """Trials of one law."""
+
+    law: str
+    numbers: Array  # (n,)
+    values: Array  # (n, objectives); of a pruned trial what is certain, NaN of one that lost
+    completed: NDArray[np.bool_]  # (n,)
+    best: NDArray[np.bool_]  # (n,)
+    signs: Array  # (objectives,) −1 where large is good
+    has_start: bool  # whether trial 0 is what the others are held against
+    fresh: Array  # (b, objectives) of the best under fresh seeds; empty where there are none
+
+
+def progress(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str) -> Figure:
+    """Each objective over the trials: a dot a completed one, a ring a pruned one, a line the best so far.
+
+    What lost, or is off the scale, is a tick at the edge.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Trials
+    objectives : sequence of str
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 1.4 + 2.4 * len(objectives)), layout="constrained")
+    panels = figure.subplots(len(objectives), 1, sharex=True, squeeze=False)[:, 0]
+    for place, (panel, name) in enumerate(zip(panels, objectives, strict=True)):
+        for label, trials in by_label.items():
+            _progress(panel, label, trials, place)
+        _finish(panel, [trials.values[trials.completed, place] for trials in by_label.values()], "y")
+        panel.set_ylabel(name, fontsize="small")
+    panels[0].set_title(title, fontsize="medium")
+    panels[-1].set_xlabel("trial")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+def front(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str) -> Figure:
+    """Two objectives of all completed trials, and the front of those that none is better than in both.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Trials
+    objectives : sequence of str
+        Two.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 5.6), layout="constrained")
+    panel = figure.subplots()
+    for label, trials in by_label.items():
+        colour, chosen = law_colour(trials.law), trials.values[trials.best]
+        panel.plot(*trials.values[trials.completed].T, "o", color=colour, markersize=3, alpha=0.35,
+                   label=f"{label}, trial")  # fmt: skip
+        chosen = chosen[np.argsort(chosen[:, 0])]
+        panel.step(*chosen.T, where="post" if trials.signs[0] > 0 else "pre", color=colour, linewidth=1.2)
+        panel.plot(*chosen.T, "o", color=colour, markersize=5.5, label=f"{label}, front")
+        if len(trials.fresh):
+            panel.plot(*trials.fresh.T, "o", color=colour, markerfacecolor="white", markersize=5,
+                       label=f"{label}, front under fresh seeds")  # fmt: skip
+        if trials.has_start and trials.completed[0]:
+            panel.plot(*trials.values[0], "*", color=INK, markersize=13, label=f"{label}, start", zorder=5)
+    for which, place in (("x", 0), ("y", 1)):
+        _finish(panel, [trials.values[trials.completed, place] for trials in by_label.values()], which)
+    panel.set_xlabel(objectives[0])
+    panel.set_ylabel(objectives[1])
+    panel.set_title(title, fontsize="medium")
+    figure.legend(loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+def _progress(panel: Axes, label: str, trials: Trials, place: int) -> None:
+    colour, values = law_colour(trials.law), trials.values[:, place]
+    pruned = ~trials.completed & np.isfinite(values)
+    lost = ~np.isfinite(values)
+    panel.plot(trials.numbers[trials.completed], values[trials.completed], "o", color=colour, markersize=3.5,
+               label=f"{label}, completed")  # fmt: skip
+    panel.plot(trials.numbers[pruned], values[pruned], "o", color=colour, markerfacecolor="none",
+               markersize=3.5, alpha=0.6, label=f"{label}, pruned: at least")  # fmt: skip
+    if np.any(lost):
+        edge = panel.get_xaxis_transform()
+        panel.plot(trials.numbers[lost], np.ones(np.sum(lost)), "x", color=colour, transform=edge,
+                   clip_on=False, markersize=5, label=f"{label}, lost")  # fmt: skip
+    if np.any(trials.completed):
+        sign = trials.signs[place]
+        best = sign * np.minimum.accumulate(np.where(trials.completed, sign * values, np.inf))
+        shown = np.isfinite(best)
+        panel.step(trials.numbers[shown], best[shown], where="post", color=colour, linewidth=1.2,
+                   label=f"{label}, best so far")  # fmt: skip
+
+
+def _finish(panel: Axes, values: Sequence[Array], which: str) -> None:
+    """A logarithmic axis where all is above zero, cut where only what is far from the best lies."""
+    of_all = np.concatenate(values)
+    if len(of_all) and np.all(of_all > 0):
+        (panel.set_xscale if which == "x" else panel.set_yscale)("log")
+        low, high = float(of_all.min()), float(of_all.max())
+        limits = (low / 1.15, min(high, DECADES_ON * low) * 1.15)
+        (panel.set_xlim if which == "x" else panel.set_ylim)(*limits)
+    panel.grid(visible=True, which="both", color=FAINT, alpha=0.3, linewidth=0.6)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,240 @@
+"""Figure of numbers by row and column: each written into its square, whose colour is what has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.colors import LogNorm, Normalize, SymLogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
+from spheretwin.viz.theme import law_colours
+
+Array = NDArray[np.float64]
+
+ROW_in = 0.3
+NEAR, FAR = 0.003, 0.1  # degrees: less change is hardly coloured, more has the full colour
+TICKS = (-0.1, -0.03, -0.01, 0, 0.01, 0.03, 0.1)
+MOST_BESIDE = 5  # columns of panels that have room side by side
+DARK = 0.36  # distance from the middle of the scale beyond which numbers are written in white
+
+
+class HeatPanel(NamedTuple):
+    """Numbers of one panel; what is no number stays empty."""
+
+    values: Array  # (rows, columns)
+    changes: Array  # (rows, columns)
+
+
+def heat(
+    panels: Mapping[str, HeatPanel], rows: Sequence[str], columns: Sequence[str], title: str, change: str
+) -> Figure:
+    """Panels side by side, or one below the other where columns are many, on one scale of colours.
+
+    Blue is less, red is more.
+
+    Parameters
+    ----------
+    panels : mapping of title to Panel
+    rows, columns : sequence of str
+    title : str
+    change : str
+        What the colours are, with its unit.
+    """
+    scale = SymLogNorm(linthresh=NEAR, vmin=-FAR, vmax=FAR)
+    beside = len(columns) <= MOST_BESIDE
+    down, across = (1, len(panels)) if beside else (len(panels), 1)
+    height_in = 1.8 + ROW_in * len(rows) * down
+    figure = Figure(figsize=(1.35 * WIDTH_in, height_in), layout="constrained")
+    sides = figure.subplots(down, across, sharex=not beside, sharey=beside, squeeze=False).ravel()
+    for axes, (name, panel) in zip(sides, panels.items(), strict=True):
+        image = axes.imshow(np.clip(panel.changes, -FAR, FAR), norm=scale, cmap="RdBu_r", aspect="auto")
+        _write_cells(axes, panel, scale)
+        axes.set_xticks(range(len(columns)), columns, rotation=35, ha="right")
+        axes.set_yticks(range(len(rows)), rows)
+        axes.set_title(name, fontsize="medium")
+        axes.tick_params(length=0)
+        axes.spines[:].set_color(FAINT)
+    bar = figure.colorbar(image, ax=list(sides), shrink=0.8, aspect=30, extend="both", label=change)
+    bar.set_ticks(list(TICKS), labels=[f"{tick:+g}" if tick else "0" for tick in TICKS])
+    bar.ax.minorticks_off()
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _write_cells(axes: Axes, panel: HeatPanel, scale: SymLogNorm) -> None:
+    for (row, column), value in np.ndenumerate(panel.values):
+        if np.isfinite(value):
+            away = abs(float(scale(np.clip(panel.changes[row, column], -FAR, FAR))) - 0.5)
+            axes.text(column, row, _text(value), ha="center", va="center", fontsize="small",
+                      color="white" if away > DARK else "black")  # fmt: skip
+
+
+def _text(value: float) -> str:
+    return f"{value:.3f}" if value < 1 else f"{value:.2f}"
+
+
+CELL_in = 0.42
+LIGHT = 0.55  # share of the scale beyond which numbers are written in black
+MANY = 200.0  # from which on whole powers of ten are ticks enough
+SEVERAL = 5.0  # ratio of largest to smallest from which on a scale is logarithmic
+MOST_WRITTEN = 12  # rows or columns: in more, the numbers of the squares cannot be read
+
+
+class MapPanel(NamedTuple):
+    """Numbers of one law."""
+
+    values: Array  # (rows, columns); NaN where no run came to its end
+    lost: NDArray[np.bool_]  # (rows, columns) where some runs did not
+
+
+class StudyLine(NamedTuple):
+    """Numbers of one law over one axis."""
+
+    median: Array  # (n,)
+    low: Array  # (n,)
+    high: Array  # (n,)
+    lost: NDArray[np.bool_]  # (n,) where some runs did not come to their end
+
+
+def maps(
+    panels: Mapping[str, MapPanel],
+    axes_names: tuple[str, str],
+    labels: tuple[Sequence[str], Sequence[str]],
+    quantity: str,
+    title: str,
+) -> Figure:
+    """Squares of a panel a law, on one scale of colours; crossed out where runs did not come to their end.
+
+    Parameters
+    ----------
+    panels : mapping of law to Panel
+    axes_names : two str
+        What the rows are, and what the columns.
+    labels : two sequences of str
+        Values of the rows, and of the columns.
+    quantity : str
+        What the numbers are.
+    title : str
+    """
+    count, colours = len(panels), law_colours(list(panels))
+    across, down = min(count, 3), -(-count // 3)
+    cells = [min(len(each), MOST_WRITTEN) * CELL_in for each in labels]
+    figure = Figure(
+        figsize=(max(WIDTH_in, across * (cells[1] + 0.5) + 1.6), 1.5 + down * (cells[0] + 0.9)),
+        layout="constrained",
+    )
+    grid = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False)
+    values = np.concatenate([panel.values.ravel() for panel in panels.values()])
+    scale = _scale(values)
+    for spare in grid.flat[count:]:
+        spare.set_visible(False)
+    for axes, (law, panel) in zip(grid.flat, panels.items(), strict=False):
+        image = axes.imshow(panel.values, norm=scale, cmap="viridis", aspect="auto", origin="lower")
+        _write_map_cells(axes, panel, scale)
+        axes.set_xticks(*_ticks(labels[1]))
+        axes.set_yticks(*_ticks(labels[0]))
+        axes.set_title(law, fontsize="medium", color=colours[law], fontweight="bold")
+        axes.set_facecolor("#eceef0")
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+    for axes in grid[:, 0]:
+        axes.set_ylabel(axes_names[0])
+    for axes in grid[-1]:
+        axes.set_xlabel(axes_names[1])
+    bar = figure.colorbar(image, ax=list(grid.flat), shrink=0.9, aspect=30, label=quantity)
+    bar.outline.set_visible(False)
+    if is_wide(values):
+        _in_plain_numbers(bar.ax.yaxis, float(np.nanmax(values) / np.nanmin(values)))
+    bar.ax.tick_params(labelsize="small")
+    lost = any(np.any(panel.lost) for panel in panels.values())
+    figure.suptitle(f"{title}\n× not all rows came to their end" if lost else title, fontsize="medium")
+    return figure
+
+
+def lines(
+    by_law: Mapping[str, StudyLine], x: Array | Sequence[str], axis_name: str, quantity: str, title: str
+) -> Figure:
+    """A line a law over one axis: the median of the repeats, their range a band, crosses where some are lost.
+
+    Parameters
+    ----------
+    by_law : mapping of law to Line
+    x : (n,) array, or names
+    axis_name, quantity, title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 4.2), layout="constrained")
+    axes = figure.subplots()
+    named, colours = not isinstance(x, np.ndarray), law_colours(list(by_law))
+    places = np.arange(len(x)) if named else np.asarray(x)
+    for law, line in by_law.items():
+        colour = colours[law]
+        axes.fill_between(places, line.low, line.high, color=colour, alpha=0.18, linewidth=0)
+        axes.plot(places, line.median, "o-", color=colour, markersize=4, linewidth=1.3, label=law)
+        axes.plot(places[line.lost], line.median[line.lost], "x", color=INK, markersize=9)
+    if any(np.any(line.lost) for line in by_law.values()):
+        axes.plot([], [], "x", color=INK, label="not all runs came to their end")
+    if named:
+        axes.set_xticks(places, list(x), rotation=20, ha="right")
+    values = np.concatenate([line.median for line in by_law.values()])
+    fit_scale(axes, "y", values)
+    axes.set_xlabel(axis_name)
+    axes.set_ylabel(quantity)
+    axes.set_title(title, fontsize="medium")
+    axes.grid(visible=True, which="both", color=FAINT, alpha=0.3, linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+    return figure
+
+
+def is_wide(values: Array) -> bool:
+    """Whether a scale for some values is better logarithmic."""
+    numbers = values[np.isfinite(values)]
+    return bool(len(numbers)) and numbers.min() > 0 and numbers.max() > SEVERAL * numbers.min()
+
+
+def fit_scale(axes: Axes, which: Literal["x", "y"], values: Array) -> None:
+    """Make an axis logarithmic, in plain numbers, where its values are better seen so."""
+    if is_wide(values):
+        (axes.set_yscale if which == "y" else axes.set_xscale)("log")
+        numbers = values[np.isfinite(values)]
+        _in_plain_numbers(axes.yaxis if which == "y" else axes.xaxis, numbers.max() / numbers.min())
+
+
+def _in_plain_numbers(axis: Axis, ratio: float) -> None:
+    """Ticks of a logarithmic axis: 1, 2 and 5, or where it is long, whole powers of ten."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ratio < MANY else (1,)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
+
+
+def _scale(values: Array) -> Normalize:
+    numbers = values[np.isfinite(values)]
+    low, high = (numbers.min(), numbers.max()) if len(numbers) else (0.0, 1.0)
+    return LogNorm(low, high) if is_wide(values) else Normalize(low, high)
+
+
+def _write_map_cells(axes: Axes, panel: MapPanel, scale: Normalize) -> None:
+    written = max(panel.values.shape) <= MOST_WRITTEN
+    for (row, column), value in np.ndenumerate(panel.values):
+        if panel.lost[row, column]:
+            axes.plot(column, row, "x", color=INK, markersize=11 if np.isnan(value) else 17, alpha=0.55,
+                      markeredgewidth=1)  # fmt: skip
+        if written and np.isfinite(value):
+            light = float(scale(value)) > LIGHT
+            axes.text(column, row, f"{value:.2g}", ha="center", va="center", fontsize="x-small",
+                      color="black" if light else "white")  # fmt: skip
+
+
+def _ticks(labels: Sequence[str]) -> tuple[list[int], list[str]]:
+    """Places and labels of at most twelve of them."""
+    step = -(-len(labels) // MOST_WRITTEN)
+    places = list(range(0, len(labels), step))
+    return places, [labels[place] for place in places]

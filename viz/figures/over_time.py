@@ -1,0 +1,241 @@
+"""Figures of tracking errors: their course under several laws, and their size under several conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import NullFormatter
+from numpy.typing import NDArray
+
+from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
+from spheretwin.viz.figures.style import on_errors, styles
+from spheretwin.viz.theme import law_colour
+
+Array = NDArray[np.float64]
+
+LEAST_deg = 1e-3  # less is drawn as this much, on a logarithmic axis
+LINE_in = 0.235
+
+
+class ErrorCourse(NamedTuple):
+    """Errors of one law over time."""
+
+    law: str
+    errors_deg: Array  # (seeds, windows, axes)
+    paper_deg: float
+    paper_axes: tuple[int, ...]  # for which the paper prints it; none where it has not the law
+
+
+class Line(NamedTuple):
+    """Largest errors under one condition, one for each seed."""
+
+    label: str
+    measured_deg: Array
+    true_deg: Array
+
+
+class Group(NamedTuple):
+    """Conditions of one law."""
+
+    law: str
+    label: str
+    lines: Sequence[Line]
+    paper_deg: float | None
+
+
+def courses(
+    by_label: Mapping[str, ErrorCourse], window_s: float, axes_names: Sequence[str], title: str
+) -> Figure:
+    """Errors over time: a panel an axis, a colour a law, the median a line and the range a band.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Course
+    window_s : float, s
+        Length of what each entry is the largest error of.
+    axes_names : sequence of str
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 6.6), layout="constrained")
+    panels = figure.subplots(len(axes_names), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axis, (panel, name) in enumerate(zip(panels, axes_names, strict=True)):
+        for label, course in by_label.items():
+            _course(panel, label, course, window_s, axis)
+        _on_logarithmic(panel, "y")
+        panel.set_ylabel(f"|error| of {name}, degrees")
+    panels[0].set_title(title, fontsize="medium")
+    panels[-1].set_xlabel("time, s")
+    panels[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=len(by_label), frameon=False)
+    return figure
+
+
+def lines(groups: Sequence[Group], quantity: str, title: str) -> Figure:
+    """Largest errors by law and condition: a row a condition, a dot the median, a line the range.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+    quantity : str
+        What the axis is, with its unit.
+    title : str
+    """
+    rows = [len(group.lines) for group in groups]
+    figure = Figure(figsize=(WIDTH_in, 1.2 + LINE_in * (sum(rows) + 2 * len(rows))), layout="constrained")
+    panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False, height_ratios=rows)[:, 0]
+    for panel, group in zip(panels, groups, strict=True):
+        colour = law_colour(group.law)
+        for row, line in enumerate(group.lines):
+            _spread(panel, row - 0.13, line.measured_deg, colour, colour)
+            _spread(panel, row + 0.13, line.true_deg, colour, "white")
+        if group.paper_deg:
+            panel.axvline(group.paper_deg, color=INK, linestyle=":", linewidth=1.4, zorder=1)
+        panel.set_yticks(range(len(group.lines)), [line.label for line in group.lines])
+        panel.set_ylim(len(group.lines) - 0.5, -0.5)
+        _on_logarithmic(panel, "x")
+        panel.set_title(group.label, fontsize="small", loc="left", color=colour, fontweight="bold")
+    panels[-1].set_xlabel(quantity)
+    for inside, label in ((INK, "measured"), ("white", "true")):
+        panels[-1].plot([], [], "o", color=INK, markerfacecolor=inside, markersize=5, label=label)
+    panels[-1].plot([], [], ":", color=INK, linewidth=1.4, label="the paper's figure")
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _course(panel: Axes, label: str, course: ErrorCourse, window_s: float, axis: int) -> None:
+    errors, colour = np.maximum(course.errors_deg[:, :, axis], LEAST_deg), law_colour(course.law)
+    whole = ~np.any(np.isnan(errors), axis=0)  # where every seed still runs
+    t_s = window_s * (np.arange(errors.shape[1])[whole] + 0.5)
+    low, middle, high = np.quantile(errors[:, whole], [0, 0.5, 1], axis=0)
+    panel.fill_between(t_s, low, high, color=colour, alpha=0.18, linewidth=0)
+    panel.plot(t_s, middle, color=colour, linewidth=1.3, label=label)
+    if axis in course.paper_axes:
+        panel.axhline(course.paper_deg, color=colour, linestyle=":", linewidth=1.4, zorder=1)
+
+
+def _spread(panel: Axes, y: float, values: Array, colour: str, inside: str) -> None:
+    low, middle, high = np.maximum(np.quantile(values, [0, 0.5, 1]), LEAST_deg)
+    panel.plot([low, high], [y, y], color=colour, linewidth=1.6, alpha=0.6, solid_capstyle="butt")
+    panel.plot(middle, y, "o", color=colour, markerfacecolor=inside, markersize=5)
+
+
+def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
+    """A logarithmic axis in plain numbers, a faint grid behind, no box."""
+    axis = panel.yaxis if which == "y" else panel.xaxis
+    (panel.set_yscale if which == "y" else panel.set_xscale)("log")
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
+    panel.grid(visible=True, which="both", axis=which, color=FAINT, alpha=0.3, linewidth=0.6)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)
+
+
+LEAST_mrad = 0.2  # less is drawn as this much, on a logarithmic axis
+MARKS = 9  # markers along a line
+OUTLINED = [withStroke(linewidth=1.6, foreground="white")]  # seen on a dark line too
+
+
+class Course(NamedTuple):
+    """Errors of one law."""
+
+    law: str
+    error_rad: Array  # (seeds, windows, hinges) largest within each; no numbers after the end of a run
+
+
+class Motion(NamedTuple):
+    """Angles of one run."""
+
+    law: str
+    t_s: Array  # (n,)
+    q_rad: Array  # (n, hinges)
+    desired_t_s: Array  # (m,)
+    desired_rad: Array  # (m, hinges) of the whole motion, however long the run
+    whole: bool  # whether it came to its end
+
+
+def errors(by_label: Mapping[str, Course], window_s: float, hinges: Sequence[str], title: str) -> Figure:
+    """Errors over time: the median over the seeds a line, their range a band, a cross where runs end early.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Course
+    window_s : float, s
+        Length of what each entry is the largest error of.
+    hinges : sequence of str
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 7.4), layout="constrained")
+    panels = figure.subplots(len(hinges), 1, sharex=True, squeeze=False)[:, 0]
+    looks = styles([course.law for course in by_label.values()])
+    highest = max(float(np.nanmax(1e3 * course.error_rad)) for course in by_label.values())
+    longest = max(course.error_rad.shape[1] for course in by_label.values())
+    for hinge, (panel, name) in enumerate(zip(panels, hinges, strict=True)):
+        for place, (label, course) in enumerate(by_label.items()):
+            style, of_seeds = looks[course.law], np.maximum(1e3 * course.error_rad[:, :, hinge], LEAST_mrad)
+            running = ~np.any(np.isnan(of_seeds), axis=0)
+            low, middle, high = np.quantile(of_seeds[:, running], [0, 0.5, 1], axis=0)
+            t_s = window_s * (np.flatnonzero(running) + 0.5)
+            every = max(1, longest // MARKS)
+            panel.fill_between(t_s, low, high, color=style.colour, alpha=0.2, linewidth=0)
+            panel.plot(t_s, middle, linewidth=1.3, marker=style.marker, markersize=4.5, label=label,
+                       markevery=(place * every // len(by_label), every), **style.line())  # fmt: skip
+            if len(t_s) < longest and len(t_s):
+                panel.plot(t_s[-1], middle[-1], "x", color=style.colour, markersize=9, markeredgewidth=2)
+        on_errors([panel], LEAST_mrad, 1.3 * highest)
+        panel.set_ylabel(f"|error| of {name}, mrad")
+    panels[-1].set_xlabel("time, s")
+    handles, labels = panels[0].get_legend_handles_labels()
+    if any(_ends_early(course, longest) for course in by_label.values()):
+        handles += panels[0].plot([], [], "x", color=INK, markersize=9, markeredgewidth=2, linestyle="")
+        labels.append("ended early")
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, handlelength=3.2)
+    figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def _ends_early(course: Course, longest: int) -> bool:
+    return course.error_rad.shape[1] < longest or bool(np.isnan(course.error_rad).any())
+
+
+def angles(by_label: Mapping[str, Motion], hinges: Sequence[str], title: str) -> Figure:
+    """Angles and what was asked of them: a column a law, a row a hinge.
+
+    Parameters
+    ----------
+    by_label : mapping of label to Motion
+    hinges : sequence of str
+    title : str
+    """
+    figure = Figure(figsize=(max(2.5 * len(by_label), WIDTH_in), 5.6), layout="constrained")
+    grid = figure.subplots(len(hinges), len(by_label), sharex=True, sharey="row", squeeze=False)
+    looks = styles([motion.law for motion in by_label.values()])
+    for column, (place, (label, motion)) in zip(grid.T, enumerate(by_label.items()), strict=True):
+        colour = looks[motion.law].colour
+        for hinge, panel in enumerate(column):
+            panel.plot(motion.t_s, motion.q_rad[:, hinge], color=colour, linewidth=2.2)
+            panel.plot(motion.desired_t_s, motion.desired_rad[:, hinge], color=INK, linewidth=1,
+                       linestyle=(0, (4, 2)), path_effects=OUTLINED)  # fmt: skip
+            if not motion.whole:
+                panel.plot(motion.t_s[-1], motion.q_rad[-1, hinge], "x", color=colour, markersize=9,
+                           markeredgewidth=2)  # fmt: skip
+            panel.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
+            panel.set_axisbelow(True)
+            panel.spines[["top", "right"]].set_visible(False)
+        column[0].set_title(f"({chr(ord('a') + place)}) {label}", fontsize="medium")
+        column[-1].set_xlabel("time, s")
+    for panel, name in zip(grid[:, 0], hinges, strict=True):
+        panel.set_ylabel(f"{name}, rad")
+    key = [
+        grid[0, 0].plot([], [], color=INK, linewidth=2.2, label="q, in the colour of its law")[0],
+        grid[0, 0].plot([], [], color=INK, linewidth=1, linestyle=(0, (4, 2)), label="q_d, desired")[0],
+    ]
+    if not all(motion.whole for motion in by_label.values()):
+        key += grid[0, 0].plot([], [], "x", color=INK, markersize=9, markeredgewidth=2, label="ended early")
+    figure.legend(handles=key, loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle(title, fontsize="medium")
+    return figure

@@ -1,0 +1,293 @@
+"""Which coils work how hard, and how near to their limit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import rerun.blueprint as rrb
+
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.viz.layout.extents import Channel
+from spheretwin.viz.layout.plots import Line, Plots, quantity, signal
+from spheretwin.viz.layout.view import (
+    CURRENT_BARS,
+    CURRENT_MAP,
+    EVENTS,
+    PHASE_PLANE,
+    SCENARIO,
+    SUMMARY,
+    TIMELINE,
+)
+from spheretwin.viz.quantities import (
+    COPPER_LOSS,
+    COUPLING,
+    DELIVERED,
+    ERROR,
+    ERROR_ANGLE,
+    ESTIMATED_RATE,
+    MARGIN,
+    MEASURED_ANGLE,
+    MOST,
+    TIP_DISTANCE,
+)
+from spheretwin.viz.scene import meshes as scene
+from spheretwin.viz.scene.motion import SCALE, TRACES, Trace
+
+LEAST_rad, LEAST_rad_s = 0.02, 0.05
+
+ANGLE_SIGNALS = ("q_rad", "q_ref_rad", "q_governed_rad", "q_predicted_rad", "q_measured_rad")
+RATE_SIGNALS = (
+    "qdot_rad_s",
+    "qdot_ref_rad_s",
+    "qdot_governed_rad_s",
+    "qdot_predicted_rad_s",
+    "qdot_estimated_rad_s",
+)
+
+
+def compare(plots: Plots) -> rrb.Container:
+    """Angles and rates of each axis, white as asked; below, how far apart the shaft's tips are."""
+    angles, rates = _lines(plots, ANGLE_SIGNALS), _lines(plots, RATE_SIGNALS)
+    angles_of_each = [
+        plots.whole(name, "rad", *angles, least=LEAST_rad, axis=axis) for axis, name in enumerate(ANGLES)
+    ]
+    rates_of_each = [
+        plots.about_zero(f"rate of {name}", "rad/s", *rates, least=LEAST_rad_s, axis=axis)
+        for axis, name in enumerate(ANGLES)
+    ]
+    apart = plots.above_zero(
+        "shaft's tip from where it should be", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
+    )
+    above = rrb.Horizontal(*angles_of_each), rrb.Horizontal(*rates_of_each)
+    return rrb.Vertical(*above, apart, row_shares=[4, 4, 3], name="compare")
+
+
+def _lines(plots: Plots, names: tuple[str, ...]) -> list[Line]:
+    return [signal(name) for name in names if name in plots.view.names]
+
+
+def scenario(plots: Plots) -> rrb.View:
+    """The resolved scenario as text."""
+    return rrb.TextDocumentView(origin=f"/{SCENARIO}", name="scenario")
+
+
+PHASE_TRAIL_S = 1.0
+
+
+def run_line() -> rrb.TextDocumentView:
+    """What the run is and how it stands."""
+    return rrb.TextDocumentView(origin=f"/{SUMMARY}", name="run", titlebar=False)
+
+
+def current_map(plots: Plots) -> rrb.TimeSeriesView:
+    """Currents as colours: a row for each group, time along it."""
+    limit, groups = plots.view.current_limit_A, plots.view.groups
+    title = f"currents of groups 0 (lowest) to {groups - 1}: blue -{limit:g} A, red +{limit:g} A"
+    return plots.fixed(title, Line(CURRENT_MAP, CURRENT_MAP), low=-0.7, high=groups - 0.3)
+
+
+def current_bars(plots: Plots) -> rrb.Spatial2DView:
+    """Currents of this moment, one bar a group, between the limits."""
+    return rrb.Spatial2DView(
+        origin=f"/{CURRENT_BARS}",
+        name="currents at the cursor, by group, between the limits",
+        visual_bounds=rrb.VisualBounds2D(x_range=[-0.1, 2.1], y_range=[-0.6, 0.7]),
+    )
+
+
+def phase_plane(plots: Plots) -> rrb.Spatial2DView:
+    """Rate of the error over what of the sliding variable is the error's, with its last second."""
+    boundary = rrb.TimeRangeBoundary
+    trail = rrb.VisibleTimeRanges(
+        timeline=TIMELINE,
+        start=boundary.cursor_relative(seconds=-PHASE_TRAIL_S),
+        end=boundary.cursor_relative(),
+    )
+    bounds = None
+    if plots.seen:
+        size = plots.seen.limit(Channel("sliding_s"), least=0.1) / 2
+        bounds = rrb.VisualBounds2D(x_range=[-size, size], y_range=[-size, size])
+    return rrb.Spatial2DView(
+        origin=f"/{PHASE_PLANE}",
+        name="phase plane: ė up, s - ė right; line s = 0",
+        visual_bounds=bounds,
+        time_ranges=trail,
+    )
+
+
+def log() -> rrb.TextLogView:
+    """What is worth a line."""
+    columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])  # all have one path
+    return rrb.TextLogView(origin=f"/{EVENTS}", name="events", columns=columns)
+
+
+def coils(plots: Plots) -> rrb.Container:
+    """Currents over time; below, those at the cursor, and the heat of all."""
+    heat = plots.above_zero("heat of all coils", "W", quantity(COPPER_LOSS), least=COPPER_LOSS.floor)
+    below = rrb.Horizontal(current_bars(plots), heat)
+    return rrb.Vertical(current_map(plots), below, row_shares=[3, 2], name="coils")
+
+
+SLIDING = "sliding_s"
+
+LEAST = {"N·m": 0.01, "rad/s": 0.05, "rad": 0.02, "rad/s²": 0.5}
+"""Half of the least range, by unit; other units have one of their own size."""
+
+
+def control(plots: Plots) -> rrb.Container:
+    """Errors and torques of each axis; below, what the law says of itself, and the coupling of the axes."""
+    errors = [
+        plots.about_zero(f"error {name}", "mrad", quantity(ERROR), least=ERROR.floor, axis=axis)
+        for axis, name in enumerate(ANGLES)
+    ]
+    asked = [signal("torque_command_Nm"), quantity(DELIVERED), signal("disturbance_Nm")]
+    torques = [
+        plots.about_zero(
+            f"torque {name}",
+            "N·m",
+            *asked,
+            least=DELIVERED.floor,
+            axis=axis,
+            key=", grey load",
+        )
+        for axis, name in enumerate(ANGLES)
+    ]
+    return rrb.Grid(*errors, *torques, *_of_the_law(plots), grid_columns=3, name="control")
+
+
+def _of_the_law(plots: Plots) -> list[rrb.Container | rrb.View]:
+    own = {each.name: each for each in plots.view.own if _is_of_the_law(each)}
+    coupling = plots.about_zero("coupling", "N·m", quantity(COUPLING), least=COUPLING.floor)
+    sliding = []
+    if SLIDING in own:
+        del own[SLIDING]
+        sliding = [
+            plots.about_zero("sliding variables s", "rad/s", signal(SLIDING), least=LEAST["rad/s"]),
+            phase_plane(plots),
+        ]
+    units = dict.fromkeys(each.unit for each in own.values())
+    tabs = [coupling, *(_plot(plots, unit, own) for unit in units)]
+    return [*sliding, rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else coupling]
+
+
+def _plot(plots: Plots, unit: str, own: dict[str, Signal]) -> rrb.TimeSeriesView:
+    """Plot of all signals of one unit."""
+    names = [name for name, each in own.items() if each.unit == unit]
+    return plots.whole(", ".join(names), unit, *map(signal, names), least=LEAST.get(unit, 1e-3))
+
+
+def _is_of_the_law(of: Signal) -> bool:
+    """Whether a signal is one of those that laws log, and not of a stage around them."""
+    return of.size <= len(ANGLES) and not of.states and of.name not in _AROUND
+
+
+_AROUND = frozenset(
+    {
+        "q_measured_rad",
+        "qdot_estimated_rad_s",
+        "q_governed_rad",
+        "qdot_governed_rad_s",
+        "q_predicted_rad",
+        "qdot_predicted_rad_s",
+        "friction_Nm",
+        "supply_power_W",
+    }
+)
+"""Signals that stand in other views."""
+
+
+# Half of a range of temperatures: what a coil warms by in a short run is nothing yet.
+LEAST_degC = 5.0
+
+# Half of a range of powers.
+LEAST_W = 1.0
+
+
+def hardware(plots: Plots) -> rrb.Container:
+    """States and events beside what the chain of sensors, amplifiers and coils shows of itself."""
+    names = plots.view.names
+    shown = []
+    if "coil_temperature_degC" in names:
+        line = signal("coil_temperature_degC")
+        shown.append(plots.whole("temperature of the coils", "°C", line, least=LEAST_degC))
+    if "voltage_limited" in names:
+        title = "share of time with the voltage at its limit"
+        shown.append(plots.fixed(title, signal("voltage_limited"), low=-0.02, high=1.05))
+    if "supply_power_W" in names:
+        line = signal("supply_power_W")
+        shown.append(plots.whole("power of the supply", "W", line, least=LEAST_W))
+    if "q_measured_rad" in names:
+        title = "measured - true"
+        shown.append(plots.about_zero(title, "mrad", quantity(MEASURED_ANGLE), least=MEASURED_ANGLE.floor))
+        title = "estimated - true"
+        shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
+    if "friction_Nm" in names:
+        shown.append(plots.whole("friction", "N·m", signal("friction_Nm"), least=0.002))
+    told = [plots.states("states of what can fail"), log()]
+    if not shown:
+        return rrb.Vertical(*told, name="hardware")
+    chain = rrb.Grid(*shown, grid_columns=2)
+    return rrb.Horizontal(
+        rrb.Vertical(*told, row_shares=[3, 2]), chain, column_shares=[2, 3], name="hardware"
+    )
+
+
+EYE_m, LOOKED_AT_m = (0.16, -0.16, 0.22), (0.0, 0.0, 0.02)
+
+
+def eye(size: float) -> rrb.EyeControls3D:
+    """Where all of an actuator of a size is seen from, and of what is drawn beside it."""
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=[size * each for each in EYE_m],
+        look_target=[size * each for each in LOOKED_AT_m],
+        eye_up=[0, 0, 1],
+    )
+
+
+def actuator_view(size: float) -> rrb.Spatial3DView:
+    """View of all that moves, and of the traces of the last seconds, on the ground of the viewer's theme."""
+    return rrb.Spatial3DView(
+        origin=f"/{scene.WORLD}",
+        name=f"actuator; {SCALE}",
+        line_grid=False,
+        eye_controls=eye(size),
+        overrides={f"/{trace.entity}": _ages(trace) for trace in TRACES},
+    )
+
+
+def _ages(trace: Trace) -> rrb.VisibleTimeRanges:
+    boundary = rrb.TimeRangeBoundary
+    return rrb.VisibleTimeRanges(
+        timeline=TIMELINE,
+        start=boundary.cursor_relative(seconds=-trace.oldest_s),
+        end=boundary.cursor_relative(seconds=-trace.newest_s),
+    )
+
+
+def overview(plots: Plots) -> rrb.Container:
+    """Actuator and currents beside the errors, what is left of the torque, states and events."""
+    seen = rrb.Vertical(actuator_view(plots.view.size), current_map(plots), row_shares=[3, 2])
+    told = rrb.Vertical(
+        plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
+        plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor),
+        plots.fixed(
+            f"torque margin [times the commanded], 0 is saturated, {MOST:g} or more is {MOST:g}",
+            quantity(MARGIN),
+            low=-0.05 * MOST,
+            high=1.05 * MOST,
+        ),
+        rrb.Horizontal(plots.states(), log(), column_shares=[1, 1]),
+        row_shares=[3, 3, 2, 4 if any(each.states for each in plots.view.own) else 3],
+    )
+    return rrb.Horizontal(seen, told, column_shares=[4, 5], name="overview")
+
+
+VIEWS: dict[str, Callable[[Plots], rrb.Container | rrb.View]] = {
+    "overview": overview,
+    "control": control,
+    "coils": coils,
+    "hardware": hardware,
+    "compare": compare,
+    "scenario": scenario,
+}

@@ -1,1 +1,0 @@
-"""Layouts of a recording, each for one question about the run."""

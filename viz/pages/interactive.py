@@ -1,0 +1,287 @@
+"""The figures of the page: all over time in one, spectra of the errors in another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+import plotly.graph_objects as plotly
+from plotly.offline import get_plotlyjs
+
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.comparison.runs import Run, Spectrum, run_colours
+from spheretwin.viz.decimation import highest_by_octave, strongest, thinned
+from spheretwin.viz.pages import html
+from spheretwin.viz.quantities import Array, ComparedQuantity
+
+# The browser itself is told to ask no host for anything.
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:;"
+    " font-src data:; form-action 'none'; base-uri 'none'"
+)
+
+STYLE = """
+body { max-width: 84rem; }
+.runs { position: sticky; top: 0; z-index: 2; display: flex; flex-wrap: wrap; gap: 0.4rem;
+  padding: 0.5rem 0; background: var(--paper); }
+.runs button { font: inherit; font-size: 0.9rem; padding: 0.2rem 0.7rem; border-radius: 1rem;
+  border: 1px solid var(--faint); background: var(--soft); color: inherit; cursor: pointer; }
+.runs button::before { content: ""; display: inline-block; width: 1.2rem; height: 0.25rem;
+  margin-right: 0.5rem; vertical-align: middle; background: var(--run); }
+.runs button[aria-pressed="false"] { opacity: 0.4; text-decoration: line-through; }
+.plot { background: #fff; border-radius: 4px; }
+"""
+
+SCRIPT = """
+const config = {displaylogo: false, responsive: true, doubleClick: "reset", plotlyServerURL: "",
+  modeBarButtons: [["zoom2d", "pan2d", "resetScale2d"]]};
+const plots = Object.keys(figures).map((name) => document.getElementById(name));
+for (const plot of plots) {
+  Plotly.newPlot(plot, figures[plot.id].data, figures[plot.id].layout, config);
+}
+for (const button of document.querySelectorAll(".runs button")) {
+  button.addEventListener("click", () => {
+    const on = button.getAttribute("aria-pressed") === "false";
+    button.setAttribute("aria-pressed", on);
+    for (const plot of plots) {
+      const its = plot.data.flatMap((trace, i) => (trace.meta === button.dataset.run ? [i] : []));
+      Plotly.restyle(plot, {visible: on}, its);
+    }
+  });
+}
+"""
+
+
+def page(
+    title: str,
+    runs: Sequence[Run],
+    over_time: plotly.Figure,
+    spectra: plotly.Figure,
+    above: str,
+    below: str,
+) -> str:
+    """Whole page.
+
+    Parameters
+    ----------
+    title : str
+    runs : sequence of Run
+    over_time, spectra : Figure
+    above, below : str
+        What stands above and below the figures, in Markdown.
+    """
+    figures = {"over-time": over_time, "spectra": spectra}
+    content = ", ".join(f'"{name}": {figure.to_json()}' for name, figure in figures.items())
+    body = [
+        html.rendered(above),
+        f'<div class="runs" role="group" aria-label="runs">{_switches(runs)}</div>',
+        *(f'<div class="plot" id="{name}"></div>' for name in figures),
+        html.rendered(below),
+        f"<script>{get_plotlyjs()}</script>",
+        # No text of a user's ends the script.
+        f"<script>const figures = {{{content}}};".replace("<", "\\u003c").replace("\\u003c", "<", 1),
+        f"{SCRIPT}</script>\n",
+    ]
+    head = f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<style>{STYLE}</style>'
+    return html.whole(title, "\n".join(body), head)
+
+
+def _switches(runs: Sequence[Run]) -> str:
+    colours = run_colours([run.law for run in runs])
+    return "".join(
+        f'<button type="button" data-run="{place}" aria-pressed="true" style="--run: {colour}">'
+        f"{escape(run.label)}</button>"
+        for place, (run, colour) in enumerate(zip(runs, colours, strict=True))
+    )
+
+
+FAINT, INK, ASKED = "#e3e6ea", "#30343a", "#9aa1ab"
+
+HEIGHT_px, GAP_px, MARGIN_px = 150, 26, 46
+
+
+class Panel(NamedTuple):
+    """One of them."""
+
+    title: str
+    """With its unit."""
+    traces: Sequence[Any]
+    axis: dict[str, Any]
+    """What its vertical axis has beside the looks of all."""
+    height: float = 1.0
+    """Of that of an ordinary one."""
+
+
+def stacked(panels: Sequence[Panel], x: str, **axis: Any) -> plotly.Figure:
+    """Figure of panels.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    x : str
+        What the common axis is, with its unit.
+    **axis
+        What it has beside the looks of all.
+    """
+    inner_px = sum(panel.height * HEIGHT_px + GAP_px for panel in panels)
+    figure, top = plotly.Figure(), 1.0
+    for place, panel in enumerate(panels, start=1):
+        number = "" if place == 1 else f"{place}"
+        bottom = top - panel.height * HEIGHT_px / inner_px
+        looks = {"gridcolor": FAINT, "zerolinecolor": FAINT, "linecolor": INK, "tickfont_size": 11}
+        figure.layout[f"yaxis{number}"] = {"domain": (max(bottom, 0.0), top), **looks, **panel.axis}
+        for trace in panel.traces:
+            trace.update(xaxis="x", yaxis=f"y{number}")
+            figure.add_trace(trace)
+        figure.add_annotation(text=f"<b>{panel.title}</b>", xref="paper", yref="paper", x=0, y=top,
+                              xanchor="left", yanchor="bottom", showarrow=False, font_size=12)  # fmt: skip
+        top = bottom - GAP_px / inner_px
+    spikes = {"showspikes": True, "spikemode": "across", "spikesnap": "cursor", "spikethickness": 1}
+    last = "" if len(panels) == 1 else f"{len(panels)}"
+    figure.update_layout(
+        template="none",
+        height=inner_px + 2 * MARGIN_px,
+        margin={"l": 64, "r": 16, "t": MARGIN_px, "b": MARGIN_px},
+        font={"family": "system-ui, sans-serif", "color": INK},
+        showlegend=False,
+        hovermode="x",
+        hoversubplots="axis",
+        hoverlabel={"font_size": 11, "namelength": 0},
+        xaxis={"title": {"text": x}, "anchor": f"y{last}", "gridcolor": FAINT, **spikes, **axis,
+               "spikecolor": INK, "spikedash": "dot", "linecolor": INK, "zeroline": False},
+    )  # fmt: skip
+    return figure
+
+
+MOST_NUMBERS = 130_000
+"""In all lines; each takes five to six bytes of the page, beside the library's 4.8 MB."""
+
+MOST_POINTS, FEWEST_POINTS = 20_000, 300
+MOST_COLUMNS, MOST_CURRENTS = 500, 30_000
+MOST_LINES_EACH_OCTAVE, FEWEST_LINES_EACH_OCTAVE = 48, 8
+LINES_OF_ALL = 288
+
+BLUE_TO_RED = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]]
+
+
+def over_time(
+    runs: Sequence[Run], leading: Sequence[int], quantities: Sequence[ComparedQuantity]
+) -> plotly.Figure:
+    """Figure of every quantity, the currents of each run and what happened.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    leading : sequence of int
+        Places of the runs that show what was asked for.
+    quantities : sequence of Quantity
+    """
+    most = int(np.clip(points_each(runs, leading, quantities), FEWEST_POINTS, MOST_POINTS))
+    colours = run_colours([run.law for run in runs])
+    panels = []
+    for quantity in quantities:
+        asked = [
+            _line(runs[place], place, quantity.desired(runs[place].rows), most, ASKED, 4.0)
+            for place in leading
+            if quantity.desired
+        ]
+        lines = [
+            _line(run, place, quantity.of(run.rows), most, colour, 1.3)
+            for place, (run, colour) in enumerate(zip(runs, colours, strict=True))
+        ]
+        for trace in asked:
+            trace.hoverinfo, trace.hovertemplate = "skip", None
+        axis = {"range": quantity.limits} if quantity.limits else {}
+        panels.append(Panel(_text(quantity.heading), [*asked, *lines], axis))
+    panels += _currents(runs)
+    panels.append(_happened(runs, colours))
+    return stacked(panels, "time [s]")
+
+
+def points_each(runs: Sequence[Run], leading: Sequence[int], quantities: Sequence[ComparedQuantity]) -> int:
+    """Points that each line may have."""
+    lines = sum(len(runs) + (len(leading) if each.desired else 0) for each in quantities)
+    return MOST_NUMBERS // max(lines, 1)
+
+
+def of_errors(runs: Sequence[Run], spectra: Sequence[Sequence[Spectrum]]) -> plotly.Figure:
+    """Figure of the errors' spectra.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    spectra : sequence of sequence of Spectrum
+        Of each run, of each hinge.
+    """
+    colours, panels = run_colours([run.law for run in runs]), []
+    each = int(np.clip(LINES_OF_ALL // len(runs), FEWEST_LINES_EACH_OCTAVE, MOST_LINES_EACH_OCTAVE))
+    for axis, name in enumerate(ANGLES):
+        traces = []
+        for place, (colour, of_run) in enumerate(zip(colours, spectra, strict=True)):
+            spectrum, look = of_run[axis], {"color": colour, "width": 1.3}
+            x, y = highest_by_octave(spectrum.frequency_Hz, spectrum.amplitude_mrad, each)
+            hover = "%{x:.4g} Hz: %{y:.3g} mrad<extra></extra>"
+            traces.append(plotly.Scatter(x=_small(x), y=_small(y), mode="lines", line=look,
+                                         meta=f"{place}", hovertemplate=hover))  # fmt: skip
+            tops = np.array(spectrum.peaks).reshape(-1, 2).T
+            traces.append(plotly.Scatter(x=tops[0], y=tops[1], mode="markers", hoverinfo="skip",
+                                         marker={"color": colour, "size": 8}, meta=f"{place}"))  # fmt: skip
+        panels.append(
+            Panel(f"error of {name}, amplitude [mrad]", traces, {"type": "log", "exponentformat": "power"})
+        )
+    return stacked(panels, "frequency [Hz]", type="log")
+
+
+def _line(run: Run, place: int, values: Array, most: int, colour: str, width: float) -> plotly.Scatter:
+    few = thinned(values, most)
+    return plotly.Scatter(
+        x0=float(run.table["t_s"][0]),
+        dx=run.period_s * few.rows_each,
+        y=_small(few.values),
+        mode="lines",
+        line={"color": colour, "width": width},
+        meta=f"{place}",
+        hovertemplate="%{y:.4g}<extra></extra>",
+    )
+
+
+def _currents(runs: Sequence[Run]) -> list[Panel]:
+    """Of each run a panel: a row a group, blue negative, red positive, on one scale."""
+    largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs)
+    panels = []
+    for place, run in enumerate(runs):
+        groups = run.table["current_A"].shape[1]
+        few = strongest(run.table["current_A"], min(MOST_COLUMNS, MOST_CURRENTS // (groups * len(runs))))
+        step_s, hover = run.period_s * few.rows_each, "group %{y}: %{z:.3g} A<extra></extra>"
+        trace = plotly.Heatmap(z=_small(few.values.T), x0=float(run.table["t_s"][0]) + step_s / 2, dx=step_s,
+                               colorscale=BLUE_TO_RED, zmin=-largest_A, zmax=largest_A, showscale=False,
+                               meta=f"{place}", hovertemplate=hover)  # fmt: skip
+        title = f"currents by group, up to ±{largest_A:.3g} A: {_text(run.label)}"
+        panels.append(Panel(title, [trace], {"autorange": "reversed", "dtick": max(1, groups // 6)}))
+    return panels
+
+
+def _happened(runs: Sequence[Run], colours: Sequence[str]) -> Panel:
+    """A row a run, a mark an event."""
+    traces = []
+    for place, (run, colour) in enumerate(zip(runs, colours, strict=True)):
+        times = [each[0] for each in run.events]
+        text = [_text(f"{t_s:.4g} s: {text}") for t_s, _, text in run.events]
+        symbols = ["circle" if level == "INFO" else "triangle-up" for _, level, _ in run.events]
+        traces.append(plotly.Scatter(x=times, y=[place + 1] * len(times), mode="markers", text=text,
+                                     marker={"color": colour, "size": 9, "symbol": symbols},
+                                     meta=f"{place}", hovertemplate="%{text}<extra></extra>"))  # fmt: skip
+    axis = {"range": (len(runs) + 0.6, 0.4), "dtick": 1, "fixedrange": True}
+    return Panel("events, by run", traces, axis, height=0.25 + 0.15 * len(runs))
+
+
+def _small(values: Array) -> np.ndarray:
+    """In half the bytes: seven digits are more than a plot shows."""
+    return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def _text(text: str) -> str:
+    """Text in which no tag is obeyed; quotes stay, which the library would show as they are written."""
+    return escape(text, quote=False)

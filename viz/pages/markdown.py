@@ -1,0 +1,102 @@
+"""Pieces of a page in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.files import make_folder, whole_file
+from spheretwin.viz.figures.style import Drawing
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[bool]) -> list[str]:
+    """Lines of a table.
+
+    Parameters
+    ----------
+    head : sequence of str
+        A heading for each column.
+    rows : sequence of sequence of str
+    numbers : sequence of bool
+        Whether each column is of figures, and so at the right.
+    """
+    return [
+        _row(head),
+        f"|{'|'.join('---:' if right else '---' for right in numbers)}|",
+        *(_row(row) for row in rows),
+    ]
+
+
+def figure(drawing: Drawing) -> str:
+    """A figure and, below it, what it shows."""
+    return f"![{drawing.caption}]({drawing.file})\n\n*{drawing.caption}*\n"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(_cell(cell) for cell in cells)} |"
+
+
+def _cell(text: str) -> str:
+    """Text in which no bar ends a cell of the table."""
+    return text.replace("|", "\\|")
+
+
+def prepare(folder: Path, *libraries: str) -> None:
+    """Find out before a run whether a page can be drawn and written, and leave an empty folder.
+
+    Parameters
+    ----------
+    folder : Path
+    *libraries : str
+        What draws, beside matplotlib.
+
+    Raises
+    ------
+    InputError
+        A library is not installed, or the folder cannot be made or written to.
+    """
+    for library in ("matplotlib", *libraries):
+        if find_spec(library) is None:
+            raise InputError(
+                "output: expected the extra `spheretwin[plots]` to draw figures,"
+                f" received an installation without {library}"
+            )
+    make_folder(folder)
+
+
+def save_drawings(folder: Path, drawings: Iterable[Drawing], *, vector: bool = False) -> None:
+    """Write figures into a folder that exists.
+
+    Parameters
+    ----------
+    folder : Path
+    drawings : iterable of Drawing
+    vector : bool
+        Write each as SVG beside its PNG, too.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written there.
+    """
+    from spheretwin.viz.figures import crosscheck
+
+    for drawing in drawings:
+        crosscheck.save(drawing.figure, folder / drawing.file)
+        if vector:
+            crosscheck.save(drawing.figure, (folder / drawing.file).with_suffix(".svg"))
+
+
+def save_text(path: Path, text: str) -> Path:
+    """Write a file, whole or not at all; returns its path.
+
+    Raises
+    ------
+    InputError
+        It cannot be written there.
+    """
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path

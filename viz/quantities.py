@@ -1,0 +1,340 @@
+"""Heat of all coils together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz import theme
+from spheretwin.viz.scene.motion import shaft_tip
+
+Array = NDArray[np.float64]
+
+
+class Rows(NamedTuple):
+    """What a quantity is computed from."""
+
+    table: Table
+    """Rows of one chunk."""
+    before: Table
+    """The row before the first of them; at the start of a run its first row itself."""
+    actuator: Actuator
+    current_limit_A: float
+
+
+class Kept(Enum):
+    """What of many rows is drawn: nothing that matters is lost between those that are."""
+
+    BOTH = "both bounds: a line as wide as the values were far apart"
+    LEAST = "the least value"
+    GREATEST = "the greatest value"
+    MEAN = "the mean, where single rows say nothing"
+
+
+class Quantity(NamedTuple):
+    """What is derived from telemetry to be looked at."""
+
+    name: str
+    """Ends in its unit."""
+    unit: str
+    meaning: str
+    values: Callable[[Rows], Array]
+    """One row for each of the chunk's: (n, size)."""
+    floor: float
+    """Half of the least range that its plot shows: what is less does not look like something."""
+    labels: tuple[str, ...] = ("",)
+    """A name for each entry."""
+    colours: tuple[theme.Colour, ...] = (theme.PLAIN,)
+    """A colour for each entry."""
+    needs: str = ""
+    """Signal that a run must have for it; none unless given."""
+    kept: Kept = Kept.GREATEST
+
+    @property
+    def size(self) -> int:
+        """Numbers a row."""
+        return len(self.labels)
+
+
+def by_axis(
+    name: str,
+    unit: str,
+    meaning: str,
+    values: Callable[[Rows], Array],
+    floor: float,
+    needs: str = "",
+    kept: Kept = Kept.BOTH,
+) -> Quantity:
+    """Quantity with an entry for each hinge, in the colours of the axes."""
+    return Quantity(name, unit, meaning, values, floor, ANGLES, theme.AXIS_COLOURS, needs, kept)
+
+
+def copper_loss(rows: Rows) -> Array:
+    """Copper loss, (n, 1) in W: as the amplifiers tell it, else by the resistance of cold coils."""
+    table = rows.table
+    if any(signal.name == "copper_loss_W" for signal in table.signals):
+        return np.sum(table["copper_loss_W"], axis=1, keepdims=True)
+    return rows.actuator.group.resistance_ohm * np.sum(table["current_A"] ** 2, axis=1, keepdims=True)
+
+
+COPPER_LOSS = Quantity("copper_loss_total_W", "W", "heat of all coils", copper_loss, floor=0.5)
+
+
+def coupling_torque(rows: Rows) -> Array:
+    """What of ``M qddot + C qdot`` is not an axis's own inertia, (n, 3) in N·m.
+
+    The accelerations are those of the rates from tick to tick; the inertia is that of the rotor alone.
+    """
+    q, rate, t_s = rows.table["q_rad"], rows.table["qdot_rad_s"], rows.table["t_s"]
+    step_s = np.diff(t_s, prepend=rows.before["t_s"])
+    change = np.diff(rate, axis=0, prepend=rows.before["qdot_rad_s"])
+    acceleration = change / np.where(step_s > 0, step_s, 1.0)[:, None]  # 0 at the first tick of a run
+    return _inertial(q, acceleration, rows.actuator.inertia) + _coriolis(q, rate, rows.actuator.inertia)
+
+
+def _inertial(q: Array, acceleration: Array, inertia: Array) -> Array:
+    """Entries off the diagonal of M, times the accelerations."""
+    J1, J2, J3 = inertia
+    alpha_beta = (J1 - J2) * np.cos(q[:, 1]) * np.cos(q[:, 2]) * np.sin(q[:, 2])
+    alpha_gamma = J3 * np.sin(q[:, 1])
+    a, b, g = acceleration.T
+    return np.stack([alpha_beta * b + alpha_gamma * g, alpha_beta * a, alpha_gamma * a], axis=1)
+
+
+def _coriolis(q: Array, rate: Array, inertia: Array) -> Array:
+    """Coriolis and centrifugal torques ``C qdot``: each product of rates once."""
+    J1, J2, J3 = inertia
+    cb, sb, cg, sg = np.cos(q[:, 1]), np.sin(q[:, 1]), np.cos(q[:, 2]), np.sin(q[:, 2])
+    a, b, g = rate.T
+    D = J1 - J2
+    double_angle = D * cb * (cg**2 - sg**2)
+    tilt = (J3 - J1 * cg**2 - J2 * sg**2) * sb * cb
+    turn = D * sg * cg
+    return np.stack(
+        [
+            2 * tilt * a * b - 2 * turn * cb**2 * a * g - turn * sb * b**2 + (double_angle + J3 * cb) * b * g,
+            -tilt * a**2 + (double_angle - J3 * cb) * a * g + 2 * turn * b * g,
+            turn * cb**2 * a**2 + (J3 * cb - double_angle) * a * b - turn * b**2,
+        ],
+        axis=1,
+    )
+
+
+COUPLING = by_axis(
+    "coupling_torque_Nm",
+    "N·m",
+    "torques of the hinges on each other (6)-(10)",
+    coupling_torque,
+    floor=0.005,
+    kept=Kept.MEAN,  # accelerations from tick to tick are mostly the chatter of the command
+)
+
+
+def delivered_torque(rows: Rows) -> Array:
+    """Generalised torque ``E^T torque_S`` at the pose of the tick, (n, 3) in N·m."""
+    return on_the_hinges(rows.table["q_rad"], rows.table["torque_Nm"])
+
+
+def on_the_hinges(q: Array, torque_S: Array) -> Array:
+    """Generalised torque of torques of the stator frame (n, 3) in N·m, at hinge angles (n, 3) in rad."""
+    x, y, z = torque_S.T
+    ca, sa = np.cos(q[:, 0]), np.sin(q[:, 0])
+    cb, sb = np.cos(q[:, 1]), np.sin(q[:, 1])
+    return np.stack([x, ca * y + sa * z, sb * x + cb * (ca * z - sa * y)], axis=1)
+
+
+DELIVERED = by_axis(
+    "torque_delivered_Nm", "N·m", "generalised torque of the coils", delivered_torque, floor=0.02
+)
+
+
+def tracking_error(rows: Rows) -> Array:
+    """Error (28), (n, 3) in mrad."""
+    return 1e3 * rows.table["error_rad"]
+
+
+ERROR = by_axis("error_mrad", "mrad", "tracking error q - q_ref (28)", tracking_error, floor=0.1)
+
+
+def error_angle(rows: Rows) -> Array:
+    """Angle of ``R_ref^T R``, (n, 1) in degrees."""
+    return np.degrees(angle_between(rows.table["q_rad"], rows.table["q_ref_rad"]))[:, None]
+
+
+def angle_between(q: Array, desired: Array) -> Array:
+    """Angle of the one rotation between two orientations, (n,) in rad, of hinge angles (n, 3) in rad.
+
+    It is that of ``Ry(-β_ref) Rx(α - α_ref) Ry(β) Rz(γ - γ_ref)``, of which this is the quaternion. Its
+    vector part counts as well as its scalar: near 1 the scalar alone would lose half of the digits.
+    """
+    difference, sum_beta = (q - desired) / 2, (q[:, 1] + desired[:, 1]) / 2
+    (ca, cb, cg), (sa, sb, sg) = np.cos(difference).T, np.sin(difference).T
+    w, z = ca * cb, sa * np.sin(sum_beta)
+    along = w * cg - z * sg
+    across = (sa * np.cos(sum_beta)) ** 2 + (ca * sb) ** 2 + (z * cg + w * sg) ** 2
+    return np.asarray(2 * np.arctan2(np.sqrt(across), np.abs(along)))
+
+
+ERROR_ANGLE = Quantity(
+    "error_angle_deg", "°", "angle between the rotor and where it should be", error_angle, 0.01
+)
+
+
+def estimated_rate(rows: Rows) -> Array:
+    """Estimated minus true rates, (n, 3) in rad/s."""
+    return rows.table["qdot_estimated_rad_s"] - rows.table["qdot_rad_s"]
+
+
+ESTIMATED_RATE = by_axis(
+    "rate_error_rad_s",
+    "rad/s",
+    "estimated minus true rates",
+    estimated_rate,
+    0.01,
+    needs="qdot_estimated_rad_s",
+)
+
+
+MOST = 3.0
+"""What is more is drawn as this: it matters to no one, and has no bound where hardly any torque is asked."""
+
+
+def torque_margin(rows: Rows) -> Array:
+    """Share of the commanded torque that could be added along itself, (n, 1); 0 where the limit acts."""
+    largest_A = np.max(np.abs(rows.table["current_command_A"]), axis=1)
+    factor = rows.current_limit_A / np.maximum(largest_A, rows.current_limit_A / (1 + MOST))
+    left = np.where(rows.table["allocation_scale"] < 1, 0.0, np.maximum(factor - 1, 0.0))
+    return left[:, None]
+
+
+MARGIN = Quantity(
+    "torque_margin",
+    "1",
+    "share of the commanded torque that the current limit would let be added",
+    torque_margin,
+    floor=MOST / 2,
+    kept=Kept.LEAST,
+)
+
+
+def measured_angle(rows: Rows) -> Array:
+    """Measured minus true angles, (n, 3) in mrad."""
+    return 1e3 * (rows.table["q_measured_rad"] - rows.table["q_rad"])
+
+
+MEASURED_ANGLE = by_axis(
+    "measurement_error_mrad",
+    "mrad",
+    "measured minus true angles",
+    measured_angle,
+    0.1,
+    needs="q_measured_rad",
+)
+
+
+def tip_distance(rows: Rows) -> Array:
+    """Distance between the tip and the desired tip, (n, 1) in mm."""
+    actual = shaft_tip(rows.table["q_rad"], rows.actuator)
+    desired = shaft_tip(rows.table["q_ref_rad"], rows.actuator)
+    return 1e3 * np.sqrt(np.sum((actual - desired) ** 2, axis=1))[:, None]
+
+
+TIP_DISTANCE = Quantity(
+    "tip_distance_mm", "mm", "distance of the shaft's tip from where it should be", tip_distance, 0.01
+)
+
+
+QUANTITIES: tuple[Quantity, ...] = (
+    ERROR,
+    ERROR_ANGLE,
+    TIP_DISTANCE,
+    DELIVERED,
+    MARGIN,
+    COUPLING,
+    COPPER_LOSS,
+    MEASURED_ANGLE,
+    ESTIMATED_RATE,
+)
+
+
+def quantities_of(names: Collection[str]) -> tuple[Quantity, ...]:
+    """Those that a run with signals of these names has."""
+    return tuple(quantity for quantity in QUANTITIES if not quantity.needs or quantity.needs in names)
+
+
+class ComparedQuantity(NamedTuple):
+    """One that is drawn."""
+
+    name: str
+    """What stands for it in a path."""
+    title: str
+    """Short: beside two others it has the room of a sixth of a screen."""
+    unit: str
+    group: str
+    """Of quantities that are drawn in one row."""
+    needs: tuple[str, ...]
+    """Signals that it is made of."""
+    of: Callable[[Rows], Array]
+    """Its values, (n,)."""
+    desired: Callable[[Rows], Array] | None = None
+    """What was asked for, (n,)."""
+    limits: tuple[float, float] | None = None
+    """Of its axis; what its values need unless given."""
+
+    @property
+    def heading(self) -> str:
+        """Title with the unit."""
+        return f"{self.title} [{self.unit}]"
+
+
+def compared_quantities(tables: Sequence[Table]) -> list[ComparedQuantity]:
+    """Quantities that all of some runs have."""
+    names = [{signal.name for signal in table.signals} for table in tables]
+    return [each for each in COMPARED_QUANTITIES if all(set(each.needs) <= having for having in names)]
+
+
+def _entry(signal: str, axis: int) -> Callable[[Rows], Array]:
+    return lambda rows: rows.table[signal][:, axis]
+
+
+def _column(values: Callable[[Rows], Array], place: int = 0) -> Callable[[Rows], Array]:
+    """One entry of what is derived for a recording of one run."""
+    return lambda rows: values(rows)[:, place]
+
+
+def _largest(signal: str) -> Callable[[Rows], Array]:
+    return lambda rows: np.abs(rows.table[signal]).max(axis=1)
+
+
+def _asked_Nm(rows: Rows) -> Array:
+    return np.linalg.norm(rows.table["torque_command_Nm"], axis=1)
+
+
+def _delivered_Nm(rows: Rows) -> Array:
+    return np.linalg.norm(DELIVERED.values(rows), axis=1)
+
+
+COMPARED_QUANTITIES = (
+    ComparedQuantity("error_angle_deg", "error as one angle", "°", "whole", ("q_rad", "q_ref_rad"),
+             _column(ERROR_ANGLE.values)),
+    *(ComparedQuantity(f"error_{axis}_mrad", f"error of {axis}", "mrad", "error", ("error_rad",),
+               _column(ERROR.values, i)) for i, axis in enumerate(ANGLES)),
+    *(ComparedQuantity(f"angle_{axis}_rad", f"angle {axis}", "rad", "angle", ("q_rad", "q_ref_rad"),
+               _entry("q_rad", i), _entry("q_ref_rad", i)) for i, axis in enumerate(ANGLES)),
+    *(ComparedQuantity(f"sliding_{axis}_rad_s", f"sliding of {axis}", "rad/s", "sliding", ("sliding_s",),
+               _entry("sliding_s", i)) for i, axis in enumerate(ANGLES)),
+    ComparedQuantity("torque_asked_Nm", "torque asked", "N·m", "effort", ("torque_command_Nm",), _asked_Nm),
+    ComparedQuantity("largest_current_A", "top current", "A", "effort", ("current_A",), _largest("current_A")),
+    ComparedQuantity("torque_margin", "torque margin", "1", "effort", ("current_command_A", "allocation_scale"),
+             _column(MARGIN.values), limits=(-0.05 * MOST, 1.05 * MOST)),
+    ComparedQuantity("torque_delivered_Nm", "torque delivered on the hinges", "N·m", "more",
+             ("q_rad", "torque_Nm"), _delivered_Nm),
+)  # fmt: skip
+"""All, in the order in which they are drawn; a group of them beside each other."""

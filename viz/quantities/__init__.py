@@ -1,1 +1,0 @@
-"""What is plotted beside the telemetry, one quantity a file, computed from its rows."""

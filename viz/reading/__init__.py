@@ -1,1 +1,0 @@
-"""Recordings read back, whole or as a killed process left them."""

@@ -1,0 +1,177 @@
+"""A part of a recording: what it logs at the start, of every chunk, and at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
+from spheretwin.models.telemetry.status import Event, Status
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.layout.view import CHECKSUM, OVERVIEW, TIMELINE, TOTAL, View
+from spheretwin.viz.scene.static import size_of
+
+
+class Rows(Enum):
+    """Which rows of a run a part is given."""
+
+    ALL = "all"
+    """Every row, at once: for what thins them itself, or must not miss any."""
+    KEPT = "kept"
+    """Those that the recording keeps, whole; known some seconds later where it is thinned."""
+
+
+class Subject(NamedTuple):
+    """What is recorded."""
+
+    actuator: Actuator
+    """Has as many groups as the telemetry has currents."""
+    signals: tuple[Signal, ...]
+    """Columns of the telemetry at the start; a change of law may bring others."""
+    facts: RunFacts
+    live: bool = False
+    """Whether it is watched while it runs."""
+    shown: str = OVERVIEW
+    """The view of it that is open at first."""
+    run: str = ""
+    """What tells this recording from all others."""
+    rate_Hz: float | None = None
+    """Rows a second that are kept beside those that stand out; None for every row."""
+
+    @property
+    def view(self) -> View:
+        """What its layout is made for."""
+        return View(
+            self.facts.duration_s,
+            self.facts.current_limit_A,
+            len(self.actuator.groups),
+            tuple(signal for signal in self.signals if signal.name not in COMMON_NAMES),
+            self.live,
+            self.shown,
+            size_of(self.actuator),
+            self.run,
+        )
+
+
+class Part:
+    """Logs nothing; a subclass says what it logs, and when.
+
+    Parameters
+    ----------
+    subject : Subject
+        What is recorded.
+
+    Attributes
+    ----------
+    rows : Rows
+        Which rows `write` is given.
+    """
+
+    rows: ClassVar[Rows] = Rows.ALL
+
+    def __init__(self, subject: Subject) -> None:
+        self.subject = subject
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log what stays the same."""
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Log the rows of one chunk, of which there is at least one."""
+
+    def note(self, recording: rr.RecordingStream, event: Event) -> None:
+        """Log an event that the rows do not show."""
+
+    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
+        """Log how the run ended."""
+
+    def close(self, recording: rr.RecordingStream) -> None:
+        """Log what is known when nothing else will be logged."""
+
+
+Index = list[rr.TimeColumn]
+
+_SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descriptor()
+
+
+def time_index(t_s: NDArray[np.float64]) -> Index:
+    """Times in whole nanoseconds: Rerun would cut the fraction of seconds off, a nanosecond too early."""
+    return [rr.TimeColumn(TIMELINE, duration=nanoseconds(t_s).astype("timedelta64[ns]"))]
+
+
+def nanoseconds(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return times as a recording has them."""
+    return np.round(t_s * 1e9).astype(np.int64)
+
+
+def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
+    """What `rr.Scalars.columns` makes of (n, size) values, at half its price."""
+    batch = rr.components.ScalarBatch(values.ravel())
+    return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
+
+
+class Struct:
+    """Values with named fields, as a component.
+
+    Rerun's own form for types that it does not know wants each name to have one type in a whole process,
+    and runs differ in their signals.
+    """
+
+    def __init__(self, fields: Mapping[str, pa.Array]) -> None:
+        self._array = pa.StructArray.from_arrays(list(fields.values()), list(fields))
+
+    def as_arrow_array(self) -> pa.Array:
+        """What Rerun asks for."""
+        return self._array
+
+
+class Numbers:
+    """Whole numbers as a component."""
+
+    def __init__(self, values: Sequence[int] | NDArray[np.uint64]) -> None:
+        self._array = pa.array(values, type=pa.uint64())
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return what Rerun asks for."""
+        return self._array
+
+
+def checksums(values: NDArray[np.uint64]) -> rr.ComponentColumn:
+    """Return the component with number and checksum of each line."""
+    return rr.ComponentColumn(CHECKSUM, Numbers(values))
+
+
+def range_checksum(first: int, count: int, checksum: int) -> rr.ComponentColumn:
+    """Return the component with the checksum of some rows, by the number of the first and their count."""
+    return rr.ComponentColumn(CHECKSUM, Numbers([first, count, checksum]), lengths=[3])
+
+
+def total(count: int) -> rr.DescribedComponentBatch:
+    """Return the component with the number of rows or lines of a complete recording."""
+    return rr.DescribedComponentBatch(Numbers([count]), rr.ComponentDescriptor(TOTAL))
+
+
+def vectors(values: NDArray[np.float64], size: int) -> pa.Array:
+    """Arrow form of (n, size) values: `size` numbers a row, whose places need no room."""
+    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), size)
+
+
+def no_vectors(rows: int, size: int) -> pa.Array:
+    """What stands for (n, size) values where there are none."""
+    return pa.nulls(rows, pa.list_(pa.float64(), size))
+
+
+def strips(segments: NDArray[np.float64]) -> pa.Array:
+    """Arrow form of equally long line strips (n, points, 3); Rerun's own conversion takes them one by one."""
+    kind = rr.components.LineStrip3DBatch([]).as_arrow_array().type
+    flat = pa.array(segments.ravel().astype(np.float32))
+    points = pa.FixedSizeListArray.from_arrays(flat, type=kind.value_type)
+    starts = np.arange(len(segments) + 1, dtype=np.int32) * segments.shape[1]
+    return pa.ListArray.from_arrays(pa.array(starts), points, type=kind)

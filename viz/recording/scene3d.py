@@ -1,0 +1,216 @@
+"""The actuator itself: where its bodies are, and the current in each coil."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.models import mjcf
+from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.status import Level, Status
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz import theme
+from spheretwin.viz.recording.part import Part, Subject, strips, time_index
+from spheretwin.viz.scene.meshes import COILS, FAILURE, FAILURE_TEXT, TORQUES, WORLD
+from spheretwin.viz.scene.motion import (
+    SHOWN,
+    TRACES,
+    LONGEST_m,
+    METRES_PER_Nm,
+    Trace,
+    body_quaternions,
+    gravity_torque,
+    load_torque,
+    shaft_tip,
+)
+from spheretwin.viz.scene.static import labels, log_static, size_of
+
+FRAME_RATE_Hz = 60.0
+
+LARGEST_rad = 1e6
+"""Beyond it a pose is none any more, and its sine has no digits left."""
+
+
+class Frames:
+    """Picks the first tick of each frame, chunk by chunk, where it has a pose.
+
+    Parameters
+    ----------
+    rate_Hz : float
+        Of the frames.
+    """
+
+    def __init__(self, rate_Hz: float = FRAME_RATE_Hz) -> None:
+        self._rate_Hz = rate_Hz
+        self._next = 0
+
+    def of(self, rows: Table) -> NDArray[np.bool_]:
+        """Whether each row of a chunk is drawn."""
+        frame = np.floor(rows["t_s"] * self._rate_Hz + 1e-6).astype(np.int64)
+        new = frame >= np.concatenate([[self._next], frame[:-1] + 1])
+        self._next = max(self._next, int(frame[-1]) + 1)
+        return new & posed(rows)
+
+
+def posed(rows: Table) -> NDArray[np.bool_]:
+    """Whether each row has a pose; the last of a run that diverged may have none."""
+    small: NDArray[np.bool_] = np.all(np.abs(rows["q_rad"]) < LARGEST_rad, axis=1)
+    return small
+
+
+class MovingActuator(Part):
+    """Meshes, and of every frame the poses and the coils' colours."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._frames = Frames()
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log what keeps its shape."""
+        log_static(recording, self.subject.actuator, self.subject.facts)
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the ticks that fall on a frame."""
+        new = self._frames.of(rows)
+        if not np.any(new):
+            return
+        index = time_index(rows["t_s"][new])
+        for body, quaternion in body_quaternions(rows["q_rad"][new]).items():
+            recording.send_columns(f"{WORLD}/{body}", index, rr.Transform3D.columns(quaternion=quaternion))
+        recording.send_columns(COILS, index, self._coil_colours(rows["current_A"][new]))
+
+    def _coil_colours(self, current_A: NDArray[np.float64]) -> rr.ComponentColumnList:
+        colours = theme.current_colours(current_A, self.subject.facts.current_limit_A)  # (n, groups, 3)
+        coils = np.empty((len(current_A), len(self.subject.actuator.coil_axes), 3), dtype=np.uint8)
+        for side in range(2):  # both coils of a group carry its current
+            coils[:, self.subject.actuator.groups[:, side]] = colours
+        return rr.Mesh3D.columns(albedo_texture_buffer=coils.reshape(len(coils), -1))
+
+
+# A ball around the tip, and its text on top of a pole, clear of the texts of the torques.
+MARK_RADIUS_m, POLE_m = 0.006, 0.1
+
+
+class Ending(Part):
+    """A mark at the shaft's tip from the last tick on, where that is a failure."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._t_s = 0.0
+        self._q_rad = np.zeros((1, 3))
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Keep the last pose; of a run that diverged, the last that is one."""
+        self._t_s = float(rows["t_s"][-1])
+        poses = rows["q_rad"][posed(rows)]
+        if len(poses):
+            self._q_rad = poses[-1:]
+
+    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
+        """Mark a failure."""
+        if status.level != Level.ERROR:
+            return
+        tip = shaft_tip(self._q_rad, self.subject.actuator)
+        top = tip + size_of(self.subject.actuator) * np.array([0.0, 0.0, POLE_m])
+        mark = [
+            *rr.Points3D.columns(positions=tip, colors=[theme.FAILURE], radii=[MARK_RADIUS_m]),
+            *rr.LineStrips3D.columns(
+                strips=np.stack([tip, top], axis=1),
+                colors=[theme.FAILURE],
+                radii=rr.Radius.ui_points(1.5),
+            ),
+        ]
+        text = f"{status.replace('_', ' ')} at {self._t_s:.3f} s"
+        told = rr.Points3D.columns(
+            positions=top, colors=[theme.FAILURE], radii=rr.Radius.ui_points(0.0), labels=[text]
+        )
+        index = time_index(np.array([self._t_s]))
+        recording.send_columns(FAILURE, index, mark)
+        recording.send_columns(FAILURE_TEXT, index, told)
+
+
+RATE_Hz = 20.0
+
+
+class Torques(Part):
+    """Of the coils, of a payload's weight, and of the load where there is one."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._frames = Frames(RATE_Hz)
+        self._gravity_m_s2 = _gravity(subject.facts)
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log names and colours; the load is the last, so that it can be left out."""
+        shown = [SHOWN[name] for name in ("coils", *self._weight(), "load")]
+        colours = [torque.colour for torque in shown]
+        style = rr.Arrows3D.from_fields(colors=colours, radii=rr.Radius.ui_points(2.5))
+        recording.log(TORQUES, style, labels([torque.label for torque in shown], colours), static=True)
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the ticks that fall on a frame."""
+        new = self._frames.of(rows)
+        if not np.any(new):
+            return
+        q, load_Nm = rows["q_rad"][new], rows["disturbance_Nm"][new]
+        torques = [rows["torque_Nm"][new]]
+        if self._weight():
+            actuator, facts = self.subject.actuator, self.subject.facts
+            torques.append(gravity_torque(q, facts.payload_kg, actuator.payload_mount_m, self._gravity_m_s2))
+        torques.append(load_torque(q, load_Nm))
+        metres = size_of(self.subject.actuator) * METRES_PER_Nm
+        vectors = np.clip(metres * np.stack(torques, axis=1), -LONGEST_m, LONGEST_m)
+        drawn = np.ones(vectors.shape[:2], dtype=bool)
+        drawn[:, -1] = np.any(load_Nm != 0, axis=1)
+        count = drawn.sum(axis=1)
+        columns = [
+            *rr.Arrows3D.columns(vectors=vectors[drawn]).partition(count),
+            # Labels at the heads: the same numbers once more, which takes no bytes.
+            *rr.Points3D.columns(positions=vectors[drawn]).partition(count),
+            *rr.Transform3D.columns(translation=shaft_tip(q, self.subject.actuator)),
+        ]
+        recording.send_columns(TORQUES, time_index(rows["t_s"][new]), columns)
+
+    def _weight(self) -> tuple[str, ...]:
+        return ("gravity",) if self.subject.facts.payload_kg else ()
+
+
+def _gravity(facts: RunFacts) -> NDArray[np.float64]:
+    """Gravity in the stator frame, (3,) in m/s²."""
+    if facts.gravity_m_s2 is not None:
+        return np.array([0.0, 0.0, -facts.gravity_m_s2])
+    return np.array(mjcf.gravity(mjcf.read(facts.mjcf).described.opt))
+
+
+class Traces(Part):
+    """One short segment a frame; the view shows those of each trace's ages."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._frames = {trace: Frames(trace.rate_Hz) for trace in TRACES}
+        self._last: dict[Trace, NDArray[np.float64]] = {}
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log what each trace looks like."""
+        for trace in TRACES:
+            width = rr.Radius.ui_points(trace.width)
+            style = rr.LineStrips3D.from_fields(colors=[trace.colour], radii=width)
+            recording.log(trace.entity, style, static=True)
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the ticks that fall on a frame."""
+        for trace, frames in self._frames.items():
+            new = frames.of(rows)
+            if np.any(new):
+                self._send(recording, trace, rows["t_s"][new], rows[trace.signal][new])
+
+    def _send(
+        self, recording: rr.RecordingStream, trace: Trace, t_s: NDArray[np.float64], q: NDArray[np.float64]
+    ) -> None:
+        tips = shaft_tip(q, self.subject.actuator)
+        before = np.concatenate([self._last.get(trace, tips[:1]), tips[:-1]])
+        self._last[trace] = tips[-1:]
+        segments = np.stack([before, tips], axis=1)  # (n, 2, 3)
+        columns = rr.LineStrips3D.columns(strips=strips(segments))
+        recording.send_columns(trace.entity, time_index(t_s), columns)

@@ -1,0 +1,304 @@
+"""Signals whose values are states, as lanes of a timeline: one for each part that ever changes its state."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.models.telemetry.checksums import line_checksums
+from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.status import QUIET_S, Event, Events, Level, Status
+from spheretwin.models.telemetry.table import Table, rank_lost, saturated
+from spheretwin.viz import theme
+from spheretwin.viz.layout.view import EVENTS, STATES, shown_until_s
+from spheretwin.viz.recording.part import Part, Subject, checksums, nanoseconds, time_index, total
+
+
+class Lane(NamedTuple):
+    """Changes of one part's state."""
+
+    entity: str
+    t_s: NDArray[np.float64]
+    states: list[str]
+    possible: tuple[str, ...]
+
+
+class StateChanges:
+    """Finds changes of states in a run's telemetry, chunk by chunk; before the first row all are 0."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, NDArray[np.float64]] = {}
+
+    def of(self, rows: Table) -> list[Lane]:
+        """Lanes that have changes in one chunk."""
+        return [lane for signal in rows.signals if signal.states for lane in self._lanes(rows, signal)]
+
+    def _lanes(self, rows: Table, signal: Signal) -> list[Lane]:
+        values = rows[signal.name].reshape(len(rows), -1)
+        last = self._last.get(signal.name, np.zeros(signal.size))
+        changed = values != np.concatenate([last[None], values[:-1]])
+        self._last[signal.name] = values[-1].copy()
+        return [
+            Lane(
+                _entity(signal, int(place)),
+                rows["t_s"][changed[:, place]],
+                [signal.states[int(value)] for value in values[changed[:, place], place]],
+                signal.states,
+            )
+            for place in np.flatnonzero(changed.any(axis=0))
+        ]
+
+
+def _entity(signal: Signal, place: int) -> str:
+    names = [STATES, signal.name, *signal.labels[place : place + 1]]
+    return "/".join(rr.escape_entity_path_part(name.replace(" ", "-")) for name in names)
+
+
+class States(Part):
+    """Lanes of a timeline."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._changes = StateChanges()
+        self._styled: set[str] = set()
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the changes of a chunk."""
+        for entity, t_s, states, possible in self._changes.of(rows):
+            if entity not in self._styled:
+                self._styled.add(entity)
+                fine, *others = possible
+                colours = [theme.FINE, *[theme.FAILURE] * len(others)]
+                style = rr.StateConfiguration(values=[fine, *others], colors=colours)
+                recording.log(entity, style, static=True)
+            recording.send_columns(entity, time_index(t_s), rr.StateChange.columns(state=states))
+
+
+class Log(Part):
+    """Lines of what the telemetry shows, and how the run ended."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._events = Events()
+        self._lines = 0
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Log what is worth a line in a chunk."""
+        self._log(recording, self._events.of(rows))
+
+    def note(self, recording: rr.RecordingStream, event: Event) -> None:
+        """Log an event that the rows do not show."""
+        self._log(recording, [event])
+
+    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
+        """Log how the run ended."""
+        self._log(recording, [self._events.end(status)])
+
+    def close(self, recording: rr.RecordingStream) -> None:
+        """Log the number of lines."""
+        recording.log(EVENTS, [total(self._lines)], static=True)
+
+    def _log(self, recording: rr.RecordingStream, events: list[Event]) -> None:
+        log_lines(recording, events, self._lines)
+        self._lines += len(events)
+
+
+def log_lines(recording: rr.RecordingStream, events: list[Event], first: int = 0) -> None:
+    """Log some lines at their times.
+
+    Parameters
+    ----------
+    recording : rr.RecordingStream
+    events : list of Event
+    first : int
+        Number of the first of them.
+    """
+    if events:
+        t_s, level, text = zip(*events, strict=True)
+        lines = rr.TextLog.columns(text=list(text), level=list(level))
+        t_ns = nanoseconds(np.array(t_s)).tolist()
+        sums = line_checksums(list(zip(t_ns, level, text, strict=True)), first)
+        recording.send_columns(EVENTS, time_index(np.array(t_s)), [*lines, checksums(sums)])
+
+
+RUN = f"{STATES}/run"
+LIMITS = f"{STATES}/limits"
+
+WITHIN, VOLTAGE, CURRENT, RANK = LEVELS = (
+    "within limits",
+    "voltage at its limit",
+    "saturated",
+    "rank lost",
+)
+"""From what holds nothing back to what holds back most."""
+
+Change = tuple[float, str]
+"""Time in s, and the state from then on."""
+
+
+class Spells:
+    """Finds when a run is at a limit, chunk by chunk: pauses shorter than `QUIET_S` are none."""
+
+    def __init__(self) -> None:
+        self._level = 0
+        self._last_s = -np.inf
+        self._free_s = 0.0  # of the first tick after the last one at a limit
+
+    def of(self, rows: Table) -> list[Change]:
+        """Changes that the rows of a chunk make sure of."""
+        t_s, levels, changes = rows["t_s"], _levels(rows), []
+        if self._free_s < self._last_s:  # the last row of the chunk before was at a limit
+            self._free_s = float(t_s[0])
+        for i in np.flatnonzero(levels):
+            changes += self._end_before(t_s[i])
+            if levels[i] > self._level:
+                self._level = int(levels[i])
+                changes.append((float(t_s[i]), LEVELS[self._level]))
+            self._last_s = float(t_s[i])
+            self._free_s = float(t_s[i + 1]) if i + 1 < len(t_s) else -np.inf
+        return changes + self._end_before(t_s[-1])
+
+    def _end_before(self, t_s: float) -> list[Change]:
+        if not self._level or t_s - self._last_s <= QUIET_S:
+            return []
+        self._level = 0
+        return [(self._free_s, WITHIN)]
+
+
+def _levels(rows: Table) -> NDArray[np.int64]:
+    """What holds back most at each tick, as a place among `LEVELS`."""
+    levels = np.zeros(len(rows), dtype=np.int64)
+    if any(signal.name == "voltage_limited" for signal in rows.signals):
+        levels[np.any(rows["voltage_limited"] > 0, axis=1)] = LEVELS.index(VOLTAGE)
+    levels[saturated(rows)] = LEVELS.index(CURRENT)
+    levels[rank_lost(rows)] = LEVELS.index(RANK)
+    return levels
+
+
+class Limits(Part):
+    """Logs both lanes."""
+
+    def __init__(self, subject: Subject) -> None:
+        super().__init__(subject)
+        self._spells = Spells()
+        self._last_s = 0.0
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log colours, and how a run begins."""
+        endings = {status.replace("_", " "): _colour(status) for status in Status}
+        levels = dict(zip(LEVELS, (theme.FINE, theme.BELIEVED, theme.WARNING, theme.FAILURE), strict=True))
+        for lane, colours in ((RUN, endings), (LIMITS, levels)):
+            states = rr.StateConfiguration(values=list(colours), colors=list(colours.values()))
+            recording.log(lane, states, static=True)
+        _log(recording, RUN, [(0.0, str(Status.RUNNING))])
+        _log(recording, LIMITS, [(0.0, WITHIN)])
+
+    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
+        """Record the spells of a chunk."""
+        self._last_s = float(rows["t_s"][-1])
+        _log(recording, LIMITS, self._spells.of(rows))
+
+    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
+        """Record how the run ended, where that is not as planned, and to the end of the time axes."""
+        if status not in (Status.COMPLETED, Status.RUNNING):
+            until_s = shown_until_s(self.subject.facts.duration_s, self._last_s)
+            _log(recording, RUN, [(t_s, status.replace("_", " ")) for t_s in (self._last_s, until_s)])
+
+
+def _colour(status: Status) -> theme.Colour:
+    return {Level.INFO: theme.FINE, Level.WARN: theme.WARNING, Level.ERROR: theme.FAILURE}[status.level]
+
+
+def _log(recording: rr.RecordingStream, lane: str, changes: list[Change]) -> None:
+    if changes:
+        t_s, states = zip(*changes, strict=True)
+        recording.send_columns(lane, time_index(np.array(t_s)), rr.StateChange.columns(state=list(states)))
+
+
+# Axes, what was asked and what the controller believes have the same colours in every plot.
+KEY = "α red, β green, γ blue; white what was asked, amber what the controller takes for true"
+
+
+class Summary:
+    """Keeps what the line needs.
+
+    Parameters
+    ----------
+    facts : RunFacts
+        What is known from the start.
+
+    Attributes
+    ----------
+    last_s : float
+        Time of the last row.
+    """
+
+    def __init__(self, facts: RunFacts) -> None:
+        self._facts = facts
+        self.last_s = 0.0
+        self._ticks = 0
+        self._saturated = self._rank_lost = 0
+        self._largest_deg = 0.0
+        self._squares = 0.0
+
+    def add(self, rows: Table, error_deg: NDArray[np.float64]) -> None:
+        """Add the rows of a chunk, with the error angle of each."""
+        self.last_s = float(rows["t_s"][-1])
+        self._ticks += len(rows)
+        self._saturated += int(np.count_nonzero(saturated(rows)))
+        self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
+        told = error_deg[np.isfinite(error_deg)]  # the last rows of a run that diverged may hold no numbers
+        self._largest_deg = max(self._largest_deg, float(np.max(told, initial=0.0)))
+        self._squares += float(np.sum(told**2))
+
+    def running(self) -> str:
+        """The line while the run goes on."""
+        return _told(f"{self._what()} — running")
+
+    def ended(self, status: Status) -> str:
+        """The line once it has ended."""
+        how = "completed" if status.level is Level.INFO else f"**{status.replace('_', ' ')}**"
+        at = "" if status == Status.COMPLETED else f" at {self.last_s:.3g} s of {self._facts.duration_s:g} s"
+        if not self._ticks:
+            return _told(f"{self._what()} — {how}")
+        lost = f"; rank lost {_percent(self._rank_lost / self._ticks)} of the time" if self._rank_lost else ""
+        rms_deg = np.sqrt(self._squares / self._ticks)
+        return _told(
+            f"{self._what()} — {how}{at}; error largest **{self._largest_deg:.3g}°**, RMS **{rms_deg:.3g}°**;"
+            f" saturated {_percent(self._saturated / self._ticks)} of the time{lost}"
+        )
+
+    def _what(self) -> str:
+        facts = self._facts
+        told = [f"**{facts.name}** under **{facts.law}**"]
+        told += [
+            f"{symbol} = {value:g}"
+            for symbol, section, field in (
+                ("m", "plant", "modelling_error"),
+                ("L", "disturbance", "load"),
+            )
+            if isinstance(value := self._field(section, field), int | float)
+        ]
+        if facts.payload_kg:
+            told.append(f"payload {facts.payload_kg:g} kg")
+        if hardware := self._field("run", "hardware"):
+            told.append(f"{hardware} hardware")
+        if faults := self._field("run", "fault"):
+            told.append(f"{len(faults)} fault{'s' * (len(faults) > 1)} planned")
+        return " · ".join(told)
+
+    def _field(self, section: str, field: str) -> Any:
+        return self._facts.sections.get(section, {}).get(field)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if 0 < share < 0.1 else f"{100 * share:.0f} %"
+
+
+def _told(line: str) -> str:
+    """The line, and below it what the colours mean."""
+    return f"{line}\n\n{KEY}"

@@ -1,1 +1,0 @@
-"""Rerun's web viewer, served by this process to this machine alone."""

@@ -1,0 +1,302 @@
+"""What a browser on this machine asks for: the viewer's files, and the recording as it grows."""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+from collections import deque
+from collections.abc import Iterator
+from contextlib import suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Condition, Thread
+from typing import NamedTuple
+
+import rerun_cli
+
+from spheretwin.models.base.errors import SpheretwinError, without_breaks
+
+# Kept for viewers that come late; the oldest make room first.
+KEPT_BYTES = 200 << 20
+
+# A reader that is farther behind goes on with the newest: what it shows is to be of now.
+BEHIND_BYTES = 8 << 20
+
+
+class Broadcast:
+    """Pieces of a recording, each of whole messages, in memory that is bounded.
+
+    Parameters
+    ----------
+    kept_bytes : int
+        Of pieces, beside what every reader needs; at least the newest is kept.
+    behind_bytes : int
+        How far a reader may be behind.
+    """
+
+    def __init__(self, kept_bytes: int = KEPT_BYTES, behind_bytes: int = BEHIND_BYTES) -> None:
+        self._kept_bytes, self._behind_bytes = kept_bytes, behind_bytes
+        self._first: bytes | None = None
+        self._pieces: deque[tuple[int, bytes]] = deque()  # each with the bytes that were sent before it
+        self._dropped, self._sent_bytes = 0, 0
+        self._ended = False
+        self._changed = Condition()
+
+    def begin(self, first: bytes) -> None:
+        """Give what every reader needs."""
+        with self._changed:
+            self._first = first
+            self._changed.notify_all()
+
+    def send(self, piece: bytes) -> None:
+        """Give what comes next."""
+        with self._changed:
+            self._pieces.append((self._sent_bytes, piece))
+            self._sent_bytes += len(piece)
+            while self._sent_bytes - self._pieces[0][0] > self._kept_bytes and len(self._pieces) > 1:
+                self._pieces.popleft()
+                self._dropped += 1
+            self._changed.notify_all()
+
+    def end(self) -> None:
+        """Nothing more comes."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
+
+    def read(self) -> Iterator[bytes]:
+        """What every reader needs, what is kept, and then what comes, to the end.
+
+        A reader that falls behind after it has caught up with what was kept lacks what is between.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: self._first is not None or self._ended)
+            first, place, late = self._first, self._dropped, self._count
+        if first is not None:
+            yield first
+        while (found := self._next(place, late)) is not None:
+            place, piece = found
+            yield piece
+
+    @property
+    def _count(self) -> int:
+        """Pieces that were ever sent."""
+        return self._dropped + len(self._pieces)
+
+    def _next(self, place: int, late: int) -> tuple[int, bytes] | None:
+        """The piece at a place, or a newer one, and the place behind it; None where nothing more comes."""
+        with self._changed:
+            self._changed.wait_for(lambda: place < self._count or self._ended)
+            if place == self._count:
+                return None
+            place = max(place, self._dropped)
+            before, piece = self._pieces[place - self._dropped]
+            if place >= late and self._sent_bytes - before > self._behind_bytes:
+                place, (_, piece) = self._count - 1, self._pieces[-1]
+            return place + 1, piece
+
+
+HOST = "127.0.0.1"
+INDEX = "/index.html"
+FILES = (INDEX, "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
+
+# Its program is large, and where nothing of it is in the machine's cache it has to be read first.
+_PATIENCE_S = 60.0
+
+# Without this, it asks its makers' server for the number of its latest release, and tells it what is opened.
+_GUARD = """<script>
+      const ask = window.fetch;
+      window.fetch = (what, options) =>
+        new URL(what.url ?? what, location).host === location.host
+          ? ask(what, options)
+          : Promise.resolve(new Response(null, { status: 204 }));
+    </script>
+    """
+_OUTSIDE = re.compile(r"<link\b[^>]*https://[^>]*>\s*")
+
+# Ends the program as soon as whoever wanted its files is gone, even by SIGKILL: then its input ends.
+_SUPERVISED = """
+import os, subprocess, sys, threading
+program = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
+threading.Thread(target=lambda: (os.read(0, 1), program.kill()), daemon=True).start()
+os._exit(program.wait() != 0)
+"""
+
+
+class Asset(NamedTuple):
+    """A file of the viewer."""
+
+    kind: str
+    """Its media type."""
+    content: bytes
+
+
+def read_assets() -> dict[str, Asset]:
+    """Files of the viewer by their paths; the program that holds them runs as long as this takes.
+
+    Raises
+    ------
+    SpheretwinError
+        The program is missing or gives none.
+    """
+    program = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
+    if not program.is_file():
+        raise SpheretwinError(f"viewer: expected Rerun's viewer at {program}, received none")
+    port = _free_port()
+    # Without an address of data it would serve some itself.
+    options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(port), f"rerun+http://{HOST}:1/proxy"]
+    try:
+        with subprocess.Popen(
+            [sys.executable, "-I", "-S", "-c", _SUPERVISED, str(program), *options],
+            env={**os.environ, "CI": "1", "RUST_LOG": "off"},  # in a CI it keeps no statistics of its use
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) as process:
+            assets = {path: _read(port, path, process) for path in FILES}
+            process.stdin.close()  # type: ignore[union-attr]
+    except OSError as error:
+        raise SpheretwinError(
+            f"viewer: expected the files of Rerun's viewer, {without_breaks(error)}"
+        ) from None
+    return {**assets, INDEX: _kept_here(assets[INDEX])}
+
+
+def _read(port: int, path: str, process: subprocess.Popen[bytes]) -> Asset:
+    """A file, as soon as the program answers."""
+    until = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            with urllib.request.urlopen(f"http://{HOST}:{port}{path}", timeout=_PATIENCE_S) as answer:
+                return Asset(answer.headers["Content-Type"], answer.read())
+        except urllib.error.HTTPError as error:
+            raise OSError(f"{path}: {error}") from None
+        except OSError:
+            if process.poll() is not None or time.monotonic() > until:
+                raise
+            time.sleep(0.01)
+
+
+def _kept_here(index: Asset) -> Asset:
+    """The page without fonts of another host, and with its own requests kept on this one."""
+    text = _OUTSIDE.sub("", index.content.decode())
+    return index._replace(content=text.replace("<script>", f"{_GUARD}<script>", 1).encode())
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+RECORDING = "/live.rrd"
+
+# The browser itself refuses whatever a page of this server asks of another host.
+POLICY = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline';"
+    " connect-src 'self' data: blob:; img-src 'self' data: blob:; worker-src 'self' blob:"
+)
+
+
+class ViewerServer:
+    """Serves the viewer and one recording on 127.0.0.1, from threads that end with this process.
+
+    It answers from the moment it is made.
+
+    Parameters
+    ----------
+    recording : Broadcast
+        What the viewer is to show.
+
+    Raises
+    ------
+    SpheretwinError
+        The viewer's files are not there.
+    """
+
+    def __init__(self, recording: Broadcast) -> None:
+        assets = read_assets()
+
+        class Handler(_Handler):
+            def answer(self, path: str) -> None:
+                if path == RECORDING:
+                    self.stream(recording)
+                elif asset := assets.get(path):
+                    self.whole(asset.kind, asset.content)
+                else:
+                    self.send_error(404)
+
+        self._server = _Server((HOST, 0), Handler)
+        self._thread = Thread(target=self._server.serve_forever, name="viewer server", daemon=True)
+        self._thread.start()
+
+    @property
+    def address(self) -> str:
+        """Page to open in a browser."""
+        return f"http://{HOST}:{self._server.server_port}/"
+
+    def close(self) -> None:
+        """Serve nobody any more."""
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    """Answers each request in a thread that nobody waits for: a viewer may take nothing for ever."""
+
+    daemon_threads = True
+    block_on_close = False
+
+    def handle_error(self, *_: object) -> None:
+        """Leave the terminal to the run: a viewer was closed amid its request."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """One request; a subclass says what there is."""
+
+    def answer(self, path: str) -> None:
+        """Answer a request for a path."""
+        raise NotImplementedError
+
+    def do_GET(self) -> None:
+        """Answer, unless a page of another host asks under a name of its own for this one."""
+        here = f"{HOST}:{self.connection.getsockname()[1]}"
+        path, _, query = self.path.partition("?")
+        with suppress(OSError):  # the viewer was closed
+            if self.headers["Host"] != here:
+                self.send_error(403)
+            elif path == "/" and not query:
+                recording = urllib.parse.quote(f"http://{here}{RECORDING}", safe="")
+                self.send_response(302)
+                self.send_header("Location", f"/?url={recording}")
+                self.end_headers()
+            else:
+                self.answer(INDEX if path == "/" else path)
+
+    def whole(self, kind: str, content: bytes) -> None:
+        """Send a file."""
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Content-Security-Policy", POLICY)
+        self.end_headers()
+        self.wfile.write(content)
+
+    def stream(self, recording: Broadcast) -> None:
+        """Send a recording as it grows, until it ends."""
+        self.send_response(200)
+        self.send_header("Content-Type", "application/octet-stream")
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        for piece in recording.read():
+            self.wfile.write(piece)
+
+    def log_message(self, *_: object) -> None:
+        """Leave the terminal to the run."""

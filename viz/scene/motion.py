@@ -1,0 +1,153 @@
+"""Where the moving parts of the actuator are, from its hinge angles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.viz import theme
+from spheretwin.viz.scene.meshes import WORLD
+from spheretwin.viz.scene.static import AXES_LENGTH_m
+
+
+def body_quaternions(q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Orientation of each moving body, as (n, 4) quaternions x, y, z, w.
+
+    Parameters
+    ----------
+    q : (n, 3) array, rad
+        Hinge angles.
+    """
+    about_x, about_y, about_z = (_about(axis, q[:, axis]) for axis in range(3))
+    inner = _product(about_x, about_y)
+    return {"outer_ring": about_x, "inner_ring": inner, "rotor": _product(inner, about_z)}
+
+
+def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
+    """Position of the shaft's tip, wherever in the rotor it is: (n, 3) in m, for hinge angles (n, 3)."""
+    return carried(q, actuator.shaft_tip_m)
+
+
+def carried(q: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Position in the stator frame of a point of the rotor: (n, 3) in m, for hinge angles (n, 3)."""
+    (ca, cb, cg), (sa, sb, sg) = np.cos(q).T, np.sin(q).T
+    x, y, z = point_m
+    x, y = cg * x - sg * y, sg * x + cg * y  # about z, then y, then x
+    x, z = cb * x + sb * z, cb * z - sb * x
+    y, z = ca * y - sa * z, sa * y + ca * z
+    return np.stack([x, y, z], axis=1)
+
+
+def _about(axis: int, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    quaternion = np.zeros((len(angle), 4))
+    quaternion[:, axis], quaternion[:, 3] = np.sin(angle / 2), np.cos(angle / 2)
+    return quaternion
+
+
+def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quaternion product: first b, then a."""
+    vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + np.cross(a[:, :3], b[:, :3])
+    scalar = a[:, 3] * b[:, 3] - np.sum(a[:, :3] * b[:, :3], axis=1)
+    return np.concatenate([vector, scalar[:, None]], axis=1)
+
+
+Array = NDArray[np.float64]
+
+
+class Shown(NamedTuple):
+    """How a torque is shown."""
+
+    label: str
+    colour: theme.Colour
+
+
+SHOWN = {
+    "coils": Shown("coils", theme.COIL_TORQUE),
+    "gravity": Shown("gravity", theme.PAYLOAD),
+    "load": Shown("load", theme.LOAD),
+}
+"""By name."""
+
+METRES_PER_Nm = 0.1
+"""Beside an actuator as large as the shipped one; like the axes, longer beside a larger one."""
+
+SCALE = f"torque arrows: the length of x, y, z is {AXES_LENGTH_m / METRES_PER_Nm:g} N·m"
+"""What the arrows' lengths mean, for people."""
+
+LONGEST_m = 1e3
+"""Of an arrow along each axis: torques of a run that diverges are beyond single precision."""
+
+
+def load_torque(q: Array, disturbance_Nm: Array) -> Array:
+    """Cartesian torque of the load: its part in (1) is subtracted, and ``tau_q = E^T tau``.
+
+    Parameters
+    ----------
+    q : (n, 3) array, rad
+        Poses, away from beta = +-90 degrees.
+    disturbance_Nm : (n, 3) array
+        Generalised, as the telemetry has it.
+
+    Returns
+    -------
+    (n, 3) array, N·m
+        On the rotor, stator frame.
+    """
+    (ca, cb, _), (sa, sb, _) = np.cos(q).T, np.sin(q).T
+    about_alpha, about_beta, about_gamma = -disturbance_Nm.T
+    in_plane = (about_gamma - sb * about_alpha) / cb
+    return np.stack([about_alpha, ca * about_beta - sa * in_plane, sa * about_beta + ca * in_plane], axis=1)
+
+
+def gravity_torque(q: Array, payload_kg: float, mount_m: Array, gravity_m_s2: Array) -> Array:
+    """Torque of a payload's weight about the joint centre: ``r x m g``.
+
+    Parameters
+    ----------
+    q : (n, 3) array, rad
+        Poses.
+    payload_kg : float, kg
+        Point mass.
+    mount_m : (3,) array, m
+        Where it is, rotor frame.
+    gravity_m_s2 : (3,) array, m/s²
+        Stator frame.
+
+    Returns
+    -------
+    (n, 3) array, N·m
+        On the rotor, stator frame.
+    """
+    return np.cross(carried(q, mount_m), payload_kg * gravity_m_s2)
+
+
+TRAIL_S = 2.0
+"""What is older is not shown."""
+
+
+class Trace(NamedTuple):
+    """Part of a way, between two ages."""
+
+    entity: str
+    signal: str
+    """Hinge angles, rad."""
+    newest_s: float
+    oldest_s: float
+    rate_Hz: float
+    colour: theme.Colour
+    width: float
+    """Radius in points of the screen."""
+
+
+_FADED = [theme.mixed(theme.TRACE, theme.DESIRED_TRACE, share) for share in (0.0, 0.4, 0.75)]
+
+TRACES: tuple[Trace, ...] = (
+    Trace(f"{WORLD}/tip/new", "q_rad", 0.0, 0.6, 30.0, _FADED[0], 2.4),
+    Trace(f"{WORLD}/tip/older", "q_rad", 0.6, 1.2, 15.0, _FADED[1], 1.7),
+    Trace(f"{WORLD}/tip/oldest", "q_rad", 1.2, TRAIL_S, 15.0, _FADED[2], 1.2),
+    Trace(f"{WORLD}/tip_desired", "q_ref_rad", 0.0, TRAIL_S, 15.0, theme.DESIRED_TRACE, 0.7),
+)
+"""The older, the thinner and greyer, which is fainter on any ground; each age has segments of its own."""

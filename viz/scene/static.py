@@ -1,0 +1,120 @@
+"""What keeps its shape for a whole run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.viz import theme
+from spheretwin.viz.scene.meshes import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROTOR_AXES, WORLD, read_meshes
+
+Array = NDArray[np.float64]
+
+AXES_LENGTH_m = 0.05
+"""Of the stator's: the measure of all that is drawn."""
+
+REACH_m = 0.12
+"""From the joint to the farthest that an actuator has, of one beside which the lengths here are right."""
+
+# A bar before the foot, square to the eye of the layout; its ends are the current limit.
+MIDDLE_m = np.array([0.064, -0.064, -0.078])
+ALONG = np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
+UP = np.array([-0.4, 0.4, 0.82])
+LENGTH_m, HEIGHT_m = 0.14, 0.008
+STRIPES = 32
+TICKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+
+
+def size_of(actuator: Actuator) -> float:
+    """How many times as large as the lengths here what is drawn beside an actuator is."""
+    coils_m = actuator.coil.distance_m + actuator.coil.length_m / 2
+    return max(float(np.linalg.norm(actuator.shaft_tip_m)), coils_m) / REACH_m
+
+
+def axes(origin_m: Sequence[float] | Array, length_m: float) -> rr.Arrows3D:
+    """Axes of a frame in the colours of the plots."""
+    return rr.Arrows3D(
+        origins=[origin_m] * 3,
+        vectors=length_m * np.eye(3),
+        colors=theme.AXIS_COLOURS,
+        radii=rr.Radius.ui_points(1.5),
+    )
+
+
+def labels(texts: Sequence[str], colours: Sequence[theme.Colour]) -> rr.Points3D:
+    """Texts for the heads of arrows, as points without a size: an arrow's own text stands in its middle."""
+    size = rr.Radius.ui_points(0.0)
+    return rr.Points3D.from_fields(labels=texts, colors=colours, radii=size, show_labels=True)
+
+
+def current_scale(size: float) -> rr.Mesh3D:
+    """Bar in the colours of all currents within the limit, for an actuator of a size."""
+    share = np.linspace(-1.0, 1.0, STRIPES + 1)
+    lower = MIDDLE_m + LENGTH_m / 2 * share[:, None] * ALONG
+    first = np.arange(STRIPES)
+    one, other = (
+        [first, first + 1, first + STRIPES + 1],
+        [first + 1, first + STRIPES + 2, first + STRIPES + 1],
+    )
+    return rr.Mesh3D(
+        vertex_positions=size * np.concatenate([lower, lower + HEIGHT_m * UP]),
+        triangle_indices=np.concatenate([np.stack(corners, axis=1) for corners in (one, other)]),
+        vertex_colors=np.tile(theme.current_colours(share, 1.0), (2, 1)),
+    )
+
+
+def current_scale_labels(limit_A: float, size: float) -> rr.Points3D:
+    """Currents along the bar."""
+    at = np.array(TICKS)
+    return rr.Points3D(
+        size * (MIDDLE_m + LENGTH_m / 2 * at[:, None] * ALONG - 0.3 * HEIGHT_m * UP),
+        labels=[f"{share * limit_A:+g} A" if share else "0" for share in at.tolist()],
+        colors=[theme.DESIRED_TRACE],
+        radii=rr.Radius.ui_points(1.0),
+        show_labels=True,
+    )
+
+
+PAYLOAD_LENGTH_m, PAYLOAD_RADIUS_m = 0.014, 0.011
+
+# The stator's axes stand beside its foot; the rotor's, shorter, around the shaft below a payload.
+AXES_AT_m = (-0.085, -0.105, -0.075)
+NAMED_AT = 1.15  # of the length: beyond the head
+ROTOR_AXES_HEIGHT, ROTOR_AXES_LENGTH_m = 0.6, 0.025
+
+
+def log_static(recording: rr.RecordingStream, actuator: Actuator, facts: RunFacts) -> None:
+    """Log everything that keeps its shape: meshes, axes of both frames, the scale of the coils' colours."""
+    recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    meshes = read_meshes(facts.mjcf)
+    if meshes.coils:
+        recording.log(COILS, meshes.coils, static=True)
+    for entity, piece in meshes.others.items():
+        recording.log(entity, *piece.archetypes(), static=True)
+    if facts.payload_kg > 0:
+        recording.log(PAYLOAD, _payload(actuator), static=True)
+    size = size_of(actuator)
+    at, length_m = size * np.array(AXES_AT_m), size * AXES_LENGTH_m
+    names = labels(["x", "y", "z"], theme.AXIS_COLOURS)
+    ends = rr.Points3D.from_fields(positions=at + NAMED_AT * length_m * np.eye(3))
+    recording.log(AXES, axes(at, length_m), names, ends, static=True)
+    rotor_axes = axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, size * ROTOR_AXES_LENGTH_m)
+    recording.log(ROTOR_AXES, rotor_axes, static=True)
+    recording.log(CURRENT_SCALE, current_scale(size), static=True)
+    currents = current_scale_labels(facts.current_limit_A, size)
+    recording.log(f"{CURRENT_SCALE}/labels", currents, static=True)
+
+
+def _payload(actuator: Actuator) -> rr.Cylinders3D:
+    return rr.Cylinders3D(
+        lengths=[PAYLOAD_LENGTH_m],
+        radii=[PAYLOAD_RADIUS_m],
+        centers=[actuator.payload_mount_m],
+        colors=[theme.PAYLOAD],
+        fill_mode=rr.components.FillMode.Solid,
+    )

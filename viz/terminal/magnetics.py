@@ -1,0 +1,128 @@
+"""The magnetic model's verdicts as tables for people, on stdout."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from spheretwin.models.design.curve_check import ComputedCurve, JudgedCurve, Misfit, Peak
+from spheretwin.models.design.field_check import FieldVerdict
+from spheretwin.models.design.torque_map import WorkspaceVerdict, direction_text
+from spheretwin.viz.terminal import tables
+
+# A table row for every third tilt: one screen.
+ROW_STRIDE = 3
+
+FIGURE_NAMES = {
+    "least_norm": ("least norm", "least_norm_Nm", "N·m"),
+    "best": ("best", "best_Nm", "N·m"),
+    "singular_value": ("least σ", "singular_value_Nm_per_A", "N·m/A"),
+}
+
+
+def print_computed_curve(computed: ComputedCurve) -> None:
+    """Print what is known of a curve that was computed."""
+    _print_curve("torque curve computed from the geometry", [("peak", _peak(computed.peak))])
+
+
+def print_judged_curve(path: Path, judged: JudgedCurve) -> None:
+    """Print what is known of a user's curve."""
+    geometry = judged.geometry
+    rows = [
+        ("samples", str(judged.rows)),
+        ("peak", _peak(judged.peak)),
+        ("a sample left out is missed by", _misfit(judged.leave_one_out, "peak")),
+        ("apart from the geometry's curve", _misfit(geometry.as_given, "its peak")),
+        ("best factor on the geometry's curve", f"{geometry.scale:.4f}"),
+        ("apart from it, so scaled", _misfit(geometry.scaled, "its peak")),
+        ("look-up table apart from the spline", f"{judged.lookup_error:.1e} of the peak"),
+    ]
+    _print_curve(f"torque curve {path}", rows)
+
+
+def print_field(verdict: FieldVerdict) -> None:
+    """Print the errors of the torque matrix by tilt, and where they come from."""
+    console = tables.terminal_console()
+    title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
+    table = tables.new_table(
+        title, "tilt", "poses", "median error", "largest", "of largest torque", "half the points"
+    )
+    for band in verdict.by_tilt:
+        low, high = band.tilt_deg
+        table.add_row(
+            f"{low:.0f}° to {high:.0f}°",
+            str(band.poses),
+            _percent(band.median_relative_error),
+            _percent(band.largest_relative_error),
+            _percent(band.largest_error_of_largest_torque),
+            _percent(band.quadrature_of_largest_torque),
+        )
+    console.print(table)
+    sources = verdict.sources
+    console.print(
+        "Where it comes from: the direct sum's quadrature"
+        f" (half the points change it by {sources.quadrature_of_largest_torque:.0e} of the largest torque);"
+        f" the curve between its samples ({sources.curve_between_samples_of_peak:.0e} of its peak);"
+        f" the look-up table ({sources.lookup_of_peak:.0e} of the peak)."
+    )
+
+
+def print_workspace(verdict: WorkspaceVerdict) -> None:
+    """Print the torque capability by tilt, and the weakest poses."""
+    console = tables.terminal_console()
+    table = tables.new_table(
+        f"torque in every direction at {verdict.current_limit_A:g} A, N·m:"
+        f" worst and median of {verdict.poses} poses",
+        "tilt",
+        "least norm",
+        "median",
+        "best currents",
+        "median",
+        "least σ, N·m/A",
+        "cond.",
+        "copper, W/(N·m)²",
+    )
+    for i, tilt in enumerate(verdict.by_tilt):
+        if i % ROW_STRIDE == 0 or i == len(verdict.by_tilt) - 1:
+            table.add_row(
+                f"{tilt.tilt_deg:g}°",
+                f"{tilt.least_norm_Nm:.3f}",
+                f"{tilt.least_norm_median_Nm:.3f}",
+                f"{tilt.best_Nm:.3f}",
+                f"{tilt.best_median_Nm:.3f}",
+                f"{tilt.singular_value_Nm_per_A:.4f}",
+                f"{tilt.condition:.2f}",
+                f"{tilt.copper_W_per_Nm2:.0f}",
+            )
+    console.print(table)
+    weak = tables.new_table("weakest poses", "by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
+    weak.columns[-1].no_wrap = True
+    for pose in verdict.weakest:
+        name, key, unit = FIGURE_NAMES[pose.figure]
+        angles = (_tenths(angle) for angle in (pose.tilt_deg, *pose.q_deg))
+        weak.add_row(name, f"{getattr(pose, key):.3g} {unit}", *angles, direction_text(pose.direction))
+    console.print(weak)
+
+
+def _print_curve(title: str, rows: Sequence[tuple[str, str]]) -> None:
+    table = tables.new_table(title, "figure", "value")
+    for row in rows:
+        table.add_row(*row)
+    tables.terminal_console().print(table)
+
+
+def _peak(peak: Peak) -> str:
+    return f"{peak.peak_Nm_per_A:.5f} N·m/A at {peak.peak_deg:.2f}°"
+
+
+def _misfit(misfit: Misfit, unit: str) -> str:
+    rms, worst = 100 * misfit.rms, 100 * misfit.worst
+    return f"rms {rms:.2g} %, at most {worst:.2g} % of {unit} (at {misfit.worst_deg:.2f}°)"
+
+
+def _tenths(value: float) -> str:
+    return f"{round(value, 1) + 0.0:.1f}"  # no negative zero
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3f} %"
