@@ -1,14 +1,16 @@
-"""A new member of every family: its file, its row, and where that belongs."""
+"""A new member of every family: its class, its row, and where they belong."""
 
 from typing import NamedTuple
 
 
 class Addition(NamedTuple):
-    """What is written for a new member: its file, and its row (with the import) in the family's list."""
+    """Text of a new member, and its row (with the import) in the family's list."""
 
     file: str
+    """File of the text: a new one, or one to whose end it goes; empty where it goes in front of the list."""
     text: str
     registry: str
+    """File of the list."""
     row: tuple[str, str]
     imported: str = ""
 
@@ -23,7 +25,7 @@ import numpy as np
 from pydantic import Field
 
 from spheretwin.control.law import Known, Law
-from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each, named
+from spheretwin.control.law_components.parameters import LawParameters, PositiveEach, each, named
 
 
 class Lazy(LawParameters):
@@ -46,16 +48,8 @@ def step(t, reference, measurement, parameters, state, torque):
         "from spheretwin.control.laws.lazy import Lazy\n",
     ),
     "trajectory": Addition(
-        "twin/trajectories/shapes/ramp.py",
+        "twin/trajectories/shapes.py",
         '''
-from typing import Literal
-
-import numpy as np
-from pydantic import Field
-
-from spheretwin.twin.trajectories.trajectory import Shape, Triple
-
-
 class Ramp(Shape):
     """Each axis at a rate of its own."""
 
@@ -69,19 +63,11 @@ class Ramp(Shape):
 ''',
         "twin/trajectories/__init__.py",
         ("    | Waypoints,\n", "    | Waypoints\n    | Ramp,\n"),
-        "from spheretwin.trajectories.shapes.ramp import Ramp\n",
+        "from spheretwin.trajectories.shapes import Ramp\n",
     ),
     "disturbance": Addition(
-        "twin/disturbances/kick.py",
+        "",
         '''
-from typing import Literal
-
-import numpy as np
-from pydantic import Field
-
-from spheretwin.twin.disturbances.term import Term, Torque
-
-
 class Kick(Term):
     """One pulse."""
 
@@ -93,29 +79,22 @@ class Kick(Term):
 ''',
         "twin/disturbances.py",
         ("    | Random,\n", "    | Random\n    | Kick,\n"),
-        "from spheretwin.disturbances.kick import Kick\n",
     ),
     "telemetry column": Addition(
-        "twin/columns/largest.py",
+        "",
         """
-from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.models.telemetry.signals import Signal
-from spheretwin.twin.columns.column import Columns
-
-
 @part_of_its_caller
-def write(row, controller, sensors, plant):
+def write_largest(row, controller, sensors, plant):
     row[0] = 0.0
     for j in range(plant.current.shape[0]):
         row[0] = max(row[0], abs(plant.current[j]))
 
 
-SIGNALS = (Signal("largest_current_A", "A", 1, "largest group current at the end of the tick"),)
-COLUMNS = Columns(lambda groups: SIGNALS, lambda scenario: True, write)
+LARGEST_SIGNALS = (Signal("largest_current_A", "A", 1, "largest group current at the end of the tick"),)
+LARGEST = Channel(lambda groups: LARGEST_SIGNALS, lambda scenario: True, write_largest)
 """,
         "twin/channels.py",
-        ("    drive.COLUMNS,\n", "    drive.COLUMNS,\n    largest.COLUMNS,\n"),
-        "from spheretwin.channels import largest\n",
+        ("    DRIVE,\n", "    DRIVE,\n    LARGEST,\n"),
     ),
     "plant": Addition(
         "twin/plant/stiff.py",
@@ -125,7 +104,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.plant.rotor import EngineKind
+from spheretwin.plant.rotor import EngineKind
 
 
 class Integrators(NamedTuple):
@@ -166,18 +145,15 @@ def step(rotor):
 UNCOUPLED = EngineKind("uncoupled", Uncoupled, Integrators, step)
 """,
         "twin/plant/step.py",
-        ("        lagrangian.LAGRANGIAN,\n", "        lagrangian.LAGRANGIAN,\n        stiff.UNCOUPLED,\n"),
+        (
+            "        lagrangian_rotor.LAGRANGIAN,\n",
+            "        lagrangian_rotor.LAGRANGIAN,\n        stiff.UNCOUPLED,\n",
+        ),
         "from spheretwin.plant import stiff\n",
     ),
     "metric": Addition(
-        "twin/metrics/effort/mean_load.py",
+        "",
         '''
-import numpy as np
-
-from spheretwin.twin.metrics.metric import Metric
-from spheretwin.twin.metrics.reducing import add_rows
-
-
 class MeanLoad(Metric):
     """Mean disturbance on each axis, N·m."""
 
@@ -198,15 +174,14 @@ class MeanLoad(Metric):
             '    "copper_loss_J": CopperLoss,\n',
             '    "copper_loss_J": CopperLoss,\n    "mean_load_Nm": MeanLoad,\n',
         ),
-        "from spheretwin.metrics.mean_load import MeanLoad\n",
     ),
     "check": Addition(
         "twin/crosscheck/units.py",
         """
 from typing import NamedTuple
 
-from spheretwin.models.base.check import Check
-from spheretwin.twin.crosscheck.part import Part
+from spheretwin.models.base.checks import Check
+from spheretwin.crosscheck.part import Part
 
 
 class Units(NamedTuple):
@@ -221,16 +196,13 @@ def examine(subject):
 PART = Part("units", examine)
 """,
         "twin/crosscheck/suite.py",
-        ("    closed_loop.PART,\n", "    closed_loop.PART,\n    units.PART,\n"),
+        ("    closed_loop.CLOSED_LOOP,\n", "    closed_loop.CLOSED_LOOP,\n    units.PART,\n"),
         "from spheretwin.crosscheck import units\n",
     ),
     "figure": Addition(
-        "twin/crosscheck/figures/names.py",
+        "",
         """
-from spheretwin.viz.figures.drawing import Drawing
-
-
-def draw(evidence):
+def draw_names(evidence):
     from matplotlib.figure import Figure
 
     figure = Figure()
@@ -238,13 +210,12 @@ def draw(evidence):
     return Drawing("names.png", "Names of the checks.", figure)
 """,
         "twin/crosscheck/suite.py",
-        ("    closed_loop.draw,\n", "    closed_loop.draw,\n    names.draw,\n"),
-        "from spheretwin.crosscheck.suite import names\n",
+        ("    draw_closed_loop,\n", "    draw_closed_loop,\n    draw_names,\n"),
     ),
     "experiment": Addition(
-        "twin/reproduce/holding.py",
+        "twin/paper/holding.py",
         """
-from spheretwin.twin.reproduce.experiment import Case, Experiment, Section, Table
+from spheretwin.paper.experiment import Case, Experiment, ResultTable, Section
 
 
 def cases():
@@ -254,13 +225,16 @@ def cases():
 
 def tell(outcomes):
     rows = [(name, str(found[0].status)) for name, found in outcomes.items()]
-    return [Section("All", "They hold.", [Table("Ends", ("law", "status"), rows)])]
+    return [Section("All", "They hold.", [ResultTable("Ends", ("law", "status"), rows)])]
 
 
 EXPERIMENT = Experiment("holding", "Holding on", "Laws that hold on.", cases, tell)
 """,
         "twin/paper/__init__.py",
-        ("        budget.EXPERIMENT,\n", "        budget.EXPERIMENT,\n        holding.EXPERIMENT,\n"),
+        (
+            "        error_budget.EXPERIMENT,\n",
+            "        error_budget.EXPERIMENT,\n        holding.EXPERIMENT,\n",
+        ),
         "from spheretwin.paper import holding\n",
     ),
     "status": Addition(
@@ -273,13 +247,13 @@ EXPERIMENT = Experiment("holding", "Holding on", "Laws that hold on.", cases, te
         ),
     ),
     "estimator": Addition(
-        "control/estimation/rough.py",
+        "control/estimators/rough.py",
         '''
 from typing import Literal
 
 import numpy as np
 
-from spheretwin.control.estimation.estimator import Derived, Estimator, EstimatorParameters, Sampling, named
+from spheretwin.control.estimators.estimator import Derived, Estimator, EstimatorParameters, Sampling, named
 
 
 class Rough(EstimatorParameters):
@@ -305,16 +279,9 @@ def step(angle, parameters, state, rate):
         "from spheretwin.control.estimators.rough import Rough\n",
     ),
     "sensor stage": Addition(
-        "twin/electronics/sensing/gear.py",
-        '''
-from typing import NamedTuple
-
-from pydantic import Field
-
-from spheretwin.models.base.compiled import allocation_free
-from spheretwin.twin.electronics.fault_line import FaultLine, fault_line, through
-from spheretwin.twin.electronics.sensing.stage import SensorStage
-from spheretwin.twin.electronics.streams import errors
+        "",
+        '''from spheretwin.electronics.random_streams import errors
+from spheretwin.electronics.stages import FaultLine, fault_line, through
 
 
 class GearSection(SensorStage):
@@ -353,18 +320,12 @@ def turn(stage, measurement, numbers):
             "    gear: GearSection = GearSection()\n"
             "    potentiometer: PotentiometerSection = PotentiometerSection()\n",
         ),
-        "from spheretwin.electronics.gear import GearSection\n",
     ),
     "drive stage": Addition(
-        "twin/electronics/driving/filter.py",
-        '''
-from typing import ClassVar, NamedTuple
+        "",
+        '''from typing import ClassVar
 
-from pydantic import Field
-
-from spheretwin.models.base.compiled import part_of_its_caller
-from spheretwin.twin.electronics.driving.stage import DriveStage, pass_line
-from spheretwin.twin.electronics.fault_line import FaultLine, fault_line
+from spheretwin.electronics.drive_stage import pass_line
 
 
 class FilterSection(DriveStage):
@@ -404,65 +365,41 @@ def attenuate(stage, asked, draws):
             "class DriveSection(DelaySection, DacSection, ",
             "class DriveSection(DelaySection, FilterSection, DacSection, ",
         ),
-        "from spheretwin.electronics.filter import FilterSection\n",
     ),
     "fault": Addition(
-        "twin/faults/targets/fuse.py",
+        "",
         """
-from spheretwin.twin.electronics.driving.coil import OPEN
-from spheretwin.twin.faults.target import Mode, Target
-
-
 def _blow(effects, fault):
     effects.drive.coil.contact[fault.place] = OPEN
 
 
-TARGET = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
+FUSE = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
 """,
         "twin/faults/targets.py",
-        ("        coil.TARGET,\n", "        fuse.TARGET,\n        coil.TARGET,\n"),
-        "from spheretwin.faults.targets import fuse\n",
+        ("        COIL,\n", "        FUSE,\n        COIL,\n"),
     ),
     "sensor stage's fault": Addition(
-        "twin/faults/targets/gear.py",
+        "",
         """
-from spheretwin.twin.faults import line_modes
-from spheretwin.twin.faults.line_modes import Signal
-from spheretwin.twin.faults.target import Target
-
-SIGNAL = Signal(lambda effects: effects.sensors.stage("gear").line, "rad")
-TARGET = Target("gear", line_modes.modes(SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
+GEAR_SIGNAL = Signal(lambda effects: effects.sensors.stage("gear").line, "rad")
+GEAR = Target("gear", line_modes.modes(GEAR_SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
 """,
         "twin/faults/targets.py",
-        ("        dac.TARGET,\n", "        dac.TARGET,\n        gear.TARGET,\n"),
-        "from spheretwin.faults.targets import gear\n",
+        ("        DAC,\n", "        DAC,\n        GEAR,\n"),
     ),
     "drive stage's fault": Addition(
-        "twin/faults/targets/filter.py",
+        "",
         """
-from spheretwin.twin.faults import line_modes
-from spheretwin.twin.faults.line_modes import Signal
-from spheretwin.twin.faults.target import Target
-
-SIGNAL = Signal(lambda effects: effects.drive.stage("filter").line, "A")
-MODES = {**line_modes.modes(SIGNAL), **line_modes.silent_modes(SIGNAL)}
-TARGET = Target("filter", MODES, each_group=True)
+FILTER_SIGNAL = Signal(lambda effects: effects.drive.stage("filter").line, "A")
+FILTER_MODES = {**line_modes.modes(FILTER_SIGNAL), **line_modes.silent_modes(FILTER_SIGNAL)}
+FILTER = Target("filter", FILTER_MODES, each_group=True)
 """,
         "twin/faults/targets.py",
-        ("        supply.TARGET,\n", "        supply.TARGET,\n        filter.TARGET,\n"),
-        "from spheretwin.faults.targets import filter\n",
+        ("        SUPPLY,\n", "        SUPPLY,\n        FILTER,\n"),
     ),
     "axis": Addition(
-        "twin/study/axes/triangular.py",
+        "",
         '''
-from typing import Literal
-
-import numpy as np
-from pydantic import Field
-
-from spheretwin.twin.study.axes.axis import DrawnAxis, Number
-
-
 class Triangular(DrawnAxis):
     """Most often at its lower end."""
 
@@ -475,7 +412,6 @@ class Triangular(DrawnAxis):
 ''',
         "twin/study/axes.py",
         ("    | Normal,\n", "    | Normal\n    | Triangular,\n"),
-        "from spheretwin.study.axes.triangular import Triangular\n",
     ),
     "allocation": Addition(
         "control/allocation/halved.py",

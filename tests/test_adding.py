@@ -4,10 +4,10 @@ What is added here is what CONTRIBUTING.md says. Nothing else of the copy is tou
 a third place to be told of a new member fails here, be it in a test that every member of the family passes.
 """
 
+import ast
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,11 +16,9 @@ import numpy as np
 import pytest
 
 from tests.additions import ADDITIONS
+from tests.package_copy import copy_package
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("models", "control", "viz", "twin")
-
-
 ALONE = """
 import sys
 
@@ -41,13 +39,13 @@ DRAWN = """
 import numpy as np
 
 def drawn_numbers():
-    from spheretwin.twin import scenario as scenarios
-    from spheretwin.twin.electronics.driving.chain import drive_chain
-    from spheretwin.twin.electronics.sensing.chain import noise_streams, sense, sensor_chain
-    from spheretwin.twin.electronics.sensing.noise import noise_table
-    from spheretwin.twin.faults.plan import FaultPlan
-    from spheretwin.twin.session import Session
-    from spheretwin.twin.wiring.wires import fault_streams
+    from spheretwin import scenario as scenarios
+    from spheretwin.electronics.drive_chain import drive_chain
+    from spheretwin.electronics.random_streams import noise_table
+    from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
+    from spheretwin.faults.schedule import FaultPlan
+    from spheretwin.shared_buffers import fault_streams
+    from spheretwin.session import Session
 
     faults = [
         {"target": "adc", "mode": "noise", "value": 1e-3},
@@ -83,16 +81,16 @@ folder = Path(sys.argv[1])
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.twin import cli
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.scenario import flags
-from spheretwin.twin.crosscheck import page, suite
-from spheretwin.twin.crosscheck.part import Evidence, Subject
+from spheretwin import cli
+from spheretwin import scenario as scenarios
+from spheretwin.scenario import reading as flags
+from spheretwin.crosscheck import suite
+from spheretwin.crosscheck.part import Evidence, Subject
 from spheretwin.models import actuator as actuators
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.twin.records.facts import facts_of
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
+from spheretwin.run import facts_of
+from spheretwin.session import Session
+from spheretwin.simulation import follow
 
 (folder / "new.toml").write_text('''
 name = "new"
@@ -156,11 +154,10 @@ with Session(scenario) as session:
 
 part = suite.PARTS[-1]
 evidence = Evidence({part.name: part.examine(Subject(actuators.MJCF_PATH, actuators.load(), 10))})
-from spheretwin.twin.crosscheck.figures.registry import FIGURES
-page.FIGURES = FIGURES[-1:]
-page.write(folder, evidence, {"none": "1"})
+suite.FIGURES = suite.FIGURES[-1:]
+suite.write(folder, evidence, {"none": "1"})
 table = read_parquet(parquet)[0]
-from spheretwin.twin.electronics.streams import errors
+from spheretwin.electronics.random_streams import errors
 
 print("RESULT" + json.dumps({
     "code": code, "helped": helped, "refused": refused, "status": str(Status("bored")),
@@ -171,7 +168,7 @@ print("RESULT" + json.dumps({
     "carried": table["current_A"].tolist(), "random": drawn_numbers(),
     "largest": table["largest_current_A"].tolist(), "q_ref": table["q_ref_rad"][-1].tolist(),
     "disturbance": table["disturbance_Nm"][:, 1].tolist(), "current": abs(table["current_command_A"]).max(),
-    "page": (folder / page.PAGE).read_text(), "figure": (folder / "names.png").stat().st_size,
+    "page": (folder / suite.PAGE).read_text(), "figure": (folder / "names.png").stat().st_size,
     "recording": (folder / "n.rrd").stat().st_size,
     "reproduced": reproduced, "experiments": (folder / "page" / "reproduce.md").read_text(),
 }))
@@ -183,16 +180,23 @@ print("RESULT" + json.dumps({
 def folder(tmp_path_factory):
     """Where the copy is, with its new members."""
     folder = tmp_path_factory.mktemp("grown")
-    package = folder / "spheretwin"
-    for name in FOLDERS:
-        shutil.copytree(ROOT / name, package / name, ignore=shutil.ignore_patterns("__pycache__"))
+    package = copy_package(folder)
     for addition in ADDITIONS.values():
-        if addition.file:
-            assert not (package / addition.file).exists()
-            (package / addition.file).write_text('"""New."""\n' + addition.text)
-        registry = package / addition.registry
+        registry = package / addition.registry.removeprefix("twin/")
         text, (old, new) = registry.read_text(), addition.row
         assert text.count(old) == 1, f"{addition.registry} has no row {old!r}"
+        if addition.file:
+            file = package / addition.file.removeprefix("twin/")
+            file.write_text((file.read_text() if file.exists() else '"""New."""\n') + "\n" + addition.text)
+        else:
+            lists = next(
+                statement
+                for statement in ast.parse(text).body
+                if old in "".join(text.splitlines(keepends=True)[statement.lineno - 1 : statement.end_lineno])
+            )
+            lines = text.splitlines(keepends=True)
+            lines.insert(lists.lineno - 1, addition.text + "\n\n")
+            text = "".join(lines)
         text = text.replace(old, new)
         first = text.find("\nfrom spheretwin")
         registry.write_text(text[: first + 1] + addition.imported + text[first + 1 :])

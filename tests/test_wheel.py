@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.package_copy import INSTALLED_AS
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -39,13 +41,13 @@ def test_only_top_level_name_is_spheretwin(names):
 def test_data_files_come_along(names):
     for name in (
         "models/actuator.xml", "models/scene.xml", "models/torque_curve.csv", "models/README.md",
-        "models/assets/coil.obj", "models/py.typed", "twin/scenario/shipped/nutation.toml",
-        "twin/plant/mujoco_rotor.py", "twin/cli/simulate.py",
+        "models/assets/coil.obj", "models/py.typed", "scenario/shipped/nutation.toml",
+        "plant/mujoco_rotor.py", "cli/simulate.py", "paper/rivals_ideal.json", "py.typed",
     ):  # fmt: skip
         assert f"spheretwin/{name}" in names
 
 
 def test_every_source_file_is_packed(names):
-    for folder in ("models", "control", "viz", "twin"):
-        for path in (ROOT / folder).rglob("*.py"):
-            assert f"spheretwin/{path.relative_to(ROOT)}" in names
+    for source, place in INSTALLED_AS.items():
+        for path in (ROOT / source).rglob("*.py"):
+            assert str(Path("spheretwin", place, path.relative_to(ROOT / source))) in names

@@ -330,9 +330,14 @@ COMPARED_QUANTITIES = (
                _entry("q_rad", i), _entry("q_ref_rad", i)) for i, axis in enumerate(ANGLES)),
     *(ComparedQuantity(f"sliding_{axis}_rad_s", f"sliding of {axis}", "rad/s", "sliding", ("sliding_s",),
                _entry("sliding_s", i)) for i, axis in enumerate(ANGLES)),
-    ComparedQuantity("torque_asked_Nm", "torque asked", "N·m", "effort", ("torque_command_Nm",), _asked_Nm),
-    ComparedQuantity("largest_current_A", "top current", "A", "effort", ("current_A",), _largest("current_A")),
-    ComparedQuantity("torque_margin", "torque margin", "1", "effort", ("current_command_A", "allocation_scale"),
+    ComparedQuantity(
+        "torque_asked_Nm", "torque asked", "N·m", "effort", ("torque_command_Nm",), _asked_Nm
+    ),
+    ComparedQuantity(
+        "largest_current_A", "top current", "A", "effort", ("current_A",), _largest("current_A")
+    ),
+    ComparedQuantity("torque_margin", "torque margin", "1", "effort",
+             ("current_command_A", "allocation_scale"),
              _column(MARGIN.values), limits=(-0.05 * MOST, 1.05 * MOST)),
     ComparedQuantity("torque_delivered_Nm", "torque delivered on the hinges", "N·m", "more",
              ("q_rad", "torque_Nm"), _delivered_Nm),

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.files import whole_file
 
-COMPILED_PACKAGES = ("spheretwin.models", "spheretwin.control", "spheretwin")
+WITHOUT_COMPILED_CODE = ("analysis", "bench", "cli", "study", "viz")
+"""Folders of the package whose sources no compiled function depends on."""
 
 
 def cache_folder() -> Path | None:
@@ -117,7 +118,10 @@ def sources_digest() -> str:
 
 
 def _sources() -> Iterator[Path]:
-    for package in COMPILED_PACKAGES:
-        found = importlib.util.find_spec(package)
-        for folder in (found.submodule_search_locations or ()) if found else ():
-            yield from sorted(Path(folder).rglob("*.py"))
+    folders = {"spheretwin": WITHOUT_COMPILED_CODE, "spheretwin.models": (), "spheretwin.control": ()}
+    for package, excluded in folders.items():
+        spec = importlib.util.find_spec(package)
+        for folder in map(Path, (spec.submodule_search_locations or ()) if spec else ()):
+            yield from sorted(
+                p for p in folder.rglob("*.py") if p.relative_to(folder).parts[0] not in excluded
+            )

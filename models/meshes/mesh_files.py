@@ -1,8 +1,8 @@
 """The meshes that the MJCF draws, remade from the numbers it holds.
 
-``python -m spheretwin.models.meshes.mesh_files`` rewrites them; it needs the extra ``meshes``. Solids are built
-and cut by manifold3d, in metres, in the frame of the body that carries them (pole and coil: origin at their
-centre, z outward).
+``python -m spheretwin.models.meshes.mesh_files`` writes them again; it needs the extra ``meshes``. Solids are
+built and cut by manifold3d, in metres, in the frame of the body that carries them (pole and coil: origin at
+their centre, z outward).
 """
 
 from __future__ import annotations

@@ -266,7 +266,7 @@ from spheretwin.control.law import Law
 assert "scipy.signal" not in sys.modules
 from scipy import signal
 Law.from_lti(signal.TransferFunction([1.0], [1.0, 0.5], dt=1e-3))
-import spheretwin.twin.simulation
+import spheretwin.simulation
 assert "control" not in sys.modules
 """
 

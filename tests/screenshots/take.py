@@ -117,7 +117,7 @@ def recorded(picture: Recorded, folder: Path) -> Path:
 
 def spheretwin(*arguments: str | Path) -> None:
     """Run the command; a run that ends early is a picture too."""
-    command = [sys.executable, "-m", "spheretwin.cli", *arguments, "--json"]
+    command = [sys.executable, "-m", "spheretwin", *arguments, "--json"]
     done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
     if "Traceback" in done.stderr or done.returncode == 2:
         raise SystemExit(done.stderr)

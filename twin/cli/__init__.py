@@ -120,7 +120,3 @@ def _parser() -> argparse.ArgumentParser:
     recover.add_recover(verbs)
     magnetics.add_to(verbs)
     return parser
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -75,7 +75,7 @@ def draw_closed_loop(evidence: Evidence) -> Drawing:
     longest = max(pairs.values(), key=lambda pair: len(pair.mujoco))
     errors = {law: (pair.mujoco["error_rad"], pair.lagrangian["error_rad"]) for law, pair in pairs.items()}
     apart = {
-        law: crosscheck.Bounded(pair.difference_rad, closed_loop.STEP_BOUND_rad)
+        law: crosscheck.Bounded(pair.difference_rad, closed_loop.TRACE_BOUND_rad)
         for law, pair in pairs.items()
     }
     titles = {"PD": "PD, load 0.5", "AFSM": "AFSM, load 2"}

@@ -211,7 +211,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "AFSM": {"controller.law": "afsm"},
 }
 
-STEP_BOUND_rad = 1e-9
+TRACE_BOUND_rad = 1e-9
 
 WHY = {
     "PD": "a smooth law takes both runs to the same motion: only rounding and the gimbal rings (1e-12) part"
@@ -279,7 +279,7 @@ def _trace(law: str, pair: Pair) -> Check:
         " hinge angle at any tick",
         states=len(pair.difference_rad),
         value=float(np.max(pair.difference_rad)) if pair.same_end else float("inf"),
-        bound=STEP_BOUND_rad,
+        bound=TRACE_BOUND_rad,
         why=WHY[law],
         unit="rad",
         detail=_figures(pair),
@@ -293,8 +293,8 @@ def _step_size(mjcf: Path, name: str) -> Check:
     same_end = runs[0].status == runs[1].status and len(coarse) == len(fine)
     return Check(
         name=f"closed loop: step size, {name}",
-        compares=f"nutation under AFSM-ESO at {1e3 * LOOP_STEP_s:g} ms with that at {1e3 * FINE_s:g} ms, largest"
-        " difference of any hinge angle at any tick",
+        compares=f"nutation under AFSM-ESO at {1e3 * LOOP_STEP_s:g} ms with that at {1e3 * FINE_s:g} ms,"
+        " largest difference of any hinge angle at any tick",
         states=len(coarse),
         value=float(np.max(np.abs(coarse - fine))) if same_end else float("inf"),
         bound=STEP_BOUND_rad,

@@ -58,7 +58,7 @@ class Failure(NamedTuple):
 
 
 def failures() -> list[Failure]:
-    """Every mode of every part that is not of a group, but modes that need a value and have none in `VALUES`."""
+    """Every mode of every part that all groups share, if it needs no value or has one in `VALUES`."""
     return [
         Failure(part, mode, *VALUES.get((target.name, mode), (None, "")))
         for target in TARGETS.values()

@@ -81,7 +81,8 @@ def causes_section(outcomes: Outcomes) -> Section:
     points = {way.name: _points(by_way[way.name]) for way in (TOLD, BOUNDED) if by_way[way.name]}
     return Section(
         "Why some sets do not track",
-        f"{HOW}{_ranks(by_way)}{_causes_verdict(by_way[TOLD.name], TOLD)}{_causes_verdict(by_way[BOUNDED.name], BOUNDED)}",
+        f"{HOW}{_ranks(by_way)}"
+        f"{_causes_verdict(by_way[TOLD.name], TOLD)}{_causes_verdict(by_way[BOUNDED.name], BOUNDED)}",
         [
             ResultTable(
                 "How well one figure tells the sets that track, each with the first seed",

@@ -78,7 +78,7 @@ def package(tmp_path):
     base.mkdir()
     for folder in (models, base):
         (folder / "__init__.py").write_text("")
-    for name in ("cache.py", "compiled.py", "errors.py", "wording.py", "files.py", "machine_code.py"):
+    for name in ("cache.py", "compiled.py", "errors.py", "files.py", "numba_internals.py"):
         shutil.copy(SOURCE / name, base)
     (models / "callee.py").write_text(
         "from spheretwin.models.base.compiled import compiled\n@compiled\ndef answer():\n    return 41\n"

@@ -124,10 +124,10 @@ def test_telemetry_of_a_killed_process_is_read_and_made_whole(tmp_path, capsys):
 KILLED = """
 import os, signal, sys, time
 from pathlib import Path
-from spheretwin.twin import scenario as scenarios
-from spheretwin.twin.commands.outputs import Outputs
-from spheretwin.twin.session import Session
-from spheretwin.twin.simulation import follow
+from spheretwin import scenario as scenarios
+from spheretwin.outputs import Outputs
+from spheretwin.session import Session
+from spheretwin.simulation import follow
 
 folder = Path(sys.argv[1])
 session = Session(scenarios.load("hold", {"plant.engine": "lagrangian", "duration": 6.0}))

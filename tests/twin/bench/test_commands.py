@@ -252,7 +252,7 @@ def test_a_snapshot_brings_back_a_run_that_has_ended_and_one_before_a_reset(rese
 
 BROKEN = """
 from spheretwin.control.law import Law
-from spheretwin.control.parts.parameters import LawParameters
+from spheretwin.control.law_components.parameters import LawParameters
 
 
 def step(t, reference, measurement, parameters, state, torque):

@@ -15,7 +15,7 @@ import pytest
 
 from spheretwin.models.telemetry.table import read_parquet
 
-COMMAND = [sys.executable, "-m", "spheretwin.cli"]
+COMMAND = [sys.executable, "-m", "spheretwin"]
 
 
 def spheretwin(*arguments):

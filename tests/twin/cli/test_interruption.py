@@ -10,7 +10,7 @@ import pytest
 from spheretwin.models.base.files import OPEN_FILES
 from spheretwin.models.telemetry.table import read_parquet
 
-COMMAND = [sys.executable, "-m", "spheretwin.cli"]
+COMMAND = [sys.executable, "-m", "spheretwin"]
 
 # Each law says on stderr that it hangs: tests wait for that line. Only the first chunk of 1 s is finished.
 LAWS = """
@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 from spheretwin.control.law import Law
-from spheretwin.control.parts.parameters import LawParameters
+from spheretwin.control.law_components.parameters import LawParameters
 
 write = ctypes.CDLL(None).write
 write.argtypes, write.restype = [ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t], ctypes.c_ssize_t

@@ -14,7 +14,7 @@ from spheretwin.models.design import curve_check, direct_summation, pole_torque,
 from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
 
-COMMAND = [sys.executable, "-m", "spheretwin.cli", "magnetics"]
+COMMAND = [sys.executable, "-m", "spheretwin", "magnetics"]
 ASSETS = str(actuators.FOLDER / "assets")
 
 

@@ -10,7 +10,7 @@ from spheretwin import cli
 from spheretwin.cli import reproduce
 from tests.twin.paper.cases import IDEAL, LOST, experiment
 
-COMMAND = [sys.executable, "-m", "spheretwin.cli", "reproduce"]
+COMMAND = [sys.executable, "-m", "spheretwin", "reproduce"]
 
 
 def test_json_stands_alone_and_the_page_is_written(tmp_path):

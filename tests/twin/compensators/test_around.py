@@ -183,7 +183,7 @@ def test_a_file_replays_to_the_same_bytes(tmp_path, capsys):
 
 FILE = """
 from spheretwin.control.law import Law
-from spheretwin.control.parts.parameters import LawParameters
+from spheretwin.control.law_components.parameters import LawParameters
 
 class Mine(LawParameters):
     governor: float = 3.0

@@ -19,9 +19,9 @@ import numpy as np
 
 from spheretwin.control.law import Law
 from spheretwin.models.base.errors import InputError
-from spheretwin.twin import scenario
-from spheretwin.twin.linear.model import linearise
-from spheretwin.twin.simulation import simulate
+from spheretwin import scenario
+from spheretwin.linear import linearise
+from spheretwin.simulation import simulate
 
 generator = np.random.default_rng(3)
 errors = generator.uniform(-1, 1, (40, 2, 3))  # tick, row, axis

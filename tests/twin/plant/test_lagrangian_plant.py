@@ -276,9 +276,9 @@ def test_only_runge_kutta_and_a_payload_on_the_axis_are_known(actuator):
 
 
 SECOND_PROCESS = """
-from spheretwin.twin import loop
-from spheretwin.twin import scenario
-from spheretwin.twin.simulation import simulate
+from spheretwin import loop
+from spheretwin import scenario
+from spheretwin.simulation import simulate
 for engine in ("mujoco", "lagrangian"):
     simulate(scenario.load("hold", {"duration": 0.01, "plant.engine": engine}))
 print(sum(loop.loop.stats.cache_hits.values()), sum(loop.loop.stats.cache_misses.values()))

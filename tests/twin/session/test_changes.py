@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from spheretwin.control.law import Law
-from spheretwin.control.parts.parameters import LawParameters
+from spheretwin.control.law_components.parameters import LawParameters
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 SEEN = (Signal("seen", "N·m", 3, "third row", ANGLES),)

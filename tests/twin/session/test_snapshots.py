@@ -117,8 +117,8 @@ def test_a_session_that_was_changed_is_restored(engine):
 
 CONTINUED = """
 import pickle, sys
-from spheretwin.twin import scenario
-from spheretwin.twin.session import Session
+from spheretwin import scenario
+from spheretwin.session import Session
 with open(sys.argv[1], "rb") as file:
     taken = pickle.load(file)
 other = Session(scenario.load("hold"), law)

@@ -12,7 +12,7 @@ import pytest
 from spheretwin import cli
 from tests.twin.study.cases import found, rows_of, study, table, values
 
-COMMAND = [sys.executable, "-m", "spheretwin.cli", "sweep"]
+COMMAND = [sys.executable, "-m", "spheretwin", "sweep"]
 LOADS = [0.1 * place for place in range(60)]
 MANY = study(values("disturbance.load", *LOADS), law=[{"law": "pd"}], fields={"duration": 2.0})
 SOURCE = f"""

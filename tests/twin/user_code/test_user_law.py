@@ -25,7 +25,7 @@ import numpy as np
 from pydantic import Field
 
 from spheretwin.control.law import Law
-from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each
+from spheretwin.control.law_components.parameters import LawParameters, PositiveEach, each
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
 
 

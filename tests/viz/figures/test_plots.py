@@ -21,10 +21,18 @@ FIGURES = {
     "margins": lambda: crosscheck.margins({"one": 0.5, "two": 2.0, "three": 0.0, "four": np.inf}, "margins"),
     "spreads": lambda: crosscheck.spreads({"engine": {"M": 1e-13 * T}}, {"M": 1e-12}, "spreads"),
     "motion": lambda: crosscheck.motion(T, THREE, 1e-12 * THREE, 1e-8, "motion"),
-    "convergence": lambda: crosscheck.convergence({"RK4": crosscheck.Slope(T[1:6], T[1:6] ** 4, 4.0)}, "order"),
-    "drifts": lambda: crosscheck.drifts(T, {"energy, relative": {"2π": bounded(), "30": bounded(None)}}, "drift"),
+    "convergence": lambda: crosscheck.convergence(
+        {"RK4": crosscheck.Slope(T[1:6], T[1:6] ** 4, 4.0)}, "order"
+    ),
+    "drifts": lambda: crosscheck.drifts(
+        T, {"energy, relative": {"2π": bounded(), "30": bounded(None)}}, "drift"
+    ),
     "closed_loops": lambda: crosscheck.closed_loops(
-        T, {"PD": (THREE, THREE[:30])}, {"PD": crosscheck.Bounded(1e-9 * T[:30], 1e-8)}, ("one", "other"), "loops"
+        T,
+        {"PD": (THREE, THREE[:30])},
+        {"PD": crosscheck.Bounded(1e-9 * T[:30], 1e-8)},
+        ("one", "other"),
+        "loops",
     ),
 }  # fmt: skip
 

@@ -100,7 +100,7 @@ def test_a_viewer_gets_a_hundred_rows_a_second_and_every_event(tmp_path, headles
 def test_a_killed_run_leaves_no_server():
     """Nothing that it started goes on: the kernel closes its ports, and no process has its mark."""
     mark = f"LIVE_MARK_{os.getpid()}"
-    command = [sys.executable, "-m", "spheretwin.cli", "simulate", "hold", "--live", "--duration", "60"]
+    command = [sys.executable, "-m", "spheretwin", "simulate", "hold", "--live", "--duration", "60"]
     command += ["--plant.engine", "lagrangian"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, mark: "1"}

@@ -133,7 +133,7 @@ def test_mesh_that_cannot_be_read_is_bad_input_before_the_run(tmp_path, content)
 LIMITED = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
-from spheretwin.twin.cli import main
+from spheretwin.cli import main
 sys.exit(main(["simulate", "hold", "--duration", "0.5", "--record", sys.argv[2], "--json"]))
 """
 

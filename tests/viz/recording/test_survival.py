@@ -45,7 +45,7 @@ def test_a_reader_that_is_not_there_is_told(tmp_path, monkeypatch):
 
 READ = """
 import sys
-from spheretwin.twin import cli
+from spheretwin import cli
 for path in sys.argv[1:]:
     print(cli.main(["review", path, "--json"]), path, file=sys.stderr)
 """

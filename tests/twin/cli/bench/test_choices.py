@@ -122,7 +122,7 @@ def test_a_law_of_a_persons_own_is_offered_as_it_is_and_nothing_is_made_up(tmp_p
 OWN = """
 from pydantic import Field
 from spheretwin.control.law import Law
-from spheretwin.control.parts.parameters import LawParameters, PositiveEach, each
+from spheretwin.control.law_components.parameters import LawParameters, PositiveEach, each
 
 def step(t, reference, measurement, parameters, state, torque):
     torque[:] = 0.0

@@ -11,7 +11,7 @@ import pytest
 
 from spheretwin import cli
 
-COMMAND = (sys.executable, "-m", "spheretwin.cli", "bench", "hold", "--plant.engine", "lagrangian")
+COMMAND = (sys.executable, "-m", "spheretwin", "bench", "hold", "--plant.engine", "lagrangian")
 
 
 def test_a_port_in_use_is_told_in_one_line(capsys):

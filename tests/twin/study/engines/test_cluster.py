@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -17,6 +16,7 @@ from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study import journal
 from spheretwin.study.engines import engine, ray_cluster, ray_worker
 from spheretwin.study.study import Study, load
+from tests.package_copy import copy_package
 
 ROOT = Path(__file__).parents[4]
 
@@ -189,10 +189,8 @@ sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr
 
 
 def test_a_node_with_other_sources_is_refused_in_one_line(study, machines, wanted, tmp_path):
-    package = tmp_path / "other" / "spheretwin"
-    for name in ("models", "control", "viz", "twin"):
-        shutil.copytree(ROOT / name, package / name, ignore=shutil.ignore_patterns("__pycache__"))
-    with (package / "twin" / "loop.py").open("a") as file:
+    package = copy_package(tmp_path / "other")
+    with (package / "loop.py").open("a") as file:
         file.write("# another one\n")
     (tmp_path / "other" / "sitecustomize.py").write_text(FIRST)
     environment = {"PYTHONPATH": str(tmp_path / "other")}

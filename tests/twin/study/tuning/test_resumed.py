@@ -58,8 +58,8 @@ def test_every_cut_within_one_batch_is_gone_on_with(tmp_path):
 KILLED = """
 import sys
 from pathlib import Path
-from spheretwin.twin.study.study import made
-from spheretwin.twin.study.tuning.running import tuned
+from spheretwin.study.study import made
+from spheretwin.study.tuning.tuning import tuned
 import json
 study = made(json.loads(sys.argv[1]), "known")
 print("ready", flush=True)

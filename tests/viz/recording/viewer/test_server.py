@@ -96,7 +96,7 @@ def test_a_program_that_ends_at_once_is_told(monkeypatch, tmp_path):
 
 KILLED = """
 import subprocess, sys
-from spheretwin.viz.recording.viewer.assets import _SUPERVISED
+from spheretwin.viz.recording.viewer_server import _SUPERVISED
 sleeper = [sys.executable, "-c", "import os, time; print(os.getpid(), flush=True); time.sleep(1000)"]
 subprocess.Popen([sys.executable, "-I", "-S", "-c", _SUPERVISED, *sleeper], stdin=subprocess.PIPE).wait()
 """
