@@ -125,6 +125,9 @@ class Law:
         made = lti.running(name, system, inertia_kg_m2, constant_torque_Nm)
         return cls(name, lti.step, made.parameters, made.state, period_s=made.period_s)
 
+    def __repr__(self) -> str:
+        return f"Law({self.name}: {self.parameters.size} parameters, {self.state.size} state numbers)"
+
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name or not is_plain(self.name):
             raise InputError(f"law: expected a name without control characters, received {shown(self.name)}")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
-from inspect import isabstract
+from inspect import isabstract, unwrap
+from pathlib import Path
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -65,6 +67,23 @@ def _class_of(reference: str, found: Any, digest: str) -> type[LawParameters]:
     kind = cast("type[LawParameters]", made)
     kind.source = digest
     return kind
+
+
+def reference_of(law: Law | None) -> str | None:
+    """Reference ``FILE.py:NAME`` of a law that stands at the top level of an imported module.
+
+    None without a law, or for one that no file holds: made inside a function, typed at a prompt, or defined
+    in the script that runs, which would run again when it is loaded.
+    """
+    if law is None:
+        return None
+    function = unwrap(getattr(law.step, "py_func", law.step))
+    module = sys.modules.get(getattr(function, "__module__", ""))
+    path = getattr(module, "__file__", None)
+    if module is None or path is None or module.__name__ == "__main__":
+        return None
+    names = (name for name, value in vars(module).items() if value is law)
+    return next((f"{Path(path).resolve()}:{name}" for name in names), None)
 
 
 class _FromFile(LawParameters):

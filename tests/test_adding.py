@@ -88,7 +88,7 @@ from spheretwin.crosscheck import suite
 from spheretwin.crosscheck.part import Evidence, Subject
 from spheretwin.models import actuator as actuators
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

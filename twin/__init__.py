@@ -1,1 +1,57 @@
-"""The closed loop, and everything on the far side of the controller."""
+"""Digital twin of a permanent-magnet spherical actuator: simulate, control, record, review, compare.
+
+>>> import spheretwin as st
+>>> run = st.simulate("nutation", {"controller.law": "afsm"})
+>>> run.save("nutation.rrd")
+"""
+
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from spheretwin.analysis.recorded_run import open_run as read
+    from spheretwin.analysis.review import review
+    from spheretwin.bench import Bench
+    from spheretwin.control.law import Law
+    from spheretwin.linear import linearise
+    from spheretwin.run import Run
+    from spheretwin.scenario import load
+    from spheretwin.scenario.sections import Scenario
+    from spheretwin.session import Session
+    from spheretwin.simulation import simulate
+    from spheretwin.study import run as sweep
+
+# Numba, MuJoCo and the rest are imported with the first name that needs them.
+_MODULES = {
+    "simulate": ("spheretwin.simulation", "simulate"),
+    "Session": ("spheretwin.session", "Session"),
+    "load": ("spheretwin.scenario", "load"),
+    "Scenario": ("spheretwin.scenario.sections", "Scenario"),
+    "Law": ("spheretwin.control.law", "Law"),
+    "Run": ("spheretwin.run", "Run"),
+    "linearise": ("spheretwin.linear", "linearise"),
+    "sweep": ("spheretwin.study", "run"),
+    "review": ("spheretwin.analysis.review", "review"),
+    "read": ("spheretwin.analysis.recorded_run", "open_run"),
+    "Bench": ("spheretwin.bench", "Bench"),
+}
+
+__all__ = [
+    "Bench", "Law", "Run", "Scenario", "Session", "__version__", "linearise", "load", "read", "review",
+    "simulate", "sweep",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version("spheretwin")
+    if name not in _MODULES:
+        raise AttributeError(f"module 'spheretwin' has no attribute {name!r}; it has {', '.join(__all__)}")
+    module, attribute = _MODULES[name]
+    value = globals()[name] = getattr(import_module(module), attribute)
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from spheretwin import run
+from spheretwin import provenance
 from spheretwin import scenario as scenarios
 from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.base.user_code import is_reference
+from spheretwin.models.base.user_code import file_of, is_reference
 from spheretwin.models.telemetry.run_record import Change, RunRecord
 from spheretwin.models.telemetry.table import read_parquet
+from spheretwin.scenario import reading
 from spheretwin.scenario.sections import Scenario
 
 
@@ -41,11 +44,35 @@ def read(path: Path) -> Plan:
     except InputError as error:
         raise InputError(f"replay {path}: {error}") from None
     try:
-        return _plan(record, str(path))
+        return _plan(_with_moved_files(record, path.parent), str(path))
     except (KeyError, ValueError, TypeError, AttributeError, OverflowError, RecursionError):
         raise InputError(
             f"replay {path}: expected scenario, journal and ticks of a run, received others"
         ) from None
+
+
+def _with_moved_files(record: RunRecord, folder: Path) -> RunRecord:
+    """Record that names files in `folder` in place of gone or changed ones with the same digests."""
+    moved = {}
+    for path, dotted in provenance.files_of(dict(record.scenario), record.journal):
+        expected, candidate = record.files.get(path), folder / Path(path).name
+        is_gone = expected and provenance.digest(dotted, path) != expected
+        if is_gone and provenance.digest(dotted, str(candidate)) == expected:
+            moved[path] = str(candidate.resolve())
+
+    def place(path: str, dotted: str) -> str:
+        file = file_of(path) if is_reference(path) else path
+        return moved.get(file, file) + path[len(file) :]
+
+    return replace(
+        record,
+        scenario=reading.with_files(copy.deepcopy(dict(record.scenario)), place),
+        journal=tuple(
+            change._replace(value=reading.value_with_files(change.name, change.value, place))
+            for change in record.journal
+        ),
+        files={moved.get(path, path): digest for path, digest in record.files.items()},
+    )
 
 
 def _plan(record: RunRecord, source: str) -> Plan:
@@ -62,14 +89,14 @@ def _plan(record: RunRecord, source: str) -> Plan:
             f" {record.ticks - record.first_tick};"
             " the parts of a run that was killed do not say how far it went"
         )
-    named = run.files_of(scenario.model_dump(mode="json"), record.journal)
+    named = provenance.files_of(scenario.model_dump(mode="json"), record.journal)
     _check_files(named, record.files, source)
     return Plan(scenario, record.ticks, record.journal, record.first_tick)
 
 
 def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | None], source: str) -> None:
     for path, dotted in named:
-        if path in digests and run.digest(dotted, path) != digests[path]:  # older files hold none
+        if path in digests and provenance.digest(dotted, path) != digests[path]:  # older files hold none
             raise InputError(
                 f"replay {source}: expected {dotted} {path} as it was when the run was made,"
                 " received one that is missing or was changed since"

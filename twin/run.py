@@ -1,104 +1,249 @@
-"""What a run says of itself: to whoever follows it, and in its telemetry file."""
+"""One run: its scenario, status, telemetry and figures; saved, recorded, converted."""
 
 from __future__ import annotations
 
-import hashlib
+import html
 import json
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spheretwin.faults.fault_injector import FaultLines
 from spheretwin.metrics import METRICS, Planned
-from spheretwin.models import mjcf
-from spheretwin.models.actuator import MJCF_PATH
-from spheretwin.models.base.errors import InputError, exception_text, shown
-from spheretwin.models.telemetry.run_record import Change, RunFacts, RunRecord, versions
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.errors import InputError, LawError, exception_text, shown
+from spheretwin.models.telemetry.run_record import RunRecord, versions
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.scenario import reading
+from spheretwin.provenance import change_text, facts_of
+from spheretwin.scenario.changes import planned
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
-from spheretwin.simulation import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+    import xarray as xr
+
+TELEMETRY, RECORDING = ".parquet", ".rrd"
 
 
-def facts_of(scenario: ResolvedScenario) -> RunFacts:
-    """What is known of a run from its start.
+@dataclass(frozen=True)
+class Run:
+    """One run and its telemetry.
 
-    Parameters
+    Attributes
     ----------
     scenario : ResolvedScenario
+        Scenario at tick 0, with every default filled in.
+    status : Status
+        ``completed``, or why it ended before.
+    telemetry : Table
+        One row a control tick, up to where the run ended.
+    wall_s : float
+        Wall time of the simulated loop alone, s; not a number for a run that was read from a file.
+    actuator : Actuator
+        Actuator that was simulated.
+    law_error : LawError, optional
+        Exception of a compiled law, which ended the run; one of a law in plain Python is raised.
+    record : RunRecord, optional
+        Provenance: with it, a saved run can be replayed.
     """
-    return RunFacts(
-        name=scenario.name,
-        description=scenario.description,
-        law=scenario.controller.law,
-        duration_s=scenario.duration,
-        current_limit_A=scenario.drive.current_limit_A,
-        payload_kg=scenario.plant.payload_kg,
-        gravity_m_s2=scenario.plant.gravity_m_s2,
-        mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
-        sections=_sections(scenario.model_dump(mode="json")),
-    )
+
+    scenario: ResolvedScenario
+    status: Status
+    telemetry: Table
+    wall_s: float
+    actuator: Actuator
+    law_error: LawError | None = None
+    record: RunRecord | None = None
+
+    @cached_property
+    def figures(self) -> dict[str, Any]:
+        """Metrics by name, as in the JSON of ``simulate``."""
+        return figures_of(self)
+
+    @property
+    def provenance(self) -> RunRecord:
+        """Scenario, changes, files, versions and status: the metadata of a saved run."""
+        scenario = self.scenario.model_dump(mode="json")
+        record = self.record or RunRecord(scenario, (), len(self.telemetry), {}, versions())
+        return replace(record, status=self.status)
+
+    def save(self, path: str | Path) -> Path:
+        """Save the run as telemetry (``.parquet``) or as a Rerun recording (``.rrd``); returns the path.
+
+        Raises
+        ------
+        InputError
+            The name ends in neither, or no file can be made there.
+        SpheretwinError
+            Writing failed; what was there before is untouched.
+        """
+        writers = {TELEMETRY: self.to_parquet, RECORDING: self.to_rrd}
+        if (suffix := Path(path).suffix) not in writers:
+            expected = " or ".join(f"FILE{each}" for each in writers)
+            raise InputError(f"run: expected {expected}, received {shown(str(path))}")
+        return writers[suffix](path)
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write telemetry and provenance, as ``simulate --telemetry`` does; returns the path.
+
+        Raises
+        ------
+        InputError, SpheretwinError
+            As `save`.
+        """
+        self.telemetry.write_parquet(Path(path), self.provenance.metadata())
+        return Path(path)
+
+    def to_rrd(self, path: str | Path) -> Path:
+        """Write a Rerun recording, as ``simulate --record`` does; returns the path.
+
+        Raises
+        ------
+        InputError, SpheretwinError
+            As `save`.
+        """
+        from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
+
+        facts = facts_of(self.scenario)
+        with Recorder(self.actuator, self.telemetry.signals, facts, path=Path(path)) as recorder:
+            if len(self.telemetry):
+                recorder.write(self.telemetry)
+            for t_s, text in self._log():
+                recorder.note(t_s, text)
+            recorder.finish(self.status)
+        return Path(path)
+
+    def to_arrow(self) -> pa.Table:
+        """Return the telemetry as an Arrow table: a fixed-size list for each signal of several numbers."""
+        return self.telemetry.arrow(self.provenance.metadata())
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the telemetry as a DataFrame over ``t_s``, a column for each number: ``q_rad[alpha]``.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return _imported("pandas").DataFrame(
+            dict(self._columns()), index=_imported("pandas").Index(self.telemetry["t_s"], name="t_s")
+        )
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return the telemetry as a polars DataFrame, an Array column for each signal of several numbers.
+
+        Raises
+        ------
+        InputError
+            polars is not installed.
+        """
+        return _imported("polars").from_arrow(self.to_arrow())
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the telemetry as a Dataset over ``t_s``, with units, labels and provenance as attributes.
+
+        Raises
+        ------
+        InputError
+            xarray is not installed.
+        """
+        xarray, t_s, variables = _imported("xarray"), self.telemetry["t_s"], {}
+        for signal in self.telemetry.signals:
+            if signal.name != "t_s":
+                notes = {"units": signal.unit, "long_name": signal.meaning}
+                coordinates: dict[str, Any] = {"t_s": t_s}
+                if signal.size > 1:
+                    coordinates[f"{signal.name}_entry"] = list(signal.labels or map(str, range(signal.size)))
+                values = self.telemetry[signal.name]
+                variables[signal.name] = xarray.DataArray(values, coordinates, list(coordinates), attrs=notes)
+        return xarray.Dataset(variables, attrs=self.provenance.metadata())
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Run: {self._title()}", *(f"  {name}: {value}" for name, value in self._rows())])
+
+    def _repr_html_(self) -> str:
+        """Return title, figures and, if matplotlib is installed, plots over time: for notebooks."""
+        rows = "".join(
+            f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>"
+            for name, value in self._rows()
+        )
+        return f"<h4>{html.escape(self._title())}</h4><table>{rows}</table>{self._plots()}"
+
+    def _plots(self) -> str:
+        if not len(self.telemetry):
+            return ""
+        try:
+            from spheretwin.viz.figures import overview
+        except ModuleNotFoundError:
+            return ""
+        return overview.as_html(overview.overview(self.telemetry, self._title()))
+
+    def _title(self) -> str:
+        simulated_s = len(self.telemetry) * self.scenario.controller.period_s
+        law = self.scenario.controller.law
+        return f"{self.scenario.name} under {law}, {self.status} after {simulated_s:g} s"
+
+    def _rows(self) -> list[tuple[str, str]]:
+        """Metrics as text, those of several axes by the names of the hinges."""
+        return [(name, _text(value)) for name, value in self.figures.items() if value is not None]
+
+    def _columns(self) -> list[tuple[str, Any]]:
+        """Every number of every signal but time, by name and label."""
+        return [
+            (heading, column)
+            for signal in self.telemetry.signals
+            if signal.name != "t_s"
+            for heading, column in zip(
+                signal.headings(), np.atleast_2d(self.telemetry[signal.name].T), strict=True
+            )
+        ]
+
+    def _log(self) -> list[tuple[float, str]]:
+        """Faults, and the changes that the scenario planned or the user made, in the order of time."""
+        record, period_s = self.provenance, self.scenario.controller.period_s
+        changes = [each for each in planned(self.scenario) if each.tick < len(self.telemetry)]
+        lines = [(each.tick * period_s, change_text(each)) for each in (*changes, *record.journal)]
+        return sorted([*lines, *FaultLines().of(self.telemetry)] if len(self.telemetry) else lines)
 
 
-def record_of(session: Session, before: RunRecord | None = None, first_tick: int = 0) -> RunRecord:
-    """What a run says of itself in its telemetry file, but for how it ended.
+def _text(value: Any) -> str:
+    if isinstance(value, list) and len(value) == len(ANGLES):
+        return ", ".join(f"{axis} {_text(each)}" for axis, each in zip(ANGLES, value, strict=True))
+    return f"{value:.4g}" if isinstance(value, float) and math.isfinite(value) else str(value)
 
-    Parameters
-    ----------
-    session : Session
-        The run. Paths are told as they are from the root, so that it can be replayed from any folder.
-    before : RunRecord, optional
-        Record of the same run when it began: what its files held then is what counts.
-    first_tick : int
-        Tick from which on the rows are kept.
+
+def _imported(package: str) -> Any:
+    """Package that is not among the dependencies.
+
+    Raises
+    ------
+    InputError
+        It is not installed.
     """
-    scenario = reading.beside(os.getcwd(), session.begun_as.model_dump(mode="json"))
-    journal = tuple(map(_from_root, session.journal))
-    digests = dict(before.files) if before else {}
-    for path, dotted in files_of(scenario, journal):
-        if path not in digests:
-            digests[path] = digest(dotted, path)
-    return RunRecord(scenario, journal, session.tick, digests, versions(), first_tick=first_tick)
-
-
-def files_of(scenario: dict[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:
-    """Files that a run names at its start or on its way, each with the dotted name of its field."""
-    yield from reading.named_files(scenario)
-    for change in journal:
-        yield from reading.named_files(reading.alone(change.name, change.value))
-
-
-def digest(dotted: str, path: str) -> str | None:
-    """What tells a file from another, for a model with all that it names; None where it cannot be read."""
     try:
-        if dotted == "plant.mjcf":
-            return mjcf.contents_digest(Path(path))
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    except OSError:  # a run that is over must not lose its telemetry by it
-        return None
-
-
-def _from_root(change: Change) -> Change:
-    """A change whose paths, if it holds any, begin at the root."""
-    return change._replace(value=reading.value_beside(os.getcwd(), change.name, change.value))
-
-
-def _sections(fields: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Values by section, what stands outside of any under ``run``; name and description are told apart."""
-    outside = {key: value for key, value in fields.items() if not isinstance(value, Mapping)}
-    inside = {key: dict(value) for key, value in fields.items() if isinstance(value, Mapping)}
-    told_apart = ("name", "description")
-    return {"run": {key: outside[key] for key in outside if key not in told_apart}, **inside}
+        return import_module(package)
+    except ModuleNotFoundError:
+        raise InputError(
+            f"run: expected {package} to be installed (pip install {package}), received none"
+        ) from None
 
 
 OwnMetric = Callable[[Run], Any]
-"""A function of the user's: of a whole run, to anything that JSON holds."""
+"""Function of the user: from a complete run to a value that JSON holds."""
 
-# What the JSON of a run holds beside its metrics.
-BESIDE = (
+# Keys of the JSON of a run that are no metrics.
+OTHER_KEYS = (
     "scenario",
     "status",
     "reason",
@@ -175,8 +320,8 @@ def check_names(own: Mapping[str, OwnMetric]) -> None:
         One has not.
     """
     for name in own:
-        if name in METRICS or name in BESIDE:
-            taken = ", ".join([*METRICS, *BESIDE])
+        if name in METRICS or name in OTHER_KEYS:
+            taken = ", ".join([*METRICS, *OTHER_KEYS])
             raise InputError(f"metric: expected another name than {taken}, received {name}")
 
 

@@ -18,6 +18,7 @@ from spheretwin import loop as loops
 from spheretwin.active_config import at_start
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
+from spheretwin.control.user_law import reference_of
 from spheretwin.inputs import Exogenous
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
@@ -53,6 +54,8 @@ class Session:
     ----------
     begun_as : ResolvedScenario
         The scenario at tick 0; with the journal it says all that has happened.
+    law_reference : str or None
+        ``FILE.py:NAME`` of the law that was given at the start, if a file holds it.
     signals : tuple of Signal
         Columns of the telemetry; a change of law, friction or sensors may change them.
     journal : tuple of Change
@@ -91,6 +94,7 @@ class Session:
         self._status = Status.RUNNING
         self._in_force = at_start(scenario, law, trajectory, files)
         self.begun_as = self.scenario
+        self.law_reference = reference_of(law)
         self._planned = planned(self.begun_as)
         self._exogenous = self._outside()
         self._machine = Machine(self.scenario, self._in_force.files, self._in_force.law)
@@ -272,6 +276,10 @@ class Session:
     def close(self) -> None:
         """End the session: to advance, set, keep or restore it is refused from then on."""
         self._closed = True
+
+    def __repr__(self) -> str:
+        scenario = self.scenario
+        return f"Session({scenario.name} under {scenario.controller.law}: {self.status} at {self.t_s:g} s)"
 
     def __enter__(self) -> Session:
         return self

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
 from spheretwin.faults.fault_injector import FaultLines
-from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import LawError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import KeptTelemetry, Table, allocated
-from spheretwin.scenario.sections import ResolvedScenario, Scenario
+from spheretwin.provenance import change_text, record_of
+from spheretwin.run import Run
+from spheretwin.scenario import load
+from spheretwin.scenario.changes import changed
+from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.trajectories.trajectory import Sampled
 
@@ -40,36 +43,10 @@ class Sink(Protocol):
         """Take note of how the run ended."""
 
 
-@dataclass(frozen=True)
-class Run:
-    """What a run left.
-
-    Attributes
-    ----------
-    scenario : ResolvedScenario
-        In force at the start: what was left open is filled in from the model and the trajectory.
-    status : Status
-        ``completed``, or why it ended before.
-    telemetry : Table
-        One row a control tick, up to where the run ended.
-    wall_s : float
-        Wall time of the simulated loop alone, s.
-    actuator : Actuator
-        What was simulated.
-    law_error : LawError, optional
-        Exception of a compiled law, which ended the run; one of a law in plain Python is raised.
-    """
-
-    scenario: ResolvedScenario
-    status: Status
-    telemetry: Table
-    wall_s: float
-    actuator: Actuator
-    law_error: LawError | None = None
-
-
 def simulate(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
+    changes: Mapping[str, Any] | None = None,
+    *,
     law: Law | None = None,
     sinks: Sequence[Sink] = (),
     trajectory: Sampled | None = None,
@@ -78,8 +55,10 @@ def simulate(
 
     Parameters
     ----------
-    scenario : Scenario
-        From `scenario.load`, or built in Python.
+    scenario : Scenario or str or Path
+        From `scenario.load`, built in Python, the name of a shipped one, or the path of a TOML file.
+    changes : mapping, optional
+        Values by dotted name, such as ``{"controller.law": "pd"}``.
     law : Law, optional
         Runs instead of the law that the scenario names.
     sinks : sequence of Sink
@@ -93,7 +72,9 @@ def simulate(
         The model file, the torque curve, the law or a value of the scenario cannot be used, or the telemetry
         does not fit in memory.
     """
+    scenario = _scenario(scenario, changes or {})
     with Session(scenario, law, trajectory) as session:
+        begun = record_of(session)  # what the files hold when the run starts
         if scenario.event:  # which may change the columns
             kept = KeptTelemetry(session.signals, scenario.ticks)
             status = follow(session, scenario.ticks, [kept, *sinks])
@@ -102,7 +83,23 @@ def simulate(
             log = allocated(scenario.ticks, width(session.signals))
             status = follow(session, scenario.ticks, sinks, log=log)
             telemetry = Table(session.signals, log[: session.tick])
-        return Run(session.begun_as, status, telemetry, session.loop_s, session.actuator, session.law_error)
+        return Run(
+            session.begun_as,
+            status,
+            telemetry,
+            session.loop_s,
+            session.actuator,
+            session.law_error,
+            record_of(session, begun),
+        )
+
+
+def _scenario(given: Scenario | str | Path, changes: Mapping[str, Any]) -> Scenario:
+    if not isinstance(given, Scenario):
+        return load(os.fspath(given), changes)
+    for dotted, value in changes.items():
+        given = changed(given, dotted, value)
+    return given
 
 
 def follow(
@@ -174,13 +171,8 @@ def _note_events(session: Session, noted: int, sinks: Sequence[Sink]) -> int:
     """Tell of the events made since then; returns how many there have been."""
     for change in session.events[noted:]:
         for sink in sinks:
-            sink.note(change.tick * session.scenario.controller.period_s, change_told(change))
+            sink.note(change.tick * session.scenario.controller.period_s, change_text(change))
     return len(session.events)
-
-
-def change_told(change: Change) -> str:
-    """A change as a log has it."""
-    return f"{change.name} set to {change.value}"
 
 
 def _known_to(ticks: int, waiting: Sequence[Change]) -> int:
@@ -194,7 +186,7 @@ def _make(session: Session, ticks: int, waiting: list[Change], sinks: Sequence[S
         change = waiting.pop(0)
         session.set(change.name, change.value)
         for sink in sinks:
-            sink.note(session.t_s, change_told(change))
+            sink.note(session.t_s, change_text(change))
         if session.tick < _known_to(ticks, waiting):
             session.check_horizon(_known_to(ticks, waiting))
 

@@ -69,6 +69,13 @@ class Signal:
                 f"signal {self.name}: expected {self.size} labels or none, received {len(self.labels)}"
             )
 
+    def headings(self) -> list[str]:
+        """Return the heading of each entry: the name, which ends in its unit, and its label or place."""
+        if self.size == 1:
+            return [self.name]
+        labels = self.labels or tuple(map(str, range(self.size)))
+        return [f"{self.name}[{label}]" for label in labels]
+
     def __hash__(self) -> int:
         """Of the name, which Python keeps: what is known of some columns is looked up at every chunk."""
         return hash(self.name)

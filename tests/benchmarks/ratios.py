@@ -29,7 +29,7 @@ from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.mujoco_rotor import Rotor
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.scenario.sections import HARDWARE, Scenario
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate

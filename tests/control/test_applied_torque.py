@@ -92,7 +92,7 @@ def asking(asks=True):
 def test_where_the_model_is_true_it_is_the_torque_of_the_coils(engine):
     """Against G_t(q) times the mean current of the plant, over the whole period."""
     scenario = scenarios.load("hold", {"plant.engine": engine, "duration": 0.1, "plant.step_s": 1e-3})
-    table = simulate(scenario, asking()).telemetry
+    table = simulate(scenario, law=asking()).telemetry
     np.testing.assert_array_equal(table["believed_Nm"][0], 0)
     actuator = Session(scenario).actuator
     for row in range(99):
@@ -106,10 +106,10 @@ def test_where_the_model_is_true_it_is_the_torque_of_the_coils(engine):
 
 def test_what_is_not_asked_for_is_no_number_and_moves_no_bit():
     scenario = scenarios.load("hold", {"duration": 0.1})
-    silent, told = simulate(scenario, asking(asks=False)), simulate(scenario, asking())
+    silent, told = simulate(scenario, law=asking(asks=False)), simulate(scenario, law=asking())
     np.testing.assert_array_equal(silent.telemetry["q_rad"], told.telemetry["q_rad"])
     logging = Law("unasked", asking_step, np.array([0.5, 0.03]), np.zeros(3), BELIEVED)
-    lost = simulate(scenario, logging)
+    lost = simulate(scenario, law=logging)
     assert (lost.status, len(lost.telemetry)) == ("diverged", 0)  # it logs what is no number
 
 

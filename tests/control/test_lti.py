@@ -122,7 +122,7 @@ def test_a_positive_gain_is_the_shipped_pd_law():
     told = {"controller.law": "pd", "controller.level": "torque"}
     gains = {"controller.stiffness": 2.0, "controller.damping": 0.05}
     own, shipped = (
-        simulate(scenarios.load("hold", HOLD), law),
+        simulate(scenarios.load("hold", HOLD), law=law),
         simulate(scenarios.load("hold", HOLD | told | gains)),
     )
     # Products are added in another order; a stable loop does not let that grow.
@@ -154,7 +154,7 @@ lead = Law.from_lti(signal.TransferFunction([20.0, -19.0], [1.0, -0.6], dt={PERI
     own = simulate(scenarios.load("hold", told))
     np.testing.assert_array_equal(
         own.telemetry["q_rad"],
-        simulate(scenarios.load("hold", HOLD), Law.from_lti(LEAD)).telemetry["q_rad"],
+        simulate(scenarios.load("hold", HOLD), law=Law.from_lti(LEAD)).telemetry["q_rad"],
     )
     with pytest.raises(
         InputError, match=r"law lead: expected a control period of 0\.001 s, received 0\.002 s"
@@ -168,14 +168,14 @@ def test_another_period_is_refused_and_changes_nothing():
     late = Law.from_lti(gain([[2.0, 0.05]], dt=5e-4))
     message = r"law lti: expected a control period of 0\.0005 s, received 0\.001 s"
     with pytest.raises(InputError, match=message):
-        simulate(scenarios.load("hold", HOLD), late)
+        simulate(scenarios.load("hold", HOLD), law=late)
     with Session(scenarios.load("hold", HOLD), Law.from_lti(LEAD)) as session:
         with pytest.raises(InputError, match=message):
             session.set("controller.law", late)
         assert session.law.period_s == PERIOD_S
         assert len(session.advance(5).values) == 5
     clocks = {"controller.period_s": 5e-4 * (1 + 1e-15), "plant.step_s": 5e-4}
-    assert simulate(scenarios.load("hold", HOLD | clocks), late).status == "completed"
+    assert simulate(scenarios.load("hold", HOLD | clocks), law=late).status == "completed"
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 20, 1000])

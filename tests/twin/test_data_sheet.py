@@ -336,7 +336,7 @@ def test_a_law_that_overwrites_its_arguments_changes_no_byte():
     changes = {name: value for name, value in WHOLE.items() if name != "controller.law"}
     scenario = scenarios.load("hold", changes)
     tidy, other = (
-        simulate(scenario, Law("own", step, [], [], asks_torque=True)).telemetry
+        simulate(scenario, law=Law("own", step, [], [], asks_torque=True)).telemetry
         for step in (springy, careless)
     )
     assert other.values.tobytes() == tidy.values.tobytes()

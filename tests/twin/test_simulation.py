@@ -20,7 +20,7 @@ from spheretwin.simulation import follow, simulate
 
 def run(name, law=None, **overrides):
     changes = {key.replace("__", "."): value for key, value in overrides.items()}
-    return simulate(scenarios.load(name, changes), law)
+    return simulate(scenarios.load(name, changes), law=law)
 
 
 def largest_error(finished):
@@ -158,7 +158,7 @@ def test_a_plain_python_law_runs_as_a_compiled_one_does():
 def test_the_law_s_state_is_not_shared_between_runs(actuator):
     scenario = scenarios.load("hold", {"duration": 0.1})
     law = scenario.controller.build(Known(1e-3, 0.0, actuator.inertia))
-    first, again = simulate(scenario, law), simulate(scenario, law)
+    first, again = simulate(scenario, law=law), simulate(scenario, law=law)
     np.testing.assert_array_equal(first.telemetry.values, again.telemetry.values)
     np.testing.assert_array_equal(law.state, 0)
 
@@ -174,7 +174,7 @@ def test_a_law_that_loses_its_number_ends_the_run_and_keeps_it():
     def lost(t, reference, measurement, parameters, state, torque):
         torque[:] = 0.0 if t < 0.05 else np.nan
 
-    finished = simulate(scenarios.load("hold"), Law("lost", lost, np.zeros(0), np.zeros(0)))
+    finished = simulate(scenarios.load("hold"), law=Law("lost", lost, np.zeros(0), np.zeros(0)))
     assert finished.status == "diverged"
     assert len(finished.telemetry) == 50
     assert np.all(np.isfinite(finished.telemetry.values))
@@ -241,9 +241,9 @@ def test_a_law_that_raises_is_never_taken_for_one_that_works(step):
     law = Law("raising", step, np.zeros(0), np.zeros(0))
     if step is raising:
         with pytest.raises(ValueError, match="lost"):
-            simulate(scenarios.load("hold"), law)
+            simulate(scenarios.load("hold"), law=law)
     else:
-        finished = simulate(scenarios.load("hold"), law)
+        finished = simulate(scenarios.load("hold"), law=law)
         assert (finished.status, len(finished.telemetry)) == ("diverged", 21)
         assert str(finished.law_error) == (
             "law raising: expected a torque at 0.021 s, received ValueError: lost"
@@ -262,13 +262,13 @@ def scribbling(t, reference, measurement, parameters, state, torque):
 
 def test_a_law_that_writes_no_torque_ends_the_run():
     law = Law("silent", numba.njit(silent), np.zeros(0), np.zeros(0))
-    finished = simulate(scenarios.load("hold"), law)
+    finished = simulate(scenarios.load("hold"), law=law)
     assert (finished.status, len(finished.telemetry)) == ("diverged", 0)
 
 
 def test_a_law_cannot_change_what_is_logged():
     scenario, law = scenarios.load("hold", {"duration": 0.05}), Law("s", scribbling, [], [])
-    first, again = simulate(scenario, law), simulate(scenario, law)
+    first, again = simulate(scenario, law=law), simulate(scenario, law=law)
     np.testing.assert_array_equal(first.telemetry["q_ref_rad"], np.tile([0.2, -0.1, 0.3], (50, 1)))
     np.testing.assert_array_equal(first.telemetry.values, again.telemetry.values)
 
@@ -290,7 +290,7 @@ def test_a_law_whose_parts_do_not_fit_is_bad_input(changes, part):
 def test_a_law_of_another_signature_is_bad_input():
     law = Law("mine", numba.njit(lambda t, torque: None), np.zeros(0), np.zeros(0))
     with pytest.raises(InputError, match="that numba compiles") as caught:
-        simulate(scenarios.load("hold"), law)
+        simulate(scenarios.load("hold"), law=law)
     assert "\n" not in str(caught.value)
 
 

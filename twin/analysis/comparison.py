@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spheretwin.analysis.recorded_run import Reviewed, events
-from spheretwin.analysis.run_summary import amplitudes, of_the_actuator, peaks
+from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
+from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError, shortened, shown
 from spheretwin.models.telemetry.run_record import RunFacts

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import csv
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from spheretwin.active_config import InForce, at_start
 from spheretwin.analysis import recovery
 from spheretwin.analysis.recovery import held, ticks_of
 from spheretwin.faults.fault_injector import FaultLines
@@ -20,11 +22,14 @@ from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.checksums import has_checksums
 from spheretwin.models.telemetry.run_record import Change, RunRecord
-from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Event, Events, Level, Status
 from spheretwin.models.telemetry.table import Table, read_parquet
+from spheretwin.provenance import change_text
+from spheretwin.run import Run
+from spheretwin.scenario import from_record
 from spheretwin.scenario.changes import first_tick, from_now_on
-from spheretwin.simulation import change_told
+from spheretwin.scenario.reading import validated
+from spheretwin.scenario.sections import OwnController
 
 _BETWEEN = " set to "
 
@@ -40,7 +45,7 @@ def logged(
     log: Sequence[Event], scenario: Mapping[str, Any], period_s: float, ticks: int
 ) -> tuple[Change, ...]:
     """Changes that a log tells of and no plan; what was set without a line of the log is not among them."""
-    expected = [(change.tick, change_told(change)) for change in planned(scenario, period_s, ticks)]
+    expected = [(change.tick, change_text(change)) for change in planned(scenario, period_s, ticks)]
     found = []
     for t_s, _, text in log:
         name, between, value = text.partition(_BETWEEN)
@@ -141,6 +146,54 @@ def read(path: Path) -> Reviewed:
         ) from None
 
 
+def open_run(path: str | Path) -> Run:
+    """Open a telemetry file or a recording as a `Run`, which can be saved, recorded and converted again.
+
+    A law or a trajectory whose file is gone does not prevent it: the scenario then has its name alone.
+
+    Raises
+    ------
+    InputError
+        There is no such file, it is no file of a run, or its model or torque curve is gone.
+    """
+    recorded = read(Path(path))
+    start = _start(recorded)
+    status = recorded.record.status or Status.INTERRUPTED
+    actuator = start.files.actuator
+    return Run(start.scenario, status, recorded.every_tick, math.nan, actuator, record=recorded.record)
+
+
+def _start(recorded: Reviewed) -> InForce:
+    """Scenario and files of a run; where the law or the trajectory is gone, they are known by name alone."""
+    fields = recorded.record.scenario
+    try:
+        return at_start(from_record(fields, str(recorded.path)), None, None)
+    except InputError:
+        start = of_the_actuator(recorded)
+    controller = OwnController(
+        law=str(fields["controller"]["law"]), period_s=recorded.period_s, parameters=()
+    )
+    described = {"description": str(fields["description"]), "controller": controller}
+    return start._replace(scenario=start.scenario.model_copy(update=described))
+
+
+def of_the_actuator(run: Reviewed) -> InForce:
+    """Return plant, drive and files of a run; law and trajectory, whose files may be gone, are others.
+
+    Raises
+    ------
+    InputError
+        The scenario is none of this version.
+    """
+    kept = ("name", "duration", "seed", "plant", "drive")
+    fields = {
+        **{name: run.record.scenario[name] for name in kept},
+        "controller": {"law": "pd", "period_s": run.period_s},
+        "trajectory": {"shape": "hold"},
+    }
+    return at_start(validated(fields, str(run.path)), None, None)
+
+
 def _of_telemetry(
     path: Path, table: Table, metadata: dict[str, str], *, whole: bool, checked: bool
 ) -> Reviewed:
@@ -193,7 +246,7 @@ def events(run: Reviewed) -> list[Event]:
         log = Events()
         found = log.of(run.every_tick) if len(run.table) else []
         found += [(t_s, Level.INFO, text) for t_s, text in FaultLines().of(run.every_tick)]
-        found += [(each.tick * run.period_s, Level.INFO, change_told(each)) for each in _changes(run)]
+        found += [(each.tick * run.period_s, Level.INFO, change_text(each)) for each in _changes(run)]
         end = [log.end(ended)] if ended else []
     return [*sorted(found, key=lambda event: (event[0], event[2])), *end]
 
@@ -234,13 +287,5 @@ def export(run: Reviewed, path: Path) -> None:
         return
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([name for signal in run.table.signals for name in headings(signal)])
+        writer.writerow([name for signal in run.table.signals for name in signal.headings()])
         writer.writerows(map(repr, row) for row in run.table.values.tolist())
-
-
-def headings(signal: Signal) -> list[str]:
-    """Heading of each entry of a signal: its name, which ends in its unit, and its label or place."""
-    if signal.size == 1:
-        return [signal.name]
-    labels = signal.labels or tuple(map(str, range(signal.size)))
-    return [f"{signal.name}[{label}]" for label in labels]

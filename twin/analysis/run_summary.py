@@ -7,14 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.active_config import InForce, at_start
-from spheretwin.analysis.recorded_run import Reviewed, events
+from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.metrics import Planned
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.run import Figures
-from spheretwin.scenario.reading import validated
 
 Array = NDArray[np.float64]
 
@@ -176,27 +174,6 @@ def _metrics(run: Reviewed) -> dict[str, Any]:
     gathered = Figures(Planned(scenario, files.actuator, scenario.ticks))
     gathered.write(run.every_tick)
     return gathered.values()
-
-
-def of_the_actuator(run: Reviewed) -> InForce:
-    """Return plant, drive and files of a run; law and trajectory, which may be gone, are others.
-
-    Raises
-    ------
-    InputError
-        It is none of this version's.
-    """
-    return at_start(validated(_what_metrics_take(run), str(run.path)), None, None)
-
-
-def _what_metrics_take(run: Reviewed) -> dict[str, Any]:
-    """The run's scenario without law and trajectory, whose files may be gone: no one runs them."""
-    kept = ("name", "duration", "seed", "plant", "drive")
-    return {
-        **{name: run.record.scenario[name] for name in kept},
-        "controller": {"law": "pd", "period_s": run.period_s},
-        "trajectory": {"shape": "hold"},
-    }
 
 
 def _error_peaks(run: Reviewed) -> list[Any]:

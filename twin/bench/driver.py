@@ -9,7 +9,7 @@ from spheretwin.bench import modes
 from spheretwin.bench.modes import Limits
 from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.table import Table
-from spheretwin.run import record_of
+from spheretwin.provenance import record_of
 from spheretwin.scenario.changes import FAULT, changed, is_fixed
 from spheretwin.scenario.reading import override, validated
 from spheretwin.scenario.sections import Scenario, fields_of_set

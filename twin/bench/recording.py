@@ -8,8 +8,8 @@ from spheretwin.bench.driver import Desk
 from spheretwin.faults.fault_injector import FaultLines
 from spheretwin.models.telemetry.table import Table
 from spheretwin.outputs import Files, Keeping
+from spheretwin.provenance import change_text
 from spheretwin.session import Session
-from spheretwin.simulation import change_told
 
 
 class Recording:
@@ -71,7 +71,7 @@ class Recording:
         if self._present:
             period_s = session.scenario.controller.period_s
             for change in (*session.journal[made:], *session.events[planned:]):
-                self._present.note(change.tick * period_s, change_told(change))
+                self._present.note(change.tick * period_s, change_text(change))
         self.go_on_from(session)
 
     def ending(self, session: Session) -> Callable[..., None] | None:

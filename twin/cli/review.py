@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from spheretwin.analysis import comparison, recorded_run, tolerances
-from spheretwin.analysis.comparison import differences
-from spheretwin.analysis.recorded_run import Reviewed, read
+from spheretwin.analysis.recorded_run import Reviewed
 from spheretwin.analysis.recovery import recover
-from spheretwin.analysis.run_summary import figures
-from spheretwin.analysis.tolerances import Exceeded, exceeded
+from spheretwin.analysis.review import Review, review
+from spheretwin.analysis.tolerances import Exceeded
 from spheretwin.cli.common import print_json, warn
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
@@ -69,17 +68,15 @@ def run_review(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         expected = "--tolerance, --export, --merge, --figures or --json"
         raise InputError(f"command line: expected {expected}, received {' '.join(rest)}")
     _check(options)
-    allowed = tolerances.load(options.tolerance) if options.tolerance else None
-    first, *others = runs = [read(path) for path in options.runs]
-    told = [figures(each) for each in runs]
-    over = [exceeded(first, other, allowed) for other in others] if allowed else []
+    reviewed = review(*options.runs, tolerance=options.tolerance)
+    runs, told, over = reviewed.runs, reviewed.figures, reviewed.exceeded
     if options.export:
-        recorded_run.export(first, options.export)
+        recorded_run.export(runs[0], options.export)
     if options.merge:
         comparison.merge(runs, options.merge)
     page = comparison.write_figures(runs, told, options.figures) if options.figures else None
     if options.json:
-        _print_json(told, over, held=allowed is not None)
+        _print_json(reviewed, held=options.tolerance is not None)
     else:
         reviews.print_runs(told)
         tables.print_written([path for path in (options.export, options.merge, page) if path])
@@ -108,15 +105,15 @@ def _check(options: argparse.Namespace) -> None:
         comparison.check_figures(options.figures)
 
 
-def _print_json(told: list[dict[str, Any]], over: list[list[Exceeded]], *, held: bool) -> None:
+def _print_json(reviewed: Review, *, held: bool) -> None:
     """Print the runs, their differences, and where each first leaves what each signal is allowed."""
-    within = not any(over) if held else None
+    within = not any(reviewed.exceeded) if held else None
     print_json(
         {
-            "runs": told,
-            "differences": differences(told),
+            "runs": reviewed.figures,
+            "differences": reviewed.differences,
             "within_tolerance": within,
-            "exceeded": [place for each in over for place in each],
+            "exceeded": [place for each in reviewed.exceeded for place in each],
         }
     )
 

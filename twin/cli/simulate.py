@@ -25,11 +25,11 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import KeptTelemetry
 from spheretwin.outputs import Outputs
 from spheretwin.replay import Plan
-from spheretwin.run import Figures, OwnMetric, check_names, own_value, summary
+from spheretwin.run import Figures, OwnMetric, Run, check_names, own_value, summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
-from spheretwin.simulation import Run, Sink, follow
+from spheretwin.simulation import Sink, follow
 from spheretwin.viz.layout.view import OVERVIEW, VIEW_NAMES
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import Progress

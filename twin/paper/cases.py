@@ -25,10 +25,11 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Case, Experiment, Outcome, Outcomes
-from spheretwin.run import digest, figures_of
+from spheretwin.provenance import digest
+from spheretwin.run import Run, figures_of
 from spheretwin.scenario.reading import named_files
 from spheretwin.scenario.sections import Scenario
-from spheretwin.simulation import Run, simulate
+from spheretwin.simulation import simulate
 from spheretwin.study.agreement import Ending, compare
 from spheretwin.study.study import FULL, fast_engine
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.simulation import Run
+from spheretwin.run import Run
 from spheretwin.viz.figures.style import Drawing
 
 if TYPE_CHECKING:

@@ -21,8 +21,9 @@ from spheretwin.models.design.capability import LOST, torque_matrices
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper.experiment import Outcome
+from spheretwin.run import Run
 from spheretwin.scenario.sections import Scenario
-from spheretwin.simulation import Run, simulate
+from spheretwin.simulation import simulate
 
 # What is asked for to find out what there is: more is not told from it.
 MOST = 1e3

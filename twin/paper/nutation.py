@@ -27,7 +27,7 @@ from spheretwin.paper.experiment import (
 from spheretwin.paper.experiment import Array as ExperimentArray
 from spheretwin.paper.rows import ended
 from spheretwin.paper.sinusoid import ENDS, RMS, by_hinge, rms, triple
-from spheretwin.simulation import Run
+from spheretwin.run import Run
 from spheretwin.viz.figures.style import Drawing
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from spheretwin.paper.rival_conditions import (
     tuned_gains,
 )
 from spheretwin.paper.rows import ERRORS, figures_named
-from spheretwin.simulation import Run
+from spheretwin.run import Run
 
 OUR_LAW = "afsm_eso"
 LEVEL = 1.05

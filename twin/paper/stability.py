@@ -23,7 +23,7 @@ from spheretwin.paper.experiment import (
     ResultTable,
     Section,
 )
-from spheretwin.simulation import Run
+from spheretwin.run import Run
 from spheretwin.viz.figures.style import Drawing
 
 SCENARIO = "sinusoid"

@@ -19,8 +19,8 @@ from spheretwin.paper.experiment import (
     ResultTable,
     Section,
 )
+from spheretwin.run import Run
 from spheretwin.scenario.sections import Plant
-from spheretwin.simulation import Run
 
 SCENARIOS = ("sinusoid", "nutation", "tilt", "hold")
 SAMPLE_s = 0.01

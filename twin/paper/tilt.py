@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from spheretwin.paper.cases import measured_error
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.rows import ended, of_axis, spread_deg
-from spheretwin.simulation import Run
+from spheretwin.run import Run
 from spheretwin.viz.figures.style import Drawing
 
 

@@ -124,16 +124,17 @@ def with_files(fields: dict[str, Any], told: Callable[[str, str], str]) -> dict[
     for named in files_in(fields, section_kind(Scenario)):
         named.fields[named.name] = told(named.fields[named.name], named.dotted)
     for event in _events(fields):
-        event["value"] = _value_with(event["set"], event["value"], told)
+        event["value"] = value_with_files(event["set"], event["value"], told)
     return fields
 
 
 def value_beside(folder: str, dotted: str, value: Any) -> Any:
     """Value of one field, the paths in it taken from a folder."""
-    return _value_with(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
+    return value_with_files(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
 
 
-def _value_with(dotted: str, value: Any, told: Callable[[str, str], str]) -> Any:
+def value_with_files(dotted: str, value: Any, told: Callable[[str, str], str]) -> Any:
+    """Value of one field with other files; `told` as in `with_files`."""
     inside: Any = with_files(alone(dotted, copy.deepcopy(value)), told)
     for part in dotted.split("."):
         inside = inside[0] if isinstance(inside, list) else inside[part]

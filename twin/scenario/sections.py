@@ -349,6 +349,15 @@ class Scenario(_Section):
         check_gains(self.fault)
         return self
 
+    def __repr__(self) -> str:
+        faults = f", {len(self.fault)} faults" if self.fault else ""
+        return (
+            f"{type(self).__name__}({self.name}: {self.trajectory.shape} under {self.controller.law},"
+            f" {self.hardware} hardware, {self.duration:g} s{faults})"
+        )
+
+    __str__ = __repr__
+
     @property
     def detects(self) -> bool:
         """Whether the controller looks for groups that do not follow."""

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin import run
+from spheretwin import provenance
 from spheretwin.models.base.cache import sources_digest
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 from spheretwin.models.base.user_code import file_of, is_reference
@@ -65,8 +65,8 @@ def _contents(rows: Rows) -> Iterator[Any]:
 
 def _content(path: str, dotted: str) -> str:
     if is_reference(path):
-        return f"{run.digest(dotted, file_of(path))}:{path.rpartition(':')[2]}"
-    return str(run.digest(dotted, path))
+        return f"{provenance.digest(dotted, file_of(path))}:{path.rpartition(':')[2]}"
+    return str(provenance.digest(dotted, path))
 
 
 if sys.platform == "win32":

@@ -23,14 +23,15 @@ from spheretwin.models.base.user_code import is_reference, load_function
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import KeptTelemetry
-from spheretwin.run import OwnMetric, check_names, own_value, record_of
+from spheretwin.provenance import record_of
+from spheretwin.run import OwnMetric, Run, check_names, own_value
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field
 from spheretwin.scenario.files import Files, files_of, named_files
 from spheretwin.scenario.sections import Scenario, left_open, scenario_with
 from spheretwin.session import Session
-from spheretwin.simulation import Run, Sink, follow
+from spheretwin.simulation import Sink, follow
 from spheretwin.study.axes import Axis
 from spheretwin.study.grid import Row, Template, are_numbers, template_of
 from spheretwin.study.study import Study, fast_engine

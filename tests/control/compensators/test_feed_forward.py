@@ -100,7 +100,7 @@ def test_a_rotor_with_friction_coasts_for_ever_where_it_is_fed_forward(share):
         plant__coulomb_Nm=[2e-3] * 3, plant__viscous_Nm_s=[1e-4] * 3,
         controller__feed_forward__friction=share,
     )  # fmt: skip
-    table = simulate(scenario, IDLE, trajectory=Turning()).telemetry
+    table = simulate(scenario, law=IDLE, trajectory=Turning()).telemetry
     gained = table["qdot_rad_s"][-1, 2] - 0.5
     if not share:
         assert gained == pytest.approx(-0.5, abs=1e-3)  # long since at rest
@@ -120,7 +120,7 @@ def test_inertia_alone_follows_a_motion_as_the_period_goes_to_zero():
             "sinusoid", plant__initial_rad_s=[0.2 * np.pi] * 3, duration=0.5, controller__period_s=period_s,
             plant__step_s=period_s / 2, controller__feed_forward__inertia=1.0,
         )  # fmt: skip
-        errors.append(np.abs(simulate(scenario, IDLE).telemetry["error_rad"]).max())
+        errors.append(np.abs(simulate(scenario, law=IDLE).telemetry["error_rad"]).max())
     assert errors[0] < 2e-3
     assert 1.8 < errors[0] / errors[1] < 2.2
 
@@ -133,7 +133,7 @@ def test_a_law_s_account_of_its_own_torque_closes(delay_s, predicted):
         "sinusoid", plant__initial_rad_s=[0.2 * np.pi] * 3, duration=0.3, drive__delay_s=delay_s,
         controller__feed_forward__inertia=1.0, controller__prediction__on=predicted,
     )  # fmt: skip
-    table = simulate(scenario, IDLE).telemetry
+    table = simulate(scenario, law=IDLE).telemetry
     fed = np.abs(table["feed_forward_Nm"]).max()
     np.testing.assert_array_equal(table["torque_command_Nm"], table["feed_forward_Nm"])
     # From where the commands act on; the rotor turns by 2 mrad while one is on its way, and poles are many.

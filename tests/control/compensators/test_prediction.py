@@ -140,7 +140,7 @@ def still_air(**changes):
 
 @pytest.mark.parametrize("periods", [1, 3])
 def test_where_the_model_is_true_it_is_where_the_rotor_will_be(periods):
-    table = simulate(still_air(drive__delay_s=periods * 1e-3), TELLING).telemetry
+    table = simulate(still_air(drive__delay_s=periods * 1e-3), law=TELLING).telemetry
     for predicted, true in (("q_predicted_rad", "q_rad"), ("qdot_predicted_rad_s", "qdot_rad_s")):
         # From 10 ms on: the first command is a jump of the currents, the others are not.
         now, then, found = (each[10:] for each in (table[true][:-periods], table[true][periods:],

@@ -17,7 +17,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.checksums import METADATA, NO_CHECKSUMS
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.outputs import Outputs
-from spheretwin.run import record_of
+from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

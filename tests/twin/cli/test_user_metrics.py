@@ -130,7 +130,7 @@ def test_what_a_function_prints_is_not_among_the_figures(file, capsys):
 def test_a_replayed_run_shows_the_columns_that_came_on_its_way(file, tmp_path, capsys):
     from spheretwin import scenario as scenarios
     from spheretwin.models.telemetry.parquet import TelemetryFile
-    from spheretwin.run import record_of
+    from spheretwin.provenance import record_of
     from spheretwin.session import Session
 
     path = tmp_path / "run.parquet"

@@ -57,7 +57,7 @@ def tilt(**changes):
 
 @pytest.mark.parametrize("mine", LAWS.values(), ids=list(LAWS))
 def test_a_law_of_a_user_s_is_handed_the_governed_reference(mine):
-    run = simulate(tilt(**{"controller.governor.acceleration_rad_s2": 5.0}), mine)
+    run = simulate(tilt(**{"controller.governor.acceleration_rad_s2": 5.0}), law=mine)
     for handed, governed in zip(HANDED, GOVERNED, strict=True):
         np.testing.assert_array_equal(run.telemetry[handed.name], run.telemetry[governed])
     assert np.abs(run.telemetry["qddot_governed_rad_s2"]).max() == 5.0
@@ -66,7 +66,7 @@ def test_a_law_of_a_user_s_is_handed_the_governed_reference(mine):
 @pytest.mark.parametrize("mine", LAWS.values(), ids=list(LAWS))
 def test_every_part_works_around_it(mine):
     """What is fed forward is added, and what is governed is moved on by the delay, as what is measured is."""
-    table = simulate(tilt(**ON), mine).telemetry
+    table = simulate(tilt(**ON), law=mine).telemetry
     angle, rate, push = (table[name] for name in GOVERNED)
     # A fused product rounds once less.
     np.testing.assert_allclose(table["handed_rad"], angle + 1e-3 * rate + 5e-7 * push, rtol=0, atol=1e-15)

@@ -99,10 +99,10 @@ def no_number(t, reference, measurement, parameters, state, torque):
 @pytest.mark.parametrize("bad", range(len(BAD)))
 def test_a_law_that_gives_no_number(bad):
     law = Law("lost", no_number, np.array([float(bad)]), np.zeros(0))
-    run = simulate(scenario("hold"), law)
+    run = simulate(scenario("hold"), law=law)
     assert failed_safely(run, Reason.COMMAND, 50) == 50
     assert len(run.telemetry) == 51 + RUNDOWN
-    plain = simulate(scenario("hold", **{"watchdog.on": False}), law)
+    plain = simulate(scenario("hold", **{"watchdog.on": False}), law=law)
     assert plain.status == "diverged"
     assert len(plain.telemetry) == 50
 

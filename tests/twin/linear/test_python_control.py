@@ -91,7 +91,7 @@ plant = control.sample_system(model.system, 1e-3)
 gain, _, poles = control.dlqr(plant, np.diag([1e4] * 3 + [1.0] * 3), 10 * np.eye(3))
 assert np.all(np.abs(poles) < 1)
 law = Law.from_lti(control.ss([], [], [], gain, 1e-3), constant_torque_Nm=model.input_at_rest)
-run = simulate(still, law)
+run = simulate(still, law=law)
 assert run.status == "completed"
 # Upright, gravity pulls away in proportion to the angle: a proportional gain goes past, by 0.17 %.
 np.testing.assert_allclose(run.telemetry["q_rad"][-1], [0.2, -0.1, 0.3], rtol=0.01)

@@ -260,7 +260,7 @@ def test_a_plain_python_law_runs_on_both_plants():
     changes = {"duration": 0.1, "plant.payload_kg": PAYLOAD_KG}
     law = Law("mine", proportional, np.zeros(0), np.zeros(0))
     tables = [
-        simulate(scenarios.load("hold", {**changes, "plant.engine": name}), law).telemetry
+        simulate(scenarios.load("hold", {**changes, "plant.engine": name}), law=law).telemetry
         for name in ("mujoco", "lagrangian")
     ]
     # A smooth law: the gimbal rings and rounding, nothing that grows.

@@ -131,7 +131,7 @@ def replayed(path, table):
 def test_a_run_is_what_the_stock_engine_makes_of_its_torques(written, case, parameters):
     path = written(case.edits)
     law = Law("constant", constant_torque, parameters, np.zeros(0))
-    finished = simulate(scenario_of(path), law)
+    finished = simulate(scenario_of(path), law=law)
     assert finished.status == "completed"
     assert np.any(finished.telemetry["torque_Nm"]) == np.any(parameters)
     # No tolerance: the same operations in the same order. A difference of 1e-18 N·m could change the number
@@ -142,7 +142,7 @@ def test_a_run_is_what_the_stock_engine_makes_of_its_torques(written, case, para
 def test_a_law_in_plain_python_meets_the_same_physics(written):
     path = written(models.CASES["frictionloss"].edits)
     law = Law("constant", constant_torque.py_func, TORQUE_Q, np.zeros(0))
-    table = simulate(scenario_of(path), law).telemetry
+    table = simulate(scenario_of(path), law=law).telemetry
     np.testing.assert_allclose(table["q_rad"], replayed(path, table), rtol=0, atol=1e-12)  # as above
 
 

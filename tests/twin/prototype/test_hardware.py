@@ -125,6 +125,6 @@ def test_a_plain_law_runs_under_it_too():
     def step(t, reference, measurement, parameters, state, torque):
         torque[:] = -0.5 * (measurement[0] - reference[0]) - 0.03 * measurement[1]
 
-    run = simulate(prototype(duration=0.05), Law("plain", step, [], []))
+    run = simulate(prototype(duration=0.05), law=Law("plain", step, [], []))
     assert run.status == "completed"
     assert np.isfinite(run.telemetry.values).all()

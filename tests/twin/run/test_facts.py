@@ -6,7 +6,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
-from spheretwin.run import facts_of, record_of
+from spheretwin.provenance import facts_of, record_of
 from spheretwin.session import Session
 
 

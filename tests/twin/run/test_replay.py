@@ -13,7 +13,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.outputs import Outputs
-from spheretwin.run import record_of
+from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

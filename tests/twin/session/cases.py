@@ -7,7 +7,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.law import Law
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.run import record_of
+from spheretwin.provenance import record_of
 from spheretwin.session import Session
 
 SHIPPED, ENGINES = ("pd", "adaptive_fuzzy", "afsm"), ("mujoco", "lagrangian")

@@ -14,7 +14,7 @@ from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.run import record_of
+from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 

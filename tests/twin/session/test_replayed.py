@@ -11,7 +11,7 @@ from spheretwin import cli, replay
 from spheretwin.models.telemetry import parquet as telemetry_file
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.table import read_parquet
-from spheretwin.run import record_of
+from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 

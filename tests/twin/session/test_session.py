@@ -11,7 +11,7 @@ from spheretwin.control.law import Known, Law
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table, read_parquet
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.simulation import follow, simulate
 
 # By its path: the tests are no package.
@@ -87,14 +87,14 @@ def test_beyond_the_workspace_there_are_no_more_rows():
 
 def test_what_a_law_makes_of_its_parameters_does_not_reach_the_next_run():
     law = compiled_law()
-    first = simulate(scenario("hold", duration=0.2), law)
-    again = simulate(scenario("hold", duration=0.2), law)
+    first = simulate(scenario("hold", duration=0.2), law=law)
+    again = simulate(scenario("hold", duration=0.2), law=law)
     assert rows(first.telemetry) == rows(again.telemetry)
     np.testing.assert_array_equal(law.parameters, [0.5, 0.05])
 
 
 def test_a_run_says_whose_law_it_was(tmp_path):
-    finished = simulate(scenario("hold", duration=0.05), compiled_law("cautious"))
+    finished = simulate(scenario("hold", duration=0.05), law=compiled_law("cautious"))
     assert finished.scenario.controller.law == "cautious"
     assert finished.scenario.controller.parameters == (0.5, 0.05)
     assert "sliding_s" not in [signal.name for signal in finished.telemetry.signals]

@@ -215,7 +215,7 @@ def test_sys_exit_in_a_law_does_not_end_the_program_that_simulates():
         sys.exit(0)
 
     with pytest.raises(LawError, match="received SystemExit: 0") as raised:
-        simulate(scenarios.load("hold"), Law("leaves", leaves, [], []))
+        simulate(scenarios.load("hold"), law=Law("leaves", leaves, [], []))
     assert isinstance(raised.value.__cause__, SystemExit)
 
 
@@ -224,7 +224,7 @@ def test_ctrl_c_in_a_law_stays_ctrl_c():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate(scenarios.load("hold"), Law("interrupted", interrupted, [], []))
+        simulate(scenarios.load("hold"), law=Law("interrupted", interrupted, [], []))
 
 
 def test_a_session_that_is_restored_has_no_error_any_more():

@@ -228,7 +228,7 @@ def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):
     def step(t, reference, measurement, parameters, state, torque):
         torque[:] = 0.0
 
-    from spheretwin.run import facts_of
+    from spheretwin.provenance import facts_of
     from spheretwin.viz.recording.recorder import Recorder
 
     law = Law("odd", step, [], np.zeros(3), (Signal("a b", "1", 3, "odd", ANGLES),))

@@ -6,7 +6,7 @@ from rerun.chunk import RrdReader
 
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import COMMON_NAMES, common_signals
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import (

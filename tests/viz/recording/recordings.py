@@ -5,7 +5,7 @@ import pyarrow as pa
 from rerun.chunk import RrdReader
 
 from spheretwin import scenario as scenarios
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from spheretwin.viz.layout.view import TIMELINE

@@ -14,7 +14,7 @@ from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz import theme

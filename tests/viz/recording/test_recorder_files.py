@@ -14,7 +14,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 from spheretwin.viz.layout.view import TELEMETRY

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import width
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.recording import plots

@@ -12,7 +12,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf, torque_curve
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.viz import theme
 from spheretwin.viz.layout.layout import layout

@@ -10,7 +10,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.status import QUIET_S, Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from spheretwin.viz import theme

@@ -10,7 +10,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import Table, read_parquet
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.recording.recorder import Recorder

@@ -13,7 +13,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
-from spheretwin.run import facts_of
+from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import TIMELINE

@@ -1,0 +1,94 @@
+"""Provenance of a run: scenario, changes, files and versions, from which it can be run again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from spheretwin.models import mjcf
+from spheretwin.models.actuator import MJCF_PATH
+from spheretwin.models.telemetry.run_record import Change, RunFacts, RunRecord, versions
+from spheretwin.scenario import reading
+from spheretwin.scenario.sections import OwnController, ResolvedScenario
+from spheretwin.session import Session
+
+
+def facts_of(scenario: ResolvedScenario) -> RunFacts:
+    """What is known of a run from its start.
+
+    Parameters
+    ----------
+    scenario : ResolvedScenario
+    """
+    return RunFacts(
+        name=scenario.name,
+        description=scenario.description,
+        law=scenario.controller.law,
+        duration_s=scenario.duration,
+        current_limit_A=scenario.drive.current_limit_A,
+        payload_kg=scenario.plant.payload_kg,
+        gravity_m_s2=scenario.plant.gravity_m_s2,
+        mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
+        sections=_sections(scenario.model_dump(mode="json")),
+    )
+
+
+def record_of(session: Session, before: RunRecord | None = None, first_tick: int = 0) -> RunRecord:
+    """What a run says of itself in its telemetry file, but for how it ended.
+
+    Parameters
+    ----------
+    session : Session
+        The run. Paths are told as they are from the root, so that it can be replayed from any folder.
+    before : RunRecord, optional
+        Record of the same run when it began: what its files held then is what counts.
+    first_tick : int
+        Tick from which on the rows are kept.
+    """
+    scenario = reading.beside(os.getcwd(), session.begun_as.model_dump(mode="json"))
+    if session.law_reference and isinstance(session.begun_as.controller, OwnController):
+        scenario["controller"]["law"] = session.law_reference
+    journal = tuple(map(_from_root, session.journal))
+    digests = dict(before.files) if before else {}
+    for path, dotted in files_of(scenario, journal):
+        if path not in digests:
+            digests[path] = digest(dotted, path)
+    return RunRecord(scenario, journal, session.tick, digests, versions(), first_tick=first_tick)
+
+
+def files_of(scenario: dict[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:
+    """Files that a run names at its start or on its way, each with the dotted name of its field."""
+    yield from reading.named_files(scenario)
+    for change in journal:
+        yield from reading.named_files(reading.alone(change.name, change.value))
+
+
+def digest(dotted: str, path: str) -> str | None:
+    """What tells a file from another, for a model with all that it names; None where it cannot be read."""
+    try:
+        if dotted == "plant.mjcf":
+            return mjcf.contents_digest(Path(path))
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:  # a run that is over must not lose its telemetry by it
+        return None
+
+
+def _from_root(change: Change) -> Change:
+    """A change whose paths, if it holds any, begin at the root."""
+    return change._replace(value=reading.value_beside(os.getcwd(), change.name, change.value))
+
+
+def _sections(fields: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Values by section, what stands outside of any under ``run``; name and description are told apart."""
+    outside = {key: value for key, value in fields.items() if not isinstance(value, Mapping)}
+    inside = {key: dict(value) for key, value in fields.items() if isinstance(value, Mapping)}
+    told_apart = ("name", "description")
+    return {"run": {key: outside[key] for key in outside if key not in told_apart}, **inside}
+
+
+def change_text(change: Change) -> str:
+    """Return the text of a change in a log."""
+    return f"{change.name} set to {change.value}"

@@ -1,0 +1,61 @@
+"""Overview of one run for a notebook: angles, tracking error and largest current over time."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.table import Table
+from spheretwin.viz.decimation import thinned
+from spheretwin.viz.figures.crosscheck import AXES, DPI, INK, WIDTH_in
+from spheretwin.viz.figures.style import MOST_POINTS, plain
+
+
+def overview(table: Table, title: str) -> Figure:
+    """Draw a run: hinge angles with their references, tracking errors, largest current of all groups.
+
+    Parameters
+    ----------
+    table : Table
+        Telemetry with at least one row.
+    title : str
+    """
+    figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
+    angles, errors, currents = figure.subplots(3, 1, sharex=True)
+    for i, (name, colour) in enumerate(zip(ANGLES, AXES, strict=True)):
+        angles.plot(
+            *_decimated(table, np.degrees(table["q_rad"][:, i])), color=colour, label=name, linewidth=1.1
+        )
+        reference = _decimated(table, np.degrees(table["q_ref_rad"][:, i]))
+        label = "reference" if i == 0 else None
+        angles.plot(*reference, color=INK, label=label, linewidth=0.7, linestyle=(0, (4, 3)))
+        errors.plot(
+            *_decimated(table, 1e3 * table["error_rad"][:, i]), color=colour, label=name, linewidth=1.1
+        )
+    largest = np.abs(table["current_A"]).max(axis=1)
+    currents.plot(*_decimated(table, largest), color=INK, label="largest of all groups", linewidth=1.1)
+    for panel, heading in ((angles, "angle,\n°"), (errors, "error,\nmrad"), (currents, "current,\nA")):
+        plain(panel, heading)
+        panel.legend(loc="upper right", fontsize="small", ncols=4)
+    angles.set_title(title, fontsize="medium")
+    currents.set_xlabel("time, s")
+    return figure
+
+
+def as_html(figure: Figure) -> str:
+    """Return an image element that holds the figure as PNG."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=DPI / 2, metadata={"Software": None})
+    data = base64.b64encode(content.getvalue()).decode()
+    return f'<img alt="plots of the run" src="data:image/png;base64,{data}">'
+
+
+def _decimated(table: Table, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    few = thinned(values, MOST_POINTS)
+    period_s = float(table["t_s"][1] - table["t_s"][0]) if len(table) > 1 else 0.0
+    t_s = float(table["t_s"][0]) + period_s * few.rows_each * np.arange(len(few.values))
+    return t_s, few.values
