@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import CellType, FunctionType
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.numba_internals import MachineCode
 
+F = TypeVar("F", bound=Callable[..., Any])
+
 COMPILES = not numba.config.DISABLE_JIT
 """Whether functions are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as they are written, to debug them."""
 
@@ -30,7 +32,7 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 _CALLBACKS = "__spheretwin_callbacks__"
 
 
-def compiled(function: Callable[..., Any]) -> Any:
+def compiled(function: F) -> F:
     """Compile a function at its first call and keep the machine code between processes.
 
     The uncompiled function stays reachable with `uncompiled`. The interpreter lock is released while
@@ -40,7 +42,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     return _compiled(function)
 
 
-def allocation_free(function: Callable[..., Any]) -> Any:
+def allocation_free(function: F) -> F:
     """Compile a function, as `compiled` does, that makes no array: it fills those that it is handed.
 
     Nothing in it then needs its references counted, which would be a third of the loop's own time: each
@@ -49,7 +51,7 @@ def allocation_free(function: Callable[..., Any]) -> Any:
     return _compiled(function, _nrt=False)
 
 
-def rounding_each(function: Callable[..., Any]) -> Any:
+def rounding_each(function: F) -> F:
     """Compile a function, as `allocation_free` does, with each product and each sum rounded by itself.
 
     For what has to be the same to the last bit as what NumPy makes of the same numbers.
@@ -57,7 +59,7 @@ def rounding_each(function: Callable[..., Any]) -> Any:
     return _compiled(function, _nrt=False, fastmath=False)
 
 
-def part_of_its_caller(function: Callable[..., Any]) -> Any:
+def part_of_its_caller(function: F) -> F:
     """Compile a function, as `allocation_free` does, into each compiled function that calls it.
 
     For what is called once a tick or a step with tuples of many arrays: handed over, each array is seven
@@ -264,20 +266,20 @@ def _line_of(error: Exception, function: Callable[..., Any]) -> int | None:
     return location.line if location and Path(location.filename).name == file else None
 
 
-def compilable(function: Callable[..., Any]) -> Any:
+def compilable(function: F) -> F:
     """Leave a function to Python, and make it part of the compiled code that calls it.
 
     For what calls functions of its users: in the uncompiled loop these are plain Python.
     """
-    return register_jitable(_nrt=False, inline="always", **_OPTIONS)(function)
+    return cast("F", register_jitable(_nrt=False, inline="always", **_OPTIONS)(function))
 
 
-def _compiled(function: Callable[..., Any], **more: Any) -> Any:
+def _compiled(function: F, **more: Any) -> F:
     if not COMPILES:
         return function
     dispatcher = numba.njit(nogil=True, **{**_OPTIONS, **more})(function)
     dispatcher._cache = MachineCode(function, "function")  # as its `enable_caching` does with numba's own
-    return dispatcher
+    return cast("F", dispatcher)
 
 
 @allocation_free

@@ -158,7 +158,7 @@ def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
     return {name.decode(): text.decode() for name, text in (metadata or {}).items()}
 
 
-def _signal(field) -> Signal:  # type: ignore[no-untyped-def]
+def _signal(field: pa.Field) -> Signal:
     described = _texts(field.metadata)
     size = getattr(field.type, "list_size", 1)
     labels, states = (tuple(filter(None, text.split(","))) for text in _named(described))
@@ -169,7 +169,7 @@ def _named(described: Mapping[str, str]) -> tuple[str, str]:
     return described["labels"], described.get("states", "")
 
 
-def _flat(column, size: int) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+def _flat(column: pa.ChunkedArray, size: int) -> NDArray[np.float64]:
     chunk = column.combine_chunks()
     return np.asarray(chunk.flatten() if size > 1 else chunk, dtype=np.float64).reshape(-1, size)
 
