@@ -140,23 +140,23 @@ def _ideal(law: str) -> Change:
 
 
 CHANGES = (
-    Change("pd", "stiffness", "830 1/s²", {"controller.stiffness": 830.0}),  # 820: 0.555°, 840: 0.546°
+    Change("pd", "stiffness", "830 1/s²", {"controller.stiffness": 830.0}),  # 820: 0.555°, 840: 0.544°
     _rounding("pd", 0.3),
     _governed("pd"),
     _estimator("pd", "difference", 100.0),
     _true_rates("pd"),
     _ideal("pd"),
-    Change("adaptive_fuzzy", "λ", "130 1/s", {"controller.surface_slope": 130.0}),  # 125: 0.252°, 135: 0.241°
-    Change("adaptive_fuzzy", "K", "43 1/s", {"controller.reaching_gain": 43.0}),  # 42: 0.255°, 44: 0.245°
-    Change("adaptive_fuzzy", "η", "600", {"controller.fuzzy_rate": 600.0}),  # 300: 0.305°, 1000: 0.227°
+    Change("adaptive_fuzzy", "λ", "125 1/s", {"controller.surface_slope": 125.0}),  # 130: 0.244°, 135: 0.239°
+    Change("adaptive_fuzzy", "K", "43 1/s", {"controller.reaching_gain": 43.0}),  # 42: 0.253°, 44: 0.243°
+    Change("adaptive_fuzzy", "η", "600", {"controller.fuzzy_rate": 600.0}),  # 300: 0.298°, 1000: 0.225°
     _rounding("adaptive_fuzzy", 0.16),
     _governed("adaptive_fuzzy"),
     _estimator("adaptive_fuzzy", "difference", 100.0),
     _true_rates("adaptive_fuzzy"),
     _ideal("adaptive_fuzzy"),
-    Change("afsm", "λ", "240 1/s", {"controller.surface_slope": 240.0}),  # 200: 0.135°, 300: 0.137°
-    Change("afsm", "K", "100 1/s", {"controller.reaching_gain": 100.0}),  # 90: 0.125°, 110: 0.118°
-    Change("afsm", "η", "3000", {"controller.fuzzy_rate": 3000.0}),  # 1000: 0.202°
+    Change("afsm", "λ", "260 1/s", {"controller.surface_slope": 260.0}),  # 200: 0.142°, 300: 0.141°
+    Change("afsm", "K", "90 1/s", {"controller.reaching_gain": 90.0}),  # 80: 0.126°, 100: 0.116°
+    Change("afsm", "η", "3000", {"controller.fuzzy_rate": 3000.0}),  # 1000: 0.205°
     _rounding("afsm", 0.16),
     _governed("afsm"),
     _estimator("afsm", "kalman", 1500.0),
