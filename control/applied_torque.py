@@ -17,10 +17,10 @@ from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
 
 # A delay that fits a whole number of periods does so to rounding only.
-WHOLE = 1e-9
+ROUNDING = 1e-9
 
 
-class Lag(NamedTuple):
+class LagStep(NamedTuple):
     """First-order lag over a part of a period, the command held."""
 
     decay: float
@@ -29,15 +29,15 @@ class Lag(NamedTuple):
     """Share of that distance that is left on average."""
 
 
-class Belief(NamedTuple):
+class AppliedTorque(NamedTuple):
     """What the controller believes of the currents."""
 
-    asked: bool
+    on: bool
     """Whether the law wants to know; else nothing of it is computed."""
-    late: float
+    fraction: float
     """Share of a period in which the older command still acts, f."""
-    before: Lag
-    after: Lag
+    older_lag: LagStep
+    newer_lag: LagStep
     commands: NDArray[np.float64]  # (n + 2, groups) A, newest first
     current: NDArray[np.float64]  # (groups,) A, at the end of the last period
     mean: NDArray[np.float64]  # (groups,) A, over it
@@ -49,7 +49,9 @@ class Belief(NamedTuple):
         return self.commands, self.current, self.torque_q
 
 
-def belief(asked: bool, groups: int, period_s: float, delay_s: float, time_constant_s: float) -> Belief:
+def applied_torque(
+    on: bool, groups: int, period_s: float, delay_s: float, time_constant_s: float
+) -> AppliedTorque:
     """Belief at rest: no currents, and none on their way.
 
     Parameters
@@ -61,23 +63,26 @@ def belief(asked: bool, groups: int, period_s: float, delay_s: float, time_const
     period_s, delay_s, time_constant_s : float, s
         Control period, known delay, and lag L/R; 0 for none.
     """
-    whole, late = whole_periods(delay_s if asked else 0.0, period_s)
-    return Belief(
-        asked=asked,
-        late=late,
-        before=lag(late * period_s, time_constant_s),
-        after=lag((1 - late) * period_s, time_constant_s),
+    whole, fraction = split_delay(delay_s if on else 0.0, period_s)
+    return AppliedTorque(
+        on=on,
+        fraction=fraction,
+        older_lag=lag_step(fraction * period_s, time_constant_s),
+        newer_lag=lag_step((1 - fraction) * period_s, time_constant_s),
         commands=np.zeros((whole + 2, groups)),
         current=np.zeros(groups),
         mean=np.zeros(groups),
         torque_S=np.zeros(3),
-        torque_q=np.zeros(3) if asked else np.full(3, np.nan),
+        torque_q=np.zeros(3) if on else np.full(3, np.nan),
     )
 
 
 @allocation_free
-def believe(
-    belief: Belief, pose: NDArray[np.float64], G: NDArray[np.float64], command: NDArray[np.float64]
+def estimate_applied_torque(
+    applied_torque: AppliedTorque,
+    pose: NDArray[np.float64],
+    G: NDArray[np.float64],
+    command: NDArray[np.float64],
 ) -> None:
     """Move the belief on by one control period.
 
@@ -92,7 +97,12 @@ def believe(
     command : (groups,) array, A
         Asked for in this tick.
     """
-    commands, current, mean, late = belief.commands, belief.current, belief.mean, belief.late
+    commands, current, mean, fraction = (
+        applied_torque.commands,
+        applied_torque.current,
+        applied_torque.mean,
+        applied_torque.fraction,
+    )
     last = commands.shape[0] - 1
     for j in range(command.shape[0]):
         for row in range(last, 0, -1):
@@ -100,35 +110,37 @@ def believe(
         commands[0, j] = command[j]
         older, newer = commands[last, j], commands[last - 1, j]
         distance = current[j] - older
-        first = older + belief.before.mean_share * distance
-        distance = older + belief.before.decay * distance - newer
-        mean[j] = late * first + (1.0 - late) * (newer + belief.after.mean_share * distance)
-        current[j] = newer + belief.after.decay * distance
-    rotor_torque(G, mean, belief.torque_S)
-    generalised_torque(pose, belief.torque_S, belief.torque_q)
+        first = older + applied_torque.older_lag.mean_share * distance
+        distance = older + applied_torque.older_lag.decay * distance - newer
+        mean[j] = fraction * first + (1.0 - fraction) * (
+            newer + applied_torque.newer_lag.mean_share * distance
+        )
+        current[j] = newer + applied_torque.newer_lag.decay * distance
+    rotor_torque(G, mean, applied_torque.torque_S)
+    generalised_torque(pose, applied_torque.torque_S, applied_torque.torque_q)
 
 
-def carried_on(before: Belief, belief: Belief) -> None:
+def transfer_applied_torque(previous: AppliedTorque, applied_torque: AppliedTorque) -> None:
     """Go on with what was believed before, under another delay or lag; commands older than any known repeat.
 
     Nothing is known where nobody asked before: what is believed then begins at rest.
     """
-    if before.asked and belief.asked:
-        transfer_state(before, belief)
+    if previous.on and applied_torque.on:
+        transfer_state(previous, applied_torque)
 
 
-def whole_periods(delay_s: float, period_s: float) -> tuple[int, float]:
+def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
     """Whole periods of a delay, and the share of a period beyond them."""
     periods = delay_s / period_s
-    whole = int(periods * (1 + WHOLE) + WHOLE)
+    whole = int(periods * (1 + ROUNDING) + ROUNDING)
     return whole, max(0.0, periods - whole)
 
 
-def lag(duration_s: float, time_constant_s: float) -> Lag:
+def lag_step(duration_s: float, time_constant_s: float) -> LagStep:
     """First-order lag over a duration."""
     if duration_s == 0:
-        return Lag(1.0, 0.0)
+        return LagStep(1.0, 0.0)
     if time_constant_s == 0:
-        return Lag(0.0, 0.0)
+        return LagStep(0.0, 0.0)
     times = duration_s / time_constant_s
-    return Lag(exp(-times), -expm1(-times) / times)
+    return LagStep(exp(-times), -expm1(-times) / times)

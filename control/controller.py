@@ -10,22 +10,22 @@ from numpy.typing import NDArray
 from spheretwin.control import allocation as allocations
 from spheretwin.control import law as laws
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
-from spheretwin.control.applied_torque import Belief, believe
-from spheretwin.control.compensators import Around, prepare
+from spheretwin.control.applied_torque import AppliedTorque, estimate_applied_torque
+from spheretwin.control.compensators import Compensators, apply_compensators
 from spheretwin.control.estimators.estimator import Estimator, estimator_at
-from spheretwin.control.manual_currents import Manual, ask_by_hand
-from spheretwin.control.supervision.enabled_groups import Groups, leave_out
-from spheretwin.control.supervision.fault_detector import Detector, find
+from spheretwin.control.manual_currents import Manual, command_manual_currents
+from spheretwin.control.supervision.enabled_groups import EnabledGroups, mask_disabled_groups
+from spheretwin.control.supervision.fault_detector import Detector, detect_faults
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.compiled import compilable
 from spheretwin.models.base.numba_internals import function_at
 from spheretwin.models.kinematics import cartesian_torque
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, kept_matrix
+from spheretwin.models.magnetics import CachedMatrix, TorqueModel, cached_matrix, update_cached_matrix
 
 # Whatever a law may ask for while it loses the rotor; beyond it the allocation's products would overflow.
 LARGEST_TORQUE_Nm = 1e100
 
-LOST = -1.0
+NO_TORQUE = -1.0
 """Share of the torque that is returned where the law gave none."""
 
 _COMMAND = int(Reason.COMMAND)
@@ -34,10 +34,10 @@ law_at = function_at(laws.SIGNATURE)
 allocation_at = function_at(allocations.SIGNATURE)
 
 
-class Estimates(NamedTuple):
+class EstimatorState(NamedTuple):
     """What rates are estimated with, and what the estimator remembers."""
 
-    made: bool
+    on: bool
     """Whether there is an estimator; if not, the rates are handed over as they come."""
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
@@ -46,7 +46,7 @@ class Estimates(NamedTuple):
 class Supervision(NamedTuple):
     """What looks after the actuator beside the law."""
 
-    groups: Groups
+    groups: EnabledGroups
     detector: Detector
     watchdog: Watchdog
 
@@ -57,17 +57,17 @@ class Controller(NamedTuple):
     parameters: NDArray[np.float64]  # of the law
     memory: NDArray[np.float64]  # state of the law
     magnetics: TorqueModel  # nominal
-    kept: KeptMatrix
+    cached_matrix: CachedMatrix
     current_limit_A: float
     logged: int  # leading entries of the memory that are logged
     torque_q: NDArray[np.float64]  # (3,) N·m, what the law asked for in this tick
     torque_S: NDArray[np.float64]  # (3,) N·m, the same in the stator frame
-    estimates: Estimates
+    estimator_state: EstimatorState
     pose: NDArray[np.float64]  # (3,) rad, as the law is handed it
     rates: NDArray[np.float64]  # (3,) rad/s, likewise
     scratch: NDArray[np.float64]  # of the allocation
-    belief: Belief
-    around: Around
+    applied_torque: AppliedTorque
+    compensators: Compensators
     supervision: Supervision
     manual: Manual
 
@@ -77,8 +77,8 @@ def controller(
     magnetics: TorqueModel,
     current_limit_A: float,
     logged: int,
-    belief: Belief,
-    around: Around,
+    applied_torque: AppliedTorque,
+    compensators: Compensators,
     supervision: Supervision,
     manual: Manual,
     estimator: Estimator | None = None,
@@ -110,12 +110,12 @@ def controller(
         parameters=law.parameters.copy(),
         memory=law.state.copy(),
         magnetics=magnetics,
-        kept=kept_matrix(magnetics),
+        cached_matrix=cached_matrix(magnetics),
         current_limit_A=current_limit_A,
         logged=logged,
         torque_q=np.zeros(3),
         torque_S=np.zeros(3),
-        estimates=Estimates(
+        estimator_state=EstimatorState(
             estimator is not None,
             estimator.parameters.copy() if estimator else np.zeros(0),
             estimator.state.copy() if estimator else np.zeros(0),
@@ -123,8 +123,8 @@ def controller(
         pose=np.zeros(3),
         rates=np.zeros(3),
         scratch=np.empty((SCRATCH_ROWS, groups)),
-        belief=belief,
-        around=around,
+        applied_torque=applied_torque,
+        compensators=compensators,
         supervision=supervision,
         manual=manual,
     )
@@ -169,35 +169,37 @@ def control_tick(
         watchdog is there to take the currents away. Where it does, nothing is asked for, and all of it is
         given.
     """
-    pose, estimates = controller.pose, controller.estimates
-    if estimates.made:
-        estimator_at(estimate)(measurement[0], estimates.parameters, estimates.memory, measurement[1])
+    pose, estimator_state = controller.pose, controller.estimator_state
+    if estimator_state.on:
+        estimator_at(estimate)(
+            measurement[0], estimator_state.parameters, estimator_state.memory, measurement[1]
+        )
     for i in range(3):
         pose[i], controller.rates[i] = measurement[0, i], measurement[1, i]
     watchdog = controller.supervision.watchdog
     if watchdog.on:
         watch(watchdog, pose, controller.rates)
-    keep_torque_matrix(pose, controller.magnetics, controller.kept)
+    update_cached_matrix(pose, controller.magnetics, controller.cached_matrix)
     _supervise(controller, t)
-    asks_law = watchdog.halt[0] == GO and not controller.manual.on
-    if asks_law and not _ask_law(controller, law, t, reference, measurement):
+    law_active = watchdog.halt[0] == GO and not controller.manual.on
+    if law_active and not _call_law(controller, law, t, reference, measurement):
         if not watchdog.on:
-            return LOST
+            return NO_TORQUE
         trip(watchdog, _COMMAND)
     share = 1.0
-    if asks_law and watchdog.halt[0] == GO:
+    if law_active and watchdog.halt[0] == GO:
         share = _allocate(controller, allocate, command)
     else:
-        _ask_nothing(controller, command)
+        _command_zero(controller, command)
         if watchdog.halt[0] == GO:
-            share = ask_by_hand(controller.manual, controller.current_limit_A, command)
-    if controller.belief.asked:
-        believe(controller.belief, pose, controller.kept.G, command)
+            share = command_manual_currents(controller.manual, controller.current_limit_A, command)
+    if controller.applied_torque.on:
+        estimate_applied_torque(controller.applied_torque, pose, controller.cached_matrix.G, command)
     return share
 
 
 @compilable
-def _ask_law(
+def _call_law(
     controller: Controller,
     law: Any,
     t: float,
@@ -205,16 +207,18 @@ def _ask_law(
     measurement: NDArray[np.float64],
 ) -> bool:
     """Let the law write its torque; whether that, and all that it logs and is handed, are numbers."""
-    torque_q, around = controller.torque_q, controller.around
+    torque_q, compensators = controller.torque_q, controller.compensators
     for i in range(3):
         torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
-        measurement[2, i] = controller.belief.torque_q[i]
-    if around.on and not prepare(around, controller.belief, controller.magnetics, measurement, reference):
+        measurement[2, i] = controller.applied_torque.torque_q[i]
+    if compensators.on and not apply_compensators(
+        compensators, controller.applied_torque, controller.magnetics, measurement, reference
+    ):
         return False
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
-    if around.feed.on:
+    if compensators.feed_forward.on:
         for i in range(3):
-            torque_q[i] += around.feed.torque_q[i]
+            torque_q[i] += compensators.feed_forward.torque_q[i]
     for i in range(3):
         if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
             return False
@@ -229,8 +233,8 @@ def _supervise(controller: Controller, t: float) -> None:
     """Look for groups that do not follow, where that is wanted, and while they are driven."""
     groups, detector, watchdog = controller.supervision
     if detector.on and watchdog.halt[0] == GO:
-        G, believed = controller.kept.G, controller.belief.current
-        find(detector, groups, believed, G, controller.pose, controller.rates, t)
+        G, current = controller.cached_matrix.G, controller.applied_torque.current
+        detect_faults(detector, groups, current, G, controller.pose, controller.rates, t)
 
 
 @compilable
@@ -239,21 +243,23 @@ def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64
 
     The allocation is handed a copy of the torque matrix: what it writes reaches nothing else.
     """
-    groups, pose, G = controller.supervision.groups, controller.pose, controller.kept.G
-    if controller.around.prediction.on:
-        pose, G = controller.around.prediction.pose, controller.around.prediction.kept.G
+    groups, pose, G = controller.supervision.groups, controller.pose, controller.cached_matrix.G
+    if controller.compensators.prediction.on:
+        pose, G = controller.compensators.prediction.pose, controller.compensators.prediction.cached_matrix.G
     cartesian_torque(pose, controller.torque_q, controller.torque_S)
-    leave_out(groups, G)
+    mask_disabled_groups(groups, G)
     return allocation_at(allocate)(
         groups.G, controller.torque_S, controller.current_limit_A, command, controller.scratch
     )
 
 
 @compilable
-def _ask_nothing(controller: Controller, command: NDArray[np.float64]) -> None:
+def _command_zero(controller: Controller, command: NDArray[np.float64]) -> None:
     """No torque and no currents; what a law logs stays what it was, unless that is no number."""
     for i in range(3):
-        controller.torque_q[i] = controller.torque_S[i] = controller.around.feed.torque_q[i] = 0.0
+        controller.torque_q[i] = controller.torque_S[i] = controller.compensators.feed_forward.torque_q[i] = (
+            0.0
+        )
     for j in range(command.shape[0]):
         command[j] = 0.0
     for i in range(controller.logged):

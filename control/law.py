@@ -25,7 +25,7 @@ SIGNATURE = types.void(types.float64, _matrix, _matrix, _vector, _vector, _vecto
 SAME_PERIOD = 1e-9
 
 
-class Known(NamedTuple):
+class NominalModel(NamedTuple):
     """What a law is told when it is built: the nominal model, never the plant itself.
 
     Compiled functions of the equations of motion, for use inside a law: `inertia_matrix`, `coriolis_matrix`
@@ -112,7 +112,7 @@ class Law:
         name : str
             For tables and figures.
         inertia_kg_m2 : float or (3,) array, kg·m², optional
-            Where given, as `Known.inertia`, the outputs are accelerations (rad/s²): it multiplies them.
+            Where given, as `NominalModel.inertia`, the outputs are accelerations (rad/s²): it multiplies them.
         constant_torque_Nm : float or (3,) array, N·m
             Added to the outputs: what holds the rotor where the errors are 0.
 

@@ -52,12 +52,12 @@ def manual(section: ManualSection, groups: int) -> Manual:
 
 
 @allocation_free
-def ask_by_hand(manual: Manual, limit_A: float, command: Array) -> float:
+def command_manual_currents(manual: Manual, limit_A: float, command: Array) -> float:
     """Write the currents (n,), A, each cut at a limit; returns the least share that the cut left of one."""
     share = 1.0
     for j in range(command.shape[0]):
-        wanted = manual.currents_A[j]
-        command[j] = min(max(wanted, -limit_A), limit_A)
-        if command[j] != wanted:
-            share = min(share, limit_A / abs(wanted))
+        desired = manual.currents_A[j]
+        command[j] = min(max(desired, -limit_A), limit_A)
+        if command[j] != desired:
+            share = min(share, limit_A / abs(desired))
     return share

@@ -12,8 +12,8 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import Field, create_model
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.law_components.parameters import AROUND, LawParameters, named
+from spheretwin.control.law import Law, NominalModel
+from spheretwin.control.law_components.parameters import COMPENSATORS, LawParameters, named
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.user_code import load_with_digest
 
@@ -50,7 +50,7 @@ def _class_of(reference: str, found: Any, digest: str) -> type[LawParameters]:
         if isabstract(found):
             raise InputError(f"law {reference}: expected a class with build(known), received one without")
         common, own = LawParameters.model_fields, found.model_fields
-        if taken := [name for name in AROUND if own[name].annotation != common[name].annotation]:
+        if taken := [name for name in COMPENSATORS if own[name].annotation != common[name].annotation]:
             raise InputError(f"law {reference}: expected no parameter named {taken[0]}, received one")
         base = found
     elif isinstance(found, Law):
@@ -109,7 +109,7 @@ def _of_law(law: Law) -> type[LawParameters]:
     class OfLaw(LawParameters):
         parameters: tuple[float, ...] = Field(numbers, description=f"numbers handed to {law.name}")
 
-        def build(self, known: Known) -> Law:
+        def build(self, known: NominalModel) -> Law:
             return replace(law, parameters=np.array(self.parameters))
 
     OfLaw.__name__ = law.name

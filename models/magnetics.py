@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator, Coil, Magnet
-from spheretwin.models.base.cache import kept_array
+from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.models.base.errors import InputError, one_line, told_apart
 from spheretwin.models.kinematics import rotation_rows
@@ -186,7 +186,7 @@ def fill_torque_matrix(
         G_z[j] = x * s_y[j] - y * s_x[j]
 
 
-class KeptMatrix(NamedTuple):
+class CachedMatrix(NamedTuple):
     """A torque matrix and the pose it belongs to: at the same pose it need not be filled again."""
 
     q: NDArray[np.float64]  # (3,) rad; NaN as long as nothing is kept
@@ -194,13 +194,13 @@ class KeptMatrix(NamedTuple):
     scratch: NDArray[np.float64]  # (5, lines × n), of `scratch_of`
 
 
-def kept_matrix(model: TorqueModel) -> KeptMatrix:
+def cached_matrix(model: TorqueModel) -> CachedMatrix:
     """Room for the torque matrix of a model, nothing kept as yet."""
-    return KeptMatrix(np.full(3, np.nan), np.empty((3, model.group_axes.shape[1])), scratch_of(model))
+    return CachedMatrix(np.full(3, np.nan), np.empty((3, model.group_axes.shape[1])), scratch_of(model))
 
 
 @part_of_its_caller
-def keep_torque_matrix(q: NDArray[np.float64], model: TorqueModel, kept: KeptMatrix) -> None:
+def update_cached_matrix(q: NDArray[np.float64], model: TorqueModel, cached: CachedMatrix) -> None:
     """Keep the torque matrix at a pose, filled anew only where the pose is another than the kept one.
 
     Parameters
@@ -212,9 +212,9 @@ def keep_torque_matrix(q: NDArray[np.float64], model: TorqueModel, kept: KeptMat
     kept : KeptMatrix
         Changed in place.
     """
-    if not (q[0] == kept.q[0] and q[1] == kept.q[1] and q[2] == kept.q[2]):
-        fill_torque_matrix(q, model, kept.G, kept.scratch)
-        kept.q[0], kept.q[1], kept.q[2] = q[0], q[1], q[2]
+    if not (q[0] == cached.q[0] and q[1] == cached.q[1] and q[2] == cached.q[2]):
+        fill_torque_matrix(q, model, cached.G, cached.scratch)
+        cached.q[0], cached.q[1], cached.q[2] = q[0], q[1], q[2]
 
 
 @allocation_free
@@ -240,7 +240,7 @@ def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S:
 def _kept_table(curve: TorqueCurve) -> NDArray[np.float64]:
     """Look-up table from the cache where possible: the spline is slow to import."""
     samples = curve.phi_rad.tobytes() + curve.torque_Nm_per_A.tobytes()
-    return kept_array(samples, lambda: lookup_table(curve))
+    return cached_array(samples, lambda: lookup_table(curve))
 
 
 def _pole_lines(actuator: Actuator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

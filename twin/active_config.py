@@ -79,7 +79,7 @@ def resolved(
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
             parameters=tuple(law.parameters.tolist()),
-            **scenario.controller.around,
+            **scenario.controller.compensators,
         )
         made = made.model_copy(update={"controller": controller})
     if trajectory:

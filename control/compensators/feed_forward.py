@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.applied_torque import whole_periods
+from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries, triple, turns
@@ -63,13 +63,13 @@ class FeedForward(NamedTuple):
     coulomb_Nm: Array  # (3,) share of the nominal
     viscous_Nm_s: Array  # (3,) likewise
     smoothing_rad_s: float
-    late: float  # share of a period in which the older torque still acts
-    given: Array  # (n + 2, 3) N·m, what was fed forward, newest first
+    fraction: float  # share of a period in which the older torque still acts
+    history: Array  # (n + 2, 3) N·m, what was fed forward, newest first
     torque_q: Array  # (3,) N·m, in this tick
 
     def state_arrays(self) -> tuple[Array, ...]:
         """Arrays that it goes on from."""
-        return self.given, self.torque_q
+        return self.history, self.torque_q
 
 
 class NominalRotor(NamedTuple):
@@ -92,7 +92,7 @@ def feed_forward(
     period_s, delay_s : float, s
         Control period, and the delay that the law is told of.
     """
-    whole, late = whole_periods(delay_s, period_s)
+    whole, fraction = split_delay(delay_s, period_s)
     return FeedForward(
         on=section.on,
         share=np.array(section.inertia),
@@ -100,22 +100,24 @@ def feed_forward(
         coulomb_Nm=np.array(section.friction) * rotor.coulomb_Nm,
         viscous_Nm_s=np.array(section.friction) * rotor.viscous_Nm_s,
         smoothing_rad_s=section.smoothing_rad_s,
-        late=late,
-        given=np.zeros((whole + 2, 3)),
+        fraction=fraction,
+        history=np.zeros((whole + 2, 3)),
         torque_q=np.zeros(3),
     )
 
 
 @allocation_free
-def take_off(feed: FeedForward, torque_q: Array) -> None:
+def subtract_feed_forward(feed: FeedForward, torque_q: Array) -> None:
     """Take what was fed forward off the torque (N·m) that is believed of the last period."""
-    last = feed.given.shape[0] - 1
+    last = feed.history.shape[0] - 1
     for i in range(3):
-        torque_q[i] -= feed.late * feed.given[last, i] + (1.0 - feed.late) * feed.given[last - 1, i]
+        torque_q[i] -= (
+            feed.fraction * feed.history[last, i] + (1.0 - feed.fraction) * feed.history[last - 1, i]
+        )
 
 
 @allocation_free
-def reckon(feed: FeedForward, reference: Array) -> None:
+def compute_feed_forward(feed: FeedForward, reference: Array) -> None:
     """Reckon the torque of this tick.
 
     Parameters
@@ -126,8 +128,8 @@ def reckon(feed: FeedForward, reference: Array) -> None:
         Angle, rate and acceleration as rows.
     """
     q, v, a = triple(reference[0]), triple(reference[1]), triple(reference[2])
-    at, moments = turns(q), triple(feed.inertia)
-    M, C = inertia_entries(at, moments), coriolis_rows(at, v, moments)
+    pose_turns, moments = turns(q), triple(feed.inertia)
+    M, C = inertia_entries(pose_turns, moments), coriolis_rows(pose_turns, v, moments)
     inertial = (
         M.alpha * a[0] + M.alpha_beta * a[1] + M.alpha_gamma * a[2],
         M.alpha_beta * a[0] + M.beta * a[1],
@@ -135,8 +137,8 @@ def reckon(feed: FeedForward, reference: Array) -> None:
     )
     for i in range(3):
         k = feed.viscous_Nm_s[i] + feed.coulomb_Nm[i] / sqrt(v[i] ** 2 + feed.smoothing_rad_s**2)
-        turning = C[i][0] * v[0] + C[i][1] * v[1] + C[i][2] * v[2]
-        feed.torque_q[i] = k * v[i] + feed.share[i] * (inertial[i] + turning)
-        for row in range(feed.given.shape[0] - 1, 0, -1):
-            feed.given[row, i] = feed.given[row - 1, i]
-        feed.given[0, i] = feed.torque_q[i]
+        coriolis = C[i][0] * v[0] + C[i][1] * v[1] + C[i][2] * v[2]
+        feed.torque_q[i] = k * v[i] + feed.share[i] * (inertial[i] + coriolis)
+        for row in range(feed.history.shape[0] - 1, 0, -1):
+            feed.history[row, i] = feed.history[row - 1, i]
+        feed.history[0, i] = feed.torque_q[i]

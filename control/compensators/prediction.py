@@ -6,10 +6,10 @@ knows. Load and friction are left out: over 1 ms the prototype's friction change
 
 *What a law is handed.* Rows 0 to 2 of its measurement (angle, rate, torque over the last period) are those of
 the instant at which its command begins to act, and so are the rows of its reference, moved on by their own
-rate and acceleration. It is told of no delay (`Known.delay_s` is 0): to a law that knows nothing of all this,
+rate and acceleration. It is told of no delay (`NominalModel.delay_s` is 0): to a law that knows nothing of all this,
 also one with an observer of its own, the delay is gone, and angle and torque belong together. One that would
 rather correct its observer by what was measured, and move that on itself, finds it in rows 3 to 5, in the
-same order, with the torque that belongs to it, and in `Known.ahead_s` how far rows 0 to 2 are ahead of them.
+same order, with the torque that belongs to it, and in `NominalModel.ahead_s` how far rows 0 to 2 are ahead of them.
 
 *Allocation.* The currents are found for the pose at which they begin to act.
 
@@ -31,11 +31,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.applied_torque import Belief, Lag, lag
+from spheretwin.control.applied_torque import AppliedTorque, LagStep, lag_step
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.lagrangian import acceleration_entries, triple, turns
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, kept_matrix, rotor_torque
+from spheretwin.models.magnetics import (
+    CachedMatrix,
+    TorqueModel,
+    cached_matrix,
+    rotor_torque,
+    update_cached_matrix,
+)
 
 Array = NDArray[np.float64]
 
@@ -60,23 +66,23 @@ class Prediction(NamedTuple):
     ahead_s: float
     period_s: float
     inertia: Array  # (3,) kg·m², nominal
-    over_a_period: Lag
+    full_lag: LagStep
     pose: Array  # (3,) rad, predicted
     rates: Array  # (3,) rad/s, likewise
-    kept: KeptMatrix  # nominal, at that pose
-    middle: Array  # (3,) rad, pose in the middle of a step
+    cached_matrix: CachedMatrix  # nominal, at that pose
+    midpoint: Array  # (3,) rad, pose in the middle of a step
     current: Array  # (groups,) A, at the end of a step
     mean: Array  # (groups,) A, over it
     torque_S: Array  # (3,) N·m, likewise
     torque_q: Array  # (3,) N·m, the same on the hinges
-    before_q: Array  # (3,) N·m, over the first step that was made in the last tick
+    first_step_torque_q: Array  # (3,) N·m, over the first step that was made in the last tick
 
     def state_arrays(self) -> tuple[Array, ...]:
         """Arrays that it goes on from."""
-        return self.pose, self.rates, self.before_q
+        return self.pose, self.rates, self.first_step_torque_q
 
 
-class Delayed(NamedTuple):
+class DelayModel(NamedTuple):
     """What a prediction reckons with."""
 
     period_s: float
@@ -85,7 +91,7 @@ class Delayed(NamedTuple):
     inertia: Array  # (3,) kg·m²
 
 
-def prediction(section: PredictionSection, delayed: Delayed, magnetics: TorqueModel) -> Prediction:
+def prediction(section: PredictionSection, model: DelayModel, magnetics: TorqueModel) -> Prediction:
     """Prediction with no torque on its way.
 
     Parameters
@@ -98,24 +104,26 @@ def prediction(section: PredictionSection, delayed: Delayed, magnetics: TorqueMo
     groups = magnetics.group_axes.shape[1]
     return Prediction(
         on=section.on,
-        ahead_s=delayed.delay_s,
-        period_s=delayed.period_s,
-        inertia=delayed.inertia,
-        over_a_period=lag(delayed.period_s, delayed.time_constant_s),
+        ahead_s=model.delay_s,
+        period_s=model.period_s,
+        inertia=model.inertia,
+        full_lag=lag_step(model.period_s, model.time_constant_s),
         pose=np.zeros(3),
         rates=np.zeros(3),
-        kept=kept_matrix(magnetics),
-        middle=np.zeros(3),
+        cached_matrix=cached_matrix(magnetics),
+        midpoint=np.zeros(3),
         current=np.zeros(groups),
         mean=np.zeros(groups),
         torque_S=np.zeros(3),
         torque_q=np.zeros(3),
-        before_q=np.zeros(3),
+        first_step_torque_q=np.zeros(3),
     )
 
 
 @allocation_free
-def predict(prediction: Prediction, belief: Belief, magnetics: TorqueModel, measurement: Array) -> bool:
+def predict(
+    prediction: Prediction, applied_torque: AppliedTorque, magnetics: TorqueModel, measurement: Array
+) -> bool:
     """Put what is predicted into the rows of a measurement, and what was measured into those behind them.
 
     Parameters
@@ -140,28 +148,28 @@ def predict(prediction: Prediction, belief: Belief, magnetics: TorqueModel, meas
         for row in range(MEASURED):
             measurement[MEASURED + row, i] = measurement[row, i]
     for j in range(prediction.current.shape[0]):
-        prediction.current[j] = belief.current[j]
-    whole, late, finite = belief.commands.shape[0] - 2, belief.late, True
-    if late > 0.0:
-        command = belief.commands[whole]
-        finite = _step(prediction, magnetics, command, late * prediction.period_s, belief.before)
+        prediction.current[j] = applied_torque.current[j]
+    whole, fraction, finite = applied_torque.commands.shape[0] - 2, applied_torque.fraction, True
+    if fraction > 0.0:
+        command = applied_torque.commands[whole]
+        finite = _step(
+            prediction, magnetics, command, fraction * prediction.period_s, applied_torque.older_lag
+        )
         for i in range(3):
             if whole == 0:  # the period that ends there began within the last one
-                measurement[2, i] += late * (prediction.torque_q[i] - prediction.before_q[i])
-            prediction.before_q[i] = prediction.torque_q[i]
+                measurement[2, i] += fraction * (prediction.torque_q[i] - prediction.first_step_torque_q[i])
+            prediction.first_step_torque_q[i] = prediction.torque_q[i]
     for row in range(whole - 1, -1, -1):
-        command = belief.commands[row]
-        finite = finite and _step(
-            prediction, magnetics, command, prediction.period_s, prediction.over_a_period
-        )
-    finite = finite and _matrix_at(prediction, magnetics, pose)
+        command = applied_torque.commands[row]
+        finite = finite and _step(prediction, magnetics, command, prediction.period_s, prediction.full_lag)
+    finite = finite and _update_matrix(prediction, magnetics, pose)
     for i in range(3):
         if whole > 0:
             measurement[2, i] = prediction.torque_q[i]
         finite = finite and isfinite(rates[i])
     for i in range(3):
         if not finite:
-            pose[i] = rates[i] = prediction.before_q[i] = 0.0
+            pose[i] = rates[i] = prediction.first_step_torque_q[i] = 0.0
         measurement[0, i], measurement[1, i] = pose[i], rates[i]
     return finite
 
@@ -177,25 +185,25 @@ def advance(prediction: Prediction, reference: Array) -> None:
 
 @allocation_free
 def _step(
-    prediction: Prediction, magnetics: TorqueModel, command: Array, duration_s: float, lagging: Lag
+    prediction: Prediction, magnetics: TorqueModel, command: Array, duration_s: float, lag: LagStep
 ) -> bool:
     """Move pose, rates and currents on while one command acts; whether the pose is finite on the way."""
-    q, v, middle = prediction.pose, prediction.rates, prediction.middle
+    q, v, midpoint = prediction.pose, prediction.rates, prediction.midpoint
     for i in range(3):
-        middle[i] = q[i] + 0.5 * duration_s * v[i]
-    if not _matrix_at(prediction, magnetics, middle):
+        midpoint[i] = q[i] + 0.5 * duration_s * v[i]
+    if not _update_matrix(prediction, magnetics, midpoint):
         return False
     for j in range(command.shape[0]):
         distance = prediction.current[j] - command[j]
-        prediction.mean[j] = command[j] + lagging.mean_share * distance
-        prediction.current[j] = command[j] + lagging.decay * distance
-    rotor_torque(prediction.kept.G, prediction.mean, prediction.torque_S)
-    generalised_torque(middle, prediction.torque_S, prediction.torque_q)
+        prediction.mean[j] = command[j] + lag.mean_share * distance
+        prediction.current[j] = command[j] + lag.decay * distance
+    rotor_torque(prediction.cached_matrix.G, prediction.mean, prediction.torque_S)
+    generalised_torque(midpoint, prediction.torque_S, prediction.torque_q)
     torque, inertia = triple(prediction.torque_q), triple(prediction.inertia)
     first = acceleration_entries(turns(triple(q)), triple(v), torque, inertia, 0.0)
     half = 0.5 * duration_s
     between = v[0] + half * first[0], v[1] + half * first[1], v[2] + half * first[2]
-    second = acceleration_entries(turns(triple(middle)), between, torque, inertia, 0.0)
+    second = acceleration_entries(turns(triple(midpoint)), between, torque, inertia, 0.0)
     for i in range(3):
         q[i] += duration_s * between[i]
         v[i] += duration_s * second[i]
@@ -203,10 +211,10 @@ def _step(
 
 
 @allocation_free
-def _matrix_at(prediction: Prediction, magnetics: TorqueModel, pose: Array) -> bool:
+def _update_matrix(prediction: Prediction, magnetics: TorqueModel, pose: Array) -> bool:
     """Keep the torque matrix at a pose, if that is finite."""
     for i in range(3):
         if not isfinite(pose[i]):
             return False
-    keep_torque_matrix(pose, magnetics, prediction.kept)
+    update_cached_matrix(pose, magnetics, prediction.cached_matrix)
     return True

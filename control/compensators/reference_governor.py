@@ -36,7 +36,7 @@ from spheretwin.models.base.compiled import allocation_free, transfer_state
 Array = NDArray[np.float64]
 
 # Share of the acceleration that is left for catching up, however much the desired motion takes.
-LEAST_SPARE = 0.1
+LEAST_SPARE_SHARE = 0.1
 
 
 class GovernorSection(BaseModel):
@@ -63,11 +63,11 @@ class Governor(NamedTuple):
     largest_rad_s2: Array  # (3,)
     period_s: float
     motion: Array  # (3, 3) angle, rate, acceleration as rows: where it is, and what it does from there
-    begun: Array  # (1,) whether it is anywhere
+    started: Array  # (1,) whether it is anywhere
 
     def state_arrays(self) -> tuple[Array, ...]:
         """Arrays that it goes on from."""
-        return self.motion, self.begun
+        return self.motion, self.started
 
 
 def governor(section: GovernorSection, period_s: float) -> Governor:
@@ -97,22 +97,22 @@ def govern(governor: Governor, measurement: Array, reference: Array) -> bool:
     motion, h = governor.motion, governor.period_s
     finite = True
     for axis in range(3):
-        if governor.begun[0] == 0.0:
+        if governor.started[0] == 0.0:
             motion[0, axis], motion[1, axis] = measurement[0, axis], measurement[1, axis]
         else:
             motion[0, axis] += h * (motion[1, axis] + 0.5 * h * motion[2, axis])
             motion[1, axis] += h * motion[2, axis]
-        largest, wanted = governor.largest_rad_s2[axis], reference[2, axis]
-        spare = max(largest - abs(wanted), LEAST_SPARE * largest)
-        ahead, faster = motion[0, axis] - reference[0, axis], motion[1, axis] - reference[1, axis]
-        wanted += fhan(ahead - 0.5 * h * faster, faster, spare, h)
-        motion[2, axis] = min(max(wanted, -largest), largest)
+        largest, acceleration = governor.largest_rad_s2[axis], reference[2, axis]
+        spare = max(largest - abs(acceleration), LEAST_SPARE_SHARE * largest)
+        angle_error, rate_error = motion[0, axis] - reference[0, axis], motion[1, axis] - reference[1, axis]
+        acceleration += fhan(angle_error - 0.5 * h * rate_error, rate_error, spare, h)
+        motion[2, axis] = min(max(acceleration, -largest), largest)
         for row in range(3):
             finite = finite and isfinite(motion[row, axis])
             reference[row, axis] = motion[row, axis]
-    governor.begun[0] = 1.0
+    governor.started[0] = 1.0
     if not finite:
-        governor.begun[0] = 0.0
+        governor.started[0] = 0.0
         for axis in range(3):
             motion[0, axis] = motion[1, axis] = motion[2, axis] = 0.0
     return finite
@@ -133,7 +133,7 @@ def fhan(x: float, v: float, largest: float, h: float) -> float:
     return -largest * min(max(switching / reach, -1.0), 1.0)
 
 
-def carried_on(before: Governor, after: Governor) -> None:
+def transfer_governor(before: Governor, after: Governor) -> None:
     """Go on from where it was, with other figures; one that was off begins at the next tick."""
     if before.on and after.on:
         transfer_state(before, after)

@@ -44,14 +44,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.applied_torque import whole_periods
-from spheretwin.control.law import Known
-from spheretwin.control.law_components.nominal_motion import Motion, Nominal, inertial_torque, moved_on
+from spheretwin.control.applied_torque import split_delay
+from spheretwin.control.law import NominalModel
+from spheretwin.control.law_components.nominal_motion import (
+    RotorModel,
+    RotorMotion,
+    advance_motion,
+    inertial_torque,
+)
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.lagrangian import Triple
 
 
-class Gains(NamedTuple):
+class ObserverGains(NamedTuple):
     """What an innovation corrects on one axis."""
 
     of_angle: float  # l1
@@ -59,15 +64,17 @@ class Gains(NamedTuple):
     of_acceleration: float  # l3, 1/s²
 
 
-class Observed(NamedTuple):
+class ObserverState(NamedTuple):
     """What the observer knows."""
 
-    motion: Motion
+    motion: RotorMotion
     disturbance: Triple  # d̂, N·m
 
 
 @allocation_free
-def observer_gains(bandwidth_rad_s: float, disturbance_bandwidth_rad_s: float, period_s: float) -> Gains:
+def observer_gains(
+    bandwidth_rad_s: float, disturbance_bandwidth_rad_s: float, period_s: float
+) -> ObserverGains:
     """Gains that put two poles at the one bandwidth and one at the other.
 
     Parameters
@@ -80,18 +87,18 @@ def observer_gains(bandwidth_rad_s: float, disturbance_bandwidth_rad_s: float, p
     of_angle = 1.0 - a * a * b
     of_acceleration = (1.0 - a) ** 2 * (1.0 - b) / period_s**2
     of_rate = (3.0 - 2.0 * a - b - of_angle - 0.5 * of_acceleration * period_s**2) / period_s
-    return Gains(of_angle, of_rate, of_acceleration)
+    return ObserverGains(of_angle, of_rate, of_acceleration)
 
 
 @allocation_free
 def observe(
-    before: Observed,
+    before: ObserverState,
     angle: Triple,
     torque: Triple,
-    gains: tuple[Gains, Gains, Gains],
-    nominal: Nominal,
+    gains: tuple[ObserverGains, ObserverGains, ObserverGains],
+    nominal: RotorModel,
     period_s: float,
-) -> Observed:
+) -> ObserverState:
     """What is known one period later.
 
     Parameters
@@ -106,14 +113,14 @@ def observe(
     period_s : float, s
     """
     alpha, beta, gamma = gains
-    predicted = moved_on(before.motion, _sum(torque, before.disturbance), nominal, period_s)
+    predicted = advance_motion(before.motion, _sum(torque, before.disturbance), nominal, period_s)
     (q1, q2, q3), (v1, v2, v3) = predicted.angle, predicted.rate
     i1, i2, i3 = angle[0] - q1, angle[1] - q2, angle[2] - q3
     corrected = (q1 + alpha.of_angle * i1, q2 + beta.of_angle * i2, q3 + gamma.of_angle * i3)
     rate = (v1 + alpha.of_rate * i1, v2 + beta.of_rate * i2, v3 + gamma.of_rate * i3)
     unexplained = (alpha.of_acceleration * i1, beta.of_acceleration * i2, gamma.of_acceleration * i3)
     learnt = inertial_torque(corrected, unexplained, nominal)
-    return Observed(Motion(corrected, rate), _sum(before.disturbance, learnt))
+    return ObserverState(RotorMotion(corrected, rate), _sum(before.disturbance, learnt))
 
 
 @allocation_free
@@ -121,23 +128,23 @@ def _sum(x: Triple, y: Triple) -> Triple:
     return x[0] + y[0], x[1] + y[1], x[2] + y[2]
 
 
-def lateness(known: Known) -> tuple[float, int]:
+def history_layout(known: NominalModel) -> tuple[float, int]:
     """Share of a period in which the older command still acts, and the numbers of memory that it takes."""
-    whole, late = whole_periods(known.delay_s, known.period_s)
-    return late, 3 * (whole + 2)
+    whole, fraction = split_delay(known.delay_s, known.period_s)
+    return fraction, 3 * (whole + 2)
 
 
 @allocation_free
-def asked_before(asked: NDArray[np.float64], axis: int, late: float) -> float:
+def delayed_command(history: NDArray[np.float64], axis: int, fraction: float) -> float:
     """Torque (N·m) on an axis that the last period was asked for."""
-    last = asked.shape[0] - 3
-    return late * asked[last + axis] + (1.0 - late) * asked[last - 3 + axis]
+    last = history.shape[0] - 3
+    return fraction * history[last + axis] + (1.0 - fraction) * history[last - 3 + axis]
 
 
 @allocation_free
-def remember(asked: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
+def store_command(history: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
     """Keep the torque (3,) that is asked for now."""
-    for i in range(asked.shape[0] - 1, 2, -1):
-        asked[i] = asked[i - 3]
+    for i in range(history.shape[0] - 1, 2, -1):
+        history[i] = history[i - 3]
     for axis in range(3):
-        asked[axis] = torque[axis]
+        history[axis] = torque[axis]

@@ -15,13 +15,17 @@ torque beyond the wires, as a drive whose limit is below the nominal one, a cont
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.law_components.extended_state_observer import asked_before, lateness, remember
+from spheretwin.control.law import Law, NominalModel
+from spheretwin.control.law_components.extended_state_observer import (
+    delayed_command,
+    history_layout,
+    store_command,
+)
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 
-def tracking_rate(rate: NDArray[np.float64], known: Known) -> NDArray[np.float64]:
+def tracking_rate(rate: NDArray[np.float64], known: NominalModel) -> NDArray[np.float64]:
     """Rates of back-calculation (1/s), none faster than the tick can follow."""
     return np.minimum(rate, 1 / known.period_s)
 
@@ -29,8 +33,8 @@ def tracking_rate(rate: NDArray[np.float64], known: Known) -> NDArray[np.float64
 Array = NDArray[np.float64]
 
 INTEGRAL_SIGNAL = Signal("integral_torque_Nm", "N·m", 3, "torque of the integral", ANGLES)
-STIFFNESS, DAMPING, INTEGRAL, TRACKING, LATE, PERIOD = 0, 3, 6, 9, 12, 13  # layout of the parameters
-TORQUE, ASKED = 0, 3  # layout of the state
+STIFFNESS, DAMPING, INTEGRAL, TRACKING, FRACTION, PERIOD = 0, 3, 6, 9, 12, 13  # layout of the parameters
+TORQUE, HISTORY = 0, 3  # layout of the state
 
 
 def triple_pole(bandwidth_rad_s: float) -> tuple[float, float, float]:
@@ -38,12 +42,12 @@ def triple_pole(bandwidth_rad_s: float) -> tuple[float, float, float]:
     return 3 * bandwidth_rad_s**2, 3 * bandwidth_rad_s, bandwidth_rad_s**3
 
 
-def tracking(damping: Array, integral: Array, known: Known) -> Array:
+def tracking(damping: Array, integral: Array, known: NominalModel) -> Array:
     """Rates of back-calculation, (3,) in 1/s: √(integral/damping)."""
     return tracking_rate(np.sqrt(integral / damping), known)
 
 
-def feedback(name: str, gains: Array, known: Known) -> Law:
+def feedback(name: str, gains: Array, known: NominalModel) -> Law:
     """Law whose integral starts at 0.
 
     Parameters
@@ -52,12 +56,12 @@ def feedback(name: str, gains: Array, known: Known) -> Law:
     gains : (3, 3) array
         Stiffness, damping and integral as rows, 1/s², 1/s and 1/s³: acceleration a unit of error, of its
         rate and of its integral.
-    known : Known
+    known : NominalModel
     """
-    late, kept = lateness(known)
+    fraction, size = history_layout(known)
     torques = (gains * known.inertia).ravel()
-    parameters = [*torques, *tracking(gains[1], gains[2], known), late, known.period_s]
-    state = np.zeros(ASKED + kept)
+    parameters = [*torques, *tracking(gains[1], gains[2], known), fraction, known.period_s]
+    state = np.zeros(HISTORY + size)
     return Law(name, step, np.array(parameters), state, (INTEGRAL_SIGNAL,), asks_torque=True)
 
 
@@ -65,16 +69,16 @@ def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
     """Write the torque of one control tick, as `control.law.Law` says."""
-    late, period, asked = parameters[LATE], parameters[PERIOD], state[ASKED:]
+    fraction, period, history = parameters[FRACTION], parameters[PERIOD], state[HISTORY:]
     for axis in range(3):
         error = measurement[0, axis] - reference[0, axis]
         error_rate = measurement[1, axis] - reference[1, axis]
-        owed = measurement[2, axis] - asked_before(asked, axis, late)
-        state[TORQUE + axis] += period * parameters[TRACKING + axis] * owed
+        torque_error = measurement[2, axis] - delayed_command(history, axis, fraction)
+        state[TORQUE + axis] += period * parameters[TRACKING + axis] * torque_error
         stiffness, damping = parameters[STIFFNESS + axis], parameters[DAMPING + axis]
         torque[axis] = state[TORQUE + axis] - stiffness * error - damping * error_rate
         state[TORQUE + axis] -= period * parameters[INTEGRAL + axis] * error
-    remember(asked, torque)
+    store_command(history, torque)
 
 
 SLIDING_SIGNAL = Signal("sliding_s", "rad/s", 3, "sliding variable s = λe + ė (30)", ANGLES)

@@ -76,7 +76,7 @@ def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: 
     return output
 
 
-class Restraint(NamedTuple):
+class AdaptationLimits(NamedTuple):
     """What keeps the consequents from drifting."""
 
     dead_zone: float  # of |s|, rad/s
@@ -90,7 +90,7 @@ def approximate_within_bounds(
     angle: float,
     s: float,
     adaptation_rate: float,
-    restraint: Restraint,
+    limits: AdaptationLimits,
     period_s: float,
     consequents: NDArray[np.float64],
 ) -> float:
@@ -109,16 +109,16 @@ def approximate_within_bounds(
     consequents : (75,) array
         theta, changed in place.
     """
-    learnt_from = s if abs(s) > restraint.dead_zone else 0.0
-    drive = -adaptation_rate * learnt_from * period_s
+    s_effective = s if abs(s) > limits.dead_zone else 0.0
+    drive = -adaptation_rate * s_effective * period_s
     output = approximate_and_adapt(rate, angle, drive, consequents)
     squares = 0.0
     for k in range(consequents.shape[0]):
         squares += consequents[k] * consequents[k]
-    kept = max(0.0, 1.0 - restraint.leakage * period_s)
-    norm = kept * sqrt(squares)
-    if norm > restraint.bound:
-        kept *= restraint.bound / norm
+    factor = max(0.0, 1.0 - limits.leakage * period_s)
+    norm = factor * sqrt(squares)
+    if norm > limits.bound:
+        factor *= limits.bound / norm
     for k in range(consequents.shape[0]):
-        consequents[k] *= kept
+        consequents[k] *= factor
     return output

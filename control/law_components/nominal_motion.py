@@ -22,7 +22,7 @@ UPRIGHT = Turns(1.0, 0.0, 1.0, 0.0, 1.0, 0.0)
 AT_REST = (0.0, 0.0, 0.0)
 
 
-class Nominal(NamedTuple):
+class RotorModel(NamedTuple):
     """The rotor as a law has it."""
 
     inertia: Triple  # principal inertias, kg·m²
@@ -30,7 +30,7 @@ class Nominal(NamedTuple):
     """Whether its axes act on each other; else each is a double integrator of its own inertia."""
 
 
-class Motion(NamedTuple):
+class RotorMotion(NamedTuple):
     """Where the rotor is, and how it moves."""
 
     angle: Triple  # rad
@@ -38,9 +38,9 @@ class Motion(NamedTuple):
 
 
 @allocation_free
-def moved_on(motion: Motion, torque: Triple, nominal: Nominal, time_s: float) -> Motion:
+def advance_motion(motion: RotorMotion, torque: Triple, nominal: RotorModel, time_s: float) -> RotorMotion:
     """Motion after some time (s) under a constant torque (N·m), at the acceleration of its beginning."""
-    at, rate = _coupled(motion, nominal)
+    at, rate = _operating_point(motion, nominal)
     push = acceleration_entries(at, rate, torque, nominal.inertia, 0.0)
     half = 0.5 * time_s * time_s
     (q1, q2, q3), (v1, v2, v3) = motion.angle, motion.rate
@@ -49,13 +49,13 @@ def moved_on(motion: Motion, torque: Triple, nominal: Nominal, time_s: float) ->
         q2 + time_s * v2 + half * push[1],
         q3 + time_s * v3 + half * push[2],
     )
-    return Motion(angle, (v1 + time_s * push[0], v2 + time_s * push[1], v3 + time_s * push[2]))
+    return RotorMotion(angle, (v1 + time_s * push[0], v2 + time_s * push[1], v3 + time_s * push[2]))
 
 
 @allocation_free
-def torque_for(motion: Motion, acceleration: Triple, nominal: Nominal) -> Triple:
+def required_torque(motion: RotorMotion, acceleration: Triple, nominal: RotorModel) -> Triple:
     """Torque ``M a + C qdot`` (N·m) that an acceleration (rad/s²) takes."""
-    at, rate = _coupled(motion, nominal)
+    at, rate = _operating_point(motion, nominal)
     C_alpha, C_beta, C_gamma = coriolis_rows(at, rate, nominal.inertia)
     alpha, beta, gamma = _times(inertia_entries(at, nominal.inertia), acceleration)
     return (
@@ -66,14 +66,14 @@ def torque_for(motion: Motion, acceleration: Triple, nominal: Nominal) -> Triple
 
 
 @allocation_free
-def inertial_torque(angle: Triple, acceleration: Triple, nominal: Nominal) -> Triple:
+def inertial_torque(angle: Triple, acceleration: Triple, nominal: RotorModel) -> Triple:
     """Torque ``M a`` (N·m), without Coriolis terms."""
-    at, _ = _coupled(Motion(angle, AT_REST), nominal)
+    at, _ = _operating_point(RotorMotion(angle, AT_REST), nominal)
     return _times(inertia_entries(at, nominal.inertia), acceleration)
 
 
 @allocation_free
-def _coupled(motion: Motion, nominal: Nominal) -> tuple[Turns, Triple]:
+def _operating_point(motion: RotorMotion, nominal: RotorModel) -> tuple[Turns, Triple]:
     """What the equations of motion are taken at: upright and at rest, no axis acts on another."""
     if nominal.coupled:
         return turns(motion.angle), motion.rate

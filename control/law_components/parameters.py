@@ -13,7 +13,7 @@ from spheretwin.control.compensators.feed_forward import FeedForwardSection
 from spheretwin.control.compensators.prediction import PredictionSection
 from spheretwin.control.compensators.reference_governor import GovernorSection
 from spheretwin.control.law import LARGEST as LARGEST
-from spheretwin.control.law import Known, Law
+from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.law import NonNegative as NonNegative
 from spheretwin.control.law import NonNegativeEach as NonNegativeEach
 from spheretwin.control.law import Positive as Positive
@@ -22,7 +22,7 @@ from spheretwin.control.law import each as each
 
 # The file of a law, shipped or its user's, finds here all that it needs of these.
 
-AROUND = ("governor", "prediction", "feed_forward")
+COMPENSATORS = ("governor", "prediction", "feed_forward")
 """Sections of a controller that stand around its law."""
 
 Level = Annotated[
@@ -65,13 +65,13 @@ class ControllerSection(BaseModel):
     )
 
     @property
-    def around(self) -> dict[str, Any]:
+    def compensators(self) -> dict[str, Any]:
         """Sections of what stands around the law, by name."""
-        return {name: getattr(self, name) for name in AROUND}
+        return {name: getattr(self, name) for name in COMPENSATORS}
 
-    def alone(self) -> Self:
+    def without_compensators(self) -> Self:
         """The same with nothing around the law."""
-        return self.model_copy(update={name: type(self).model_fields[name].default for name in AROUND})
+        return self.model_copy(update={name: type(self).model_fields[name].default for name in COMPENSATORS})
 
 
 class LawParameters(ControllerSection):
@@ -82,10 +82,10 @@ class LawParameters(ControllerSection):
     """
 
     @abstractmethod
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law with these parameters, for what is known of the rotor."""
 
 
-def torque_factor(level: str, known: Known) -> NDArray[np.float64]:
+def torque_factor(level: str, known: NominalModel) -> NDArray[np.float64]:
     """Factor from the output of (41) to a torque on each axis, (3,)."""
     return known.inertia if level == "acceleration" else np.ones(3)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
 from spheretwin.control.law_components.fuzzy import CONSEQUENTS, approximate_and_adapt
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
@@ -34,7 +34,7 @@ class AdaptiveFuzzy(LawParameters):
     reaching_gain: NonNegativeEach = Field(each(20.0), description="K of the reaching term K s, 1/s")
     fuzzy_rate: NonNegativeEach = Field(each(10.0), description="η, adaptation rate of the fuzzy consequents")
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law whose consequents all start at 0."""
         gains = [*self.surface_slope, *self.reaching_gain, *self.fuzzy_rate]
         parameters = np.array([*gains, *torque_factor(self.level, known), known.period_s])

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, PositiveEach, each
 from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
@@ -64,7 +64,7 @@ class ADRC(LawParameters):
         OBSERVER_rad_s, description="ω_o of the observer's triple pole, 1/s"
     )
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law whose observer starts at the first measurement."""
         gains = observer_gains(np.array(self.observer_bandwidth), known.period_s)
         parameters = np.array([*self.bandwidth, *np.concatenate(gains), *known.inertia, known.period_s])

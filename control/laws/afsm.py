@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
 from spheretwin.control.law_components.fuzzy import CONSEQUENTS, approximate_and_adapt
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
@@ -45,7 +45,7 @@ class AFSM(LawParameters):
     switching_rate: NonNegativeEach = Field(each(10.0), description="σ, growth rate of the switching gain ξ̂")
     bound_rate: NonNegativeEach = Field(each(10.0), description="ς, growth rate of the coupling bound ζ̂")
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law whose estimates all start at 0."""
         gains = [*self.surface_slope, *self.reaching_gain, *self.fuzzy_rate]
         rates = [*self.switching_rate, *self.bound_rate]

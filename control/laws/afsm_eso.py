@@ -66,19 +66,32 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from spheretwin.control.law import Known, Law, NonNegative, NonNegativeEach, Positive, PositiveEach, each
+from spheretwin.control.law import (
+    Law,
+    NominalModel,
+    NonNegative,
+    NonNegativeEach,
+    Positive,
+    PositiveEach,
+    each,
+)
 from spheretwin.control.law_components.extended_state_observer import (
-    Gains,
-    Observed,
-    asked_before,
-    lateness,
+    ObserverGains,
+    ObserverState,
+    delayed_command,
+    history_layout,
     observe,
     observer_gains,
-    remember,
+    store_command,
 )
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
-from spheretwin.control.law_components.fuzzy import CONSEQUENTS, Restraint, approximate_within_bounds
-from spheretwin.control.law_components.nominal_motion import Motion, Nominal, moved_on, torque_for
+from spheretwin.control.law_components.fuzzy import CONSEQUENTS, AdaptationLimits, approximate_within_bounds
+from spheretwin.control.law_components.nominal_motion import (
+    RotorModel,
+    RotorMotion,
+    advance_motion,
+    required_torque,
+)
 from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.lagrangian import Triple
@@ -97,14 +110,24 @@ SIGNALS = (
 # Layout of the parameters: three of each, then single numbers.
 INERTIA, SLOPE, REACHING, BOOST_SLOPE, LAYER, BOOST_BOUND = 0, 3, 6, 9, 12, 15
 BANDWIDTH, SLOW, FAST, FUZZY_RATE = 18, 21, 24, 27
-PERIOD, KEPT, LATE, COUPLED, DEAD_ZONE, LEAKAGE, FUZZY_BOUND = 30, 31, 32, 33, 34, 35, 36
+PERIOD, FADE_DECAY, FRACTION, COUPLED, DEAD_ZONE, LEAKAGE, FUZZY_BOUND = 30, 31, 32, 33, 34, 35, 36
 # Layout of the state: the signals, the observer's motion, theta; what was asked, newest first, is the rest.
-SLIDING, DISTURBANCE, BOOST, IN_FORCE, FUZZY, ANGLE, RATE, STARTED, THETA = 0, 3, 6, 9, 12, 15, 18, 21, 22
-ASKED = THETA + 3 * CONSEQUENTS
+SLIDING, DISTURBANCE, BOOST, ACTIVE_BANDWIDTH, FUZZY, ANGLE, RATE, STARTED, THETA = (
+    0,
+    3,
+    6,
+    9,
+    12,
+    15,
+    18,
+    21,
+    22,
+)
+HISTORY = THETA + 3 * CONSEQUENTS
 
 # Share of the torque asked for that may be missing before the approximator stops learning; the coils' lag
 # alone takes some of it while the torque changes.
-SHORTFALL = 0.2
+LARGEST_SHORTFALL = 0.2
 
 PRESETS: dict[str, dict[str, Any]] = {
     "ideal": {
@@ -206,113 +229,113 @@ class AFSMWithObserver(LawParameters):
 
     @model_validator(mode="before")
     @classmethod
-    def _fill_in(cls, given: Any) -> Any:
-        if not isinstance(given, dict):
-            return given
-        preset = given.get("preset", "ideal")
-        return _filled(given, PRESETS.get(preset if isinstance(preset, str) else "", {}))
+    def _fill_in(cls, fields: Any) -> Any:
+        if not isinstance(fields, dict):
+            return fields
+        preset = fields.get("preset", "ideal")
+        return _filled(fields, PRESETS.get(preset if isinstance(preset, str) else "", {}))
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law that knows of no disturbance, and has asked for nothing, before its first tick."""
         surface = [*self.surface_slope_1_s, *self.reaching_gain_1_s]
         boost = [*self.boost_slope_1_s, *self.boost_layer_rad_s, *self.boost_bound_rad_s2]
         bandwidths = [*self.observer_bandwidth_rad_s, *self.disturbance_bandwidth_rad_s]
         bandwidths += self.fast_disturbance_bandwidth_rad_s
         period_s = known.period_s
-        kept = exp(-period_s / self.fade_s) if self.fade_s else 0.0
-        late, remembered = lateness(known)
-        single = [period_s, kept, late, float(self.coupled)]
+        decay = exp(-period_s / self.fade_s) if self.fade_s else 0.0
+        fraction, size = history_layout(known)
+        single = [period_s, decay, fraction, float(self.coupled)]
         single += [self.fuzzy_dead_zone_rad_s, self.fuzzy_leakage_1_s, self.fuzzy_bound]
         parameters = np.array(
             [*known.inertia, *surface, *boost, *bandwidths, *self.fuzzy_adaptation, *single]
         )
-        return Law(self.law, step, parameters, np.zeros(ASKED + remembered), SIGNALS, asks_torque=True)
+        return Law(self.law, step, parameters, np.zeros(HISTORY + size), SIGNALS, asks_torque=True)
 
 
-def _filled(given: dict[str, Any], preset: dict[str, Any]) -> dict[str, Any]:
+def _filled(fields: dict[str, Any], preset: dict[str, Any]) -> dict[str, Any]:
     """What is given, beside what a preset has for the rest; sections field by field."""
     sections = {
-        name: {**value, **given[name]}
+        name: {**value, **fields[name]}
         for name, value in preset.items()
-        if isinstance(value, dict) and isinstance(given.get(name), dict)
+        if isinstance(value, dict) and isinstance(fields.get(name), dict)
     }
-    return {**preset, **given, **sections}
+    return {**preset, **fields, **sections}
 
 
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
     """Write the torque of one control tick, as `control.law.Law` says."""
-    nominal = Nominal(_triple(parameters, INERTIA), parameters[COUPLED] != 0.0)
+    nominal = RotorModel(_triple(parameters, INERTIA), parameters[COUPLED] != 0.0)
     _observe(measurement, parameters, state, nominal)
-    motion = _ahead(parameters, state, nominal)
-    learns = _gets_what_it_asks(measurement, parameters, state)
-    wanted = (
-        _wanted(0, motion.angle[0], motion.rate[0], learns, reference, parameters, state),
-        _wanted(1, motion.angle[1], motion.rate[1], learns, reference, parameters, state),
-        _wanted(2, motion.angle[2], motion.rate[2], learns, reference, parameters, state),
+    motion = _motion_ahead(parameters, state, nominal)
+    adapts = _torque_follows(measurement, parameters, state)
+    accelerations = (
+        _desired_acceleration(0, motion.angle[0], motion.rate[0], adapts, reference, parameters, state),
+        _desired_acceleration(1, motion.angle[1], motion.rate[1], adapts, reference, parameters, state),
+        _desired_acceleration(2, motion.angle[2], motion.rate[2], adapts, reference, parameters, state),
     )
-    needed = torque_for(motion, wanted, nominal)
+    model_torque = required_torque(motion, accelerations, nominal)
     for axis in range(3):
-        torque[axis] = needed[axis] - state[DISTURBANCE + axis]
-    remember(state[ASKED:], torque)
+        torque[axis] = model_torque[axis] - state[DISTURBANCE + axis]
+    store_command(state[HISTORY:], torque)
 
 
 @allocation_free
-def _observe(measurement: Array, parameters: Array, state: Array, nominal: Nominal) -> None:
+def _observe(measurement: Array, parameters: Array, state: Array, nominal: RotorModel) -> None:
     """Take the measured angles; at the first tick, the rates too."""
     if state[STARTED] == 0.0:
         state[STARTED] = 1.0
         for axis in range(3):
             state[ANGLE + axis], state[RATE + axis] = measurement[0, axis], measurement[1, axis]
-            state[IN_FORCE + axis] = parameters[SLOW + axis]
+            state[ACTIVE_BANDWIDTH + axis] = parameters[SLOW + axis]
         return
-    before = Observed(_motion(state), _triple(state, DISTURBANCE))
+    before = ObserverState(_motion(state), _triple(state, DISTURBANCE))
     gains = _gains(0, parameters, state), _gains(1, parameters, state), _gains(2, parameters, state)
-    angle, given = _triple(measurement[0], 0), _triple(measurement[2], 0)
-    now = observe(before, angle, given, gains, nominal, parameters[PERIOD])
+    angle, coil_torque = _triple(measurement[0], 0), _triple(measurement[2], 0)
+    now = observe(before, angle, coil_torque, gains, nominal, parameters[PERIOD])
     for axis in range(3):
         state[ANGLE + axis], state[RATE + axis] = now.motion.angle[axis], now.motion.rate[axis]
         state[DISTURBANCE + axis] = now.disturbance[axis]
 
 
 @allocation_free
-def _gains(axis: int, parameters: Array, state: Array) -> Gains:
-    return observer_gains(parameters[BANDWIDTH + axis], state[IN_FORCE + axis], parameters[PERIOD])
+def _gains(axis: int, parameters: Array, state: Array) -> ObserverGains:
+    return observer_gains(parameters[BANDWIDTH + axis], state[ACTIVE_BANDWIDTH + axis], parameters[PERIOD])
 
 
 @allocation_free
-def _ahead(parameters: Array, state: Array, nominal: Nominal) -> Motion:
+def _motion_ahead(parameters: Array, state: Array, nominal: RotorModel) -> RotorMotion:
     """Motion at the end of the known delay, under what was asked for and does not act yet."""
     motion, period, disturbance = _motion(state), parameters[PERIOD], _triple(state, DISTURBANCE)
-    whole = (state.shape[0] - ASKED) // 3 - 2
+    whole = (state.shape[0] - HISTORY) // 3 - 2
     for row in range(whole, -1, -1):
-        time_s = parameters[LATE] * period if row == whole else period
+        time_s = parameters[FRACTION] * period if row == whole else period
         if time_s > 0.0:
-            asked = _triple(state, ASKED + 3 * row)
-            given = (asked[0] + disturbance[0], asked[1] + disturbance[1], asked[2] + disturbance[2])
-            motion = moved_on(motion, given, nominal, time_s)
+            command = _triple(state, HISTORY + 3 * row)
+            total = (command[0] + disturbance[0], command[1] + disturbance[1], command[2] + disturbance[2])
+            motion = advance_motion(motion, total, nominal, time_s)
     return motion
 
 
 @allocation_free
-def _gets_what_it_asks(measurement: Array, parameters: Array, state: Array) -> bool:
+def _torque_follows(measurement: Array, parameters: Array, state: Array) -> bool:
     """Whether the torque of the last period was about what was asked for it, so that s tells of the rotor."""
     asked_for, missing = 0.0, 0.0
     for axis in range(3):
-        asked = asked_before(state[ASKED:], axis, parameters[LATE])
-        asked_for += abs(asked)
-        missing += abs(asked - measurement[2, axis])
-    return missing <= SHORTFALL * asked_for
+        command = delayed_command(state[HISTORY:], axis, parameters[FRACTION])
+        asked_for += abs(command)
+        missing += abs(command - measurement[2, axis])
+    return missing <= LARGEST_SHORTFALL * asked_for
 
 
 @allocation_free
-def _wanted(
-    axis: int, angle: float, rate: float, learns: bool, reference: Array, parameters: Array, state: Array
+def _desired_acceleration(
+    axis: int, angle: float, rate: float, adapts: bool, reference: Array, parameters: Array, state: Array
 ) -> float:
     """Acceleration of one axis, by the reference as it will be when the torque acts."""
     period = parameters[PERIOD]
-    ahead_s = ((state.shape[0] - ASKED) // 3 - 2 + parameters[LATE]) * period
+    ahead_s = ((state.shape[0] - HISTORY) // 3 - 2 + parameters[FRACTION]) * period
     acceleration = reference[2, axis]
     desired_rate = reference[1, axis] + ahead_s * acceleration
     desired = reference[0, axis] + ahead_s * (reference[1, axis] + 0.5 * ahead_s * acceleration)
@@ -320,10 +343,10 @@ def _wanted(
     s = sliding_surface(angle - desired, rate - desired_rate, slope)
     boost = boosted(s, parameters[BOOST_SLOPE + axis], layer, parameters[BOOST_BOUND + axis])
     slow, fast = parameters[SLOW + axis], parameters[FAST + axis]
-    in_force = slow + parameters[KEPT] * (state[IN_FORCE + axis] - slow)
-    state[IN_FORCE + axis] = fast if abs(s) > layer else in_force
+    faded = slow + parameters[FADE_DECAY] * (state[ACTIVE_BANDWIDTH + axis] - slow)
+    state[ACTIVE_BANDWIDTH + axis] = fast if abs(s) > layer else faded
     state[SLIDING + axis], state[BOOST + axis] = s, boost
-    fuzzy = _fuzzy(axis, angle, rate, s if learns else 0.0, parameters, state)
+    fuzzy = _fuzzy(axis, angle, rate, s if adapts else 0.0, parameters, state)
     state[FUZZY + axis] = parameters[INERTIA + axis] * fuzzy
     return acceleration - slope * (rate - desired_rate) - parameters[REACHING + axis] * s - boost + fuzzy
 
@@ -340,15 +363,15 @@ def _fuzzy(axis: int, angle: float, rate: float, s: float, parameters: Array, st
     adaptation = parameters[FUZZY_RATE + axis]
     if adaptation == 0.0:
         return 0.0
-    restraint = Restraint(parameters[DEAD_ZONE], parameters[LEAKAGE], parameters[FUZZY_BOUND])
+    limits = AdaptationLimits(parameters[DEAD_ZONE], parameters[LEAKAGE], parameters[FUZZY_BOUND])
     first = THETA + CONSEQUENTS * axis
     theta = state[first : first + CONSEQUENTS]
-    return approximate_within_bounds(rate, angle, s, adaptation, restraint, parameters[PERIOD], theta)
+    return approximate_within_bounds(rate, angle, s, adaptation, limits, parameters[PERIOD], theta)
 
 
 @allocation_free
-def _motion(state: Array) -> Motion:
-    return Motion(_triple(state, ANGLE), _triple(state, RATE))
+def _motion(state: Array) -> RotorMotion:
+    return RotorMotion(_triple(state, ANGLE), _triple(state, RATE))
 
 
 @allocation_free

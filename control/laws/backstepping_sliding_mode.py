@@ -32,8 +32,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
-from spheretwin.control.law_components.extended_state_observer import asked_before, lateness, remember
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.extended_state_observer import (
+    delayed_command,
+    history_layout,
+    store_command,
+)
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface, tracking_rate
 from spheretwin.control.law_components.nominal_motion import model_torque
 from spheretwin.control.law_components.parameters import LawParameters, named
@@ -46,10 +50,10 @@ SIGNALS = (
     Signal("adapted_torque_Nm", "N·m", 3, "estimate D of what disturbs", ANGLES),
 )
 # Layout of the parameters.
-SURFACE_SLOPE, REACHING_GAIN, SWITCHING, LAYER, ADAPTATION, TRACKING, INERTIA, LATE, PERIOD = (
+SURFACE_SLOPE, REACHING_GAIN, SWITCHING, LAYER, ADAPTATION, TRACKING, INERTIA, FRACTION, PERIOD = (
     0, 3, 6, 9, 12, 15, 18, 21, 22,
 )  # fmt: skip
-SLIDING, ADAPTED, ASKED = 0, 3, 6  # layout of the state
+SLIDING, ADAPTED, HISTORY = 0, 3, 6  # layout of the state
 
 BANDWIDTH_rad_s = 40.0
 
@@ -68,22 +72,22 @@ class BacksteppingSlidingMode(LawParameters):
         each(BANDWIDTH_rad_s**2), description="γ, adaptation rate of the disturbance's estimate, 1/s²"
     )
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law whose estimate starts at 0."""
-        late, kept = lateness(known)
+        fraction, size = history_layout(known)
         slope, reaching = np.array(self.surface_slope), np.array(self.reaching_gain)
         tracking = tracking_rate(np.sqrt(slope * self.adaptation_rate / (slope + reaching)), known)
         gains = [*self.surface_slope, *self.reaching_gain, *self.switching, *self.layer]
         rates = [*self.adaptation_rate, *tracking]
-        parameters = np.array([*gains, *rates, *known.inertia, late, known.period_s])
-        return Law(self.law, step, parameters, np.zeros(ASKED + kept), SIGNALS, asks_torque=True)
+        parameters = np.array([*gains, *rates, *known.inertia, fraction, known.period_s])
+        return Law(self.law, step, parameters, np.zeros(HISTORY + size), SIGNALS, asks_torque=True)
 
 
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
     """Write the torque of one control tick, as `control.law.Law` says."""
-    period, asked, inertia = parameters[PERIOD], state[ASKED:], parameters[INERTIA : INERTIA + 3]
+    period, history, inertia = parameters[PERIOD], state[HISTORY:], parameters[INERTIA : INERTIA + 3]
     rate, acceleration = np.empty(3), np.empty(3)
     for axis in range(3):
         slope = parameters[SURFACE_SLOPE + axis]
@@ -92,8 +96,8 @@ def step(
         state[SLIDING + axis] = sliding_surface(error, error_rate, slope)
         rate[axis] = reference[1, axis] - slope * error
         acceleration[axis] = reference[2, axis] - slope * error_rate
-        owed = measurement[2, axis] - asked_before(asked, axis, parameters[LATE])
-        state[ADAPTED + axis] += period * parameters[TRACKING + axis] * owed
+        torque_error = measurement[2, axis] - delayed_command(history, axis, parameters[FRACTION])
+        state[ADAPTED + axis] += period * parameters[TRACKING + axis] * torque_error
     model_torque(measurement, acceleration, rate, inertia, torque)
     for axis in range(3):
         s = state[SLIDING + axis]
@@ -101,4 +105,4 @@ def step(
         reaching = parameters[REACHING_GAIN + axis] * (s + switched)
         torque[axis] += state[ADAPTED + axis] - inertia[axis] * reaching
         state[ADAPTED + axis] -= period * parameters[ADAPTATION + axis] * inertia[axis] * s
-    remember(asked, torque)
+    store_command(history, torque)

@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import feedback
 from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.base.errors import InputError
@@ -79,7 +79,7 @@ class LQI(LawParameters):
         each(BANDWIDTH_rad_s**3), description="weight of its integral, 1/s³"
     )
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law whose integral starts at 0."""
         weights = zip(self.error_weight, self.rate_weight, self.integral_weight, strict=True)
         gains = np.array([regulator(*each, known.period_s) for each in weights])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ class PD(LawParameters):
     stiffness: PositiveEach = Field(each(50.0), description="torque or acceleration a unit of error, 1/s²")
     damping: NonNegativeEach = Field(each(20.0), description="the same a unit of its rate, 1/s")
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law without memory."""
         factor = torque_factor(self.level, known)
         return Law(self.law, step, np.array([*self.stiffness, *self.damping, *factor]), np.zeros(0))

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import feedback, triple_pole
 from spheretwin.control.law_components.parameters import LawParameters, named
 
@@ -32,6 +32,6 @@ class PID(LawParameters):
     damping: PositiveEach = Field(each(_DAMPING), description="the same a unit of its rate, 1/s")
     integral: NonNegativeEach = Field(each(_INTEGRAL), description="the same a unit of its integral, 1/s³")
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law whose integral starts at 0."""
         return feedback(self.law, np.array([self.stiffness, self.damping, self.integral]), known)

@@ -30,8 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
-from spheretwin.control.law_components.extended_state_observer import asked_before, lateness, remember
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.extended_state_observer import (
+    delayed_command,
+    history_layout,
+    store_command,
+)
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface, tracking_rate
 from spheretwin.control.law_components.nominal_motion import model_torque
 from spheretwin.control.law_components.parameters import LawParameters, named
@@ -43,8 +47,8 @@ SIGNALS = (
     SLIDING_SIGNAL,
     Signal("twisting_torque_Nm", "N·m", 3, "torque W of the integral", ANGLES),
 )
-SURFACE_SLOPE, ROOT, TWISTING, LINEAR, TRACKING, INERTIA, LATE, PERIOD = 0, 3, 6, 9, 12, 15, 18, 19
-SLIDING, TWISTED, ASKED = 0, 3, 6  # layout of the state
+SURFACE_SLOPE, ROOT, TWISTING, LINEAR, TRACKING, INERTIA, FRACTION, PERIOD = 0, 3, 6, 9, 12, 15, 18, 19
+SLIDING, TWISTED, HISTORY = 0, 3, 6  # layout of the state
 
 BANDWIDTH_rad_s = 40.0
 LINEAR_SHARE = 8.0  # (rad/s)^-½
@@ -65,20 +69,20 @@ class SuperTwisting(LawParameters):
         each(LINEAR_SHARE), description="μ of s beside its root, (rad/s)^-½; 0 for the root alone"
     )
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         """Law whose integral starts at 0."""
-        late, kept = lateness(known)
+        fraction, size = history_layout(known)
         tracking = tracking_rate(np.array(self.surface_slope) / sqrt(3), known)
         gains = [*self.surface_slope, *self.root_gain, *self.twisting_gain, *self.linear_share]
-        parameters = np.array([*gains, *tracking, *known.inertia, late, known.period_s])
-        return Law(self.law, step, parameters, np.zeros(ASKED + kept), SIGNALS, asks_torque=True)
+        parameters = np.array([*gains, *tracking, *known.inertia, fraction, known.period_s])
+        return Law(self.law, step, parameters, np.zeros(HISTORY + size), SIGNALS, asks_torque=True)
 
 
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
     """Write the torque of one control tick, as `control.law.Law` says."""
-    period, asked, inertia = parameters[PERIOD], state[ASKED:], parameters[INERTIA : INERTIA + 3]
+    period, history, inertia = parameters[PERIOD], state[HISTORY:], parameters[INERTIA : INERTIA + 3]
     acceleration, growth = np.empty(3), np.empty(3)
     for axis in range(3):
         slope, linear = parameters[SURFACE_SLOPE + axis], parameters[LINEAR + axis]
@@ -89,11 +93,11 @@ def step(
         second = (0.5 + 1.5 * linear * root + linear * linear * root * root) * sign
         acceleration[axis] = reference[2, axis] - slope * error_rate - parameters[ROOT + axis] * first
         growth[axis] = -parameters[TWISTING + axis] * inertia[axis] * second
-        owed = measurement[2, axis] - asked_before(asked, axis, parameters[LATE])
-        state[TWISTED + axis] += period * parameters[TRACKING + axis] * owed
+        torque_error = measurement[2, axis] - delayed_command(history, axis, parameters[FRACTION])
+        state[TWISTED + axis] += period * parameters[TRACKING + axis] * torque_error
         state[SLIDING + axis] = s
     model_torque(measurement, acceleration, measurement[1], inertia, torque)
     for axis in range(3):
         torque[axis] += state[TWISTED + axis]
         state[TWISTED + axis] += period * growth[axis]
-    remember(asked, torque)
+    store_command(history, torque)

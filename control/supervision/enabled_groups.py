@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import allocation_free
 
-IN_USE, TOLD, FOUND_OPEN, FOUND_SHORTED = 0, 1, 2, 3
+IN_USE, REPORTED, DETECTED_OPEN, DETECTED_SHORTED = 0, 1, 2, 3
 """How a group stands."""
 
 STATES = ("in use", "known to be out", "found open", "found shorted")
 """The same in words."""
 
 
-class Groups(NamedTuple):
+class EnabledGroups(NamedTuple):
     """Which groups may be used, for compiled code."""
 
     some_out: NDArray[np.bool_]  # (1,)
@@ -29,26 +29,26 @@ class Groups(NamedTuple):
         return self.some_out, self.out, self.out_s
 
 
-def groups(count: int) -> Groups:
+def groups(count: int) -> EnabledGroups:
     """All in use."""
-    return Groups(
+    return EnabledGroups(
         np.zeros(1, dtype=np.bool_), np.zeros(count, dtype=np.int64), np.zeros(count), np.zeros((3, count))
     )
 
 
-def tell(groups: Groups, told: NDArray[np.bool_], t_s: float) -> None:
+def mark_faulty_groups(groups: EnabledGroups, reported: NDArray[np.bool_], t_s: float) -> None:
     """Leave out the groups (n,) that are known to fail, from a time on, and use again those that no more do.
 
     What a detector has found stays out: it cannot tell that a group works which it does not use.
     """
-    new, healed = told & (groups.out == IN_USE), ~told & (groups.out == TOLD)
-    groups.out[new], groups.out_s[new] = TOLD, t_s
-    groups.out[healed] = IN_USE
+    added, cleared = reported & (groups.out == IN_USE), ~reported & (groups.out == REPORTED)
+    groups.out[added], groups.out_s[added] = REPORTED, t_s
+    groups.out[cleared] = IN_USE
     groups.some_out[0] = np.any(groups.out != IN_USE)
 
 
 @allocation_free
-def leave_out(groups: Groups, G: NDArray[np.float64]) -> None:
+def mask_disabled_groups(groups: EnabledGroups, G: NDArray[np.float64]) -> None:
     """Copy a torque matrix (3, n), with nothing in the columns of the groups that are out."""
     for j in range(groups.out.shape[0]):
         used = groups.out[j] == IN_USE

@@ -36,7 +36,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.supervision.enabled_groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, Groups
+from spheretwin.control.supervision.enabled_groups import (
+    DETECTED_OPEN,
+    DETECTED_SHORTED,
+    IN_USE,
+    REPORTED,
+    EnabledGroups,
+)
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.kinematics import angular_velocity
 
@@ -63,7 +69,7 @@ class DetectorSection(BaseModel):
     )
 
 
-class Followed(NamedTuple):
+class NominalCurrents(NamedTuple):
     """Nominal drive and nominal sensors of the currents."""
 
     period_s: float
@@ -90,33 +96,33 @@ class Detector(NamedTuple):
     reach_A: float  # that the swing carries through the coil
     measured_A: Array  # (n,) what the sensors of the currents say
     shorted_A: Array  # (n,) what a shorted coil would carry
-    counted: NDArray[np.int64]  # (n,) ticks that speak for a fault
+    count: NDArray[np.int64]  # (n,) ticks that speak for a fault
     open_A2: Array  # (n,) squared differences over these ticks
     shorted_A2: Array  # (n,)
     rate_S: Array  # (3,) rad/s
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
         """Arrays that it goes on from."""
-        return self.shorted_A, self.counted, self.open_A2, self.shorted_A2
+        return self.shorted_A, self.count, self.open_A2, self.shorted_A2
 
 
-def derived_threshold_A(followed: Followed) -> float:
+def derived_threshold_A(nominal: NominalCurrents) -> float:
     """Threshold that keeps healthy groups healthy, as the head of this file says."""
-    errors = followed.static_error_A + DEVIATIONS * followed.noise_A
-    return max(LEAST_SHARE * followed.current_limit_A, errors)
+    errors = nominal.static_error_A + DEVIATIONS * nominal.noise_A
+    return max(LEAST_SHARE * nominal.current_limit_A, errors)
 
 
-def derived_ticks(followed: Followed) -> int:
+def derived_ticks(nominal: NominalCurrents) -> int:
     """Ticks for which a healthy current may look like none, and one more."""
-    spare_V = followed.swing_V - followed.resistance_ohm * followed.current_limit_A
+    spare_V = nominal.swing_V - nominal.resistance_ohm * nominal.current_limit_A
     # Where the swing does not carry the limit at all, the current gets there with L/R at best.
-    natural_s = SETTLING * followed.inductance_H / followed.resistance_ohm
-    swing_s = 2 * followed.current_limit_A * followed.inductance_H / spare_V if spare_V > 0 else natural_s
-    slow_s = min(swing_s, natural_s) + SETTLING * followed.time_constant_s
-    return 1 + ceil(slow_s / followed.period_s)
+    natural_s = SETTLING * nominal.inductance_H / nominal.resistance_ohm
+    swing_s = 2 * nominal.current_limit_A * nominal.inductance_H / spare_V if spare_V > 0 else natural_s
+    slow_s = min(swing_s, natural_s) + SETTLING * nominal.time_constant_s
+    return 1 + ceil(slow_s / nominal.period_s)
 
 
-def detector(section: DetectorSection, on: bool, groups: int, followed: Followed) -> Detector:
+def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCurrents) -> Detector:
     """Detector that has seen nothing yet.
 
     Parameters
@@ -130,14 +136,14 @@ def detector(section: DetectorSection, on: bool, groups: int, followed: Followed
     """
     return Detector(
         on=on,
-        threshold_A=section.threshold_A or derived_threshold_A(followed),
-        ticks=section.ticks or derived_ticks(followed),
-        decay=exp(-followed.period_s * followed.resistance_ohm / followed.inductance_H),
-        resistance_ohm=followed.resistance_ohm,
-        reach_A=followed.swing_V / followed.resistance_ohm,
+        threshold_A=section.threshold_A or derived_threshold_A(nominal),
+        ticks=section.ticks or derived_ticks(nominal),
+        decay=exp(-nominal.period_s * nominal.resistance_ohm / nominal.inductance_H),
+        resistance_ohm=nominal.resistance_ohm,
+        reach_A=nominal.swing_V / nominal.resistance_ohm,
         measured_A=np.zeros(groups),
         shorted_A=np.zeros(groups),
-        counted=np.zeros(groups, dtype=np.int64),
+        count=np.zeros(groups, dtype=np.int64),
         open_A2=np.zeros(groups),
         shorted_A2=np.zeros(groups),
         rate_S=np.zeros(3),
@@ -145,8 +151,8 @@ def detector(section: DetectorSection, on: bool, groups: int, followed: Followed
 
 
 @allocation_free
-def find(
-    detector: Detector, groups: Groups, believed: Array, G: Array, q: Array, qdot: Array, t: float
+def detect_faults(
+    detector: Detector, groups: EnabledGroups, applied: Array, G: Array, q: Array, qdot: Array, t: float
 ) -> None:
     """Hold the measured currents of one control tick against what they would be.
 
@@ -166,56 +172,56 @@ def find(
     """
     threshold = detector.threshold_A
     angular_velocity(q, qdot, detector.rate_S)
-    for j in range(believed.shape[0]):
+    for j in range(applied.shape[0]):
         emf = G[0, j] * detector.rate_S[0] + G[1, j] * detector.rate_S[1] + G[2, j] * detector.rate_S[2]
         settled = -emf / detector.resistance_ohm
         shorted = settled + (detector.shorted_A[j] - settled) * detector.decay
         detector.shorted_A[j] = shorted
-        measured, out = detector.measured_A[j], groups.out[j]
-        driven = min(max(believed[j], -detector.reach_A), detector.reach_A)
-        as_open, as_shorted = abs(measured), abs(measured - shorted)
-        if out == TOLD:
-            _forget(detector, j)
+        measured, state = detector.measured_A[j], groups.out[j]
+        driven = min(max(applied[j], -detector.reach_A), detector.reach_A)
+        open_error, shorted_error = abs(measured), abs(measured - shorted)
+        if state == REPORTED:
+            _reset(detector, j)
             continue
-        if out != IN_USE:
-            _compare(detector, j, as_open, as_shorted)
-            groups.out[j] = _name(detector, j, out)
+        if state != IN_USE:
+            _accumulate(detector, j, open_error, shorted_error)
+            groups.out[j] = _classify(detector, j, state)
             continue
-        if not min(as_open, as_shorted) <= threshold:
-            _forget(detector, j)
+        if not min(open_error, shorted_error) <= threshold:
+            _reset(detector, j)
             continue
-        speaks = (as_open <= threshold and abs(driven) > 2.0 * threshold) or (
-            as_shorted <= threshold and abs(driven - shorted) > 2.0 * threshold
+        indicates_fault = (open_error <= threshold and abs(driven) > 2.0 * threshold) or (
+            shorted_error <= threshold and abs(driven - shorted) > 2.0 * threshold
         )
-        if not speaks:
+        if not indicates_fault:
             continue
-        detector.counted[j] += 1
-        _compare(detector, j, as_open, as_shorted)
-        if detector.counted[j] >= detector.ticks:
-            opened = detector.open_A2[j] <= detector.shorted_A2[j]
-            groups.out[j] = FOUND_OPEN if opened else FOUND_SHORTED
+        detector.count[j] += 1
+        _accumulate(detector, j, open_error, shorted_error)
+        if detector.count[j] >= detector.ticks:
+            is_open = detector.open_A2[j] <= detector.shorted_A2[j]
+            groups.out[j] = DETECTED_OPEN if is_open else DETECTED_SHORTED
             groups.out_s[j] = t
             groups.some_out[0] = True
 
 
 @allocation_free
-def _forget(detector: Detector, group: int) -> None:
+def _reset(detector: Detector, group: int) -> None:
     """Begin anew with a group."""
-    detector.counted[group] = 0
+    detector.count[group] = 0
     detector.open_A2[group] = detector.shorted_A2[group] = 0.0
 
 
 @allocation_free
-def _compare(detector: Detector, group: int, as_open: float, as_shorted: float) -> None:
+def _accumulate(detector: Detector, group: int, open_error: float, shorted_error: float) -> None:
     """Add the differences (A) of one tick to what speaks against either account."""
-    detector.open_A2[group] += as_open * as_open
-    detector.shorted_A2[group] += as_shorted * as_shorted
+    detector.open_A2[group] += open_error * open_error
+    detector.shorted_A2[group] += shorted_error * shorted_error
 
 
 @allocation_free
-def _name(detector: Detector, group: int, name: int) -> int:
+def _classify(detector: Detector, group: int, state: int) -> int:
     """How a group that was found stands: as before, unless the other account has become closer by far."""
-    closer = detector.open_A2[group] - detector.shorted_A2[group]
-    if abs(closer) <= detector.threshold_A * detector.threshold_A:
-        return name
-    return FOUND_SHORTED if closer > 0.0 else FOUND_OPEN
+    difference = detector.open_A2[group] - detector.shorted_A2[group]
+    if abs(difference) <= detector.threshold_A * detector.threshold_A:
+        return state
+    return DETECTED_SHORTED if difference > 0.0 else DETECTED_OPEN

@@ -29,13 +29,13 @@ DEVIATIONS = 6.0
 class Reason(IntEnum):
     """Why it tripped; the telemetry has the number, a summary the text."""
 
-    told: str
+    text: str
 
-    def __new__(cls, code: int, told: str) -> Reason:
+    def __new__(cls, code: int, text: str) -> Reason:
         """Number with its text."""
         reason = int.__new__(cls, code)
         reason._value_ = code
-        reason.told = told
+        reason.text = text
         return reason
 
     NONE = 0, "nothing"
@@ -104,14 +104,14 @@ class Watchdog(NamedTuple):
     missing: NDArray[np.int64]  # (3,) ticks since then
     halt: NDArray[np.int64]  # (1,) `GO`, `RELEASE` or `SHORT`: the drive reads it
     reason: NDArray[np.int64]  # (1,)
-    since: NDArray[np.int64]  # (1,) ticks since it tripped
+    ticks_since_trip: NDArray[np.int64]  # (1,) ticks since it tripped
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
         """Arrays that it goes on from."""
-        return self.last_rad, self.missing, self.halt, self.reason, self.since
+        return self.last_rad, self.missing, self.halt, self.reason, self.ticks_since_trip
 
 
-class Watched(NamedTuple):
+class MeasurementLimits(NamedTuple):
     """What a watchdog reckons with of the sensors and the rotor."""
 
     period_s: float
@@ -120,7 +120,9 @@ class Watched(NamedTuple):
     hinge_range_rad: Array  # (3, 2) nominal
 
 
-def watchdog(section: WatchdogSection, watched: Watched, fresh: Array, halt: NDArray[np.int64]) -> Watchdog:
+def watchdog(
+    section: WatchdogSection, limits: MeasurementLimits, fresh: Array, halt: NDArray[np.int64]
+) -> Watchdog:
     """Watchdog that has seen nothing yet.
 
     Parameters
@@ -132,15 +134,15 @@ def watchdog(section: WatchdogSection, watched: Watched, fresh: Array, halt: NDA
     halt : (1,) array
         The drive reads it.
     """
-    low, high = watched.hinge_range_rad.T
+    low, high = limits.hinge_range_rad.T
     return Watchdog(
         on=section.on,
         action=SHORT if section.action == "short" else RELEASE,
-        rundown_ticks=round(section.rundown_s / watched.period_s),
+        rundown_ticks=round(section.rundown_s / limits.period_s),
         stale_ticks=section.stale_ticks,
         largest_rate_rad_s=section.largest_rate_rad_s,
-        step_rad=section.largest_rate_rad_s * watched.period_s,
-        noise_rad=DEVIATIONS * sqrt(2) * watched.noise_rad + watched.quantum_rad,
+        step_rad=section.largest_rate_rad_s * limits.period_s,
+        noise_rad=DEVIATIONS * sqrt(2) * limits.noise_rad + limits.quantum_rad,
         lowest_rad=low + section.edge_margin_rad,
         highest_rad=high - section.edge_margin_rad,
         fresh=fresh,
@@ -148,7 +150,7 @@ def watchdog(section: WatchdogSection, watched: Watched, fresh: Array, halt: NDA
         missing=np.zeros(3, dtype=np.int64),
         halt=halt,
         reason=np.zeros(1, dtype=np.int64),
-        since=np.zeros(1, dtype=np.int64),
+        ticks_since_trip=np.zeros(1, dtype=np.int64),
     )
 
 
@@ -176,7 +178,7 @@ def watch(watchdog: Watchdog, angle: Array, rate: Array) -> None:
 
 
 @allocation_free
-def mend(watchdog: Watchdog, measurement: Array) -> bool:
+def replace_invalid(watchdog: Watchdog, measurement: Array) -> bool:
     """Put the last angle, and no rate, in the places of a measurement (3, 3) that hold no number, and trip.
 
     Returns
@@ -202,15 +204,15 @@ def trip(watchdog: Watchdog, reason: int) -> None:
 
 
 @allocation_free
-def over(watchdog: Watchdog) -> bool:
+def count_rundown(watchdog: Watchdog) -> bool:
     """Whether a tick was the last one, as it has tripped so long ago; counts the tick."""
     if watchdog.halt[0] == GO:
         return False
-    watchdog.since[0] += 1
-    return watchdog.since[0] > watchdog.rundown_ticks
+    watchdog.ticks_since_trip[0] += 1
+    return watchdog.ticks_since_trip[0] > watchdog.rundown_ticks
 
 
-def carried_on(before: Watchdog, after: Watchdog) -> None:
+def transfer_watchdog(before: Watchdog, after: Watchdog) -> None:
     """Go on as before with other figures; what one has seen that was off since is too old to compare with."""
     transfer_state(before, after)
     if not before.on:

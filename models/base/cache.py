@@ -61,7 +61,7 @@ def keep(name: str, content: bytes) -> None:
                 temporary.write_bytes(hashlib.sha256(content).digest() + content)
 
 
-def kept_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+def cached_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
     """Array from the cache, or computed and then kept there.
 
     Parameters

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import quad
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.applied_torque import belief, believe
+from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
 from spheretwin.control.law import Law
 from spheretwin.models.base.compiled import restore_state, save_state
 from spheretwin.models.kinematics import generalised_torque, rate_jacobian
@@ -25,7 +25,7 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
     """Against the convolution of the piecewise constant command with the lag, by quadrature."""
     generator = np.random.default_rng(3)
     commands = generator.normal(size=12)
-    mine = belief(True, 1, PERIOD_S, delay * PERIOD_S, lag_s)
+    mine = applied_torque(True, 1, PERIOD_S, delay * PERIOD_S, lag_s)
     G, pose = np.zeros((3, 1)), np.zeros(3)
 
     def command(t):
@@ -44,7 +44,7 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
         return total
 
     for tick in range(len(commands)):
-        believe(mine, pose, G, commands[tick : tick + 1])
+        estimate_applied_torque(mine, pose, G, commands[tick : tick + 1])
         begin, end = tick * PERIOD_S, (tick + 1) * PERIOD_S
         switch = begin + (delay % 1) * PERIOD_S
         parts = [(begin, switch), (switch, end)] if switch > begin else [(begin, end)]
@@ -64,15 +64,15 @@ def test_torque_on_the_hinges_is_the_transposed_jacobian_s():
 
 
 def test_its_state_brings_it_back():
-    one, other = (belief(True, 4, PERIOD_S, 1.5e-3, 7e-4) for _ in range(2))
+    one, other = (applied_torque(True, 4, PERIOD_S, 1.5e-3, 7e-4) for _ in range(2))
     generator = np.random.default_rng(1)
     G, pose = generator.normal(size=(3, 4)), np.array([0.1, 0.2, 0.3])
     for _ in range(5):
-        believe(one, pose, G, generator.normal(size=4))
+        estimate_applied_torque(one, pose, G, generator.normal(size=4))
     restore_state(other, save_state(one), "belief")
     command = generator.normal(size=4)
     for each in (one, other):
-        believe(each, pose, G, command)
+        estimate_applied_torque(each, pose, G, command)
     np.testing.assert_array_equal(save_state(one), save_state(other))
 
 

@@ -131,7 +131,7 @@ class Desk:
         if self.session.law_error:
             self.reason = f"{self.session.law_error}"
         elif self.session.ended:
-            why = f", {self.session.reason.told}" if self.session.reason else ""
+            why = f", {self.session.reason.text}" if self.session.reason else ""
             self.reason = f"{self.session.status}: {self.session.status.told}{why}"
         if len(rows):
             self.row = rows.rows(len(rows) - 1, len(rows))

@@ -261,5 +261,5 @@ def _ending(session: Session, status: str, planned_s: float) -> str:
         return f"the run ended before its first tick was complete: {status}"
     angles = np.degrees(session.q_rad)
     pose = ", ".join(f"{name} {angle:.1f}°" for name, angle in zip("αβγ", angles, strict=True))
-    why = f", {session.reason.told}" if session.reason else ""
+    why = f", {session.reason.text}" if session.reason else ""
     return f"the run ended at {session.t_s:.3f} s of {planned_s:g} s: {status}{why} ({pose})"

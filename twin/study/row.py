@@ -217,7 +217,7 @@ class Rows:
         if kept:
             run = Run(session.begun_as, status, kept.table, session.loop_s, session.actuator)
             figures |= {name: _own_value(name, metric, run, complaints) for name, metric in self._own.items()}
-        reason = session.reason.told if session.reason else None
+        reason = session.reason.text if session.reason else None
         return Result(str(status), reason, "; ".join(complaints) or None, figures)
 
     def _file(self, row: Row, session: Session) -> TelemetryFile | None:

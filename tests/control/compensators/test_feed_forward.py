@@ -10,8 +10,8 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.compensators.feed_forward import (
     FeedForwardSection,
     NominalRotor,
+    compute_feed_forward,
     feed_forward,
-    reckon,
 )
 from spheretwin.control.law import Law
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
@@ -29,7 +29,7 @@ numbers = st.lists(st.floats(-3, 3), min_size=3, max_size=3).map(np.array)
 
 def fed(reference, **shares):
     feed = feed_forward(FeedForwardSection(**shares), ROTOR, 1e-3, 0.0)
-    reckon(feed, np.array(reference))
+    compute_feed_forward(feed, np.array(reference))
     return feed.torque_q
 
 

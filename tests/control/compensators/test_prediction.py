@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.applied_torque import belief, believe
-from spheretwin.control.compensators.prediction import Delayed, PredictionSection, predict, prediction
+from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
+from spheretwin.control.compensators.prediction import DelayModel, PredictionSection, predict, prediction
 from spheretwin.control.law import Law
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration
@@ -36,19 +36,19 @@ class Way:
         self.model = torque_model(actuator)
         self.ticks = round(delay) + 20
         self.commands = [commands_at(-period_s * (self.ticks - k)) for k in range(self.ticks)]
-        delayed = Delayed(period_s, delay * period_s, LAG_S, self.inertia)
+        delayed = DelayModel(period_s, delay * period_s, LAG_S, self.inertia)
         self.mine = prediction(PredictionSection(on=True), delayed, self.model)
-        self.belief = belief(True, 18, period_s, delay * period_s, LAG_S)
+        self.applied_torque = applied_torque(True, 18, period_s, delay * period_s, LAG_S)
         self.measurement = np.zeros((6, 3))
         G = torque_matrix(Q, actuator)
         for k in range(self.ticks):
             self.predict()
-            believe(self.belief, Q, G, self.commands[k])
+            estimate_applied_torque(self.applied_torque, Q, G, self.commands[k])
         self.predict()
 
     def predict(self):
-        self.measurement[:3] = Q, V, self.belief.torque_q
-        assert predict(self.mine, self.belief, self.model, self.measurement)
+        self.measurement[:3] = Q, V, self.applied_torque.torque_q
+        assert predict(self.mine, self.applied_torque, self.model, self.measurement)
 
     def current(self, t):
         """Exact response to the delayed commands, switch by switch; at rest before the first."""
@@ -104,7 +104,7 @@ def test_the_torque_is_that_of_the_period_before_the_instant_predicted(delay, ac
     tolerance = np.abs(E_G).max() * 18 * 8 * np.abs(V).max() * end + 1e-9
     np.testing.assert_allclose(way.measurement[2], torque / period_s, rtol=0, atol=tolerance)
     np.testing.assert_array_equal(way.measurement[3:5], [Q, V])
-    np.testing.assert_array_equal(way.measurement[5], way.belief.torque_q)
+    np.testing.assert_array_equal(way.measurement[5], way.applied_torque.torque_q)
 
 
 HANDED = tuple(

@@ -6,7 +6,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.controller import law_at
-from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.control.law import SIGNATURE, NominalModel
 from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver, boosted
 from spheretwin.models.base.compiled import compiled_callback
 from spheretwin.models.base.errors import InputError
@@ -111,7 +111,7 @@ class SlowLaw:
 )
 def test_law_follows_its_equations(actuator, gains, delay_s):
     gains = AFSMWithObserver(**gains)
-    law = gains.build(Known(PERIOD, delay_s, actuator.inertia))
+    law = gains.build(NominalModel(PERIOD, delay_s, actuator.inertia))
     slow = SlowLaw(gains, actuator.inertia, delay_s)
     compiled = compiled_callback(SIGNATURE, law.step)
     generator = np.random.default_rng(0)
@@ -192,7 +192,7 @@ def test_a_preset_that_is_none_is_refused(bad):
 
 def closed_loop(preset, modelling_error, inertia):
     """Matrix of one period of (angle, rate, ẑ₁, ẑ₂, d̂) of β: the law on (1 + m) of its double integrator."""
-    law = AFSMWithObserver(preset=preset, coupled=False).build(Known(PERIOD, 0.0, inertia))
+    law = AFSMWithObserver(preset=preset, coupled=False).build(NominalModel(PERIOD, 0.0, inertia))
     columns, small = [], 1e-4  # well within the layer
     state, torque = law.state.copy(), np.empty(3)
     law.step(0.0, np.zeros((3, 3)), np.zeros((3, 3)), law.parameters, state, torque)

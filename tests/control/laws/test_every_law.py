@@ -9,7 +9,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control import laws
-from spheretwin.control.law import Known
+from spheretwin.control.law import NominalModel
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
 from spheretwin.simulation import simulate
@@ -20,7 +20,7 @@ def test_every_law_runs_to_a_status(name):
     run = simulate(scenarios.load("hold", {"controller.law": name, "duration": 0.05}))
     assert run.status in set(Status)
     assert len(run.telemetry) == 50 or run.status != Status.COMPLETED
-    known = Known(run.scenario.controller.period_s, 0.0, run.actuator.inertia)
+    known = NominalModel(run.scenario.controller.period_s, 0.0, run.actuator.inertia)
     for signal in run.scenario.controller.build(known).signals:
         assert np.isfinite(run.telemetry[signal.name]).all()
         assert signal.unit
