@@ -1,7 +1,7 @@
-"""The torque of the last control period as the controller believes it: its commands, nominal delay and lag.
+"""Applied torque: estimate of the torque over the last control period, from commands, nominal delay and lag.
 
-Over the period that begins with command k, the amplifiers still follow command k - n - 1 for a share f of it,
-then command k - n, where the known delay is n + f periods. The lag is solved exactly over both parts.
+The nominal delay is n + f periods. Over the period that begins with command k, the amplifiers follow command
+k - n - 1 for a share f of the period, then command k - n. The lag is solved exactly over both parts.
 """
 
 from __future__ import annotations
@@ -16,52 +16,52 @@ from spheretwin.models.base.compiled import allocation_free, transfer_state
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
 
-# A delay that fits a whole number of periods does so to rounding only.
+# A delay of a whole number of periods is one to rounding only.
 ROUNDING = 1e-9
 
 
 class LagStep(NamedTuple):
-    """First-order lag over a part of a period, the command held."""
+    """First-order lag over a part of a period, with a constant command."""
 
     decay: float
-    """Share of the distance to the command that is left at its end."""
+    """Remaining share of the distance to the command at the end of the part."""
     mean_share: float
-    """Share of that distance that is left on average."""
+    """Mean remaining share of that distance."""
 
 
 class AppliedTorque(NamedTuple):
-    """What the controller believes of the currents."""
+    """Estimated currents and applied torque."""
 
     on: bool
-    """Whether the law wants to know; else nothing of it is computed."""
+    """True if the law, the detector or the prediction uses it; otherwise nothing is computed."""
     fraction: float
-    """Share of a period in which the older command still acts, f."""
+    """Share of a period in which the older command acts, f."""
     older_lag: LagStep
     newer_lag: LagStep
     commands: NDArray[np.float64]  # (n + 2, groups) A, newest first
     current: NDArray[np.float64]  # (groups,) A, at the end of the last period
-    mean: NDArray[np.float64]  # (groups,) A, over it
-    torque_S: NDArray[np.float64]  # (3,) N·m, mean over it, stator frame
-    torque_q: NDArray[np.float64]  # (3,) N·m, the same on the hinges; no numbers where nobody asked
+    mean: NDArray[np.float64]  # (groups,) A, over the last period
+    torque_S: NDArray[np.float64]  # (3,) N·m, mean over the last period, stator frame
+    torque_q: NDArray[np.float64]  # (3,) N·m, the same on the hinges; NaN if `on` is False
 
     def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Arrays that it goes on from."""
+        """Return the arrays that hold the state."""
         return self.commands, self.current, self.torque_q
 
 
 def applied_torque(
     on: bool, groups: int, period_s: float, delay_s: float, time_constant_s: float
 ) -> AppliedTorque:
-    """Belief at rest: no currents, and none on their way.
+    """Applied torque at rest: no currents and no pending commands.
 
     Parameters
     ----------
     asked : bool
-        Whether the law wants it.
+        Whether it is used.
     groups : int
         Coil groups.
     period_s, delay_s, time_constant_s : float, s
-        Control period, known delay, and lag L/R; 0 for none.
+        Control period, nominal delay, and time constant L/R of the lag; 0 for none.
     """
     whole, fraction = split_delay(delay_s if on else 0.0, period_s)
     return AppliedTorque(
@@ -84,18 +84,18 @@ def estimate_applied_torque(
     G: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> None:
-    """Move the belief on by one control period.
+    """Advance the estimate by one control period.
 
     Parameters
     ----------
     belief : Belief
         Changed in place.
     pose : (3,) array, rad
-        As measured at the beginning of the period.
+        Measured at the beginning of the period.
     G : (3, groups) array, N·m/A
         Nominal torque matrix at that pose.
     command : (groups,) array, A
-        Asked for in this tick.
+        Commanded in this tick.
     """
     commands, current, mean, fraction = (
         applied_torque.commands,
@@ -121,23 +121,23 @@ def estimate_applied_torque(
 
 
 def transfer_applied_torque(previous: AppliedTorque, applied_torque: AppliedTorque) -> None:
-    """Go on with what was believed before, under another delay or lag; commands older than any known repeat.
+    """Copy the state into an estimate with another delay or lag; older commands repeat the oldest one.
 
-    Nothing is known where nobody asked before: what is believed then begins at rest.
+    If `previous` was off, it has no state, and the estimate starts at rest.
     """
     if previous.on and applied_torque.on:
         transfer_state(previous, applied_torque)
 
 
 def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
-    """Whole periods of a delay, and the share of a period beyond them."""
+    """Return the whole periods of a delay and the remaining share of a period."""
     periods = delay_s / period_s
     whole = int(periods * (1 + ROUNDING) + ROUNDING)
     return whole, max(0.0, periods - whole)
 
 
 def lag_step(duration_s: float, time_constant_s: float) -> LagStep:
-    """First-order lag over a duration."""
+    """Return the first-order lag over a duration."""
     if duration_s == 0:
         return LagStep(1.0, 0.0)
     if time_constant_s == 0:

@@ -1,4 +1,4 @@
-"""One control tick: from what was measured to the currents asked for, by the nominal model alone."""
+"""One control tick: from the measurement to the commanded currents, by the nominal model alone."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from spheretwin.models.base.numba_internals import function_at
 from spheretwin.models.kinematics import cartesian_torque
 from spheretwin.models.magnetics import CachedMatrix, TorqueModel, cached_matrix, update_cached_matrix
 
-# Whatever a law may ask for while it loses the rotor; beyond it the allocation's products would overflow.
+# A diverging law may command any torque; beyond this the products of the allocation would overflow.
 LARGEST_TORQUE_Nm = 1e100
 
 NO_TORQUE = -1.0
-"""Share of the torque that is returned where the law gave none."""
+"""Share that is returned if the law gave no torque."""
 
 _COMMAND = int(Reason.COMMAND)
 
@@ -35,16 +35,16 @@ allocation_at = function_at(allocations.SIGNATURE)
 
 
 class EstimatorState(NamedTuple):
-    """What rates are estimated with, and what the estimator remembers."""
+    """Parameters and memory of the estimator of rates."""
 
     on: bool
-    """Whether there is an estimator; if not, the rates are handed over as they come."""
+    """True if there is an estimator; otherwise the law receives the measured rates."""
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
 
 
 class Supervision(NamedTuple):
-    """What looks after the actuator beside the law."""
+    """Fault detection and watchdog."""
 
     groups: EnabledGroups
     detector: Detector
@@ -52,7 +52,7 @@ class Supervision(NamedTuple):
 
 
 class Controller(NamedTuple):
-    """What the near side of the wires knows and remembers: nothing of the plant itself."""
+    """State and parameters of the controller; it has no access to the plant."""
 
     parameters: NDArray[np.float64]  # of the law
     memory: NDArray[np.float64]  # state of the law
@@ -60,11 +60,11 @@ class Controller(NamedTuple):
     cached_matrix: CachedMatrix
     current_limit_A: float
     logged: int  # leading entries of the memory that are logged
-    torque_q: NDArray[np.float64]  # (3,) N·m, what the law asked for in this tick
+    torque_q: NDArray[np.float64]  # (3,) N·m, commanded by the law in this tick
     torque_S: NDArray[np.float64]  # (3,) N·m, the same in the stator frame
     estimator_state: EstimatorState
-    pose: NDArray[np.float64]  # (3,) rad, as the law is handed it
-    rates: NDArray[np.float64]  # (3,) rad/s, likewise
+    pose: NDArray[np.float64]  # (3,) rad, that the law receives
+    rates: NDArray[np.float64]  # (3,) rad/s, that the law receives
     scratch: NDArray[np.float64]  # of the allocation
     applied_torque: AppliedTorque
     compensators: Compensators
@@ -83,7 +83,7 @@ def controller(
     manual: Manual,
     estimator: Estimator | None = None,
 ) -> Controller:
-    """Controller at the start of a run.
+    """Return the controller at the start of a run.
 
     Parameters
     ----------
@@ -92,18 +92,18 @@ def controller(
     magnetics : TorqueModel
         Nominal.
     current_limit_A : float, A
-        Largest group current the controller asks for.
+        Largest group current that the controller commands.
     logged : int
         Numbers of the law's state that the telemetry logs.
     belief : Belief
-        Of the torque that the law's commands led to.
+        Estimate of the torque of the law's commands.
     around : Around
-        What stands around the law.
+        Governor, prediction and feed-forward.
     supervision : Supervision
     manual : Manual
-        Currents that are asked for instead of the law's, if there are any.
+        Manual currents that replace those of the law, if there are any.
     estimator : Estimator, optional
-        Of the rates; the law is handed those that are measured unless given.
+        Estimator of the rates; the law receives the measured rates unless it is given.
     """
     groups = magnetics.group_axes.shape[1]
     return Controller(
@@ -141,33 +141,34 @@ def control_tick(
     measurement: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> float:
-    """Law, generalised torque to Cartesian (at the pose handed to it), allocation (by the nominal matrix).
+    """Run the law, map its generalised torque to a Cartesian one, and allocate currents.
+
+    The map is taken at the pose that the law receives, the allocation uses the nominal torque matrix.
 
     Parameters
     ----------
     controller : Controller
         Changed in place.
     law, allocate : address or callable
-        Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`: addresses in compiled code.
+        Of `control.law.SIGNATURE` and `control.allocation.SIGNATURE`: addresses in compiled code.
     estimate : address or callable
-        Of `control.estimation.estimator.SIGNATURE`; anything where nothing is estimated.
+        Of `control.estimators.estimator.SIGNATURE`; any value if nothing is estimated.
     t : float, s
         Time of the tick.
     reference : (3, 3) array
         Desired angle, rate and acceleration as rows; the law may write into it.
     measurement : (3, 3) or (6, 3) array
-        Measured angle (rad) and rate (rad/s); the other rows are filled in, six of them where the delay is
-        predicted over. The law may write into it.
+        Measured angle (rad) and rate (rad/s); the other rows are filled in. It has six rows if the
+        prediction is on. The law may write into it.
     command : (n,) array, A
-        Result: group currents asked of the amplifiers.
+        Result: commanded group currents.
 
     Returns
     -------
     float
-        Share of the law's torque that `command` gives, or the least share of a current by hand; `LOST` where
-        the law gave no torque, or one beyond `LARGEST_TORQUE_Nm`, or logs what is no number, and no
-        watchdog is there to take the currents away. Where it does, nothing is asked for, and all of it is
-        given.
+        Share of the law's torque that `command` gives, or the least share of a manual current. `NO_TORQUE` if
+        the law gave no torque, or one beyond `LARGEST_TORQUE_Nm`, or logs a value that is not finite, and the
+        watchdog is off. If the watchdog is on, it trips instead: the currents are 0 and the share is 1.
     """
     pose, estimator_state = controller.pose, controller.estimator_state
     if estimator_state.on:
@@ -206,10 +207,10 @@ def _call_law(
     reference: NDArray[np.float64],
     measurement: NDArray[np.float64],
 ) -> bool:
-    """Let the law write its torque; whether that, and all that it logs and is handed, are numbers."""
+    """Call the law; return True if its inputs, its torque and its logged values are finite."""
     torque_q, compensators = controller.torque_q, controller.compensators
     for i in range(3):
-        torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
+        torque_q[i] = np.nan  # detects a law that writes no torque, or raises
         measurement[2, i] = controller.applied_torque.torque_q[i]
     if compensators.on and not apply_compensators(
         compensators, controller.applied_torque, controller.magnetics, measurement, reference
@@ -230,7 +231,7 @@ def _call_law(
 
 @compilable
 def _supervise(controller: Controller, t: float) -> None:
-    """Look for groups that do not follow, where that is wanted, and while they are driven."""
+    """Run the fault detector if it is on and the groups are driven."""
     groups, detector, watchdog = controller.supervision
     if detector.on and watchdog.halt[0] == GO:
         G, current = controller.cached_matrix.G, controller.applied_torque.current
@@ -239,9 +240,9 @@ def _supervise(controller: Controller, t: float) -> None:
 
 @compilable
 def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64]) -> float:
-    """Currents for the law's torque, from the groups that may be used.
+    """Compute currents for the law's torque from the enabled groups.
 
-    The allocation is handed a copy of the torque matrix: what it writes reaches nothing else.
+    The allocation receives a copy of the torque matrix, so that its writes have no other effect.
     """
     groups, pose, G = controller.supervision.groups, controller.pose, controller.cached_matrix.G
     if controller.compensators.prediction.on:
@@ -255,7 +256,7 @@ def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64
 
 @compilable
 def _command_zero(controller: Controller, command: NDArray[np.float64]) -> None:
-    """No torque and no currents; what a law logs stays what it was, unless that is no number."""
+    """Command no torque and no currents; logged values of the law stay unless they are not finite."""
     for i in range(3):
         controller.torque_q[i] = controller.torque_S[i] = controller.compensators.feed_forward.torque_q[i] = (
             0.0

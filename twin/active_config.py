@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from spheretwin import assembly
 from spheretwin.control.law import Law
-from spheretwin.control.law_components.parameters import AROUND
+from spheretwin.control.law_components.parameters import COMPENSATORS
 from spheretwin.control.laws import LAWS
 from spheretwin.electronics.data_sheet import drive_sheet, sensor_sheet
 from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
@@ -270,7 +270,7 @@ class InForce(NamedTuple):
                 f" {self.own_trajectory.name} is followed instead"
             )
         own_law = None if name == "controller.law" else self.own_law
-        of_the_law = name.startswith("controller.") and name.split(".")[1] not in AROUND
+        of_the_law = name.startswith("controller.") and name.split(".")[1] not in COMPENSATORS
         if own_law and of_the_law:
             raise InputError(f"session: expected no field of a shipped law, as {own_law.name} is not one")
         scenario = changed(self.scenario, name, value)

@@ -1,4 +1,4 @@
-"""What stands around any law, shipped or its user's, each part off unless asked for."""
+"""Compensators around any law: reference governor, delay prediction, feed-forward; each is off by default."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ Array = NDArray[np.float64]
 
 
 class Compensators(NamedTuple):
-    """What a control tick does before and after it calls the law."""
+    """Compensators of a run, for compiled code."""
 
     on: bool
-    """Whether there is any of it."""
+    """True if any compensator is on."""
     governor: Governor
     prediction: Prediction
     feed_forward: FeedForward
@@ -40,23 +40,23 @@ def apply_compensators(
     measurement: Array,
     reference: Array,
 ) -> bool:
-    """Make of measurement and reference what the law is to be handed.
+    """Apply the compensators to the measurement and the reference that the law receives.
 
     Parameters
     ----------
     around : Around
         Changed in place.
     belief : Belief
-        Of the currents, at the time of the measurement.
+        Estimate at the time of the measurement.
     magnetics : TorqueModel
         Nominal.
     measurement, reference : (3, 3) arrays
-        The result too; of the measurement (6, 3) where the delay is predicted over.
+        Changed in place; the measurement is (6, 3) if the prediction is on.
 
     Returns
     -------
     bool
-        Whether these are numbers.
+        True if both are finite.
     """
     if compensators.governor.on and not govern(compensators.governor, measurement, reference):
         return False
@@ -71,7 +71,7 @@ def apply_compensators(
 
 
 def transfer_compensators(before: Compensators, after: Compensators) -> None:
-    """Go on with what each part is in the midst of, under other figures."""
+    """Copy the state of each compensator into compensators with other parameters."""
     reference_governor.carried_on(before.governor, after.governor)
     transfer_state(before.prediction, after.prediction)
     transfer_state(before.feed_forward, after.feed_forward)

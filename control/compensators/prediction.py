@@ -1,24 +1,25 @@
-r"""Where the rotor will be when the command of this tick begins to act: the delay taken out of the loop.
+r"""Delay compensation: predicts the rotor's motion at the time at which the command of this tick acts.
 
-From a measurement to the currents that answer it a known delay passes. Over it the nominal equations of
-motion move the measured angles and rates on, under the torque of the commands on their way, which the belief
-knows. Load and friction are left out: over 1 ms the prototype's friction changes a rate by 1 mrad/s.
+The currents respond to a measurement after the nominal delay. The nominal equations of motion advance the
+measured angles and rates over that delay, under the torque of the pending commands in `AppliedTorque`. Load
+and friction are left out: over 1 ms the prototype's friction changes a rate by 1 mrad/s.
 
-*What a law is handed.* Rows 0 to 2 of its measurement (angle, rate, torque over the last period) are those of
-the instant at which its command begins to act, and so are the rows of its reference, moved on by their own
-rate and acceleration. It is told of no delay (`NominalModel.delay_s` is 0): to a law that knows nothing of all this,
-also one with an observer of its own, the delay is gone, and angle and torque belong together. One that would
-rather correct its observer by what was measured, and move that on itself, finds it in rows 3 to 5, in the
-same order, with the torque that belongs to it, and in `NominalModel.ahead_s` how far rows 0 to 2 are ahead of them.
+*Inputs of the law.* Rows 0 to 2 of the measurement (angle, rate, torque over the last period) are those of
+the time at which the command begins to act. The rows of the reference are advanced to the same time by their
+own rate and acceleration. `NominalModel.delay_s` is 0. For a law that is not aware of the prediction, also
+one with its own observer, there is no delay, and angle and torque belong to the same time. A law that
+corrects its observer with the measured values and predicts the motion itself finds these values in rows 3 to
+5, in the same order, with the torque that belongs to them. `NominalModel.ahead_s` is the time from rows 3 to
+5 to rows 0 to 2.
 
-*Allocation.* The currents are found for the pose at which they begin to act.
+*Allocation.* The currents are computed for the pose at which they begin to act.
 
-*Steps.* One for each command on its way: its mean current, solved exactly through the lag, acts on the rotor
-over the midpoint rule. With the shape of the current within a period left out, both are of second order in
-the period.
+*Steps.* One step for each pending command: its mean current, solved exactly through the lag, acts on the
+rotor over the midpoint rule. The shape of the current within a period is left out. Both errors are of second
+order in the period.
 
-*What it is worth.* A known delay no longer unsettles a loop; the start and the corners of a reference are
-still answered late, and noise of the rates is carried over the delay. The study `delays` measures it on the
+*Benefit.* A known delay no longer destabilises the loop. The start and the corners of a reference are still
+followed late, and noise of the rates is extrapolated over the delay. The study `delays` measures it on the
 prototype's tilt.
 """
 
@@ -46,17 +47,15 @@ from spheretwin.models.magnetics import (
 Array = NDArray[np.float64]
 
 MEASURED = 3
-"""First of the rows that hold what was measured."""
+"""First row of the measured values."""
 
 
 class PredictionSection(BaseModel):
-    """Prediction over the known delay; off unless asked for."""
+    """Prediction over the nominal delay; off by default."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    on: bool = Field(
-        False, description="whether the law is handed the rotor as it will be after nominal.delay_s"
-    )
+    on: bool = Field(False, description="whether the law receives the predicted motion after nominal.delay_s")
 
 
 class Prediction(NamedTuple):
@@ -68,22 +67,22 @@ class Prediction(NamedTuple):
     inertia: Array  # (3,) kg·m², nominal
     full_lag: LagStep
     pose: Array  # (3,) rad, predicted
-    rates: Array  # (3,) rad/s, likewise
-    cached_matrix: CachedMatrix  # nominal, at that pose
+    rates: Array  # (3,) rad/s, predicted
+    cached_matrix: CachedMatrix  # nominal, at the predicted pose
     midpoint: Array  # (3,) rad, pose in the middle of a step
     current: Array  # (groups,) A, at the end of a step
-    mean: Array  # (groups,) A, over it
-    torque_S: Array  # (3,) N·m, likewise
+    mean: Array  # (groups,) A, over a step
+    torque_S: Array  # (3,) N·m, over a step
     torque_q: Array  # (3,) N·m, the same on the hinges
-    first_step_torque_q: Array  # (3,) N·m, over the first step that was made in the last tick
+    first_step_torque_q: Array  # (3,) N·m, over the first step of the last tick
 
     def state_arrays(self) -> tuple[Array, ...]:
-        """Arrays that it goes on from."""
+        """Return the arrays that hold the state."""
         return self.pose, self.rates, self.first_step_torque_q
 
 
 class DelayModel(NamedTuple):
-    """What a prediction reckons with."""
+    """Nominal delay, lag and inertia."""
 
     period_s: float
     delay_s: float
@@ -92,7 +91,7 @@ class DelayModel(NamedTuple):
 
 
 def prediction(section: PredictionSection, model: DelayModel, magnetics: TorqueModel) -> Prediction:
-    """Prediction with no torque on its way.
+    """Return a prediction without pending commands.
 
     Parameters
     ----------
@@ -124,23 +123,23 @@ def prediction(section: PredictionSection, model: DelayModel, magnetics: TorqueM
 def predict(
     prediction: Prediction, applied_torque: AppliedTorque, magnetics: TorqueModel, measurement: Array
 ) -> bool:
-    """Put what is predicted into the rows of a measurement, and what was measured into those behind them.
+    """Write the predicted values into rows 0 to 2 of a measurement and the measured values into rows 3 to 5.
 
     Parameters
     ----------
     prediction : Prediction
         Changed in place.
     belief : Belief
-        Of the currents, at the time of the measurement.
+        Estimate at the time of the measurement.
     magnetics : TorqueModel
         Nominal.
     measurement : (6, 3) array
-        Angle, rate and torque of the last period as rows; the result.
+        Angle, rate and torque of the last period as rows; changed in place.
 
     Returns
     -------
     bool
-        Whether these are numbers; where not, none is kept.
+        True if the prediction is finite; otherwise its state is set to 0.
     """
     pose, rates = prediction.pose, prediction.rates
     for i in range(3):
@@ -176,7 +175,7 @@ def predict(
 
 @allocation_free
 def advance(prediction: Prediction, reference: Array) -> None:
-    """Move the rows of a reference on by the same time."""
+    """Advance the rows of a reference by the same time."""
     ahead = prediction.ahead_s
     for i in range(3):
         reference[0, i] += ahead * (reference[1, i] + 0.5 * ahead * reference[2, i])
@@ -187,7 +186,7 @@ def advance(prediction: Prediction, reference: Array) -> None:
 def _step(
     prediction: Prediction, magnetics: TorqueModel, command: Array, duration_s: float, lag: LagStep
 ) -> bool:
-    """Move pose, rates and currents on while one command acts; whether the pose is finite on the way."""
+    """Advance pose, rates and currents while one command acts; return True if the pose stays finite."""
     q, v, midpoint = prediction.pose, prediction.rates, prediction.midpoint
     for i in range(3):
         midpoint[i] = q[i] + 0.5 * duration_s * v[i]
@@ -212,7 +211,7 @@ def _step(
 
 @allocation_free
 def _update_matrix(prediction: Prediction, magnetics: TorqueModel, pose: Array) -> bool:
-    """Keep the torque matrix at a pose, if that is finite."""
+    """Update the torque matrix at a pose; return False if the pose is not finite."""
     for i in range(3):
         if not isfinite(pose[i]):
             return False

@@ -1,9 +1,9 @@
-r"""Extended state observer: angle, rate and disturbing torque from the measured angle and the torque given.
+r"""Extended state observer: angle, rate and disturbance torque from the measured angle and applied torque.
 
-*Model.* The disturbance d is all that the nominal rotor does not explain: load, friction, and what another
-inertia than the nominal one needs. With the torque τ of the last period,
+*Model.* The disturbance d is the torque that the nominal rotor does not explain: load, friction, and the
+effect of an inertia other than the nominal one. With the torque τ of the last period,
 
-    M̂ q̈ + Ĉ q̇ = τ + d,      d a constant torque until it is seen to change.
+    M̂ q̈ + Ĉ q̇ = τ + d,      d constant over a period.
 
 *Observer.* Once a period T: predict (z₁, z₂) with τ + d̂, and correct by the innovation i = y − z₁,
 
@@ -15,13 +15,13 @@ F = (1 − l e₁ᵀ) A and A is the matrix of a triple integrator over T. Its c
 
     l₁ = 1 − a² b,   l₃ = (1 − a)² (1 − b)/T²,   l₂ = (3 − 2a − b − l₁ − ½ l₃ T²)/T.
 
-*Error at the ticks.* Only the rate of d drives it, ν = M̂⁻¹ ḋ. Over one period, with s the time that is left
-of it, ε⁺ = F ε − (1 − l e₁ᵀ) ∫ (s²/2, s, 1) ν ds, so that a constant load leaves none. The response of each
-component to a step of d at any instant has one sign: d̂ follows it without overshoot, as l₃ times c₀ z² + c₁ z
-+ c₂ and a power of z over the polynomial, with 2c₀ = s², 2c₁ = T² + 2Ts − 2s² and 2c₂ = (T − s)², none below
-0; the innovation is d̂'s step over l₃; and of the rate it is checked for all a, b and s by the tests. The sum
-of magnitudes is then what a steady rise leaves, where l₃ i = T ν. With p = 1/(1 − a) and r = 1/(1 − b) and
-for any d with |ν| ≤ N, beside what is left of the start,
+*Error at the ticks.* Only the rate of d drives it, ν = M̂⁻¹ ḋ. Over one period, with s the remaining time,
+ε⁺ = F ε − (1 − l e₁ᵀ) ∫ (s²/2, s, 1) ν ds, so that a constant load leaves no error. The response of each
+component to a step of d at any instant has one sign: d̂ follows it without overshoot, as l₃ times c₀ z² + c₁
+z + c₂ and a power of z over the polynomial, with 2c₀ = s², 2c₁ = T² + 2Ts − 2s² and 2c₂ = (T − s)², none
+below 0; the innovation is d̂'s step over l₃; for the rate the tests check it for all a, b and s. The sum of
+magnitudes is then the error under a steady rise, where l₃ i = T ν. With p = 1/(1 − a) and r = 1/(1 − b) and
+for any d with |ν| ≤ N, apart from the decaying initial error,
 
     |ε| ≤ N (T³ a² b p² r, T² (p² + 2pr − 3p − 3r/2 + 11/6), T (2p + r − 2)).
 
@@ -33,7 +33,7 @@ at most N T from one to the next, ε⁺ = F ε − e₃ T ν, and the factors th
 Both are for a fixed ω_d, the exact model and a first order in ε. For T → 0 both are
 N (1/(ω_o² ω_d), (2 ω_o + ω_d)/(ω_o² ω_d), 2/ω_o + 1/ω_d).
 
-*Schedule.* ω_d may move from tick to tick, as it likes. The left eigenvectors of the double pole a,
+*Schedule.* ω_d may change arbitrarily from tick to tick. The left eigenvectors of the double pole a,
 e₁ᵀA (A − a)⁻¹ and e₁ᵀA (A − a)⁻², do not depend on b: in their coordinates F is triangular for all b at once,
 with a, a and b on its diagonal, a cascade whose error decays as that of its slowest ω_d, or faster.
 """
@@ -57,7 +57,7 @@ from spheretwin.models.lagrangian import Triple
 
 
 class ObserverGains(NamedTuple):
-    """What an innovation corrects on one axis."""
+    """Observer gains of one axis."""
 
     of_angle: float  # l1
     of_rate: float  # l2, 1/s
@@ -65,7 +65,7 @@ class ObserverGains(NamedTuple):
 
 
 class ObserverState(NamedTuple):
-    """What the observer knows."""
+    """State of the observer."""
 
     motion: RotorMotion
     disturbance: Triple  # d̂, N·m
@@ -75,12 +75,12 @@ class ObserverState(NamedTuple):
 def observer_gains(
     bandwidth_rad_s: float, disturbance_bandwidth_rad_s: float, period_s: float
 ) -> ObserverGains:
-    """Gains that put two poles at the one bandwidth and one at the other.
+    """Return gains with two poles at the first bandwidth and one at the second.
 
     Parameters
     ----------
     bandwidth_rad_s, disturbance_bandwidth_rad_s : float, rad/s
-        ω_o and ω_d; with ω_d = 0 no disturbance is learnt.
+        ω_o and ω_d; with ω_d = 0 no disturbance is estimated.
     period_s : float, s
     """
     a, b = exp(-bandwidth_rad_s * period_s), exp(-disturbance_bandwidth_rad_s * period_s)
@@ -99,7 +99,7 @@ def observe(
     nominal: RotorModel,
     period_s: float,
 ) -> ObserverState:
-    """What is known one period later.
+    """Return the state of the observer one period later.
 
     Parameters
     ----------
@@ -129,21 +129,24 @@ def _sum(x: Triple, y: Triple) -> Triple:
 
 
 def history_layout(known: NominalModel) -> tuple[float, int]:
-    """Share of a period in which the older command still acts, and the numbers of memory that it takes."""
+    """Return the share of a period in which the older command acts, and the size of the command history.
+
+    The history holds commanded torques, three numbers a tick, newest first.
+    """
     whole, fraction = split_delay(known.delay_s, known.period_s)
     return fraction, 3 * (whole + 2)
 
 
 @allocation_free
 def delayed_command(history: NDArray[np.float64], axis: int, fraction: float) -> float:
-    """Torque (N·m) on an axis that the last period was asked for."""
+    """Return the torque (N·m) on an axis that was commanded for the last period."""
     last = history.shape[0] - 3
     return fraction * history[last + axis] + (1.0 - fraction) * history[last - 3 + axis]
 
 
 @allocation_free
 def store_command(history: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
-    """Keep the torque (3,) that is asked for now."""
+    """Store the torque (3,) that is commanded now."""
     for i in range(history.shape[0] - 1, 2, -1):
         history[i] = history[i - 3]
     for axis in range(3):

@@ -1,6 +1,6 @@
 """Adaptive fuzzy law (AF): AFSM without its switching terms, ``v = theta^T Psi - K s``.
 
-`spheretwin reproduce figure11` has its errors with the printed gains; the study `tuning` searches others.
+`spheretwin reproduce figure11` reports its errors with the printed gains; the study `tuning` searches others.
 """
 
 from typing import Literal
@@ -35,7 +35,7 @@ class AdaptiveFuzzy(LawParameters):
     fuzzy_rate: NonNegativeEach = Field(each(10.0), description="η, adaptation rate of the fuzzy consequents")
 
     def build(self, known: NominalModel) -> Law:
-        """Law whose consequents all start at 0."""
+        """Return a law whose consequents all start at 0."""
         gains = [*self.surface_slope, *self.reaching_gain, *self.fuzzy_rate]
         parameters = np.array([*gains, *torque_factor(self.level, known), known.period_s])
         return Law(self.law, step, parameters, np.zeros(THETA + 3 * CONSEQUENTS), SIGNALS)
@@ -44,7 +44,7 @@ class AdaptiveFuzzy(LawParameters):
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     for axis in range(3):
         angle, rate = measurement[0, axis], measurement[1, axis]
         error, error_rate = angle - reference[0, axis], rate - reference[1, axis]

@@ -1,11 +1,11 @@
-"""Adaptive fuzzy sliding mode law (AFSM) of the paper, one subsystem an axis (40)-(43).
+"""Adaptive fuzzy sliding mode law (AFSM) of the paper, one subsystem per axis (40)-(43).
 
 ``v = theta^T Psi - xi sgn(s) - zeta sgn(s) S - K s`` with ``S = 1 + |s| + s^2``; the estimates adapt as
 ``theta' = -eta s Psi``, ``xi' = sigma |s|``, ``zeta' = varsigma |s| S``, all from 0. As in the paper, xi and
 zeta only ever grow.
 
-`spheretwin reproduce figure11` has its errors with the printed gains, `spheretwin reproduce stability` what
-the growth of ξ and ζ leads to; the study `tuning` searches other gains.
+`spheretwin reproduce figure11` reports its errors with the printed gains, `spheretwin reproduce stability`
+the effects of the growth of ξ and ζ; the study `tuning` searches other gains.
 """
 
 from typing import Literal
@@ -46,7 +46,7 @@ class AFSM(LawParameters):
     bound_rate: NonNegativeEach = Field(each(10.0), description="ς, growth rate of the coupling bound ζ̂")
 
     def build(self, known: NominalModel) -> Law:
-        """Law whose estimates all start at 0."""
+        """Return a law whose estimates all start at 0."""
         gains = [*self.surface_slope, *self.reaching_gain, *self.fuzzy_rate]
         rates = [*self.switching_rate, *self.bound_rate]
         parameters = np.array([*gains, *rates, *torque_factor(self.level, known), known.period_s])
@@ -56,7 +56,7 @@ class AFSM(LawParameters):
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     period = parameters[PERIOD]
     for axis in range(3):
         angle, rate = measurement[0, axis], measurement[1, axis]

@@ -265,7 +265,7 @@ def _filled(fields: dict[str, Any], preset: dict[str, Any]) -> dict[str, Any]:
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     nominal = RotorModel(_triple(parameters, INERTIA), parameters[COUPLED] != 0.0)
     _observe(measurement, parameters, state, nominal)
     motion = _motion_ahead(parameters, state, nominal)

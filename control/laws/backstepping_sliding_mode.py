@@ -1,29 +1,29 @@
-"""Adaptive backstepping sliding mode: a surface found in two steps, and an estimate of what disturbs.
+"""Adaptive backstepping sliding mode: a surface designed in two steps, and a disturbance estimate.
 
-After Liu and others, *Aerospace Science and Technology* 67 (2017), doi 10.1016/j.ast.2017.03.032. Its first
-step makes −c e of ė, its second puts a surface σ = k e + (ė + c e) on what is left. c and k enter the law by
-their sum alone, so λ = c + k is the parameter: σ = ė + λe, and with the rate q̇_r = q̇_d − λe
+After Liu and others, *Aerospace Science and Technology* 67 (2017), doi 10.1016/j.ast.2017.03.032. The
+first step sets ė to −c e, the second defines the surface σ = k e + (ė + c e) on the remainder. Only the sum
+of c and k enters the law, so λ = c + k is the parameter: σ = ė + λe, and with the rate q̇_r = q̇_d − λe
 
     τ = M q̈_r + C q̇_r − J h (σ + β sat(σ/δ)) + D,   D' = −J γ σ.
 
-*Why it holds.* With the true model and a constant load d, M σ̇ + C σ = −J h (σ + β sat) + D − d, and Ṁ − 2C is
+*Stability.* With the true model and a constant load d, M σ̇ + C σ = −J h (σ + β sat) + D − d, and Ṁ − 2C is
 skew-symmetric. So for 0 < w < 4λh
 
     V  = ½ σᵀMσ + ½ w Σ J e² + ½ Σ (D − d)²/(Jγ)
     V' = −Σ J (h σ² − w e σ + wλ e²) − h β Σ J |σ sat(σ/δ)| ≤ 0,
 
-on the coupled rotor, not on three axes apart; e and σ go to 0 by Barbalat's lemma, under any constant load.
-The sign of the paper's switching is smoothed over the layer δ; |D| is held by back-calculation, as in
-`control.parts.integral_feedback`, at the rate √(λγ/(λ + h)) of the integral and damping that the law has near
+on the coupled rotor, not on three separate axes; e and σ go to 0 by Barbalat's lemma, under any constant
+load. The sign function of the paper is smoothed over the layer δ; |D| is limited by back-calculation, as in
+`control.law_components.feedback`, at the rate √(λγ/(λ + h)) of the integral and damping of the law near
 rest.
 
-*Tuning by one number.* Within the layer the characteristic polynomial of an axis at rest is
+*Tuning by one parameter.* Within the layer the characteristic polynomial of an axis at rest is
 (s + λ)(s² + h(1 + β/δ) s + γ): with λ = ω, h(1 + β/δ) = 2ω and γ = ω² three poles at −ω. β/δ = ½ leaves
 h = 4ω/3 outside.
 
 *Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s, chosen for the tilt (60) with the prototype's hardware;
-on ideal hardware a faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning`
-searches ω and the layer.
+on ideal hardware a faster one is better. `spheretwin reproduce rivals` reports the figures; the study
+`tuning` searches ω and the layer.
 """
 
 from typing import Literal
@@ -47,7 +47,7 @@ Array = NDArray[np.float64]
 
 SIGNALS = (
     SLIDING_SIGNAL,
-    Signal("adapted_torque_Nm", "N·m", 3, "estimate D of what disturbs", ANGLES),
+    Signal("adapted_torque_Nm", "N·m", 3, "estimate D of the disturbance", ANGLES),
 )
 # Layout of the parameters.
 SURFACE_SLOPE, REACHING_GAIN, SWITCHING, LAYER, ADAPTATION, TRACKING, INERTIA, FRACTION, PERIOD = (
@@ -66,14 +66,16 @@ class BacksteppingSlidingMode(LawParameters):
     reaching_gain: PositiveEach = Field(
         each(4 * BANDWIDTH_rad_s / 3), description="h of the reaching term, 1/s"
     )
-    switching: NonNegativeEach = Field(each(0.05), description="β, reaching beside σ, rad/s")
+    switching: NonNegativeEach = Field(
+        each(0.05), description="β, switching part of the reaching term, rad/s"
+    )
     layer: PositiveEach = Field(each(0.1), description="δ, boundary layer of the switching, rad/s")
     adaptation_rate: NonNegativeEach = Field(
         each(BANDWIDTH_rad_s**2), description="γ, adaptation rate of the disturbance's estimate, 1/s²"
     )
 
     def build(self, known: NominalModel) -> Law:
-        """Law whose estimate starts at 0."""
+        """Return a law whose estimate starts at 0."""
         fraction, size = history_layout(known)
         slope, reaching = np.array(self.surface_slope), np.array(self.reaching_gain)
         tracking = tracking_rate(np.sqrt(slope * self.adaptation_rate / (slope + reaching)), known)
@@ -86,7 +88,7 @@ class BacksteppingSlidingMode(LawParameters):
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     period, history, inertia = parameters[PERIOD], state[HISTORY:], parameters[INERTIA : INERTIA + 3]
     rate, acceleration = np.empty(3), np.empty(3)
     for axis in range(3):

@@ -1,18 +1,18 @@
-"""Computed torque, with or without an integral: the model's torque for the acceleration that would correct.
+"""Computed torque, with or without an integral: inverse dynamics for the correcting acceleration.
 
 ``tau = M(q) (qddot_d - damping edot - stiffness e) + C(q, qdot) qdot + I`` with the nominal M and C, after
 Bai and Lee, IEEE/ASME Transactions on Mechatronics 19 (2014), doi 10.1109/TMECH.2013.2264565, and Chen and
 others, Sensors and Actuators A 180 (2012), doi 10.1016/j.sna.2012.04.010; the integral is added.
 
-*Why.* Where the model is true and nothing disturbs, M cancels and ë + damping ė + stiffness e = 0 on each
-axis, whatever the motion: no coupling is left. A load d leaves M⁻¹d/stiffness without the integral, and
-nothing with it. I is kept as a torque, I' = −M integral e, so that a constant load is a constant to it while
-the rotor moves; it is back-calculated, see `control.parts.integral_feedback`. ``integral = 0`` is the law of
+*Principle.* With the true model and no disturbance, M cancels and ë + damping ė + stiffness e = 0 on each
+axis, for any motion: there is no coupling. A load d leaves the error M⁻¹d/stiffness without the integral, and
+none with it. I is stored as a torque, I' = −M integral e, so that it is constant under a constant load while
+the rotor moves. For back-calculation see `control.law_components.feedback`. ``integral = 0`` is the law of
 the two papers.
 
-*Tuning by one number.* (3ω², 3ω, ω³) puts three poles at −ω; without an integral (ω², 2ω, 0) puts two.
+*Tuning by one parameter.* (3ω², 3ω, ω³) puts three poles at −ω; without an integral (ω², 2ω, 0) puts two.
 
-*Default.* ω = 40 1/s, as PID's. On ideal hardware a faster one is better. `spheretwin reproduce rivals` has
+*Default.* ω = 40 1/s, as in PID. On ideal hardware a faster one is better. `spheretwin reproduce rivals` has
 the figures; the study `tuning` searches ω and the damping.
 """
 
@@ -43,15 +43,17 @@ _STIFFNESS, _DAMPING, _INTEGRAL = triple_pole(BANDWIDTH_rad_s)
 
 
 class ComputedTorque(LawParameters):
-    """Computed torque, with a triple pole; without an integral where that is 0."""
+    """Computed torque with a triple pole; without an integral if `integral` is 0."""
 
     law: Literal["computed_torque"] = named("computed_torque")
-    stiffness: PositiveEach = Field(each(_STIFFNESS), description="acceleration a unit of error, 1/s²")
-    damping: PositiveEach = Field(each(_DAMPING), description="the same a unit of its rate, 1/s")
-    integral: NonNegativeEach = Field(each(_INTEGRAL), description="the same a unit of its integral, 1/s³")
+    stiffness: PositiveEach = Field(each(_STIFFNESS), description="acceleration per unit of error, 1/s²")
+    damping: PositiveEach = Field(each(_DAMPING), description="acceleration per unit of its rate, 1/s")
+    integral: NonNegativeEach = Field(
+        each(_INTEGRAL), description="acceleration per unit of its integral, 1/s³"
+    )
 
     def build(self, known: NominalModel) -> Law:
-        """Law whose integral starts at 0."""
+        """Return a law whose integral starts at 0."""
         fraction, size = history_layout(known)
         rates = tracking(np.array(self.damping), np.array(self.integral), known)
         gains = [*self.stiffness, *self.damping, *self.integral, *rates]
@@ -62,7 +64,7 @@ class ComputedTorque(LawParameters):
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     period, history, inertia = parameters[PERIOD], state[HISTORY:], parameters[INERTIA : INERTIA + 3]
     acceleration, growth = np.empty(3), np.empty(3)
     for axis in range(3):

@@ -1,30 +1,30 @@
-"""Finds groups whose current no longer follows: open ones and shorted ones.
+"""Fault detector: finds open and shorted groups, whose current no longer follows the command.
 
-Each tick the measured current of a group is held against three accounts of it:
+At each tick the measured current of a group is compared with three model currents:
 
-- *driven*: what the controller believes, its command through the nominal delay and lag, as far as the swing
-  of the amplifier carries it through the coil;
-- *open*: nothing;
-- *shorted*: what the back-EMF drives through the coil alone, ``L di/dt = -R i - e`` with ``e = G^T w``.
+- *driven*: the command through the nominal delay and lag (applied torque), limited to the current that the
+  voltage swing of the amplifier drives through the coil;
+- *open*: zero;
+- *shorted*: the current of the back-EMF in the coil alone, ``L di/dt = -R i - e`` with ``e = G^T w``.
 
-A tick speaks for a fault where the measured current is within a threshold of an undriven account, and that
-account is further than twice the threshold from the driven one: it could not be both. A tick at which the
-current is near neither undriven account speaks for health, and what was counted before is forgotten. Ticks at
-which little is commanded say nothing. So many ticks that speak for a fault, with none between that speaks
-against, and the group is taken to be out, as open or as shorted, whichever account was closer (the mean
-square of the difference). Where the rotor is slow the two accounts are one but for noise, and the first name
-is a guess. So both go on being held against the current of a group that is out, which nothing drives any
-more, and the name changes where the sum of squares of the other one has become less by the square of the
-threshold. Whatever the account of a shorted coil, noise does that to a true name at six standard deviations.
+A tick indicates a fault if the measured current is within a threshold of the open or the shorted model, and
+that model is further than twice the threshold from the driven one, so that both cannot hold. A tick at which
+the current is near neither fault model indicates a healthy group and resets the count. Ticks with a small
+command indicate nothing. After a given number of ticks that indicate a fault, without one that indicates
+health, the group is disabled as open or as shorted, whichever model was closer (mean square of the
+difference). At low rotor speed the two models differ by noise only, and the first classification is a guess.
+Therefore both models are still compared with the current of a disabled group, which is not driven. The
+classification changes if the sum of squares of the other model is smaller by the square of the threshold.
+For any shorted current, noise causes this for a correct classification at six standard deviations.
 
-*Threshold.* A healthy group that is believed to carry more than twice the threshold must not be measured
-below it: the threshold is at least the largest static error of command and measurement together, and six
-standard deviations of the measurement's noise, which a sample passes twice in 10⁹. The account of a shorted
-coil has errors too (warm copper, estimated rates): no less than 1 % of the current limit.
+*Threshold.* The measured current of a healthy group with a driven current of more than twice the threshold
+must exceed the threshold. The threshold is therefore at least the largest static error of command and
+measurement together, plus six standard deviations of the measurement noise, which a sample exceeds twice in
+10⁹. The shorted model has errors too (warm copper, estimated rates): at least 1 % of the current limit.
 
-*Ticks.* A healthy current is late where the voltage limits its rate: from one limit to the other it needs
-``2 i L / (V - R i)``, of the swing V that is left to the amplifier, and five time constants of the lag to
-settle. It may look like none for so long. The detector waits for that many ticks, and one more.
+*Ticks.* A healthy current is delayed if the voltage limits its rate: from one limit to the other it needs
+``2 i L / (V - R i)``, with the swing V of the amplifier, and five time constants of the lag to settle. For
+that time it may look like no current. The detector waits for that many ticks, and one more.
 """
 
 from __future__ import annotations
@@ -54,18 +54,20 @@ Array = NDArray[np.float64]
 
 
 class DetectorSection(BaseModel):
-    """Detector of open and shorted groups; off unless asked for here or by a fault."""
+    """Detector of open and shorted groups; off unless switched on here or by a fault."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    detect: bool = Field(False, description="whether the controller looks for groups that do not follow")
+    detect: bool = Field(
+        False, description="whether the controller detects groups whose current does not follow"
+    )
     threshold_A: Annotated[float, Field(ge=1e-6, le=1e3)] | None = Field(
         None,
-        description="current below which a group may carry none, A; derived from `nominal` unless given",
+        description="threshold of the difference of currents, A; derived from `nominal` unless given",
     )
     ticks: Annotated[int, Field(ge=1, le=1000)] | None = Field(
         None,
-        description="control ticks in a row that must speak for a fault; derived from `nominal` unless given",
+        description="control ticks that must indicate a fault; derived from `nominal` unless given",
     )
 
 
@@ -80,7 +82,7 @@ class NominalCurrents(NamedTuple):
     """Standard deviation of a measured current."""
     time_constant_s: float
     swing_V: float
-    """Of the amplifiers; infinite where none is known."""
+    """Of the amplifiers; infinite if unknown."""
     resistance_ohm: float
     inductance_H: float
 
@@ -93,29 +95,29 @@ class Detector(NamedTuple):
     ticks: int
     decay: float  # of the current of a shorted coil, over a control period
     resistance_ohm: float
-    reach_A: float  # that the swing carries through the coil
-    measured_A: Array  # (n,) what the sensors of the currents say
-    shorted_A: Array  # (n,) what a shorted coil would carry
-    count: NDArray[np.int64]  # (n,) ticks that speak for a fault
-    open_A2: Array  # (n,) squared differences over these ticks
+    reach_A: float  # current that the swing drives through the coil
+    measured_A: Array  # (n,) measured currents
+    shorted_A: Array  # (n,) current of the shorted model
+    count: NDArray[np.int64]  # (n,) ticks that indicate a fault
+    open_A2: Array  # (n,) sum of squared differences over these ticks
     shorted_A2: Array  # (n,)
     rate_S: Array  # (3,) rad/s
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Arrays that it goes on from."""
+        """Return the arrays that hold the state."""
         return self.shorted_A, self.count, self.open_A2, self.shorted_A2
 
 
 def derived_threshold_A(nominal: NominalCurrents) -> float:
-    """Threshold that keeps healthy groups healthy, as the head of this file says."""
+    """Return the threshold that avoids false alarms; see the module's docstring."""
     errors = nominal.static_error_A + DEVIATIONS * nominal.noise_A
     return max(LEAST_SHARE * nominal.current_limit_A, errors)
 
 
 def derived_ticks(nominal: NominalCurrents) -> int:
-    """Ticks for which a healthy current may look like none, and one more."""
+    """Return the ticks for which a healthy current may look like none, plus one."""
     spare_V = nominal.swing_V - nominal.resistance_ohm * nominal.current_limit_A
-    # Where the swing does not carry the limit at all, the current gets there with L/R at best.
+    # If the swing cannot drive the limit at all, the current settles with L/R at best.
     natural_s = SETTLING * nominal.inductance_H / nominal.resistance_ohm
     swing_s = 2 * nominal.current_limit_A * nominal.inductance_H / spare_V if spare_V > 0 else natural_s
     slow_s = min(swing_s, natural_s) + SETTLING * nominal.time_constant_s
@@ -123,16 +125,16 @@ def derived_ticks(nominal: NominalCurrents) -> int:
 
 
 def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCurrents) -> Detector:
-    """Detector that has seen nothing yet.
+    """Return a detector before the first measurement.
 
     Parameters
     ----------
     section : DetectorSection
     on : bool
-        Whether it looks.
+        Whether it is on.
     groups : int
     followed : Followed
-        What healthy groups do.
+        Nominal currents of healthy groups.
     """
     return Detector(
         on=on,
@@ -154,20 +156,20 @@ def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCu
 def detect_faults(
     detector: Detector, groups: EnabledGroups, applied: Array, G: Array, q: Array, qdot: Array, t: float
 ) -> None:
-    """Hold the measured currents of one control tick against what they would be.
+    """Compare the measured currents of one control tick with the model currents.
 
     Parameters
     ----------
     detector : Detector
         Changed in place.
     groups : Groups
-        What is found is left out from now on.
+        Groups found faulty are disabled.
     believed : (n,) array, A
-        Currents at this tick as the controller believes them.
+        Estimated driven currents at this tick.
     G : (3, n) array, N·m/A
-        Nominal torque matrix, whole.
+        Nominal torque matrix of all groups.
     q, qdot : (3,) arrays, rad and rad/s
-        As the controller has them.
+        Pose and rates of the controller.
     t : float, s
     """
     threshold = detector.threshold_A
@@ -206,21 +208,21 @@ def detect_faults(
 
 @allocation_free
 def _reset(detector: Detector, group: int) -> None:
-    """Begin anew with a group."""
+    """Reset the count and the sums of a group."""
     detector.count[group] = 0
     detector.open_A2[group] = detector.shorted_A2[group] = 0.0
 
 
 @allocation_free
 def _accumulate(detector: Detector, group: int, open_error: float, shorted_error: float) -> None:
-    """Add the differences (A) of one tick to what speaks against either account."""
+    """Add the squared differences (A) of one tick to the sums of both models."""
     detector.open_A2[group] += open_error * open_error
     detector.shorted_A2[group] += shorted_error * shorted_error
 
 
 @allocation_free
 def _classify(detector: Detector, group: int, state: int) -> int:
-    """How a group that was found stands: as before, unless the other account has become closer by far."""
+    """Return the state of a detected group: unchanged, unless the other model has become clearly closer."""
     difference = detector.open_A2[group] - detector.shorted_A2[group]
     if abs(difference) <= detector.threshold_A * detector.threshold_A:
         return state

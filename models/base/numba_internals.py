@@ -56,7 +56,7 @@ class MachineCode(NullCache):
         """Machine code for a signature, None if there is none that can be used."""
         # Numba's cache would import all that can be compiled, with scipy.linalg: a third of a short run.
         rtsys.initialize(target_context)
-        content = cache.kept(self._entry(sig, target_context.codegen()))
+        content = cache.load_entry(self._entry(sig, target_context.codegen()))
         if content is None:
             return None
         try:
@@ -73,7 +73,7 @@ class MachineCode(NullCache):
             complaint = f"{self._name} is compiled in every process: it holds an address or a large array"
             warnings.warn(complaint, NumbaWarning, stacklevel=2)
             return
-        cache.keep(self._entry(sig, data.codegen), dumps((sig, data._reduce())))
+        cache.store_entry(self._entry(sig, data.codegen), dumps((sig, data._reduce())))
 
     def _entry(self, sig: Any, codegen: Any) -> str:
         """Name of an entry: of a function, its signature and the processor; readable at its beginning."""
