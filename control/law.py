@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field
 
 from spheretwin.control import lti
-from spheretwin.models.base.errors import InputError, is_plain, shown, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts, is_plain, shown
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, width
 
 _vector = types.float64[::1]
@@ -165,7 +165,7 @@ class Law:
             The law is designed for another period.
         """
         if self.period_s is not None and abs(period_s - self.period_s) > SAME_PERIOD * self.period_s:
-            own, received = told_apart(self.period_s, period_s)
+            own, received = distinct_texts(self.period_s, period_s)
             raise InputError(f"law {self.name}: expected a control period of {own} s, received {received} s")
 
 

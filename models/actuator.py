@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
-from spheretwin.models.base.errors import InputError, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.models.mjcf_reader import (
     LARGEST_LENGTH_M,
@@ -104,7 +104,7 @@ class Magnet:
 
 
 @dataclass(frozen=True)
-class Coil:
+class CoilGeometry:
     """One air-core coil of rectangular winding section."""
 
     inner_radius_m: float
@@ -116,7 +116,7 @@ class Coil:
 
 
 @dataclass(frozen=True)
-class Group:
+class CoilGroup:
     """Two collinear coils in series, and the amplifier that drives them."""
 
     resistance_ohm: float
@@ -159,8 +159,8 @@ class Actuator:
     shaft_tip_m: NDArray[np.float64]
     payload_mount_m: NDArray[np.float64]
     magnet: Magnet
-    coil: Coil
-    group: Group
+    coil: CoilGeometry
+    group: CoilGroup
     torque_curve: TorqueCurve
 
     @property
@@ -186,11 +186,11 @@ def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
     """
     if (mjcf, curve) == (MJCF_PATH, TORQUE_CURVE_PATH):
         return _shipped()  # read once: another file, or one that it includes, may change meanwhile
-    return _kept(read(mjcf), curve, torque_curve.read_bytes(curve))
+    return _cached(read(mjcf), curve, torque_curve.read_bytes(curve))
 
 
 @lru_cache(maxsize=8)
-def _kept(mjcf: Mjcf, curve: Path, content: bytes) -> Actuator:
+def _cached(mjcf: Mjcf, curve: Path, content: bytes) -> Actuator:
     """One object for files that have not changed: what is made of an actuator is kept with it."""
     return from_model(mjcf.described, torque_curve.parse(curve, content))
 
@@ -227,7 +227,7 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
     )
 
 
-def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
+def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, CoilGeometry]:
     """Read what the torque curve is computed from, before there is a curve.
 
     Raises
@@ -259,7 +259,7 @@ def _polarity(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
     polarity = model.site_user[poles, 0] if model.nuser_site else np.zeros(len(poles))
     for pole, value in zip(poles, polarity, strict=True):
         if value not in (-1.0, 1.0):
-            north, south, received = told_apart(1.0, -1.0, value)
+            north, south, received = distinct_texts(1.0, -1.0, value)
             raise InputError(
                 f"model: expected polarity {north} or {south} as user value of {model.site(pole).name},"
                 f" received {received}"
@@ -301,7 +301,7 @@ def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
     depth = min(blank.radius_m, blank.length_m)  # of the deepest cap that the blank holds
     smallest = (blank.radius_m**2 + depth**2) / (2 * depth)
     if value != 0.0 and not smallest <= value <= LARGEST_LENGTH_M:
-        low, high, received = told_apart(smallest, LARGEST_LENGTH_M, value)
+        low, high, received = distinct_texts(smallest, LARGEST_LENGTH_M, value)
         raise InputError(
             f"model: expected {FRONT_RADIUS} of 0, for a flat face, or from {low} to {high} for poles of this"
             f" radius and length, received {received}"
@@ -309,8 +309,8 @@ def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
     return value
 
 
-def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
-    coil = Coil(
+def _coil(model: mujoco.MjModel, coils: list[int]) -> CoilGeometry:
+    coil = CoilGeometry(
         inner_radius_m=number(model, "coil_inner_radius_m"),
         outer_radius_m=shared(model.site_size[coils, 0], "radius of the coils"),
         length_m=2 * shared(model.site_size[coils, 1], "length of the coils"),
@@ -318,22 +318,22 @@ def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
         turns=number(model, "coil_turns"),
     )
     if coil.inner_radius_m >= coil.outer_radius_m:
-        outer, inner = told_apart(coil.outer_radius_m, coil.inner_radius_m)
+        outer, inner = distinct_texts(coil.outer_radius_m, coil.inner_radius_m)
         raise InputError(
             f"model: expected coil_inner_radius_m below the coils' radius of {outer} m, received {inner}"
         )
     return coil
 
 
-def _group(model: mujoco.MjModel) -> Group:
-    group = Group(
+def _group(model: mujoco.MjModel) -> CoilGroup:
+    group = CoilGroup(
         resistance_ohm=number(model, "group_resistance_ohm"),
         inductance_H=number(model, "group_inductance_H"),
         current_limit_A=number(model, "group_current_limit_A"),
     )
     time_constant_s = group.inductance_H / group.resistance_ohm
     if time_constant_s > LONGEST_TIME_CONSTANT_S:
-        longest, received = told_apart(LONGEST_TIME_CONSTANT_S, time_constant_s)
+        longest, received = distinct_texts(LONGEST_TIME_CONSTANT_S, time_constant_s)
         raise InputError(
             f"model: expected group_inductance_H / group_resistance_ohm of at most {longest} s,"
             f" received {received}"

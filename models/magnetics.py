@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil, Magnet
+from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
-from spheretwin.models.base.errors import InputError, one_line, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts, one_line
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
 
@@ -80,7 +80,7 @@ def torque_model(actuator: Actuator) -> TorqueModel:
         line_axes=axes,
         line_weights=weights,
         group_axes=np.ascontiguousarray(actuator.group_axes.T),
-        table=_kept_table(actuator.torque_curve),
+        table=_cached_table(actuator.torque_curve),
     )
 
 
@@ -237,7 +237,7 @@ def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S:
         torque_S[i] = total
 
 
-def _kept_table(curve: TorqueCurve) -> NDArray[np.float64]:
+def _cached_table(curve: TorqueCurve) -> NDArray[np.float64]:
     """Look-up table from the cache where possible: the spline is slow to import."""
     samples = curve.phi_rad.tobytes() + curve.torque_Nm_per_A.tobytes()
     return cached_array(samples, lambda: lookup_table(curve))
@@ -258,7 +258,7 @@ def _pole_lines(actuator: Actuator) -> tuple[NDArray[np.float64], NDArray[np.flo
     return np.ascontiguousarray(axes), np.array(weights)
 
 
-def computed_from(magnet: Magnet, coil: Coil) -> dict[str, float]:
+def computed_from(magnet: Magnet, coil: CoilGeometry) -> dict[str, float]:
     """Every number that a computed curve depends on, by part and name, such as ``coil turns``."""
     parts = {"magnet": asdict(magnet), "coil": asdict(coil)}
     return {f"{part} {name}": value for part, data in parts.items() for name, value in data.items()}
@@ -284,6 +284,6 @@ def disagreements(actuator: Actuator) -> list[str]:
     for name, has in computed_from(actuator.magnet, actuator.coil).items():
         had = computed_for.get(name, has)
         if abs(had - has) > SAME * max(abs(had), abs(has)):
-            first, second = told_apart(had, has)
+            first, second = distinct_texts(had, has)
             lines.append(one_line(f"{curve.name} was computed for {name} {first}, the model has {second}"))
     return lines

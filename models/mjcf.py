@@ -37,7 +37,7 @@ NEGLIGIBLE = 1e-6
 # Quaternions of quarter turns keep 1e-15.
 QUARTER_TURN_TOLERANCE = 1e-12
 
-MOST_KEPT = 8
+MOST_MODELS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +80,14 @@ def read(path: Path) -> Mjcf:
         key = (path.resolve(), fingerprint(path))
     except OSError as error:  # a name that no file can have, here or in the file
         raise InputError(f"model: expected an MJCF file, {without_breaks(error)}") from None
-    if key not in _KEPT:
-        _KEPT[key] = _read(path)
-        while len(_KEPT) > MOST_KEPT:
-            _KEPT.popitem(last=False)
-    return _KEPT[key]
+    if key not in _MODELS:
+        _MODELS[key] = _read(path)
+        while len(_MODELS) > MOST_MODELS:
+            _MODELS.popitem(last=False)
+    return _MODELS[key]
 
 
-_KEPT: OrderedDict[tuple[Path, str], Mjcf] = OrderedDict()
+_MODELS: OrderedDict[tuple[Path, str], Mjcf] = OrderedDict()
 
 
 def beyond_a_free_rotor(model: mujoco.MjModel) -> list[str]:
@@ -252,8 +252,8 @@ def fingerprint(path: Path) -> str:
     for source in sorted(named):
         state = source.stat()
         # Copying can keep the time of a change and a size, but neither the inode nor its own time.
-        told = f"{source} {state.st_ino} {state.st_mtime_ns} {state.st_ctime_ns} {state.st_size} "
-        digest.update(told.encode(errors="surrogateescape"))
+        state_text = f"{source} {state.st_ino} {state.st_mtime_ns} {state.st_ctime_ns} {state.st_size} "
+        digest.update(state_text.encode(errors="surrogateescape"))
     return digest.hexdigest()
 
 

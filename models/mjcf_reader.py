@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts
 
 # Lengths of one kind are equal in the MJCF; norms of positions turned by degrees keep 1e-15.
 GEOMETRY_TOLERANCE = 1e-9
@@ -44,23 +44,23 @@ def number(model: mujoco.MjModel, name: str) -> float:
 def within(value: float, least: float, largest: float, what: str) -> float:
     """The value itself; `InputError` where it is not within the bounds."""
     if not least <= value <= largest:
-        low, high, received = told_apart(least, largest, value)
+        low, high, received = distinct_texts(least, largest, value)
         raise InputError(f"model: expected {what} from {low} to {high}, received {received}")
     return value
 
 
 def sites(model: mujoco.MjModel, prefix: str) -> list[int]:
     """Indices of all sites whose names begin so, in the order of the file."""
-    found = [i for i in range(model.nsite) if model.site(i).name.startswith(prefix)]
-    if not found:
+    indices = [i for i in range(model.nsite) if model.site(i).name.startswith(prefix)]
+    if not indices:
         raise InputError(f'model: expected sites named "{prefix}…", received none')
-    return found
+    return indices
 
 
 def shared(values: NDArray[np.float64], what: str) -> float:
     """The one length, m, that all parts of a kind have; `InputError` where they differ."""
     if np.ptp(values) > GEOMETRY_TOLERANCE:
-        least, largest = told_apart(values.min(), values.max())
+        least, largest = distinct_texts(values.min(), values.max())
         raise InputError(f"model: expected one {what}, received {least} to {largest} m")
     return within(float(values[0]), LEAST_LENGTH_M, LARGEST_LENGTH_M, f"a {what} in metres")
 
@@ -102,7 +102,7 @@ def check_joint(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         )
     range_deg = np.degrees(hinge_range(model)[1])
     if np.any(np.abs(range_deg) >= LOCKED_DEG):
-        least, largest, low, high = told_apart(-LOCKED_DEG, LOCKED_DEG, *range_deg)
+        least, largest, low, high = distinct_texts(-LOCKED_DEG, LOCKED_DEG, *range_deg)
         raise InputError(
             f"model: expected a range of beta inside {least} to {largest} degrees, where the joint locks,"
             f" received {low} to {high}"
@@ -119,7 +119,7 @@ def check_bounded(model: mujoco.MjModel) -> None:
         if not np.all(np.isfinite(numbers)):
             raise InputError(f"model: expected finite numbers, received NaN or infinity in {name}")
         if np.any(np.abs(numbers) > LARGEST):
-            largest, received = told_apart(LARGEST, numbers.flat[np.argmax(np.abs(numbers))])
+            largest, received = distinct_texts(LARGEST, numbers.flat[np.argmax(np.abs(numbers))])
             raise InputError(f"model: expected numbers of at most {largest}, received {received} in {name}")
 
 

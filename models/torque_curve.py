@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError, shown, told_apart, without_breaks
+from spheretwin.models.base.errors import InputError, distinct_texts, shown, without_breaks
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -132,19 +132,19 @@ def parse(path: Path, content: bytes) -> TorqueCurve:
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     rows = csv.DictReader(lines, skipinitialspace=True)
     try:
-        found = [name or "" for name in rows.fieldnames or ()]
-        missing = [name for name in COLUMNS if name not in found]
+        header = [name or "" for name in rows.fieldnames or ()]
+        missing = [name for name in COLUMNS if name not in header]
         records = list(rows)
     except csv.Error as error:
         raise InputError(f"torque curve {path}: expected numbers only, received {error}") from None
     if missing:
         raise InputError(
             f"torque curve {path}: expected the columns {', '.join(COLUMNS)},"
-            f" received {', '.join(found) or 'none'}"
+            f" received {', '.join(header) or 'none'}"
         )
     samples = np.array([[_number(path, row[name]) for name in COLUMNS] for row in records])
     uneven = next((i for i, row in enumerate(records) if None in row or None in row.values()), None)
-    if uneven is not None or len(set(found)) < len(found):
+    if uneven is not None or len(set(header)) < len(header):
         where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
         raise InputError(f"torque curve {path}: expected each column once in every row, received {where}")
     _check(path, samples)
@@ -179,18 +179,18 @@ def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
 
 def _computed_for(path: Path, text: str) -> dict[str, float] | None:
     """Numbers in the lines that `head` wrote."""
-    found = {}
+    numbers = {}
     for name, number in HEAD_LINE.findall(text):
         try:
-            found[name] = float(number)
+            numbers[name] = float(number)
         except ValueError:
-            found[name] = np.nan
-        if not np.isfinite(found[name]):
+            numbers[name] = np.nan
+        if not np.isfinite(numbers[name]):
             raise InputError(
                 f"torque curve {path}: expected a finite number after {COMPUTED_FOR} {name}:,"
                 f" received {number or 'none'}"
             )
-    return found or None
+    return numbers or None
 
 
 def _check(path: Path, samples: NDArray[np.float64]) -> None:
@@ -203,24 +203,24 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
     angles, torque = samples.T
     outside = (angles < 0.0) | (angles > 180.0)
     if np.any(outside):
-        least, largest, received = told_apart(0.0, 180.0, angles[np.argmax(outside)])
+        least, largest, received = distinct_texts(0.0, 180.0, angles[np.argmax(outside)])
         raise InputError(
             f"torque curve {path}: expected angles from {least} to {largest} degrees,"
             f" received {received}, which is outside"
         )
     if np.any(np.diff(angles) < CLOSEST_DEG):
         row = int(np.argmax(np.diff(angles) < CLOSEST_DEG))
-        first, then = told_apart(angles[row], angles[row + 1])
+        first, then = distinct_texts(angles[row], angles[row + 1])
         raise InputError(f"torque curve {path}: expected rising angles, received {first} then {then} degrees")
     if angles[0] != 0.0 or angles[-1] != 180.0:
-        least, largest, first, last = told_apart(0.0, 180.0, angles[0], angles[-1])
+        least, largest, first, last = distinct_texts(0.0, 180.0, angles[0], angles[-1])
         raise InputError(
             f"torque curve {path}: expected angles from {least} to {largest} degrees,"
             f" received {first} to {last}"
         )
     peak = np.max(np.abs(torque))
     if not (peak == 0.0 or LEAST_PEAK < peak < LARGEST_PEAK):
-        least, largest, received = told_apart(LEAST_PEAK, LARGEST_PEAK, peak)
+        least, largest, received = distinct_texts(LEAST_PEAK, LARGEST_PEAK, peak)
         raise InputError(
             f"torque curve {path}: expected a peak between {least} and {largest} N·m/A, received {received}"
         )

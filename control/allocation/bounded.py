@@ -32,12 +32,12 @@ from spheretwin.control.allocation.simplex import (
     TIE,
     Array,
     Vector,
-    climb,
+    add_multiple,
     column,
     dot,
+    increase_share,
     length,
-    off,
-    plus,
+    orthogonal_part,
     unit,
 )
 from spheretwin.models.base.compiled import compiled
@@ -123,7 +123,7 @@ def reach(G: Array, torque: Vector, end: float, scratch: Array) -> float:
     if not gives_share:
         demand[:] = 0.0
         share = 0.0
-    share, _ = climb(G, torque, end, share, most_steps, demand)
+    share, _ = increase_share(G, torque, end, share, most_steps, demand)
     return share
 
 
@@ -223,7 +223,7 @@ def line_direction(G: Array, side: Array, torque: Vector, small: float) -> tuple
     if sound:
         return y, True
     e1, e2, e3 = free_frame(G, side, small)
-    normal = off(off(torque, e1, e2), e3, NONE)
+    normal = orthogonal_part(orthogonal_part(torque, e1, e2), e3, NONE)
     if length(normal) > FLAT * length(torque):
         return normal, False
     y, _ = multipliers(G, side, e1, e2, e3, torque)
@@ -269,7 +269,7 @@ def multipliers(
     z = (z - l31 * x - l32 * y) / pivot_3
     y = y / pivot_2 - l32 * z
     x = x / pivot_1 - l21 * y - l31 * z
-    return plus(plus(plus(NONE, x, e1), y, e2), z, e3), min(a, d, f) > least
+    return add_multiple(add_multiple(add_multiple(NONE, x, e1), y, e2), z, e3), min(a, d, f) > least
 
 
 @compiled
@@ -287,11 +287,11 @@ def farthest(G: Array, side: Array, e1: Vector, e2: Vector, small: float) -> Vec
     best, square = NONE, small * small
     for j in range(G.shape[1]):
         if side[j] == 0.0:
-            rest = off(column(G, j), e1, e2)
+            rest = orthogonal_part(column(G, j), e1, e2)
             if dot(rest, rest) > square:
                 best, square = rest, dot(rest, rest)
     # A second time: what rounding left along the axes may be much of a short vector.
-    return unit(off(unit(best), e1, e2))
+    return unit(orthogonal_part(unit(best), e1, e2))
 
 
 @compiled
@@ -310,7 +310,7 @@ def remove_residual(
         demand[j] = clipped(demand[j])
     rest = residual(G, demand, torque, share)
     e1, e2, e3 = free_frame(G, side, small)
-    normal = off(off(torque, e1, e2), e3, NONE)
+    normal = orthogonal_part(orthogonal_part(torque, e1, e2), e3, NONE)
     if share < end and dot(normal, normal) > SOUND * dot(torque, torque):
         # The free groups cannot change the torque along the normal; the share can.
         share -= dot(normal, rest) / dot(normal, torque)
@@ -325,9 +325,9 @@ def remove_residual(
 @compiled
 def residual(G: Array, demand: Array, torque: Vector, share: float) -> Vector:
     """What the demands leave of the torque."""
-    rest = plus(NONE, share, torque)
+    rest = add_multiple(NONE, share, torque)
     for j in range(G.shape[1]):
-        rest = plus(rest, -demand[j], column(G, j))
+        rest = add_multiple(rest, -demand[j], column(G, j))
     return rest
 
 

@@ -20,20 +20,20 @@ def column(G: Array, j: int) -> Vector:
 
 
 @compiled
-def off(a: Vector, e1: Vector, e2: Vector) -> Vector:
+def orthogonal_part(a: Vector, e1: Vector, e2: Vector) -> Vector:
     """What is left of a vector without its parts along two orthonormal axes (or zeros)."""
-    return plus(plus(a, -dot(a, e1), e1), -dot(a, e2), e2)
+    return add_multiple(add_multiple(a, -dot(a, e1), e1), -dot(a, e2), e2)
 
 
 @compiled
 def unit(a: Vector) -> Vector:
     """Vector of length 1, or of zeros as it was."""
     square = dot(a, a)
-    return plus(NONE, 1.0 / sqrt(square) if square > 0.0 else 0.0, a)
+    return add_multiple(NONE, 1.0 / sqrt(square) if square > 0.0 else 0.0, a)
 
 
 @compiled
-def plus(a: Vector, factor: float, b: Vector) -> Vector:
+def add_multiple(a: Vector, factor: float, b: Vector) -> Vector:
     """Sum of a vector and a multiple of another."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
@@ -64,7 +64,7 @@ TIE = 1e-12
 
 
 @compiled
-def climb(
+def increase_share(
     G: Array, torque: Vector, end: float, share: float, most_steps: int, demand: Array
 ) -> tuple[float, int]:
     """Raise the share, by a simplex method with bounds, to `end` or to the largest there is.
@@ -97,13 +97,13 @@ def climb(
         if c < 0:
             break
         rate_c, growth = copysign(1.0, growth), abs(growth)
-        rest = plus(plus(NONE, growth, torque), -rate_c, column(G, c))  # for a and b to give
+        rest = add_multiple(add_multiple(NONE, growth, torque), -rate_c, column(G, c))  # for a and b to give
         rate_a = dot(cross(rest, g_b), plane) / dot(plane, plane)
         rate_b = dot(cross(g_a, rest), plane) / dot(plane, plane)
         noise = NOISE * (growth * length(torque) + length(column(G, c)))
-        room_a = room(demand[a], rate_a, noise / length(g_a))
-        room_b = room(demand[b], rate_b, noise / length(g_b))
-        room_c = room(demand[c], rate_c, 0.0)
+        room_a = steps_to_limit(demand[a], rate_a, noise / length(g_a))
+        room_b = steps_to_limit(demand[b], rate_b, noise / length(g_b))
+        room_c = steps_to_limit(demand[c], rate_c, 0.0)
         remaining = (end - share) / growth
         stride = min(room_a, room_b, room_c, remaining)
         demand[a] += stride * rate_a
@@ -140,18 +140,18 @@ def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
 @compiled
 def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: int) -> tuple[int, float]:
     """Group with the most to add to the share (-1 if none has), and the share's growth with its demand."""
-    best, found, found_growth, total = 0.0, -1, 0.0, 0.0
+    best, best_group, best_growth, total = 0.0, -1, 0.0, 0.0
     for j in range(G.shape[1]):
         growth = dot(column(G, j), plane) / dot(torque, plane)
         gain = abs(growth) - growth * demand[j]
         total += abs(growth)
         if gain > best and j != a and j != b:
-            best, found, found_growth = gain, j, growth
-    return (found if best > NOISE * total else -1), found_growth
+            best, best_group, best_growth = gain, j, growth
+    return (best_group if best > NOISE * total else -1), best_growth
 
 
 @compiled
-def room(demand: float, rate: float, noise: float) -> float:
+def steps_to_limit(demand: float, rate: float, noise: float) -> float:
     """Steps of a rate until a demand meets its limit; at a rate of rounding's size it never does."""
-    left = 1.0 - demand if rate > 0.0 else 1.0 + demand
-    return max(left, 0.0) / abs(rate) if abs(rate) > noise else inf
+    distance = 1.0 - demand if rate > 0.0 else 1.0 + demand
+    return max(distance, 0.0) / abs(rate) if abs(rate) > noise else inf

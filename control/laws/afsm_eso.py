@@ -1,15 +1,16 @@
-r"""AFSM's skeleton with an extended state observer: sliding surface and reaching, no switching, no drift.
+r"""AFSM with an extended state observer: sliding surface and reaching law, no switching, no drift.
 
-*Law.* With angle, rate and disturbance from the observer of `extended_state_observer` (at the end of the
-known delay: it is followed on under what was asked for already), ê = q̂ − q_d and s = dê/dt + λ ê,
+*Law.* With angle, rate and disturbance from the observer of `extended_state_observer` (predicted
+to the end of the nominal delay under the pending commands), ê = q̂ − q_d and s = dê/dt + λ ê,
 
     τ = M̂ (q̈_d − λ dê/dt − K s − boost(s) + f̂) + Ĉ q̇ − d̂,      boost(s) = clip(k_b (s − sat_δ(s)), ±v_b).
 
-The boost is 0 within the layer |s| ≤ δ and steep beyond it, so that nothing chatters. ω_d, the rate at which
-the observer learns d̂, is a schedule: fast while |s| > δ, as after a start or a jump of the load, and back to
-slow within `fade_s`, as a fast one turns noise into torque. The observer is told the torque that the currents
-gave, not what was asked for, so that neither their limit nor their lag is taken for a disturbance. f̂ is the
-fuzzy approximator of AFSM, restrained (`bounded_fuzzy`); beside the observer it earns nothing, and is off.
+The boost is 0 within the layer |s| ≤ δ and steep beyond it, which avoids chattering. ω_d, the bandwidth of d̂
+in the observer, is scheduled: fast while |s| > δ, such as after a start or a jump of the load, and slow again
+within `fade_s`, because a fast one turns noise into torque. The observer uses the applied torque, not the
+commanded one, so that neither the current limit nor the lag appears as a disturbance. f̂ is the fuzzy
+approximator of AFSM with bounded adaptation (`law_components.fuzzy`). With the observer it brings no benefit,
+and is off by default.
 
 *Stability, proven for* the nominal inertia, exact Coriolis terms, the law in continuous time, currents that
 follow and do not saturate. Let d be the disturbance, in (1) −τ_d, and ν = M̂⁻¹ ḋ.
@@ -19,44 +20,45 @@ follow and do not saturate. Let d be the disturbance, in (1) −τ_d, and ν = M
 
        |ε| ≤ E = N (T³ a² b p² r, T² (p² + 2pr − 3p − 3r/2 + 11/6), T (2p + r − 3/2)),
 
-   beside what is left of the start (`extended_state_observer` derives it). A load that changes at the ticks
-   alone, by at most N T, is within it too. For T → 0 it is N (1/(ω_o² ω_d), (2 ω_o + ω_d)/(ω_o² ω_d), 2/ω_o +
-   1/ω_d), whose third factor is too small for any T > 0, by (2 ω_o + ω_d) T²/12 in the first order of T².
-   These factors are for a fixed ω_d; under the schedule ε decays and is bounded too, however ω_d moves.
+   apart from the decaying initial error (derived in `extended_state_observer`). A load that changes at the
+   ticks only, by at most N T, is within it too. For T → 0 it is N (1/(ω_o² ω_d), (2 ω_o + ω_d)/(ω_o² ω_d),
+   2/ω_o + 1/ω_d), whose third factor is too small for any T > 0, by (2 ω_o + ω_d) T²/12 in the first order
+   of T². These factors are for a fixed ω_d; under the schedule ε decays and is bounded too, for any course
+   of ω_d.
 
 2. Surface. Put into M̂ q̈ + Ĉ q̇ = τ + d the law gives, for the true s = ė + λ e and σ = ε₂ + λ ε₁,
 
        ṡ = −K s − boost(s + σ) + w,      w = −K σ − λ ε₂ − ε₃.
 
    While |σ| ≤ δ the boost acts only where s + σ has the sign of s, so that s boost(s + σ) ≥ 0 (until then
-   it is one more disturbance, of at most v_b). Then ½ s² changes by at most −K s² + |s| |w|:
+   it is a further disturbance, of at most v_b). Then ½ s² changes by at most −K s² + |s| |w|:
 
        |s(t)| ≤ e^(−K t) |s(0)| + sup|w|/K.
 
 3. Error. ė = −λ e + s:   |e(t)| ≤ e^(−λ t) |e(0)| + sup|s|/λ.
 
-Each is input-to-state stable and none acts back on the one before, so that the cascade is; at last
+Each is input-to-state stable and none acts back on the previous one, so that the cascade is, too; finally
 
     |e| ≤ [E₃ + (K + λ) E₂ + K λ E₁]/(λ K),
 
-where ε between the ticks is taken to be within its bound at the ticks. A constant load leaves nothing.
+where ε between the ticks is assumed to be within its bound at the ticks. A constant load leaves no error.
 
-*With another inertia*, 1 + m times the nominal one, ν holds the rate of q̈ itself, and the cascade becomes a
-loop. One axis within the layer is linear then; at 1 kHz its five poles are within the unit circle for m from
-−0.91 to 7.9 (`ideal`), −0.87 to 8.2 (`fast`), −0.77 to 3.2 (`prototype`, α and β) and −0.76 to 4.8
+*With another inertia*, 1 + m times the nominal one, ν contains the rate of q̈ itself, and the cascade
+becomes a loop. One axis within the layer is linear then; at 1 kHz its five poles are within the unit circle
+for m from −0.91 to 7.9 (`ideal`), −0.87 to 8.2 (`fast`), −0.77 to 3.2 (`prototype`, α and β) and −0.76 to 4.8
 (`robust`, α and β), currents without lag.
-Where it is stable a constant load leaves no error, as d̂ rests only where angle and reference agree.
+If it is stable a constant load leaves no error, as d̂ is at rest only if angle and reference agree.
 
-*Not proven:* the current limit, the lag of the coils, a delay that is not known, the sampled boost.
-`spheretwin reproduce stability` measures how much of each the loop bears.
+*Not proven:* the current limit, the lag of the coils, an unknown delay, the sampled boost.
+`spheretwin reproduce stability` measures how much of each the loop tolerates.
 
-*Presets.* `ideal` and `fast` are for angles without noise. `prototype` is for the prototype's, with ω_d
-fixed, and has a governor and most of the friction fed forward. `robust` is for a prototype whose friction
-or inertia is larger than the nominal one: λ K and ω_o are higher, 1.2 of the nominal friction is fed forward,
-and a quarter of the nominal inertia on top of the law's own torque for the acceleration. It passes more noise
-to the currents, and is worse for a rotor lighter than the nominal one. `spheretwin reproduce rivals` compares
-the presets with the other laws; the study `sensors` has what each error of the sensors costs, `mismatch` what
-friction, inertia and delay cost that the nominal model does not have.
+*Presets.* `ideal` and `fast` are for angles without noise. `prototype` is for those of the prototype, with
+ω_d fixed, and has a governor and feed-forward of most of the friction. `robust` is for a prototype whose
+friction or inertia is larger than the nominal one: λ K and ω_o are higher, 1.2 of the nominal friction is
+fed forward, and a quarter of the nominal inertia on top of the law's own torque for the acceleration. It
+passes more noise to the currents, and is worse for a rotor lighter than the nominal one. `spheretwin
+reproduce rivals` compares the presets with the other laws; the study `sensors` measures the effect of each
+sensor error, `mismatch` the effect of friction, inertia and delay that differ from the nominal model.
 """
 
 from math import exp
@@ -101,9 +103,9 @@ Array = NDArray[np.float64]
 
 SIGNALS = (
     SLIDING_SIGNAL,
-    Signal("observed_disturbance_Nm", "N·m", 3, "what the observer adds to explain the motion, d̂", ANGLES),
+    Signal("observed_disturbance_Nm", "N·m", 3, "disturbance torque estimated by the observer, d̂", ANGLES),
     Signal("boost_rad_s2", "rad/s²", 3, "acceleration of the boost", ANGLES),
-    Signal("disturbance_bandwidth_rad_s", "rad/s", 3, "ω_d in force", ANGLES),
+    Signal("disturbance_bandwidth_rad_s", "rad/s", 3, "ω_d of the tick", ANGLES),
     Signal("fuzzy_torque_Nm", "N·m", 3, "torque of the fuzzy approximator", ANGLES),
 )
 
@@ -111,7 +113,7 @@ SIGNALS = (
 INERTIA, SLOPE, REACHING, BOOST_SLOPE, LAYER, BOOST_BOUND = 0, 3, 6, 9, 12, 15
 BANDWIDTH, SLOW, FAST, FUZZY_RATE = 18, 21, 24, 27
 PERIOD, FADE_DECAY, FRACTION, COUPLED, DEAD_ZONE, LEAKAGE, FUZZY_BOUND = 30, 31, 32, 33, 34, 35, 36
-# Layout of the state: the signals, the observer's motion, theta; what was asked, newest first, is the rest.
+# Layout of the state: the signals, the observer's motion, theta; then the command history, newest first.
 SLIDING, DISTURBANCE, BOOST, ACTIVE_BANDWIDTH, FUZZY, ANGLE, RATE, STARTED, THETA = (
     0,
     3,
@@ -125,8 +127,8 @@ SLIDING, DISTURBANCE, BOOST, ACTIVE_BANDWIDTH, FUZZY, ANGLE, RATE, STARTED, THET
 )
 HISTORY = THETA + 3 * CONSEQUENTS
 
-# Share of the torque asked for that may be missing before the approximator stops learning; the coils' lag
-# alone takes some of it while the torque changes.
+# Share of the commanded torque that may be missing before the approximator stops learning; the coils' lag
+# alone causes some of it while the torque changes.
 LARGEST_SHORTFALL = 0.2
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -180,7 +182,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "feed_forward": {"friction": 1.2, "inertia": 0.25},
     },
 }
-"""Fields by name; each of them can be given alone as well."""
+"""Fields by name; each can also be given on its own."""
 
 _IDEAL = {name: each(value) for name, value in PRESETS["ideal"].items()}
 
@@ -190,16 +192,17 @@ class AFSMWithObserver(LawParameters):
 
     law: Literal["afsm_eso"] = named("afsm_eso")
     preset: Literal["ideal", "fast", "prototype", "robust"] = Field(
-        "ideal", description="named set of gains; it gives those a value that are not given themselves"
+        "ideal", description="named set of gains; it sets the gains that are not given"
     )
     surface_slope_1_s: PositiveEach = Field(
-        _IDEAL["surface_slope_1_s"], description="λ of s = λe + ė, 1/s; this and the next as `ideal` has them"
+        _IDEAL["surface_slope_1_s"],
+        description="λ of s = λe + ė, 1/s; this and the next defaults are those of `ideal`",
     )
     reaching_gain_1_s: NonNegativeEach = Field(
         _IDEAL["reaching_gain_1_s"], description="K of the reaching term K s, 1/s"
     )
     boost_slope_1_s: NonNegativeEach = Field(
-        _IDEAL["boost_slope_1_s"], description="k_b, what is added to K beyond the layer, 1/s; 0 for no boost"
+        _IDEAL["boost_slope_1_s"], description="k_b, addition to K beyond the layer, 1/s; 0 for no boost"
     )
     boost_layer_rad_s: PositiveEach = Field(
         _IDEAL["boost_layer_rad_s"],
@@ -213,18 +216,20 @@ class AFSMWithObserver(LawParameters):
     )
     disturbance_bandwidth_rad_s: NonNegativeEach = Field(
         _IDEAL["disturbance_bandwidth_rad_s"],
-        description="ω_d, its third, within the layer, rad/s; 0 with the fast one learns no disturbance",
+        description="ω_d, its third pole, within the layer, rad/s; no disturbance is estimated if both are 0",
     )
     fast_disturbance_bandwidth_rad_s: NonNegativeEach = Field(
         _IDEAL["fast_disturbance_bandwidth_rad_s"], description="ω_d beyond the layer, rad/s"
     )
-    fade_s: NonNegative = Field(0.01, description="time constant of its return into the layer, s")
-    coupled: bool = Field(True, description="whether the nominal model has the axes act on each other")
-    fuzzy_adaptation: NonNegativeEach = Field(
-        each(0.0), description="η of the fuzzy approximator beside the observer; 0 for none"
+    fade_s: NonNegative = Field(
+        0.01, description="time constant with which ω_d returns to its value within the layer, s"
     )
-    fuzzy_dead_zone_rad_s: NonNegative = Field(0.01, description="|s| from which it learns, rad/s")
-    fuzzy_leakage_1_s: NonNegative = Field(0.1, description="rate at which what it learnt leaks away, 1/s")
+    coupled: bool = Field(True, description="whether the axes of the nominal model are coupled")
+    fuzzy_adaptation: NonNegativeEach = Field(
+        each(0.0), description="η of the fuzzy approximator, in addition to the observer; 0 for none"
+    )
+    fuzzy_dead_zone_rad_s: NonNegative = Field(0.01, description="|s| from which it adapts, rad/s")
+    fuzzy_leakage_1_s: NonNegative = Field(0.1, description="leakage rate of its consequents, 1/s")
     fuzzy_bound: Positive = Field(20.0, description="largest norm of its consequents on each axis")
 
     @model_validator(mode="before")
@@ -236,7 +241,7 @@ class AFSMWithObserver(LawParameters):
         return _filled(fields, PRESETS.get(preset if isinstance(preset, str) else "", {}))
 
     def build(self, known: NominalModel) -> Law:
-        """Law that knows of no disturbance, and has asked for nothing, before its first tick."""
+        """Return a law without a disturbance estimate and pending commands."""
         surface = [*self.surface_slope_1_s, *self.reaching_gain_1_s]
         boost = [*self.boost_slope_1_s, *self.boost_layer_rad_s, *self.boost_bound_rad_s2]
         bandwidths = [*self.observer_bandwidth_rad_s, *self.disturbance_bandwidth_rad_s]
@@ -253,7 +258,7 @@ class AFSMWithObserver(LawParameters):
 
 
 def _filled(fields: dict[str, Any], preset: dict[str, Any]) -> dict[str, Any]:
-    """What is given, beside what a preset has for the rest; sections field by field."""
+    """Return the given fields, completed from a preset; sections are completed field by field."""
     sections = {
         name: {**value, **fields[name]}
         for name, value in preset.items()
@@ -283,7 +288,7 @@ def step(
 
 @allocation_free
 def _observe(measurement: Array, parameters: Array, state: Array, nominal: RotorModel) -> None:
-    """Take the measured angles; at the first tick, the rates too."""
+    """Update the observer with the measured angles; at the first tick, with the rates too."""
     if state[STARTED] == 0.0:
         state[STARTED] = 1.0
         for axis in range(3):
@@ -306,7 +311,7 @@ def _gains(axis: int, parameters: Array, state: Array) -> ObserverGains:
 
 @allocation_free
 def _motion_ahead(parameters: Array, state: Array, nominal: RotorModel) -> RotorMotion:
-    """Motion at the end of the known delay, under what was asked for and does not act yet."""
+    """Return the motion at the end of the nominal delay, under the pending commands."""
     motion, period, disturbance = _motion(state), parameters[PERIOD], _triple(state, DISTURBANCE)
     whole = (state.shape[0] - HISTORY) // 3 - 2
     for row in range(whole, -1, -1):
@@ -320,7 +325,7 @@ def _motion_ahead(parameters: Array, state: Array, nominal: RotorModel) -> Rotor
 
 @allocation_free
 def _torque_follows(measurement: Array, parameters: Array, state: Array) -> bool:
-    """Whether the torque of the last period was about what was asked for it, so that s tells of the rotor."""
+    """Return True if the applied torque was close to the commanded one, so that s is caused by the rotor."""
     asked_for, missing = 0.0, 0.0
     for axis in range(3):
         command = delayed_command(state[HISTORY:], axis, parameters[FRACTION])
@@ -333,7 +338,7 @@ def _torque_follows(measurement: Array, parameters: Array, state: Array) -> bool
 def _desired_acceleration(
     axis: int, angle: float, rate: float, adapts: bool, reference: Array, parameters: Array, state: Array
 ) -> float:
-    """Acceleration of one axis, by the reference as it will be when the torque acts."""
+    """Return the acceleration of one axis for the reference at the time at which the torque acts."""
     period = parameters[PERIOD]
     ahead_s = ((state.shape[0] - HISTORY) // 3 - 2 + parameters[FRACTION]) * period
     acceleration = reference[2, axis]
@@ -353,7 +358,7 @@ def _desired_acceleration(
 
 @allocation_free
 def boosted(s: float, slope: float, layer: float, bound: float) -> float:
-    """Acceleration toward the surface: nothing within the layer, steep beyond it, never above its bound."""
+    """Return the acceleration toward the surface: 0 within the layer, steep beyond it, limited by a bound."""
     beyond = s - min(max(s, -layer), layer)
     return min(max(slope * beyond, -bound), bound)
 

@@ -24,7 +24,9 @@ def one_line(text: str) -> str:
     Line breaks, escape sequences and whatever else cannot be printed appear as Python's own `ascii` writes
     them. What is too long keeps both its ends.
     """
-    printable = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    printable = "".join(
+        character if character.isprintable() else ascii(character)[1:-1] for character in text
+    )
     return shortened(" ".join(shortened(word, LONGEST_WORD) for word in printable.split(" ")), LONGEST_LINE)
 
 
@@ -98,10 +100,10 @@ def _written(value: object, above: tuple[int, ...] = ()) -> str:
 
 def is_plain(text: str) -> bool:
     """Whether a text has neither control characters nor bytes that are no text (lone surrogates)."""
-    return not any(unicodedata.category(each) in ("Cc", "Cs") for each in text)
+    return not any(unicodedata.category(character) in ("Cc", "Cs") for character in text)
 
 
-def told_apart(*numbers: float) -> list[str]:
+def distinct_texts(*numbers: float) -> list[str]:
     """Numbers in as few digits as tell those apart that differ, and in no fewer than six.
 
     Parameters
@@ -148,9 +150,9 @@ class LawError(SpheretwinError):
     @classmethod
     def of(cls, law: str, t_s: float, error: BaseException) -> LawError:
         """Error of a law by its name, at a time, s; the exception becomes the cause."""
-        made = cls(f"law {law}: expected a torque at {t_s:g} s, received {exception_text(error)}")
-        made.__cause__ = error
-        return made
+        law_error = cls(f"law {law}: expected a torque at {t_s:g} s, received {exception_text(error)}")
+        law_error.__cause__ = error
+        return law_error
 
 
 class EngineError(SpheretwinError):

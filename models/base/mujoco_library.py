@@ -56,7 +56,7 @@ def compiler_warnings() -> Iterator[list[str]]:
     with _COMPILING, warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
         yield lines
-        lines += dict.fromkeys(" ".join(str(each.message).split()) for each in raised)
+        lines += dict.fromkeys(" ".join(str(warning.message).split()) for warning in raised)
 
 
 def silence_warnings() -> None:

@@ -82,9 +82,11 @@ def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
     module = _module(path, source, digest, what)
     defined = vars(module)
     if name not in defined:
-        known = [key for key, value in defined.items() if callable(value) and _is_of(module, value)]
-        expected = f"one of {', '.join(known)}" if known else "a function"
-        raise InputError(f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, known)}")
+        candidates = [key for key, value in defined.items() if callable(value) and _is_of(module, value)]
+        expected = f"one of {', '.join(candidates)}" if candidates else "a function"
+        raise InputError(
+            f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, candidates)}"
+        )
     return defined[name], digest
 
 
@@ -112,12 +114,12 @@ def _module(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
     except BaseException as error:  # the user's code may raise anything
         del sys.modules[module.__name__]
         raise InputError(
-            f"{what}: expected a file of Python that runs, received {path}: {_told(error, path)}"
+            f"{what}: expected a file of Python that runs, received {path}: {_error_text(error, path)}"
         ) from None
     return module
 
 
-def _told(error: BaseException, path: Path) -> str:
+def _error_text(error: BaseException, path: Path) -> str:
     """What went wrong, and in which line of the file."""
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return f"{type(error).__name__} in line {error.lineno}: {error.msg}"

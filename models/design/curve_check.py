@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
-from spheretwin.models.actuator import MJCF_PATH, Coil, Magnet, read_magnet_and_coil
+from spheretwin.models.actuator import MJCF_PATH, CoilGeometry, Magnet, read_magnet_and_coil
 from spheretwin.models.base.checks import Check
 from spheretwin.models.design import geometry_check, pole_torque
 from spheretwin.models.design.pole_torque import Mesh, compute_curve
@@ -35,7 +35,7 @@ class Misfit(NamedTuple):
     """Angle of the largest difference."""
 
 
-class Difference(NamedTuple):
+class CurveDifference(NamedTuple):
     """Samples against the curve computed from a geometry, in units of the computed peak."""
 
     as_given: Misfit
@@ -88,10 +88,10 @@ def largest_lookup_error(curve: TorqueCurve) -> float:
 def difference(
     curve: TorqueCurve,
     magnet: Magnet,
-    coil: Coil,
+    coil: CoilGeometry,
     mesh: Mesh | None = None,
     track: Callable[[range], Iterable[int]] = iter,
-) -> Difference:
+) -> CurveDifference:
     """Compare samples with the curve computed from a geometry, at the samples' own angles.
 
     Parameters
@@ -106,7 +106,7 @@ def difference(
     computed = compute_curve(magnet, coil, phi, mesh, track)
     expected, peak = computed.torque_Nm_per_A, computed.peak_Nm_per_A
     scale = float(sample @ expected / (expected @ expected))
-    return Difference(
+    return CurveDifference(
         as_given=_misfit(sample - expected, phi, peak),
         scale=scale,
         scaled=_misfit(sample - scale * expected, phi, peak),
@@ -130,7 +130,7 @@ MESH_BOUND = 5e-3
 LOOKUP_BOUND = 1e-6
 
 
-class Peak(NamedTuple):
+class CurvePeak(NamedTuple):
     """Where a curve is largest."""
 
     peak_Nm_per_A: float
@@ -143,8 +143,8 @@ class ComputedCurve(NamedTuple):
     curve: TorqueCurve
     csv: str
     """Text of its file, which says what it was computed from."""
-    peak: Peak
-    doubled_mesh: pole_torque.Convergence
+    peak: CurvePeak
+    doubled_mesh: pole_torque.MeshConvergence
     lookup_error: float
     """Distance of the compiled table from the spline, over the peak."""
     checks: list[Check]
@@ -155,9 +155,9 @@ class JudgedCurve(NamedTuple):
     """A curve beside the one that the geometry gives. Nothing is bounded: its owner judges the data."""
 
     rows: int
-    peak: Peak
+    peak: CurvePeak
     leave_one_out: Misfit
-    geometry: Difference
+    geometry: CurveDifference
     lookup_error: float
     warnings: list[str]
 
@@ -222,12 +222,12 @@ def judge(
     )
 
 
-def _peak(curve: TorqueCurve) -> Peak:
+def _peak(curve: TorqueCurve) -> CurvePeak:
     top = int(np.argmax(np.abs(curve.torque_Nm_per_A)))
-    return Peak(curve.peak_Nm_per_A, float(np.degrees(curve.phi_rad[top])))
+    return CurvePeak(curve.peak_Nm_per_A, float(np.degrees(curve.phi_rad[top])))
 
 
-def _mesh(measured: pole_torque.Convergence) -> Check:
+def _mesh(measured: pole_torque.MeshConvergence) -> Check:
     return Check(
         name="mesh",
         compares="peak of the curve against the one on half the mesh, over the peak",

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil, Magnet
+from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design.workspace import pose
 from spheretwin.models.kinematics import rotation
@@ -153,7 +153,9 @@ def compare(
     for i in track(range(len(q))):
         direct[i] = direct_torque_matrix(q[i], actuator, quadrature)
         coarse[i] = direct_torque_matrix(q[i], actuator, quadrature.halved())
-    return Comparison(tilt_rad, q, np.array([torque_matrix(each, actuator) for each in q]), direct, coarse)
+    return Comparison(
+        tilt_rad, q, np.array([torque_matrix(pose_q, actuator) for pose_q in q]), direct, coarse
+    )
 
 
 def errors(compared: Comparison, limit_A: float, currents: int = 200, seed: int = 0) -> Errors:
@@ -227,7 +229,7 @@ def _cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]
     return [(float(r), float(b), float(t)) for r, b, t in zip(edges[1:], lower, heights, strict=True)]
 
 
-def _torque_on_coils(magnet: Any, axes: Array, coil: Coil, rule: Rule) -> Array:
+def _torque_on_coils(magnet: Any, axes: Array, coil: CoilGeometry, rule: Rule) -> Array:
     """Torque of the magnet's field on one ampere in each of k coils, about the joint centre: (k, 3), N·m."""
     turned = np.array([_frame(axis).T for axis in axes]).reshape(-1, 3, 3)
     position, element = ((vectors @ turned).reshape(-1, 3) for vectors in _conductors(coil, rule))
@@ -240,7 +242,7 @@ def _torque_on_coils(magnet: Any, axes: Array, coil: Coil, rule: Rule) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _conductors(coil: Coil, rule: Rule) -> tuple[Array, Array]:
+def _conductors(coil: CoilGeometry, rule: Rule) -> tuple[Array, Array]:
     """Elements of one coil whose axis is z.
 
     Returns

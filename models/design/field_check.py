@@ -123,7 +123,7 @@ def _by_tilt(compared: Comparison, errors: Errors) -> list[Band]:
     band = np.digitize(np.degrees(compared.tilt_rad), BANDS_DEG[1:-1])
     rows = []
     for i in np.unique(band):
-        here = Errors(*(each[band == i] for each in errors))
+        here = Errors(*(values[band == i] for values in errors))
         relative = here.model_Nm / here.torque_Nm
         rows.append(
             Band(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil, Magnet, from_model
+from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet, from_model
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import disagreements
 from spheretwin.models.mjcf import read
@@ -38,11 +38,11 @@ def overlaps(actuator: Actuator) -> list[Overlap]:
     actuator : Actuator
         Axes of its coils and poles, and their common sizes.
     """
-    found = [
+    pairs = [
         *_overlaps("coil", actuator.coil_axes, actuator.coil, actuator.coil.outer_radius_m),
         *_overlaps("pole", actuator.pole_axes, actuator.magnet, actuator.magnet.radius_m),
     ]
-    return sorted(found, key=lambda pair: (-round(pair.depth_m / TOUCHING_M), pair.part, pair.first))
+    return sorted(pairs, key=lambda pair: (-round(pair.depth_m / TOUCHING_M), pair.part, pair.first))
 
 
 def air_gap_m(actuator: Actuator) -> float:
@@ -80,7 +80,9 @@ def clearance(axes: NDArray[np.float64], radius_m: float, length_m: float, dista
     return 2 * ((distance_m - length_m / 2) * sine_half - radius_m * cosine_half)
 
 
-def _overlaps(part: str, axes: NDArray[np.float64], size: Coil | Magnet, radius_m: float) -> list[Overlap]:
+def _overlaps(
+    part: str, axes: NDArray[np.float64], size: CoilGeometry | Magnet, radius_m: float
+) -> list[Overlap]:
     room = clearance(axes, radius_m, size.length_m, size.distance_m)
     first, second = np.nonzero(np.triu(room < -TOUCHING_M, k=1))
     return [Overlap(part, int(i), int(j), float(-room[i, j])) for i, j in zip(first, second, strict=True)]
@@ -109,10 +111,10 @@ def of_geometry(actuator: Actuator) -> list[str]:
 
 def of_parts(actuator: Actuator) -> list[str]:
     """Parts that overlap: coils and the ball, coils and coils, poles and poles (the deepest pair)."""
-    found = overlaps(actuator)
+    all_overlaps = overlaps(actuator)
     lines = []
     for part, axes in (("coil", actuator.coil_axes), ("pole", actuator.pole_axes)):
-        pairs = [overlap for overlap in found if overlap.part == part]
+        pairs = [overlap for overlap in all_overlaps if overlap.part == part]
         if pairs:
             lines.append(_line(pairs, axes))
     if (gap_m := air_gap_m(actuator)) < 0:

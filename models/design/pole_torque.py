@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Coil, Magnet
+from spheretwin.models.actuator import CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import computed_from
 from spheretwin.models.torque_curve import TorqueCurve, head
@@ -54,7 +54,7 @@ class Mesh(NamedTuple):
         return Mesh(*(2 * points for points in self))
 
 
-class Convergence(NamedTuple):
+class MeshConvergence(NamedTuple):
     """What a doubled mesh changes, in units of the peak."""
 
     peak: float
@@ -80,7 +80,7 @@ def sample_angles(step_deg: float = STEP_DEG) -> Array:
 
 def compute_curve(
     magnet: Magnet,
-    coil: Coil,
+    coil: CoilGeometry,
     phi_rad: Array | None = None,
     mesh: Mesh | None = None,
     track: Callable[[range], Iterable[int]] = iter,
@@ -149,10 +149,10 @@ def compute_curve(
 def convergence(
     curve: TorqueCurve,
     magnet: Magnet,
-    coil: Coil,
+    coil: CoilGeometry,
     mesh: Mesh | None = None,
     track: Callable[[range], Iterable[int]] = iter,
-) -> Convergence:
+) -> MeshConvergence:
     """Compare a curve with one on a doubled mesh, at its peak and at every eighth sample.
 
     Parameters
@@ -166,10 +166,12 @@ def convergence(
     again = np.append(np.arange(0, len(curve.phi_rad), CONVERGENCE_STRIDE), top)
     finer = compute_curve(magnet, coil, curve.phi_rad[again], (mesh or Mesh()).doubled(), track)
     change = np.abs(finer.torque_Nm_per_A - curve.torque_Nm_per_A[again]) / curve.peak_Nm_per_A
-    return Convergence(peak=float(change[-1]), worst=float(np.max(change)))
+    return MeshConvergence(peak=float(change[-1]), worst=float(np.max(change)))
 
 
-def provenance(magnet: Magnet, coil: Coil, measured: Convergence, mesh: Mesh | None = None) -> list[str]:
+def provenance(
+    magnet: Magnet, coil: CoilGeometry, measured: MeshConvergence, mesh: Mesh | None = None
+) -> list[str]:
     """Lines that tell where a torque curve comes from, for the head of its file.
 
     Parameters
@@ -238,7 +240,7 @@ def _on_iron(sheet: _Sheet, magnet: Magnet) -> _Sheet:
 
 
 def _torque(
-    sheet: _Sheet, remanence_T: float, coil: Coil, phi: float, mesh: Mesh, solenoid: SolenoidField
+    sheet: _Sheet, remanence_T: float, coil: CoilGeometry, phi: float, mesh: Mesh, solenoid: SolenoidField
 ) -> float:
     """f_t at one angle, N·m/A; the coil's axis is z, the pole's lies in the plane of x and z."""
     psi = (np.arange(mesh.around) + 0.5) * np.pi / mesh.around  # (around,)
@@ -252,7 +254,7 @@ def _torque(
     return float(-remanence_T * both_halves * (sheet.weight @ np.sum(radial * side, axis=1)))
 
 
-def _radial_field(coil: Coil, rho: Array, z: Array, across: int, solenoid: SolenoidField) -> Array:
+def _radial_field(coil: CoilGeometry, rho: Array, z: Array, across: int, solenoid: SolenoidField) -> Array:
     """Coil field times mu0^-1 per ampere, projected on the position from the joint centre: A/m · m.
 
     Parameters
@@ -270,7 +272,9 @@ def _radial_field(coil: Coil, rho: Array, z: Array, across: int, solenoid: Solen
     return np.concatenate([_radial_field_block(coil, rho[b], z[b], across, solenoid) for b in blocks])
 
 
-def _radial_field_block(coil: Coil, rho: Array, z: Array, across: int, solenoid: SolenoidField) -> Array:
+def _radial_field_block(
+    coil: CoilGeometry, rho: Array, z: Array, across: int, solenoid: SolenoidField
+) -> Array:
     layers, weights = _winding_layers(coil, rho, across)
     b_rho, _, b_z = solenoid(
         (0.5 * coil.length_m / layers).ravel(),
@@ -282,7 +286,7 @@ def _radial_field_block(coil: Coil, rho: Array, z: Array, across: int, solenoid:
     return coil.turns / coil.length_m * per_length
 
 
-def _winding_layers(coil: Coil, rho: Array, across: int) -> tuple[Array, Array]:
+def _winding_layers(coil: CoilGeometry, rho: Array, across: int) -> tuple[Array, Array]:
     """Radii of the solenoids that stand for the winding at each point, and their shares of the turns.
 
     The rule splits at the point's own radius and crowds there: inside the winding the field of a layer

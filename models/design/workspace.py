@@ -111,26 +111,28 @@ SAME_FIGURE = 0.01
 Figure = Callable[[Capability], Array]
 
 FIGURES: dict[str, Figure] = {
-    "least_norm": lambda found: found.least_norm_Nm,
-    "best": lambda found: found.best_Nm,
-    "singular_value": lambda found: found.singular_value_Nm_per_A,
-    "condition": lambda found: -found.condition,
+    "least_norm": lambda poses: poses.least_norm_Nm,
+    "best": lambda poses: poses.best_Nm,
+    "singular_value": lambda poses: poses.singular_value_Nm_per_A,
+    "condition": lambda poses: -poses.condition,
 }
 
 
-class Found(NamedTuple):
+class WorstPoses(NamedTuple):
     """Poses, and what the actuator can do there."""
 
     tilt_azimuth_spin_rad: Array  # (n, 3)
     q: Array  # (n, 3), rad
     capability: Capability
 
-    def at(self, index: Any) -> Found:
+    def at(self, index: Any) -> WorstPoses:
         """Some of the poses."""
-        return Found(self.tilt_azimuth_spin_rad[index], self.q[index], self.capability.at(index))
+        return WorstPoses(self.tilt_azimuth_spin_rad[index], self.q[index], self.capability.at(index))
 
 
-def worst_by_tilt(workspace: Workspace, on_grid: Capability, figure: Figure, actuator: Actuator) -> Found:
+def worst_by_tilt(
+    workspace: Workspace, on_grid: Capability, figure: Figure, actuator: Actuator
+) -> WorstPoses:
     """Worst pose at each tilt of the grid, over all azimuths and spins.
 
     Parameters
@@ -145,13 +147,13 @@ def worst_by_tilt(workspace: Workspace, on_grid: Capability, figure: Figure, act
         For the poses between the grid's.
     """
     start = _starts(workspace, on_grid, figure)
-    found = _downhill(start, _steps(workspace) * [0, 1, 1], figure, actuator, workspace.tilt_rad[-1])
-    order = np.lexsort((figure(found.capability), start[:, 0]))
+    poses = _downhill(start, _steps(workspace) * [0, 1, 1], figure, actuator, workspace.tilt_rad[-1])
+    order = np.lexsort((figure(poses.capability), start[:, 0]))
     _, first = np.unique(start[order, 0], return_index=True)
-    return found.at(order[first])
+    return poses.at(order[first])
 
 
-def local_minima(workspace: Workspace, by_tilt: Found, figure: Figure, actuator: Actuator) -> Found:
+def local_minima(workspace: Workspace, by_tilt: WorstPoses, figure: Figure, actuator: Actuator) -> WorstPoses:
     """Worst poses of the whole workspace, the worst first; those that symmetry makes alike only once.
 
     Parameters
@@ -164,18 +166,18 @@ def local_minima(workspace: Workspace, by_tilt: Found, figure: Figure, actuator:
         As there.
     """
     start = by_tilt.tilt_azimuth_spin_rad
-    found = _downhill(start, _steps(workspace), figure, actuator, workspace.tilt_rad[-1])
-    value, tilt = figure(found.capability), found.tilt_azimuth_spin_rad[:, 0]
-    kept: list[int] = []
+    poses = _downhill(start, _steps(workspace), figure, actuator, workspace.tilt_rad[-1])
+    value, tilt = figure(poses.capability), poses.tilt_azimuth_spin_rad[:, 0]
+    distinct: list[int] = []
     for i in np.argsort(value, kind="stable"):
         near = [
             k
-            for k in kept
+            for k in distinct
             if abs(tilt[i] - tilt[k]) < SAME_TILT_RAD and _alike(float(value[i]), float(value[k]))
         ]
         if not near:
-            kept.append(int(i))
-    return found.at(kept)
+            distinct.append(int(i))
+    return poses.at(distinct)
 
 
 def _alike(a: float, b: float) -> bool:
@@ -206,7 +208,9 @@ def _starts(workspace: Workspace, on_grid: Capability, figure: Figure) -> Array:
     return np.array(starts)
 
 
-def _downhill(start: Array, steps: Array, figure: Figure, actuator: Actuator, largest_tilt: float) -> Found:
+def _downhill(
+    start: Array, steps: Array, figure: Figure, actuator: Actuator, largest_tilt: float
+) -> WorstPoses:
     """Pattern search from each start: go to the best neighbour, or halve the steps where there is none."""
     offsets = np.array(list(itertools.product(*((-1, 0, 1) if step else (0,) for step in steps))))
     offsets = offsets[np.argsort(np.any(offsets, axis=1), kind="stable")]  # staying comes first and wins ties
@@ -220,4 +224,4 @@ def _downhill(start: Array, steps: Array, figure: Figure, actuator: Actuator, la
         at = around[np.arange(len(at)), best]
         scale = np.where(best == 0, scale / 2, scale)
     q = pose(*at.T)
-    return Found(at, q, capability(q, actuator))
+    return WorstPoses(at, q, capability(q, actuator))

@@ -184,11 +184,11 @@ def has_checksums(path: Path) -> bool:
     """
     with path.open("rb") as file:
         _, footer = _footer(file)
-    found = _FOOTER_VALUE.search(footer)
+    match = _FOOTER_VALUE.search(footer)
     listed = _SEGMENTS.encode() + _TEXT in footer
-    if found is None and not listed:
+    if match is None and not listed:
         return False
-    if found is None or not listed or _footer_checksum(footer, found) != found[1].decode():
+    if match is None or not listed or _footer_checksum(footer, match) != match[1].decode():
         raise damaged(path, "the footer")
     return True
 
@@ -203,22 +203,22 @@ def damaged(path: Path, place: str) -> InputError:
 
 def unreadable(path: Path, error: BaseException, expected: str) -> InputError:
     """Return the error for a file that another library could not read."""
-    told = shortened(without_breaks(error), LONGEST_WORD)
-    return InputError(f"file {path}: expected {expected}, {told}")
+    reason = shortened(without_breaks(error), LONGEST_WORD)
+    return InputError(f"file {path}: expected {expected}, {reason}")
 
 
 def _sign(path: Path) -> None:
     """Put the checksum of the footer in its place."""
     with path.open("r+b") as file:
         start, footer = _footer(file)
-        found = _FOOTER_VALUE.search(footer)
-        assert found is not None  # it was written a moment ago
-        file.seek(start + found.start(1))
-        file.write(_footer_checksum(footer, found).encode())
+        match = _FOOTER_VALUE.search(footer)
+        assert match is not None  # it was written a moment ago
+        file.seek(start + match.start(1))
+        file.write(_footer_checksum(footer, match).encode())
 
 
-def _footer_checksum(footer: bytes, found: re.Match[bytes]) -> str:
-    unsigned = footer[: found.start(1)] + _UNSIGNED.encode() + footer[found.end(1) :]
+def _footer_checksum(footer: bytes, match: re.Match[bytes]) -> str:
+    unsigned = footer[: match.start(1)] + _UNSIGNED.encode() + footer[match.end(1) :]
     return f"{zlib.crc32(unsigned):08x}"
 
 
@@ -257,7 +257,7 @@ def _group(file: pyarrow.parquet.ParquetFile, place: int) -> str:
 
     if not file.metadata.num_rows:
         return f"row group {place}"
-    counts = [file.metadata.row_group(each).num_rows for each in range(place + 1)]
+    counts = [file.metadata.row_group(group).num_rows for group in range(place + 1)]
     text = f"row group {place}, rows {sum(counts[:-1])} to {sum(counts) - 1}"
     for name in file.schema_arrow.names:
         try:

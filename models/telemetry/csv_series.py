@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError, shown, told_apart, without_breaks
+from spheretwin.models.base.errors import InputError, distinct_texts, shown, without_breaks
 
 TIME = "t_s"
 
@@ -22,7 +22,7 @@ LONGEST_s, CLOSEST_s = 1e9, 1e-9
 ROUNDING = 1e-12
 
 
-class Row(NamedTuple):
+class CsvRow(NamedTuple):
     """One row of a file."""
 
     line: int
@@ -30,7 +30,7 @@ class Row(NamedTuple):
     texts: list[str]
 
 
-class Series:
+class TimeSeries:
     """Numbers by time.
 
     Parameters
@@ -45,14 +45,14 @@ class Series:
         self.t_s, self.values = t_s, values
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Series):
+        if not isinstance(other, TimeSeries):
             return NotImplemented
         return np.array_equal(self.t_s, other.t_s) and np.array_equal(self.values, other.values)
 
     def __hash__(self) -> int:
         return hash((self.t_s.tobytes(), self.values.tobytes()))
 
-    def held(self, t: NDArray[np.float64], before: Sequence[float]) -> NDArray[np.float64]:
+    def zero_order_hold(self, t: NDArray[np.float64], before: Sequence[float]) -> NDArray[np.float64]:
         """Values that hold from their times on, and `before` the first time others.
 
         Parameters
@@ -68,7 +68,7 @@ class Series:
         """
         return np.vstack([before, self.values])[np.searchsorted(reached(self.t_s), t, side="right")]
 
-    def linear(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    def interpolate(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values on straight lines between the times, the first before and the last after them.
 
         Parameters
@@ -107,11 +107,11 @@ def check_rising(times: Sequence[float]) -> None:
     """
     fault = _first_not_rising(np.array(times))
     if fault is not None:
-        before, after = told_apart(*times[fault - 1 : fault + 1])
+        before, after = distinct_texts(*times[fault - 1 : fault + 1])
         raise ValueError(f"expected rising times, received {before} then {after} s")
 
 
-def read(what: str, path: Path, columns: Sequence[str], largest: float) -> Series:
+def read(what: str, path: Path, columns: Sequence[str], largest: float) -> TimeSeries:
     """Read a series: a header, then a row for each time; lines that begin with ``#`` are comments.
 
     Parameters
@@ -136,52 +136,52 @@ def read(what: str, path: Path, columns: Sequence[str], largest: float) -> Serie
         The file cannot be read, lacks a column, or a row of it is no series.
     """
     header, *rows = _rows(what, path)
-    wanted = (TIME, *columns)
+    names_read = (TIME, *columns)
     names = [name.strip() for name in header.texts]
-    if any(names.count(name) != 1 for name in wanted):
+    if any(names.count(name) != 1 for name in names_read):
         raise InputError(
-            f"{what} {path}: expected each of the columns {', '.join(wanted)} once,"
+            f"{what} {path}: expected each of the columns {', '.join(names_read)} once,"
             f" received {', '.join(names) or 'none'}"
         )
     if not rows:
         raise InputError(f"{what} {path}: expected at least one row below the header, received none")
     limits = dict.fromkeys(columns, largest) | {TIME: LONGEST_s}
-    table = np.empty((len(rows), len(wanted)))
+    table = np.empty((len(rows), len(names_read)))
     for target, row in zip(table, rows, strict=True):
         if len(row.texts) != len(names):
             raise InputError(
                 f"{what} {path}: expected {len(names)} numbers in line {row.line}, received {len(row.texts)}"
             )
-        for i, name in enumerate(wanted):
+        for i, name in enumerate(names_read):
             text = row.texts[names.index(name)]
             target[i] = _number(f"{what} {path}: line {row.line}", name, text, limits[name])
     fault = _first_not_rising(table[:, 0])
     if fault is not None:
-        before, after = told_apart(table[fault - 1, 0], table[fault, 0])
+        before, after = distinct_texts(table[fault - 1, 0], table[fault, 0])
         raise InputError(
             f"{what} {path}: line {rows[fault].line}: expected a {TIME} that rises,"
             f" received {before} then {after}"
         )
-    return Series(table[:, 0].copy(), table[:, 1:].copy())
+    return TimeSeries(table[:, 0].copy(), table[:, 1:].copy())
 
 
-def _rows(what: str, path: Path) -> list[Row]:
+def _rows(what: str, path: Path) -> list[CsvRow]:
     """Header and rows of a file; a header of nothing where there is none."""
     try:
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
     except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
         raise InputError(f"{what} {path}: expected a readable CSV file, {without_breaks(error)}") from None
     try:
-        return list(_split(text)) or [Row(1, [])]
+        return list(_split(text)) or [CsvRow(1, [])]
     except csv.Error as error:
         raise InputError(f"{what} {path}: expected values between commas, {error}") from None
 
 
-def _split(text: str) -> Iterator[Row]:
-    kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    reader = csv.reader((line for _, line in kept), skipinitialspace=True)
+def _split(text: str) -> Iterator[CsvRow]:
+    data_lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    reader = csv.reader((line for _, line in data_lines), skipinitialspace=True)
     for texts in reader:
-        yield Row(kept[reader.line_num - 1][0], texts)
+        yield CsvRow(data_lines[reader.line_num - 1][0], texts)
 
 
 def _number(where: str, name: str, text: str, largest: float) -> float:

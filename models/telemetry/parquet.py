@@ -17,7 +17,7 @@ import numpy as np
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 from spheretwin.models.base.files import OPEN_FILES, PartialFile, check_writable
 from spheretwin.models.telemetry.checksums import write_parquet
-from spheretwin.models.telemetry.partial_files import Parts, read_batches, read_schema
+from spheretwin.models.telemetry.partial_files import PartialStreams, read_batches, read_schema
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table
 
@@ -58,7 +58,7 @@ class TelemetryFile:
         self._path, self._facts = path, dict(facts)
         self._rows = Table(signals, np.empty((0, width(signals))))
         self._waiting: list[Table] = []
-        self._parts = Parts(path, facts)
+        self._parts = PartialStreams(path, facts)
         self._fault: SpheretwinError | None = None
         self._lock, self._closed = threading.Lock(), False
         OPEN_FILES.add(self)
@@ -121,22 +121,22 @@ class TelemetryFile:
             return None
         return PartialFile(self._parts.folder, self._path, self._parts.rows)
 
-    def _close(self, known: Mapping[str, str]) -> None:
+    def _close(self, facts: Mapping[str, str]) -> None:
         if self._fault:
             raise self._fault
         if not self._parts.rows:
-            self._pending().write_parquet(self._path, known)
+            self._pending().write_parquet(self._path, facts)
             return
         self._flush()
         if self._fault:
             raise self._fault
         try:
             self._parts.close()
-            join(self._parts.paths, self._path, known)
+            join(self._parts.paths, self._path, facts)
         except OSError as error:
             raise self._unwritten(error) from None
         except SpheretwinError as error:
-            raise SpheretwinError(f"{error}{self._kept()}") from None
+            raise SpheretwinError(f"{error}{self._kept_rows_text()}") from None
         self._parts.remove()
 
     def _pending(self) -> Table:
@@ -158,10 +158,10 @@ class TelemetryFile:
 
     def _unwritten(self, error: OSError) -> SpheretwinError:
         return SpheretwinError(
-            f"output: {self._path} could not be written, {without_breaks(error)}{self._kept()}"
+            f"output: {self._path} could not be written, {without_breaks(error)}{self._kept_rows_text()}"
         )
 
-    def _kept(self) -> str:
+    def _kept_rows_text(self) -> str:
         return f"; {self._parts.rows} rows are kept in {self._parts.folder}" if self._parts.rows else ""
 
 
@@ -201,7 +201,7 @@ def _groups(parts: Sequence[Path], schema: pa.Schema) -> Iterator[pa.Table]:
     """Row groups of the file; at least one."""
     import pyarrow as pa  # slow to import, and most runs write no file
 
-    batches = (_widened(batch, schema) for batch in _batches(parts))
+    batches = (_with_all_columns(batch, schema) for batch in _batches(parts))
     rows = 0
     while len(group := pa.Table.from_batches(islice(batches, GROUP_BATCHES), schema)):
         rows += len(group)
@@ -223,7 +223,7 @@ def _joint_schema(parts: Sequence[Path], facts: Mapping[str, str] | None) -> pa.
     """Columns of all parts, each once, in the order in which they first appear."""
     import pyarrow as pa
 
-    found: dict[str, pa.Field] = {}
+    fields: dict[str, pa.Field] = {}
     metadata = facts
     for part in parts:
         schema = read_schema(part)
@@ -231,15 +231,15 @@ def _joint_schema(parts: Sequence[Path], facts: Mapping[str, str] | None) -> pa.
             continue
         metadata = schema.metadata if metadata is None else metadata
         for field in schema:
-            known = found.setdefault(field.name, field)
-            if not known.equals(field, check_metadata=True):
+            first = fields.setdefault(field.name, field)
+            if not first.equals(field, check_metadata=True):
                 raise InputError(
-                    f"telemetry {part}: expected {field.name} as {_size(known)} numbers {_words(known)},"
+                    f"telemetry {part}: expected {field.name} as {_size(first)} numbers {_words(first)},"
                     f" received {_size(field)} {_words(field)}"
                 )
-    if not found:
+    if not fields:
         raise _empty(parts)
-    return pa.schema(found.values(), metadata=metadata)
+    return pa.schema(fields.values(), metadata=metadata)
 
 
 def _empty(parts: Sequence[Path]) -> InputError:
@@ -255,18 +255,19 @@ def _size(field: pa.Field) -> int:
     return getattr(field.type, "list_size", 1)
 
 
-def _widened(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+def _with_all_columns(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
     """A batch with all columns of the file."""
     import pyarrow as pa
 
     present = set(batch.schema.names)
     columns = [
-        batch.column(field.name) if field.name in present else _nowhere(field, len(batch)) for field in schema
+        batch.column(field.name) if field.name in present else _column_of_nan(field, len(batch))
+        for field in schema
     ]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
-def _nowhere(field: pa.Field, rows: int) -> pa.Array:
+def _column_of_nan(field: pa.Field, rows: int) -> pa.Array:
     """A column of NaN."""
     import pyarrow as pa
 

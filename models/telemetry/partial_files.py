@@ -33,7 +33,7 @@ _MESSAGE = b"\xff\xff\xff\xff"
 _STREAM = "an Arrow stream of a run"
 
 
-class Parts:
+class PartialStreams:
     """Follows a run into streams of Arrow; nothing is there before its first rows.
 
     Parameters

@@ -155,10 +155,10 @@ PACKAGES = ("spheretwin", "mujoco", "numba", "numpy", "scipy", "pydantic", "pyar
 @cache
 def versions() -> dict[str, str]:
     """Version of Python and of every package that a figure may depend on."""
-    found = {"python": platform.python_version()}
+    versions_by_package = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            versions_by_package[package] = version(package)
         except PackageNotFoundError:
             continue
-    return found
+    return versions_by_package

@@ -110,13 +110,13 @@ MOTION_SIGNALS = (
 @cache
 def common_signals(groups: int) -> tuple[Signal, ...]:
     """Signals of every run, in this order, for an actuator with a number of coil groups."""
-    each = tuple(f"group {j}" for j in range(groups))
+    labels = tuple(f"group {j}" for j in range(groups))
     first_step = "group currents, mean over the first physics step of the tick"
     return (
         *MOTION_SIGNALS,
-        Signal("current_command_A", "A", groups, "group currents asked of the amplifiers", each),
-        Signal("current_A", "A", groups, first_step, each),
-        Signal("mean_current_A", "A", groups, "group currents, mean over the tick", each),
+        Signal("current_command_A", "A", groups, "group currents asked of the amplifiers", labels),
+        Signal("current_A", "A", groups, first_step, labels),
+        Signal("mean_current_A", "A", groups, "group currents, mean over the tick", labels),
         Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
     )
 
@@ -138,7 +138,7 @@ def width(signals: tuple[Signal, ...]) -> int:
     return sum(signal.size for signal in signals)
 
 
-def with_more(known: Mapping[str, Signal], more: tuple[Signal, ...]) -> dict[str, Signal]:
+def with_more(signals: Mapping[str, Signal], added: tuple[Signal, ...]) -> dict[str, Signal]:
     """Signals by name, with more of them: a name means one thing throughout.
 
     Raises
@@ -146,12 +146,12 @@ def with_more(known: Mapping[str, Signal], more: tuple[Signal, ...]) -> dict[str
     InputError
         One has the name of another.
     """
-    for signal in more:
-        before = known.get(signal.name, signal)
+    for signal in added:
+        before = signals.get(signal.name, signal)
         if before != signal:
             raise InputError(
                 f"session: expected the signal {signal.name} as it was before,"
                 f" {before.size} in {before.unit} ({before.meaning}),"
                 f" received {signal.size} in {signal.unit} ({signal.meaning})"
             )
-    return {**known, **{signal.name: signal for signal in more}}
+    return {**signals, **{signal.name: signal for signal in added}}

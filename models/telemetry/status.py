@@ -32,14 +32,14 @@ class Status(StrEnum):
     """
 
     level: Level
-    told: str
+    text: str
     code: int | None
 
-    def __new__(cls, name: str, level: Level, told: str, code: int | None = None) -> Status:
+    def __new__(cls, name: str, level: Level, text: str, code: int | None = None) -> Status:
         """Text with its row."""
         status = str.__new__(cls, name)
         status._value_ = name
-        status.level, status.told, status.code = level, told, code
+        status.level, status.text, status.code = level, text, code
         return status
 
     RUNNING = "running", Level.INFO, "the run goes on", 0
@@ -106,12 +106,12 @@ class Events:
             self._last_lost_s = t[i]
         for i in np.flatnonzero(saturated(rows)):
             if t[i] - self._last_saturated_s > QUIET_S:
-                text = f"current limit reached: {100 * scale[i]:.0f} % of the commanded torque"
-                events.append((float(t[i]), Level.WARN, text))
+                message = f"current limit reached: {100 * scale[i]:.0f} % of the commanded torque"
+                events.append((float(t[i]), Level.WARN, message))
             self._last_saturated_s = t[i]
         self._now_s = float(t[-1])
         return sorted(events, key=lambda event: event[0])
 
     def end(self, status: Status) -> Event:
         """Event of the run's end."""
-        return self._now_s, status.level, status.told
+        return self._now_s, status.level, status.text

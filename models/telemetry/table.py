@@ -192,7 +192,7 @@ def check_rows(log: NDArray[np.float64], columns: int) -> None:
     )
 
 
-class KeptTelemetry:
+class TelemetryBuffer:
     """Follows a run and keeps its rows.
 
     Parameters
@@ -237,12 +237,12 @@ class KeptTelemetry:
     def finish(self, status: str) -> None:
         """Nothing remains to be done."""
 
-    def _widen(self, more: tuple[Signal, ...]) -> None:
-        before = self._table
-        signals = before.signals + more
-        self._table = Table(signals, allocated(len(before), width(signals)))
-        self._table.values[:, : before.values.shape[1]] = before.values
-        self._table.values[:, before.values.shape[1] :] = np.nan
+    def _widen(self, added: tuple[Signal, ...]) -> None:
+        previous = self._table
+        signals = previous.signals + added
+        self._table = Table(signals, allocated(len(previous), width(signals)))
+        self._table.values[:, : previous.values.shape[1]] = previous.values
+        self._table.values[:, previous.values.shape[1] :] = np.nan
 
 
 def saturated(rows: Table) -> NDArray[np.bool_]:
