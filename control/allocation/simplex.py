@@ -1,4 +1,4 @@
-"""The most torque in a direction that bounded currents give, by a simplex method with bounds."""
+"""Simplex method with bounds: the largest torque in a direction that bounded currents give."""
 
 from math import copysign, inf, sqrt
 
@@ -15,51 +15,51 @@ NONE: Vector = (0.0, 0.0, 0.0)
 
 @compiled
 def column(G: Array, j: int) -> Vector:
-    """Torque of one ampere in a group."""
+    """Return the torque of one ampere in a group."""
     return G[0, j], G[1, j], G[2, j]
 
 
 @compiled
 def orthogonal_part(a: Vector, e1: Vector, e2: Vector) -> Vector:
-    """What is left of a vector without its parts along two orthonormal axes (or zeros)."""
+    """Return a vector without its components along two orthonormal axes (or zeros)."""
     return add_multiple(add_multiple(a, -dot(a, e1), e1), -dot(a, e2), e2)
 
 
 @compiled
 def unit(a: Vector) -> Vector:
-    """Vector of length 1, or of zeros as it was."""
+    """Return the vector scaled to length 1; a zero vector stays zero."""
     square = dot(a, a)
     return add_multiple(NONE, 1.0 / sqrt(square) if square > 0.0 else 0.0, a)
 
 
 @compiled
 def add_multiple(a: Vector, factor: float, b: Vector) -> Vector:
-    """Sum of a vector and a multiple of another."""
+    """Return the sum of a vector and a multiple of another."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @compiled
 def length(a: Vector) -> float:
-    """Euclidean length."""
+    """Return the Euclidean length."""
     return sqrt(dot(a, a))
 
 
 @compiled
 def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
 def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
+    """Return the vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 # Share of the terms' size below which a rate or a gain is rounding.
 NOISE = 1e-12
 
-# Groups within this of their limits (in limits) are taken to meet them at once.
+# Groups within this distance of their limits (in limits) count as being at them.
 TIE = 1e-12
 
 
@@ -67,9 +67,9 @@ TIE = 1e-12
 def increase_share(
     G: Array, torque: Vector, end: float, share: float, most_steps: int, demand: Array
 ) -> tuple[float, int]:
-    """Raise the share, by a simplex method with bounds, to `end` or to the largest there is.
+    """Increase the share, by a simplex method with bounds, to `end` or to its maximum.
 
-    Two groups and the share are basic: they balance what one other group at a time is changed by.
+    Two groups and the share are basic: they balance the change of one other group at a time.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def increase_share(
     torque : tuple of three floats
     end : float
     share : float
-        What the demands give of the torque at the start.
+        Share of the torque that the demands give at the start.
     most_steps : int
     demand : (n,) array
         Within ±1, changed in place.
@@ -97,7 +97,7 @@ def increase_share(
         if c < 0:
             break
         rate_c, growth = copysign(1.0, growth), abs(growth)
-        rest = add_multiple(add_multiple(NONE, growth, torque), -rate_c, column(G, c))  # for a and b to give
+        rest = add_multiple(add_multiple(NONE, growth, torque), -rate_c, column(G, c))  # a and b balance it
         rate_a = dot(cross(rest, g_b), plane) / dot(plane, plane)
         rate_b = dot(cross(g_a, rest), plane) / dot(plane, plane)
         noise = NOISE * (growth * length(torque) + length(column(G, c)))
@@ -114,7 +114,9 @@ def increase_share(
         b_meets = (room_b - stride) * abs(rate_b) <= TIE
         if stride == room_c:
             demand[c] = rate_c
-        elif a_meets and (abs(rate_a) >= abs(rate_b) or not b_meets):  # the faster: the next basis is sounder
+        elif a_meets and (
+            abs(rate_a) >= abs(rate_b) or not b_meets
+        ):  # the faster: the next basis is better conditioned
             demand[a] = copysign(1.0, rate_a)
             a = c
         elif b_meets:
@@ -125,7 +127,7 @@ def increase_share(
 
 @compiled
 def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
-    """Two groups whose columns and the torque are far from lying in one plane."""
+    """Return two groups whose columns and the torque are far from coplanar."""
     a = b = 0
     for j in range(G.shape[1]):
         if length(cross(column(G, j), torque)) > length(cross(column(G, a), torque)):
@@ -139,7 +141,7 @@ def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
 
 @compiled
 def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: int) -> tuple[int, float]:
-    """Group with the most to add to the share (-1 if none has), and the share's growth with its demand."""
+    """Return the group that can add most to the share (-1 if none), and the growth of the share with its demand."""
     best, best_group, best_growth, total = 0.0, -1, 0.0, 0.0
     for j in range(G.shape[1]):
         growth = dot(column(G, j), plane) / dot(torque, plane)
@@ -152,6 +154,6 @@ def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: 
 
 @compiled
 def steps_to_limit(demand: float, rate: float, noise: float) -> float:
-    """Steps of a rate until a demand meets its limit; at a rate of rounding's size it never does."""
+    """Return the steps of a rate until a demand reaches its limit; infinity for a rate of the size of rounding."""
     distance = 1.0 - demand if rate > 0.0 else 1.0 + demand
     return max(distance, 0.0) / abs(rate) if abs(rate) > noise else inf

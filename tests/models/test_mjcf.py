@@ -53,7 +53,7 @@ def test_an_edit_of_the_same_size_and_time_is_read(tmp_path):
 
 
 def test_only_so_many_files_are_kept(tmp_path):
-    paths = [tmp_path / f"{number}.xml" for number in range(mjcf.MOST_KEPT + 1)]
+    paths = [tmp_path / f"{number}.xml" for number in range(mjcf.MOST_MODELS + 1)]
     for path in paths:
         path.write_text(TEXT)
     first = mjcf.read(paths[0])
