@@ -275,7 +275,7 @@ def multipliers(
 
 @compiled
 def free_frame(G: Array, side: Array, small: float) -> tuple[Vector, Vector, Vector]:
-    """Return orthonormal axes of the span of the free columns, widest extent first; zeros for missing axes."""
+    """Return orthonormal axes of the free columns' span, widest extent first; zeros for missing axes."""
     e1 = farthest(G, side, NONE, NONE, small)
     e2 = farthest(G, side, e1, NONE, small)
     e3 = farthest(G, side, e1, e2, small)

@@ -141,7 +141,7 @@ def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
 
 @compiled
 def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: int) -> tuple[int, float]:
-    """Return the group that can add most to the share (-1 if none), and the growth of the share with its demand."""
+    """Return the group that can add most to the share (-1: none), and the share's growth with its demand."""
     best, best_group, best_growth, total = 0.0, -1, 0.0, 0.0
     for j in range(G.shape[1]):
         growth = dot(column(G, j), plane) / dot(torque, plane)
@@ -154,6 +154,6 @@ def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: 
 
 @compiled
 def steps_to_limit(demand: float, rate: float, noise: float) -> float:
-    """Return the steps of a rate until a demand reaches its limit; infinity for a rate of the size of rounding."""
+    """Return the steps of a rate until a demand reaches its limit; infinity for a rate near rounding."""
     distance = 1.0 - demand if rate > 0.0 else 1.0 + demand
     return max(distance, 0.0) / abs(rate) if abs(rate) > noise else inf

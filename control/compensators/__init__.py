@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.applied_torque import AppliedTorque
-from spheretwin.control.compensators import reference_governor
 from spheretwin.control.compensators.feed_forward import (
     FeedForward,
     compute_feed_forward,
     subtract_feed_forward,
 )
 from spheretwin.control.compensators.prediction import Prediction, advance, predict
-from spheretwin.control.compensators.reference_governor import Governor, govern
+from spheretwin.control.compensators.reference_governor import Governor, govern, transfer_governor
 from spheretwin.models.base.compiled import allocation_free, transfer_state
 from spheretwin.models.magnetics import TorqueModel
 
@@ -72,6 +71,6 @@ def apply_compensators(
 
 def transfer_compensators(before: Compensators, after: Compensators) -> None:
     """Copy the state of each compensator into compensators with other parameters."""
-    reference_governor.carried_on(before.governor, after.governor)
+    transfer_governor(before.governor, after.governor)
     transfer_state(before.prediction, after.prediction)
     transfer_state(before.feed_forward, after.feed_forward)

@@ -1,4 +1,4 @@
-"""Time series from a CSV file of the user's: a column of times and named columns of numbers."""
+"""Time series from a CSV file of the user: a column of times and named columns of numbers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from spheretwin.models.base.errors import InputError, distinct_texts, shown, wit
 
 TIME = "t_s"
 
-# Beyond it a number of seconds no longer tells ticks apart; below it, differences over it would overflow.
+# Beyond the first a number of seconds cannot distinguish ticks; below the second, quotients would overflow.
 LONGEST_s, CLOSEST_s = 1e9, 1e-9
 
-# Times of ticks are products and those of a file decimal fractions: what is meant as one time may differ by
-# some units in the last place, of which this is a few thousand.
+# Times of ticks are products, those of a file decimal fractions: equal times may differ by some units in the
+# last place. This is a few thousand of them.
 ROUNDING = 1e-12
 
 
@@ -26,19 +26,19 @@ class CsvRow(NamedTuple):
     """One row of a file."""
 
     line: int
-    """Number of its line, from 1 on."""
+    """Number of the line, from 1."""
     texts: list[str]
 
 
 class TimeSeries:
-    """Numbers by time.
+    """Time series of numbers.
 
     Parameters
     ----------
     t_s : (n,) array, s
         Rising times.
     values : (n, k) array
-        What is there at these times.
+        Values at these times.
     """
 
     def __init__(self, t_s: NDArray[np.float64], values: NDArray[np.float64]) -> None:
@@ -53,14 +53,14 @@ class TimeSeries:
         return hash((self.t_s.tobytes(), self.values.tobytes()))
 
     def zero_order_hold(self, t: NDArray[np.float64], before: Sequence[float]) -> NDArray[np.float64]:
-        """Values that hold from their times on, and `before` the first time others.
+        """Interpolate with zero-order hold: each value applies from its time on.
 
         Parameters
         ----------
         t : (n,) array, s
             Times.
         before : sequence of k float
-            What holds before the first time.
+            Values before the first time.
 
         Returns
         -------
@@ -69,7 +69,7 @@ class TimeSeries:
         return np.vstack([before, self.values])[np.searchsorted(reached(self.t_s), t, side="right")]
 
     def interpolate(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values on straight lines between the times, the first before and the last after them.
+        """Interpolate linearly between the times; the first value applies before, the last after them.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class TimeSeries:
 
 
 def reached(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From when on times count as reached: earlier by what rounding may take off a tick's time.
+    """Return the times less a rounding tolerance, so that the tick of a time counts as having reached it.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def check_rising(times: Sequence[float]) -> None:
     Raises
     ------
     ValueError
-        One is not later than the one before, by a nanosecond at least.
+        A time is not later than the previous one by at least a nanosecond.
     """
     fault = _first_not_rising(np.array(times))
     if fault is not None:
@@ -117,23 +117,23 @@ def read(what: str, path: Path, columns: Sequence[str], largest: float) -> TimeS
     Parameters
     ----------
     what : str
-        What messages call the file.
+        Name of the file in messages.
     path : Path
-        The file. Columns that are not asked for are left alone.
+        The file. Other columns are ignored.
     columns : sequence of str
-        Columns beside that of the times, ``t_s``.
+        Columns in addition to the times, ``t_s``.
     largest : float
         Largest magnitude of their numbers.
 
     Returns
     -------
     Series
-        At least one row, times rising.
+        At least one row, with rising times.
 
     Raises
     ------
     InputError
-        The file cannot be read, lacks a column, or a row of it is no series.
+        The file cannot be read, lacks a column, or has an invalid row.
     """
     header, *rows = _rows(what, path)
     names_read = (TIME, *columns)
@@ -166,7 +166,7 @@ def read(what: str, path: Path, columns: Sequence[str], largest: float) -> TimeS
 
 
 def _rows(what: str, path: Path) -> list[CsvRow]:
-    """Header and rows of a file; a header of nothing where there is none."""
+    """Return header and rows of a file; an empty header for an empty file."""
     try:
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
     except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
