@@ -56,7 +56,7 @@ def applied_torque(
 
     Parameters
     ----------
-    asked : bool
+    on : bool
         Whether it is used.
     groups : int
         Coil groups.
@@ -88,7 +88,7 @@ def estimate_applied_torque(
 
     Parameters
     ----------
-    belief : Belief
+    applied_torque : AppliedTorque
         Changed in place.
     pose : (3,) array, rad
         Measured at the beginning of the period.

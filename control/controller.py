@@ -95,9 +95,9 @@ def controller(
         Largest group current that the controller commands.
     logged : int
         Numbers of the law's state that the telemetry logs.
-    belief : Belief
+    applied_torque : AppliedTorque
         Estimate of the torque of the law's commands.
-    around : Around
+    compensators : Compensators
         Governor, prediction and feed-forward.
     supervision : Supervision
     manual : Manual

@@ -43,9 +43,9 @@ def apply_compensators(
 
     Parameters
     ----------
-    around : Around
+    compensators : Compensators
         Changed in place.
-    belief : Belief
+    applied_torque : AppliedTorque
         Estimate at the time of the measurement.
     magnetics : TorqueModel
         Nominal.

@@ -96,7 +96,7 @@ def prediction(section: PredictionSection, model: DelayModel, magnetics: TorqueM
     Parameters
     ----------
     section : PredictionSection
-    delayed : Delayed
+    model : DelayModel
     magnetics : TorqueModel
         Nominal.
     """
@@ -129,7 +129,7 @@ def predict(
     ----------
     prediction : Prediction
         Changed in place.
-    belief : Belief
+    applied_torque : AppliedTorque
         Estimate at the time of the measurement.
     magnetics : TorqueModel
         Nominal.

@@ -51,11 +51,11 @@ def compare(
     Parameters
     ----------
     bandwidths_rad_s : sequence of float, rad/s
-    motion : Motion, optional
+    motion : SampledSine, optional
 
     Returns
     -------
-    dict of kind to Compared
+    dict of kind to EstimatorComparison
 
     Raises
     ------

@@ -103,13 +103,13 @@ def observe(
 
     Parameters
     ----------
-    before : Observed
+    before : ObserverState
     angle : (3,) rad
         Measured now.
     torque : (3,) N·m
         Of the coils over the period.
-    gains : Gains of each axis
-    nominal : Nominal
+    gains : ObserverGains of each axis
+    nominal : RotorModel
     period_s : float, s
     """
     alpha, beta, gamma = gains

@@ -104,7 +104,7 @@ def approximate_within_bounds(
         Sliding variable.
     adaptation_rate : float
         eta; with 0 nothing is learnt, and the consequents leak away.
-    restraint : Restraint
+    limits : AdaptationLimits
     period_s : float, s
     consequents : (75,) array
         theta, changed in place.

@@ -133,7 +133,7 @@ def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCu
     on : bool
         Whether it is on.
     groups : int
-    followed : Followed
+    nominal : NominalCurrents
         Nominal currents of healthy groups.
     """
     return Detector(
@@ -162,9 +162,9 @@ def detect_faults(
     ----------
     detector : Detector
         Changed in place.
-    groups : Groups
+    groups : EnabledGroups
         Groups found faulty are disabled.
-    believed : (n,) array, A
+    applied : (n,) array, A
         Estimated driven currents at this tick.
     G : (3, n) array, N·m/A
         Nominal torque matrix of all groups.

@@ -128,7 +128,7 @@ def watchdog(
     Parameters
     ----------
     section : WatchdogSection
-    watched : Watched
+    limits : MeasurementLimits
     fresh : (3,) array
         The sensors write into it.
     halt : (1,) array

@@ -1,4 +1,4 @@
-"""What torque there is in every direction over the workspace, where it is least, and whether it suffices."""
+"""Torque map: available torque in every direction over the workspace, its minimum, and a required torque."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from spheretwin.models.design.workspace import (
 
 TILT_STEP_DEG = 1.0
 
-# Weak poses told of each figure.
+# Number of weak poses reported for each figure.
 REPORTED_POSES = {"least_norm": 3, "best": 1, "singular_value": 1}
 
 ROUNDING = 1e-9
 
 
 class TorqueSurvey(NamedTuple):
-    """All that the verdict and the figures are taken from."""
+    """Data of the verdict and of the figures."""
 
     actuator: Actuator
     largest_tilt_deg: float
     workspace: Workspace
     on_grid: Capability
-    """Of the workspace's poses, in its shape."""
+    """Capability at the poses of the workspace, in its shape."""
     worst: dict[str, WorstPoses]
     """Worst pose at each tilt, by the names of `FIGURES`."""
     weakest: dict[str, WorstPoses]
@@ -45,7 +45,7 @@ class TorqueSurvey(NamedTuple):
 
 
 class TorqueAtTilt(NamedTuple):
-    """The worst, and the median, of all poses at one tilt."""
+    """Worst value and median over all poses at one tilt."""
 
     tilt_deg: float
     least_norm_Nm: float
@@ -58,7 +58,7 @@ class TorqueAtTilt(NamedTuple):
 
 
 class WeakPose(NamedTuple):
-    """A pose in which one of the figures is at its worst."""
+    """Pose with the worst value of a figure."""
 
     figure: str
     q_deg: list[float]
@@ -74,11 +74,11 @@ class WeakPose(NamedTuple):
 
 
 class WorkspaceVerdict(NamedTuple):
-    """The torque within reach, judged."""
+    """Torque over the workspace, with checks."""
 
     largest_tilt_deg: float
     poses: int
-    """Within the hinges' ranges."""
+    """Number of poses within the ranges of the hinges."""
     current_limit_A: float
     by_tilt: list[TorqueAtTilt]
     weakest: list[WeakPose]
@@ -91,7 +91,7 @@ def survey(
     largest_tilt_deg: float = LARGEST_TILT_DEG,
     track: Callable[[range], Iterable[int]] = iter,
 ) -> TorqueSurvey:
-    """Compute the torque capability over the workspace, and look for its worst between the grid's lines.
+    """Compute the torque capability over the workspace, and search its minimum between the grid points.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def survey(
     largest_tilt_deg : float, degrees
         Of the shaft.
     track : callable
-        Passes on the numbers of the blocks of poses, and may show progress.
+        Iterates over the numbers of the blocks of poses, and may show progress.
 
     Raises
     ------
@@ -118,14 +118,14 @@ def survey(
 
 
 def judge(surveyed: TorqueSurvey, need_Nm: float | None = None) -> WorkspaceVerdict:
-    """Tell the torque by tilt and in the weakest poses, and hold it against a need.
+    """Report the torque by tilt and in the weakest poses, and compare it with a required torque.
 
     Parameters
     ----------
     surveyed : Survey
-        What `survey` found.
+        Result of `survey`.
     need_Nm : float, N·m
-        Torque that least-norm currents have to give in every pose and direction; none unless given.
+        Torque that least-norm currents must give in every pose and direction, if given.
     """
     actuator = surveyed.actuator
     return WorkspaceVerdict(
@@ -144,7 +144,7 @@ def judge(surveyed: TorqueSurvey, need_Nm: float | None = None) -> WorkspaceVerd
 
 
 def direction_text(direction: Sequence[float]) -> str:
-    """A unit vector in a line."""
+    """Return the text of a unit vector."""
     return " ".join(f"{round(part, 2) + 0.0:.2f}" for part in direction)  # no negative zero
 
 
@@ -153,7 +153,7 @@ def _pose_text(q_deg: Sequence[float]) -> str:
 
 
 def _lost(worst_condition: WorstPoses) -> list[str]:
-    """Whether the torque matrix loses a direction, and where first."""
+    """Return a warning if the torque matrix loses a direction, with the first pose."""
     lost = np.flatnonzero(np.isinf(worst_condition.capability.condition))
     if not len(lost):
         return []
@@ -237,5 +237,5 @@ def _need(surveyed: TorqueSurvey, need_Nm: float) -> Check:
         states=int(surveyed.workspace.reachable.sum()),
         value=need_Nm / available if available else np.inf,
         bound=1.0,
-        why="asked for by --need",
+        why="required by --need",
     )

@@ -1,4 +1,4 @@
-"""Poses by the tilt of the shaft: how far, in which direction, and how far spun about itself."""
+"""Workspace: poses by tilt, azimuth and spin of the shaft, and the search for the worst ones."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ LARGEST_TILT_DEG = 57.0
 
 
 class Workspace(NamedTuple):
-    """A grid of poses.
+    """Grid of poses.
 
     Attributes
     ----------
     tilt_rad, azimuth_rad, spin_rad : (t,), (a,), (s,) array, rad
         Axes of the grid.
     q : (t, a, s, 3) array, rad
-        The poses.
+        Poses.
     reachable : (t, a, s) bool array
-        False where a hinge would have to leave its range.
+        False if a hinge would leave its range.
     """
 
     tilt_rad: Array
@@ -39,7 +39,7 @@ class Workspace(NamedTuple):
 
 
 def pose(tilt_rad: Array | float, azimuth_rad: Array | float, spin_rad: Array | float) -> Array:
-    """Pose of a rotor that is spun about its shaft, then tilted without further spin.
+    """Return the pose of a rotor that is spun about its shaft, then tilted without further spin.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def pose(tilt_rad: Array | float, azimuth_rad: Array | float, spin_rad: Array | 
     beta = np.arcsin(np.sin(tilt) * ca)
     alpha = np.arctan2(-np.sin(tilt) * sa, np.cos(tilt))
     versine = 1.0 - np.cos(tilt)
-    # What the two other hinges have turned the rotor about its shaft, to be undone by the last.
+    # Rotation about the shaft by the two other hinges, which the last hinge compensates.
     twist = np.arctan2(versine * ca * sa, 1.0 - versine * ca**2)
     gamma = np.mod(spin + twist + np.pi, 2 * np.pi) - np.pi
     return np.stack([alpha, beta, gamma], axis=-1)
 
 
 def reachable(q: Array, actuator: Actuator) -> NDArray[np.bool_]:
-    """Whether every hinge is within its range, for poses of shape (..., 3)."""
+    """Return True if every hinge is within its range, for poses of shape (..., 3)."""
     low, high = actuator.hinge_range_rad.T
     return np.all((q >= low) & (q <= high), axis=-1)
 
@@ -77,14 +77,14 @@ def grid(
     azimuths: int = 72,
     spins: int = 120,
 ) -> Workspace:
-    """Even grid over tilt, azimuth and a whole turn of spin.
+    """Return an even grid over tilt, azimuth and a full turn of spin.
 
     Parameters
     ----------
     actuator : Actuator
         Its hinge ranges bound the workspace.
     largest_tilt_deg, tilt_step_deg : float, degrees
-        The last step is the shorter one.
+        The last step may be shorter.
     azimuths, spins : int
         Numbers of directions and of spins.
     """
@@ -96,18 +96,18 @@ def grid(
     return Workspace(tilt, azimuth, spin, q, reachable(q, actuator))
 
 
-# Each round halves the steps of a pose that has found no better neighbour: 18 halvings of a 5 degree step
-# leave 0.07 arc seconds, and six rounds are left to walk.
+# Each round halves the steps of a pose without a better neighbour: 18 halvings of a 5 degree step give
+# 0.07 arc seconds, and six rounds remain for moves.
 ROUNDS = 24
 
-# The grid's worst pose need not lie in the deepest valley: one start in each sector of azimuth.
+# The worst pose of the grid may not be near the global minimum: one start in each sector of azimuth.
 SECTORS = 6
 
-# Two poses are one where symmetry maps one onto the other: told by tilt and figure alone.
+# Two poses count as one if symmetry maps one onto the other, which shows in equal tilt and figure.
 SAME_TILT_RAD = np.radians(0.5)
 SAME_FIGURE = 0.01
 
-# What is to be made as small as possible, of each pose.
+# Figure of each pose that is minimised.
 Figure = Callable[[Capability], Array]
 
 FIGURES: dict[str, Figure] = {
@@ -119,21 +119,21 @@ FIGURES: dict[str, Figure] = {
 
 
 class WorstPoses(NamedTuple):
-    """Poses, and what the actuator can do there."""
+    """Worst poses and their torque capability."""
 
     tilt_azimuth_spin_rad: Array  # (n, 3)
     q: Array  # (n, 3), rad
     capability: Capability
 
     def at(self, index: Any) -> WorstPoses:
-        """Some of the poses."""
+        """Return some of the poses."""
         return WorstPoses(self.tilt_azimuth_spin_rad[index], self.q[index], self.capability.at(index))
 
 
 def worst_by_tilt(
     workspace: Workspace, on_grid: Capability, figure: Figure, actuator: Actuator
 ) -> WorstPoses:
-    """Worst pose at each tilt of the grid, over all azimuths and spins.
+    """Return the worst pose at each tilt of the grid, over all azimuths and spins.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def worst_by_tilt(
     figure : callable
         One of `FIGURES`.
     actuator : Actuator
-        For the poses between the grid's.
+        For poses between those of the grid.
     """
     start = _starts(workspace, on_grid, figure)
     poses = _downhill(start, _steps(workspace) * [0, 1, 1], figure, actuator, workspace.tilt_rad[-1])
@@ -154,16 +154,16 @@ def worst_by_tilt(
 
 
 def local_minima(workspace: Workspace, by_tilt: WorstPoses, figure: Figure, actuator: Actuator) -> WorstPoses:
-    """Worst poses of the whole workspace, the worst first; those that symmetry makes alike only once.
+    """Return the worst poses of the whole workspace, the worst first; equivalent poses by symmetry only once.
 
     Parameters
     ----------
     workspace : Workspace
         The grid.
     by_tilt : Found
-        What `worst_by_tilt` found for the same figure.
+        Result of `worst_by_tilt` for the same figure.
     figure, actuator
-        As there.
+        As in `worst_by_tilt`.
     """
     start = by_tilt.tilt_azimuth_spin_rad
     poses = _downhill(start, _steps(workspace), figure, actuator, workspace.tilt_rad[-1])
@@ -185,7 +185,7 @@ def _alike(a: float, b: float) -> bool:
 
 
 def _steps(workspace: Workspace) -> Array:
-    """Half the grid's steps."""
+    """Return half the steps of the grid."""
     return 0.5 * np.array(
         [_spacing(axis) for axis in (workspace.tilt_rad, workspace.azimuth_rad, workspace.spin_rad)]
     )
@@ -196,14 +196,14 @@ def _spacing(axis: Array) -> float:
 
 
 def _starts(workspace: Workspace, on_grid: Capability, figure: Figure) -> Array:
-    """(n, 3) array, rad: tilt, azimuth and spin of the worst pose at each tilt, in each sector of azimuth."""
+    """Return tilt, azimuth and spin, (n, 3) in rad, of the worst pose at each tilt and sector of azimuth."""
     value = np.where(workspace.reachable, figure(on_grid), np.inf)
     sectors = np.array_split(np.arange(len(workspace.azimuth_rad)), min(SECTORS, len(workspace.azimuth_rad)))
     starts = []
     for tilt, at_tilt in zip(workspace.tilt_rad, value, strict=True):
         for sector in sectors:
             azimuth, spin = np.unravel_index(at_tilt[sector].argmin(), at_tilt[sector].shape)
-            if at_tilt[sector][azimuth, spin] < np.inf:  # else the whole sector is out of reach
+            if at_tilt[sector][azimuth, spin] < np.inf:  # otherwise no pose of the sector is reachable
                 starts.append((tilt, workspace.azimuth_rad[sector[azimuth]], workspace.spin_rad[spin]))
     return np.array(starts)
 
@@ -211,9 +211,9 @@ def _starts(workspace: Workspace, on_grid: Capability, figure: Figure) -> Array:
 def _downhill(
     start: Array, steps: Array, figure: Figure, actuator: Actuator, largest_tilt: float
 ) -> WorstPoses:
-    """Pattern search from each start: go to the best neighbour, or halve the steps where there is none."""
+    """Run a pattern search from each start: go to the best neighbour, or halve the steps if there is none."""
     offsets = np.array(list(itertools.product(*((-1, 0, 1) if step else (0,) for step in steps))))
-    offsets = offsets[np.argsort(np.any(offsets, axis=1), kind="stable")]  # staying comes first and wins ties
+    offsets = offsets[np.argsort(np.any(offsets, axis=1), kind="stable")]  # no move comes first and wins ties
     at, scale = start.copy(), np.ones(len(start))
     for _ in range(ROUNDS):
         around = at[:, None] + scale[:, None, None] * (offsets * steps)  # (n, offsets, 3)
