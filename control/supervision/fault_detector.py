@@ -98,14 +98,14 @@ class Detector(NamedTuple):
     reach_A: float  # current that the swing drives through the coil
     measured_A: Array  # (n,) measured currents
     shorted_A: Array  # (n,) current of the shorted model
-    count: NDArray[np.int64]  # (n,) ticks that indicate a fault
+    indications: NDArray[np.int64]  # (n,) ticks that indicate a fault
     open_A2: Array  # (n,) sum of squared differences over these ticks
     shorted_A2: Array  # (n,)
     rate_S: Array  # (3,) rad/s
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
         """Return the arrays that hold the state."""
-        return self.shorted_A, self.count, self.open_A2, self.shorted_A2
+        return self.shorted_A, self.indications, self.open_A2, self.shorted_A2
 
 
 def derived_threshold_A(nominal: NominalCurrents) -> float:
@@ -145,7 +145,7 @@ def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCu
         reach_A=nominal.swing_V / nominal.resistance_ohm,
         measured_A=np.zeros(groups),
         shorted_A=np.zeros(groups),
-        count=np.zeros(groups, dtype=np.int64),
+        indications=np.zeros(groups, dtype=np.int64),
         open_A2=np.zeros(groups),
         shorted_A2=np.zeros(groups),
         rate_S=np.zeros(3),
@@ -197,9 +197,9 @@ def detect_faults(
         )
         if not indicates_fault:
             continue
-        detector.count[j] += 1
+        detector.indications[j] += 1
         _accumulate(detector, j, open_error, shorted_error)
-        if detector.count[j] >= detector.ticks:
+        if detector.indications[j] >= detector.ticks:
             is_open = detector.open_A2[j] <= detector.shorted_A2[j]
             groups.out[j] = DETECTED_OPEN if is_open else DETECTED_SHORTED
             groups.out_s[j] = t
@@ -209,7 +209,7 @@ def detect_faults(
 @allocation_free
 def _reset(detector: Detector, group: int) -> None:
     """Reset the count and the sums of a group."""
-    detector.count[group] = 0
+    detector.indications[group] = 0
     detector.open_A2[group] = detector.shorted_A2[group] = 0.0
 
 

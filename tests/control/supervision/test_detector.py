@@ -143,7 +143,7 @@ def test_a_tick_of_health_is_the_end_of_what_was_counted_and_silence_is_not():
         (0.0, -2.0, 2), (-1.0, -2.0, 0),
     ]:  # fmt: skip
         hold(watcher, state, measured, believed)
-        assert watcher.count.tolist() == [counted] * COUNT
+        assert watcher.indications.tolist() == [counted] * COUNT
     assert not state.some_out[0]
 
 
