@@ -45,7 +45,7 @@ class NominalModel(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A control law, ready for the loop.
+    """Control law, ready for the loop.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-r"""A discrete linear system as a law: ``x' = A x + B e, torque = C x + D e``, once a control period.
+r"""Law that runs a discrete linear system: ``x' = A x + B e, torque = C x + D e``, once per control period.
 
 The error is *reference minus measured*, as at the summing point of a textbook loop, so
 that a stabilising gain is positive; `error_rad` of the telemetry has the opposite sign. A system with one

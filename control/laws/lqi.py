@@ -82,5 +82,5 @@ class LQI(LawParameters):
     def build(self, known: NominalModel) -> Law:
         """Return a law whose integral starts at 0."""
         weights = zip(self.error_weight, self.rate_weight, self.integral_weight, strict=True)
-        gains = np.array([regulator(*each, known.period_s) for each in weights])
+        gains = np.array([regulator(*axis_weights, known.period_s) for axis_weights in weights])
         return feedback(self.law, gains.T, known)

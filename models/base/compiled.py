@@ -302,8 +302,12 @@ def arrays_of(part: Any, method: str = "state_arrays") -> list[NDArray[Any]]:
     if hasattr(part, method):
         inner = getattr(part, method)()
     else:
-        inner = [each for each in part if isinstance(each, tuple)] if isinstance(part, tuple) else []
-    return [array for each in inner for array in arrays_of(each, method)]
+        inner = (
+            [inner_part for inner_part in part if isinstance(inner_part, tuple)]
+            if isinstance(part, tuple)
+            else []
+        )
+    return [array for inner_part in inner for array in arrays_of(inner_part, method)]
 
 
 def save_state(part: Any) -> NDArray[np.float64]:

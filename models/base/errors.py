@@ -145,7 +145,7 @@ class InputError(SpheretwinError):
 
 
 class LawError(SpheretwinError):
-    """A control law raised an exception instead of writing a torque."""
+    """Exception of a control law instead of a torque."""
 
     @classmethod
     def of(cls, law: str, t_s: float, error: BaseException) -> LawError:

@@ -100,7 +100,7 @@ MOTION_SIGNALS = (
     Signal("q_ref_rad", "rad", 3, "desired hinge angles", ANGLES),
     Signal("qdot_ref_rad_s", "rad/s", 3, "desired hinge rates", ANGLES),
     Signal("error_rad", "rad", 3, "tracking error q - q_ref (28)", ANGLES),
-    Signal("torque_command_Nm", "N·m", 3, "generalised torque asked for by the law", ANGLES),
+    Signal("torque_command_Nm", "N·m", 3, "generalised torque commanded by the law", ANGLES),
     Signal("torque_Nm", "N·m", 3, "torque of the coils on the rotor, stator frame", AXES),
     Signal("disturbance_Nm", "N·m", 3, "generalised load and random torque, subtracted in (1)", ANGLES),
 )
@@ -114,7 +114,7 @@ def common_signals(groups: int) -> tuple[Signal, ...]:
     first_step = "group currents, mean over the first physics step of the tick"
     return (
         *MOTION_SIGNALS,
-        Signal("current_command_A", "A", groups, "group currents asked of the amplifiers", labels),
+        Signal("current_command_A", "A", groups, "group currents commanded to the amplifiers", labels),
         Signal("current_A", "A", groups, first_step, labels),
         Signal("mean_current_A", "A", groups, "group currents, mean over the tick", labels),
         Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),

@@ -1,4 +1,4 @@
-"""What the controller believes of the torque that its commands led to, against the plant's own account."""
+"""Applied torque of the controller against the torque of the plant."""
 
 import numba
 import numpy as np
@@ -63,7 +63,7 @@ def test_torque_on_the_hinges_is_the_transposed_jacobian_s():
         np.testing.assert_allclose(torque_q, rate_jacobian(q).T @ torque_S, rtol=0, atol=1e-15)
 
 
-def test_its_state_brings_it_back():
+def test_a_restored_state_gives_the_same_result():
     one, other = (applied_torque(True, 4, PERIOD_S, 1.5e-3, 7e-4) for _ in range(2))
     generator = np.random.default_rng(1)
     G, pose = generator.normal(size=(3, 4)), np.array([0.1, 0.2, 0.3])
@@ -104,7 +104,7 @@ def test_where_the_model_is_true_it_is_the_torque_of_the_coils(engine):
         np.testing.assert_allclose(table["believed_Nm"][row + 1], torque_q, rtol=0, atol=1e-15)
 
 
-def test_what_is_not_asked_for_is_no_number_and_moves_no_bit():
+def test_an_unused_applied_torque_is_nan_and_changes_no_bit():
     scenario = scenarios.load("hold", {"duration": 0.1})
     silent, told = simulate(scenario, law=asking(asks=False)), simulate(scenario, law=asking())
     np.testing.assert_array_equal(silent.telemetry["q_rad"], told.telemetry["q_rad"])
@@ -114,7 +114,7 @@ def test_what_is_not_asked_for_is_no_number_and_moves_no_bit():
 
 
 @pytest.mark.parametrize("nominal", [{"nominal.delay_s": 2.5e-3}, {"nominal.time_constant_s": 0.0}])
-def test_a_session_goes_on_with_what_it_believed(nominal):
+def test_a_restored_session_continues_with_the_applied_torque(nominal):
     scenario = scenarios.load("hold", nominal)
     with Session(scenario, asking()) as session, Session(scenario, asking()) as other:
         session.advance(37)
@@ -122,7 +122,7 @@ def test_a_session_goes_on_with_what_it_believed(nominal):
         assert other.advance(50).values.tobytes() == session.advance(50).values.tobytes()
 
 
-def test_a_change_beside_the_law_leaves_the_belief(tmp_path):
+def test_a_change_outside_the_law_keeps_the_applied_torque(tmp_path):
     scenario = scenarios.load("hold")
     with Session(scenario, asking()) as kept, Session(scenario, asking()) as changed:
         changed.advance(20)

@@ -202,7 +202,7 @@ def test_path_ends_well_within_its_steps_and_may_be_left_at_any(actuator, matrix
 
 
 @pytest.mark.parametrize("matrix", cases.MATRICES)
-def test_the_way_out_of_a_lost_path_reaches_the_largest_torque_alone(actuator, matrix):
+def test_the_simplex_fallback_reaches_the_largest_torque(actuator, matrix):
     rng = np.random.default_rng(6)
     for _ in range(40):
         G, start, largest = beyond_reach(rng, matrix, actuator)

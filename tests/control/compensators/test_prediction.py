@@ -139,7 +139,7 @@ def still_air(**changes):
 
 
 @pytest.mark.parametrize("periods", [1, 3])
-def test_where_the_model_is_true_it_is_where_the_rotor_will_be(periods):
+def test_with_the_true_model_it_is_the_future_motion_of_the_rotor(periods):
     table = simulate(still_air(drive__delay_s=periods * 1e-3), law=TELLING).telemetry
     for predicted, true in (("q_predicted_rad", "q_rad"), ("qdot_predicted_rad_s", "qdot_rad_s")):
         # From 10 ms on: the first command is a jump of the currents, the others are not.
@@ -161,7 +161,7 @@ def test_where_the_model_is_true_it_is_where_the_rotor_will_be(periods):
     np.testing.assert_allclose(table["at"], np.repeat(sine, 3, axis=1), rtol=0, atol=1.01 * cubic)
 
 
-def test_without_a_delay_it_moves_no_bit():
+def test_without_a_delay_it_changes_no_bit():
     for law in ("pid", "afsm"):
         still = still_air(controller__law=law, duration=0.1)
         plain = still_air(controller__law=law, duration=0.1, controller__prediction__on=False)
@@ -170,7 +170,7 @@ def test_without_a_delay_it_moves_no_bit():
             np.testing.assert_array_equal(predicted[signal.name], other[signal.name])
 
 
-def test_a_known_delay_no_longer_unsettles_a_loop():
+def test_a_known_delay_no_longer_destabilises_a_loop():
     """Eight periods under a PID whose poles are at 60 1/s: without prediction it swings for ever."""
     fields = {"drive__delay_s": 8e-3, "controller__law": "pid", "controller__stiffness": 3 * 60.0**2,
               "controller__damping": 180.0, "controller__integral": 60.0**3, "duration": 1.0}  # fmt: skip
@@ -181,7 +181,7 @@ def test_a_known_delay_no_longer_unsettles_a_loop():
     assert np.abs(settled["error_rad"][-200:]).max() < 1e-4
 
 
-def test_a_law_is_told_that_no_delay_is_left():
+def test_a_law_receives_a_delay_of_zero_with_prediction():
     with Session(still_air(drive__delay_s=2e-3, controller__law="pid")) as session:
         session.advance(10)
         predicted = len(session.law.state)

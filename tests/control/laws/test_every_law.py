@@ -53,7 +53,7 @@ def imported_by(path):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_every_law_is_written_with_what_is_open_to_a_user_s_own(name):
+def test_every_law_imports_only_modules_open_to_user_laws(name):
     path = Path(importlib.import_module(LAWS[name].__module__).__file__)
     ours = [module for module in imported_by(path) if module.startswith("spheretwin")]
     assert "spheretwin.control.law" in ours

@@ -91,7 +91,7 @@ def test_closed_loop_poles_are_those_of_the_sampled_loop(actuator):
 
 
 @pytest.mark.parametrize("bandwidth", [10.0, 40.0])
-def test_a_triple_pole_is_where_it_is_said_to_be(actuator, bandwidth):
+def test_a_triple_pole_is_at_minus_the_bandwidth(actuator, bandwidth):
     stiffness, damping, integral = triple_pole(bandwidth)
     period_s = 1e-6
     matrix = closed_loop(

@@ -126,7 +126,7 @@ def hold(watcher, state, measured, believed=2.0, q=POSE, qdot=STILL, t=0.0, actu
     detect_faults(watcher, state, np.broadcast_to(believed, COUNT).astype(float), G, q, qdot, t)
 
 
-def test_so_many_ticks_that_speak_for_a_fault_and_not_one_less():
+def test_a_fault_needs_the_exact_number_of_ticks():
     watcher, state = made(ticks=5), groups(COUNT)
     for tick in range(5):
         assert not state.some_out[0]
@@ -136,7 +136,7 @@ def test_so_many_ticks_that_speak_for_a_fault_and_not_one_less():
     assert state.some_out[0]
 
 
-def test_a_tick_of_health_is_the_end_of_what_was_counted_and_silence_is_not():
+def test_a_healthy_tick_resets_the_count_and_a_neutral_one_does_not():
     watcher, state = made(ticks=3), groups(COUNT)
     for measured, believed, counted in [
         (0.0, 2.0, 1), (0.0, 2.0, 2), (2.0, 2.0, 0), (0.0, 2.0, 1), (0.0, 0.05, 1), (0.05, -0.05, 1),
@@ -148,7 +148,7 @@ def test_a_tick_of_health_is_the_end_of_what_was_counted_and_silence_is_not():
 
 
 @pytest.mark.parametrize("shorted", [False, True])
-def test_a_turning_rotor_tells_an_open_group_from_a_shorted_one(actuator, shorted):
+def test_a_turning_rotor_distinguishes_open_and_shorted_groups(actuator, shorted):
     """A shorted coil's current by its differential equation, with the EMF of a turning rotor."""
     watcher, state, qdot = made(ticks=6), groups(COUNT), np.array([3.0, -4.0, 6.0])
     emf = torque_matrix(POSE, actuator).T @ rate_jacobian(POSE) @ qdot
@@ -163,7 +163,7 @@ def test_a_turning_rotor_tells_an_open_group_from_a_shorted_one(actuator, shorte
     assert set(state.out[told_apart].tolist()) == {DETECTED_SHORTED if shorted else DETECTED_OPEN}
 
 
-def test_a_name_that_was_a_guess_is_mended_once_the_rotor_turns(actuator):
+def test_a_guessed_classification_is_corrected_when_the_rotor_turns(actuator):
     watcher, state = made(ticks=3), groups(COUNT)
     for _ in range(5):
         hold(watcher, state, 0.0, 3.0, actuator=actuator)
@@ -177,7 +177,7 @@ def test_a_name_that_was_a_guess_is_mended_once_the_rotor_turns(actuator):
     assert set(state.out[clear].tolist()) == {DETECTED_SHORTED}
 
 
-def test_noise_changes_no_true_name(actuator):
+def test_noise_changes_no_correct_classification(actuator):
     """A minute of the prototype's noise on open groups of a rotor that just about turns."""
     generator = np.random.default_rng(1)
     watcher, state = made(), groups(COUNT)
@@ -192,7 +192,7 @@ def test_noise_changes_no_true_name(actuator):
     assert set(state.out.tolist()) == {DETECTED_OPEN}
 
 
-def test_a_group_that_is_told_of_is_forgotten_and_begins_anew():
+def test_a_reported_group_resets_the_detector():
     watcher, state = made(ticks=3), groups(COUNT)
     for _ in range(2):
         hold(watcher, state, 0.0)
@@ -210,7 +210,7 @@ def test_a_group_that_is_told_of_is_forgotten_and_begins_anew():
     st.sampled_from([0.0, 3.0, 1e300, np.inf, np.nan]),
     st.sampled_from([0.0, 1.0, 1e200, np.nan]),
 )
-def test_what_is_no_number_is_no_fault_and_stays_in_its_group(measured, believed, rate):
+def test_a_non_finite_current_is_no_fault_and_affects_only_its_group(measured, believed, rate):
     watcher, state = made(ticks=2), groups(COUNT)
     for value in measured:
         everyone = np.full(COUNT, 2.0)
@@ -226,7 +226,7 @@ def test_what_is_no_number_is_no_fault_and_stays_in_its_group(measured, believed
         assert state.out[3] == IN_USE
 
 
-def test_a_state_is_all_it_goes_on_from(actuator):
+def test_the_state_is_complete(actuator):
     generator = np.random.default_rng(0)
     one, other = made(), made()
     first, second = groups(COUNT), groups(COUNT)

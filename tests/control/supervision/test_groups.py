@@ -1,4 +1,4 @@
-"""Groups that are left out: no current in them, and the whole torque from the others."""
+"""Disabled groups: no current in them, and the whole torque from the others."""
 
 import numpy as np
 import pytest
@@ -78,7 +78,7 @@ def test_with_too_few_left_there_is_no_torque_and_no_current(actuator, name):
         assert not current.any()
 
 
-def test_what_was_told_is_taken_back_and_what_was_found_is_not():
+def test_reported_groups_are_enabled_again_and_detected_ones_are_not():
     made = groups(COUNT)
     made.out[5], made.out[6], made.some_out[0] = DETECTED_OPEN, DETECTED_SHORTED, True
     mark_faulty_groups(made, told(2, 5), 1.0)
@@ -99,7 +99,7 @@ def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
 
 
 @given(st.lists(st.integers(0, 3), min_size=COUNT, max_size=COUNT), st.floats(0, 1e9))
-def test_a_state_is_all_there_is(out, t_s):
+def test_the_state_is_complete(out, t_s):
     made, other = groups(COUNT), groups(COUNT)
     made.out[:], made.out_s[:], made.some_out[:] = out, t_s, any(out)
     restore_state(other, save_state(made), "groups")

@@ -88,7 +88,7 @@ def test_speed_and_edge(axis):
 
 
 @given(st.tuples(*[st.sampled_from([0.1, np.nan, np.inf, -np.inf])] * 6))
-def test_what_is_no_number_is_mended_and_trips(numbers):
+def test_a_non_finite_measurement_is_replaced_and_trips(numbers):
     watcher = made()
     looked(watcher, [0.2, 0.3, 0.4])
     measurement = np.array([numbers[:3], numbers[3:], [7.0] * 3])
@@ -102,7 +102,7 @@ def test_what_is_no_number_is_mended_and_trips(numbers):
     assert not replace_invalid(off, np.full((3, 3), np.nan))
 
 
-def test_a_rate_that_is_no_number_trips_and_is_none():
+def test_a_non_finite_rate_trips_and_becomes_zero():
     watcher, rates = made(), np.array([0.0, np.inf, np.nan])
     watch(watcher, np.zeros(3), rates)
     assert watcher.reason[0] == Reason.MEASUREMENT
@@ -124,7 +124,7 @@ def test_the_first_reason_stays_and_the_run_goes_on_for_its_time(action):
 
 
 @given(st.lists(st.tuples(st.floats(-1.3, 1.3), st.floats(-50, 50), st.integers(0, 1)), max_size=20))
-def test_a_state_is_all_it_goes_on_from(samples):
+def test_the_state_is_complete(samples):
     one, other = made(), made()
     for place, (angle, rate, fresh) in enumerate(samples):
         if place == len(samples) // 2:
@@ -137,7 +137,7 @@ def test_a_state_is_all_it_goes_on_from(samples):
         assert save_state(other).tobytes() == save_state(one).tobytes()
 
 
-def test_one_that_was_off_begins_anew():
+def test_a_watchdog_that_was_off_starts_again():
     before, after = made(), made(largest_rate_rad_s=10.0)
     looked(before, [0.3, 0, 0])
     transfer_watchdog(before, after)

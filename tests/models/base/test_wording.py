@@ -87,7 +87,7 @@ def test_every_error_of_the_package_is_one_line_in_python_too():
         ((0.0, np.nan, np.inf), ["0", "nan", "inf"]),
     ],
 )
-def test_numbers_that_differ_are_told_apart_in_few_digits(numbers, texts):
+def test_different_numbers_have_different_texts_of_few_digits(numbers, texts):
     assert distinct_texts(*numbers) == texts
 
 

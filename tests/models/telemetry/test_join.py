@@ -65,7 +65,7 @@ FOREIGN = {
 
 @pytest.mark.parametrize("kind", FOREIGN)
 @pytest.mark.parametrize("after_a_good_one", [False, True])
-def test_what_is_no_part_is_refused(kind, after_a_good_one, tmp_path):
+def test_an_invalid_part_is_refused(kind, after_a_good_one, tmp_path):
     foreign, good = tmp_path / "000001.arrows", tmp_path / "000000.arrows"
     FOREIGN[kind](foreign)
     arrow_stream(good, table(10).arrow(FACTS))

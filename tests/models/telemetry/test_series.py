@@ -59,7 +59,7 @@ def test_it_is_read_as_it_is_written(tmp_path, content):
         ("t_s,a,b\n0,1," + "9" * 200_000 + "\n", "expected values between commas, field larger than"),
     ],
 )
-def test_what_is_no_series_is_refused_by_line(tmp_path, content, complaint):
+def test_an_invalid_series_is_refused_by_line(tmp_path, content, complaint):
     with pytest.raises(InputError) as refusal:
         reading(tmp_path, content)
     message = str(refusal.value)
@@ -69,7 +69,7 @@ def test_what_is_no_series_is_refused_by_line(tmp_path, content, complaint):
 
 
 @pytest.mark.parametrize("name", ["absent.csv", ".", "a\0b"])
-def test_what_is_no_file_is_refused(tmp_path, name):
+def test_an_unreadable_file_is_refused(tmp_path, name):
     with pytest.raises(InputError, match="expected a readable CSV file"):
         read("bench", tmp_path / name, ("a", "b"), 1.0)
 
