@@ -1,7 +1,7 @@
-"""The torque of the last control period as the controller believes it: its commands, nominal delay and lag.
+"""Applied torque: estimate of the torque over the last control period, from commands, nominal delay and lag.
 
-Over the period that begins with command k, the amplifiers still follow command k - n - 1 for a share f of it,
-then command k - n, where the known delay is n + f periods. The lag is solved exactly over both parts.
+The nominal delay is n + f periods. Over the period that begins with command k, the amplifiers follow command
+k - n - 1 for a share f of the period, then command k - n. The lag is solved exactly over both parts.
 """
 
 from __future__ import annotations
@@ -16,83 +16,93 @@ from spheretwin.models.base.compiled import allocation_free, transfer_state
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
 
-# A delay that fits a whole number of periods does so to rounding only.
-WHOLE = 1e-9
+# A delay of a whole number of periods is one to rounding only.
+ROUNDING = 1e-9
 
 
-class Lag(NamedTuple):
-    """First-order lag over a part of a period, the command held."""
+class LagStep(NamedTuple):
+    """First-order lag over a part of a period, with a constant command."""
 
     decay: float
-    """Share of the distance to the command that is left at its end."""
+    """Remaining share of the distance to the command at the end of the part."""
     mean_share: float
-    """Share of that distance that is left on average."""
+    """Mean remaining share of that distance."""
 
 
-class Belief(NamedTuple):
-    """What the controller believes of the currents."""
+class AppliedTorque(NamedTuple):
+    """Estimated currents and applied torque."""
 
-    asked: bool
-    """Whether the law wants to know; else nothing of it is computed."""
-    late: float
-    """Share of a period in which the older command still acts, f."""
-    before: Lag
-    after: Lag
+    on: bool
+    """True if the law, the detector or the prediction uses it; otherwise nothing is computed."""
+    fraction: float
+    """Share of a period in which the older command acts, f."""
+    older_lag: LagStep
+    newer_lag: LagStep
     commands: NDArray[np.float64]  # (n + 2, groups) A, newest first
     current: NDArray[np.float64]  # (groups,) A, at the end of the last period
-    mean: NDArray[np.float64]  # (groups,) A, over it
-    torque_S: NDArray[np.float64]  # (3,) N·m, mean over it, stator frame
-    torque_q: NDArray[np.float64]  # (3,) N·m, the same on the hinges; no numbers where nobody asked
+    mean: NDArray[np.float64]  # (groups,) A, over the last period
+    torque_S: NDArray[np.float64]  # (3,) N·m, mean over the last period, stator frame
+    torque_q: NDArray[np.float64]  # (3,) N·m, the same on the hinges; NaN if `on` is False
 
     def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Arrays that it goes on from."""
+        """Return the arrays that hold the state."""
         return self.commands, self.current, self.torque_q
 
 
-def belief(asked: bool, groups: int, period_s: float, delay_s: float, time_constant_s: float) -> Belief:
-    """Belief at rest: no currents, and none on their way.
+def applied_torque(
+    on: bool, groups: int, period_s: float, delay_s: float, time_constant_s: float
+) -> AppliedTorque:
+    """Applied torque at rest: no currents and no pending commands.
 
     Parameters
     ----------
-    asked : bool
-        Whether the law wants it.
+    on : bool
+        Whether it is used.
     groups : int
         Coil groups.
     period_s, delay_s, time_constant_s : float, s
-        Control period, known delay, and lag L/R; 0 for none.
+        Control period, nominal delay, and time constant L/R of the lag; 0 for none.
     """
-    whole, late = whole_periods(delay_s if asked else 0.0, period_s)
-    return Belief(
-        asked=asked,
-        late=late,
-        before=lag(late * period_s, time_constant_s),
-        after=lag((1 - late) * period_s, time_constant_s),
+    whole, fraction = split_delay(delay_s if on else 0.0, period_s)
+    return AppliedTorque(
+        on=on,
+        fraction=fraction,
+        older_lag=lag_step(fraction * period_s, time_constant_s),
+        newer_lag=lag_step((1 - fraction) * period_s, time_constant_s),
         commands=np.zeros((whole + 2, groups)),
         current=np.zeros(groups),
         mean=np.zeros(groups),
         torque_S=np.zeros(3),
-        torque_q=np.zeros(3) if asked else np.full(3, np.nan),
+        torque_q=np.zeros(3) if on else np.full(3, np.nan),
     )
 
 
 @allocation_free
-def believe(
-    belief: Belief, pose: NDArray[np.float64], G: NDArray[np.float64], command: NDArray[np.float64]
+def estimate_applied_torque(
+    applied_torque: AppliedTorque,
+    pose: NDArray[np.float64],
+    G: NDArray[np.float64],
+    command: NDArray[np.float64],
 ) -> None:
-    """Move the belief on by one control period.
+    """Advance the estimate by one control period.
 
     Parameters
     ----------
-    belief : Belief
+    applied_torque : AppliedTorque
         Changed in place.
     pose : (3,) array, rad
-        As measured at the beginning of the period.
+        Measured at the beginning of the period.
     G : (3, groups) array, N·m/A
         Nominal torque matrix at that pose.
     command : (groups,) array, A
-        Asked for in this tick.
+        Commanded in this tick.
     """
-    commands, current, mean, late = belief.commands, belief.current, belief.mean, belief.late
+    commands, current, mean, fraction = (
+        applied_torque.commands,
+        applied_torque.current,
+        applied_torque.mean,
+        applied_torque.fraction,
+    )
     last = commands.shape[0] - 1
     for j in range(command.shape[0]):
         for row in range(last, 0, -1):
@@ -100,35 +110,37 @@ def believe(
         commands[0, j] = command[j]
         older, newer = commands[last, j], commands[last - 1, j]
         distance = current[j] - older
-        first = older + belief.before.mean_share * distance
-        distance = older + belief.before.decay * distance - newer
-        mean[j] = late * first + (1.0 - late) * (newer + belief.after.mean_share * distance)
-        current[j] = newer + belief.after.decay * distance
-    rotor_torque(G, mean, belief.torque_S)
-    generalised_torque(pose, belief.torque_S, belief.torque_q)
+        first = older + applied_torque.older_lag.mean_share * distance
+        distance = older + applied_torque.older_lag.decay * distance - newer
+        mean[j] = fraction * first + (1.0 - fraction) * (
+            newer + applied_torque.newer_lag.mean_share * distance
+        )
+        current[j] = newer + applied_torque.newer_lag.decay * distance
+    rotor_torque(G, mean, applied_torque.torque_S)
+    generalised_torque(pose, applied_torque.torque_S, applied_torque.torque_q)
 
 
-def carried_on(before: Belief, belief: Belief) -> None:
-    """Go on with what was believed before, under another delay or lag; commands older than any known repeat.
+def transfer_applied_torque(previous: AppliedTorque, applied_torque: AppliedTorque) -> None:
+    """Copy the state into an estimate with another delay or lag; older commands repeat the oldest one.
 
-    Nothing is known where nobody asked before: what is believed then begins at rest.
+    If `previous` was off, it has no state, and the estimate starts at rest.
     """
-    if before.asked and belief.asked:
-        transfer_state(before, belief)
+    if previous.on and applied_torque.on:
+        transfer_state(previous, applied_torque)
 
 
-def whole_periods(delay_s: float, period_s: float) -> tuple[int, float]:
-    """Whole periods of a delay, and the share of a period beyond them."""
+def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
+    """Return the whole periods of a delay and the remaining share of a period."""
     periods = delay_s / period_s
-    whole = int(periods * (1 + WHOLE) + WHOLE)
+    whole = int(periods * (1 + ROUNDING) + ROUNDING)
     return whole, max(0.0, periods - whole)
 
 
-def lag(duration_s: float, time_constant_s: float) -> Lag:
-    """First-order lag over a duration."""
+def lag_step(duration_s: float, time_constant_s: float) -> LagStep:
+    """Return the first-order lag over a duration."""
     if duration_s == 0:
-        return Lag(1.0, 0.0)
+        return LagStep(1.0, 0.0)
     if time_constant_s == 0:
-        return Lag(0.0, 0.0)
+        return LagStep(0.0, 0.0)
     times = duration_s / time_constant_s
-    return Lag(exp(-times), -expm1(-times) / times)
+    return LagStep(exp(-times), -expm1(-times) / times)

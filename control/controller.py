@@ -1,4 +1,4 @@
-"""One control tick: from what was measured to the currents asked for, by the nominal model alone."""
+"""One control tick: from the measurement to the commanded currents, by the nominal model alone."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 from spheretwin.control import allocation as allocations
 from spheretwin.control import law as laws
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
-from spheretwin.control.applied_torque import Belief, believe
-from spheretwin.control.compensators import Around, prepare
+from spheretwin.control.applied_torque import AppliedTorque, estimate_applied_torque
+from spheretwin.control.compensators import Compensators, apply_compensators
 from spheretwin.control.estimators.estimator import Estimator, estimator_at
-from spheretwin.control.manual_currents import Manual, ask_by_hand
-from spheretwin.control.supervision.enabled_groups import Groups, leave_out
-from spheretwin.control.supervision.fault_detector import Detector, find
+from spheretwin.control.manual_currents import Manual, command_manual_currents
+from spheretwin.control.supervision.enabled_groups import EnabledGroups, mask_disabled_groups
+from spheretwin.control.supervision.fault_detector import Detector, detect_faults
 from spheretwin.control.supervision.watchdog import GO, Reason, Watchdog, trip, watch
 from spheretwin.models.base.compiled import compilable
 from spheretwin.models.base.numba_internals import function_at
 from spheretwin.models.kinematics import cartesian_torque
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, kept_matrix
+from spheretwin.models.magnetics import CachedMatrix, TorqueModel, cached_matrix, update_cached_matrix
 
-# Whatever a law may ask for while it loses the rotor; beyond it the allocation's products would overflow.
+# A diverging law may command any torque; beyond this the products of the allocation would overflow.
 LARGEST_TORQUE_Nm = 1e100
 
-LOST = -1.0
-"""Share of the torque that is returned where the law gave none."""
+NO_TORQUE = -1.0
+"""Share that is returned if the law gave no torque."""
 
 _COMMAND = int(Reason.COMMAND)
 
@@ -34,40 +34,40 @@ law_at = function_at(laws.SIGNATURE)
 allocation_at = function_at(allocations.SIGNATURE)
 
 
-class Estimates(NamedTuple):
-    """What rates are estimated with, and what the estimator remembers."""
+class EstimatorState(NamedTuple):
+    """Parameters and memory of the estimator of rates."""
 
-    made: bool
-    """Whether there is an estimator; if not, the rates are handed over as they come."""
+    on: bool
+    """True if there is an estimator; otherwise the law receives the measured rates."""
     parameters: NDArray[np.float64]
     memory: NDArray[np.float64]
 
 
 class Supervision(NamedTuple):
-    """What looks after the actuator beside the law."""
+    """Fault detection and watchdog."""
 
-    groups: Groups
+    groups: EnabledGroups
     detector: Detector
     watchdog: Watchdog
 
 
 class Controller(NamedTuple):
-    """What the near side of the wires knows and remembers: nothing of the plant itself."""
+    """State and parameters of the controller; it has no access to the plant."""
 
     parameters: NDArray[np.float64]  # of the law
     memory: NDArray[np.float64]  # state of the law
     magnetics: TorqueModel  # nominal
-    kept: KeptMatrix
+    cached_matrix: CachedMatrix
     current_limit_A: float
     logged: int  # leading entries of the memory that are logged
-    torque_q: NDArray[np.float64]  # (3,) N·m, what the law asked for in this tick
+    torque_q: NDArray[np.float64]  # (3,) N·m, commanded by the law in this tick
     torque_S: NDArray[np.float64]  # (3,) N·m, the same in the stator frame
-    estimates: Estimates
-    pose: NDArray[np.float64]  # (3,) rad, as the law is handed it
-    rates: NDArray[np.float64]  # (3,) rad/s, likewise
+    estimator_state: EstimatorState
+    pose: NDArray[np.float64]  # (3,) rad, that the law receives
+    rates: NDArray[np.float64]  # (3,) rad/s, that the law receives
     scratch: NDArray[np.float64]  # of the allocation
-    belief: Belief
-    around: Around
+    applied_torque: AppliedTorque
+    compensators: Compensators
     supervision: Supervision
     manual: Manual
 
@@ -77,13 +77,13 @@ def controller(
     magnetics: TorqueModel,
     current_limit_A: float,
     logged: int,
-    belief: Belief,
-    around: Around,
+    applied_torque: AppliedTorque,
+    compensators: Compensators,
     supervision: Supervision,
     manual: Manual,
     estimator: Estimator | None = None,
 ) -> Controller:
-    """Controller at the start of a run.
+    """Return the controller at the start of a run.
 
     Parameters
     ----------
@@ -92,30 +92,30 @@ def controller(
     magnetics : TorqueModel
         Nominal.
     current_limit_A : float, A
-        Largest group current the controller asks for.
+        Largest group current that the controller commands.
     logged : int
         Numbers of the law's state that the telemetry logs.
-    belief : Belief
-        Of the torque that the law's commands led to.
-    around : Around
-        What stands around the law.
+    applied_torque : AppliedTorque
+        Estimate of the torque of the law's commands.
+    compensators : Compensators
+        Governor, prediction and feed-forward.
     supervision : Supervision
     manual : Manual
-        Currents that are asked for instead of the law's, if there are any.
+        Manual currents that replace those of the law, if there are any.
     estimator : Estimator, optional
-        Of the rates; the law is handed those that are measured unless given.
+        Estimator of the rates; the law receives the measured rates unless it is given.
     """
     groups = magnetics.group_axes.shape[1]
     return Controller(
         parameters=law.parameters.copy(),
         memory=law.state.copy(),
         magnetics=magnetics,
-        kept=kept_matrix(magnetics),
+        cached_matrix=cached_matrix(magnetics),
         current_limit_A=current_limit_A,
         logged=logged,
         torque_q=np.zeros(3),
         torque_S=np.zeros(3),
-        estimates=Estimates(
+        estimator_state=EstimatorState(
             estimator is not None,
             estimator.parameters.copy() if estimator else np.zeros(0),
             estimator.state.copy() if estimator else np.zeros(0),
@@ -123,8 +123,8 @@ def controller(
         pose=np.zeros(3),
         rates=np.zeros(3),
         scratch=np.empty((SCRATCH_ROWS, groups)),
-        belief=belief,
-        around=around,
+        applied_torque=applied_torque,
+        compensators=compensators,
         supervision=supervision,
         manual=manual,
     )
@@ -141,80 +141,85 @@ def control_tick(
     measurement: NDArray[np.float64],
     command: NDArray[np.float64],
 ) -> float:
-    """Law, generalised torque to Cartesian (at the pose handed to it), allocation (by the nominal matrix).
+    """Run the law, map its generalised torque to a Cartesian one, and allocate currents.
+
+    The map is taken at the pose that the law receives, the allocation uses the nominal torque matrix.
 
     Parameters
     ----------
     controller : Controller
         Changed in place.
     law, allocate : address or callable
-        Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`: addresses in compiled code.
+        Of `control.law.SIGNATURE` and `control.allocation.SIGNATURE`: addresses in compiled code.
     estimate : address or callable
-        Of `control.estimation.estimator.SIGNATURE`; anything where nothing is estimated.
+        Of `control.estimators.estimator.SIGNATURE`; any value if nothing is estimated.
     t : float, s
         Time of the tick.
     reference : (3, 3) array
         Desired angle, rate and acceleration as rows; the law may write into it.
     measurement : (3, 3) or (6, 3) array
-        Measured angle (rad) and rate (rad/s); the other rows are filled in, six of them where the delay is
-        predicted over. The law may write into it.
+        Measured angle (rad) and rate (rad/s); the other rows are filled in. It has six rows if the
+        prediction is on. The law may write into it.
     command : (n,) array, A
-        Result: group currents asked of the amplifiers.
+        Result: commanded group currents.
 
     Returns
     -------
     float
-        Share of the law's torque that `command` gives, or the least share of a current by hand; `LOST` where
-        the law gave no torque, or one beyond `LARGEST_TORQUE_Nm`, or logs what is no number, and no
-        watchdog is there to take the currents away. Where it does, nothing is asked for, and all of it is
-        given.
+        Share of the law's torque that `command` gives, or the least share of a manual current. `NO_TORQUE` if
+        the law gave no torque, or one beyond `LARGEST_TORQUE_Nm`, or logs a value that is not finite, and the
+        watchdog is off. If the watchdog is on, it trips instead: the currents are 0 and the share is 1.
     """
-    pose, estimates = controller.pose, controller.estimates
-    if estimates.made:
-        estimator_at(estimate)(measurement[0], estimates.parameters, estimates.memory, measurement[1])
+    pose, estimator_state = controller.pose, controller.estimator_state
+    if estimator_state.on:
+        estimator_at(estimate)(
+            measurement[0], estimator_state.parameters, estimator_state.memory, measurement[1]
+        )
     for i in range(3):
         pose[i], controller.rates[i] = measurement[0, i], measurement[1, i]
     watchdog = controller.supervision.watchdog
     if watchdog.on:
         watch(watchdog, pose, controller.rates)
-    keep_torque_matrix(pose, controller.magnetics, controller.kept)
+    update_cached_matrix(pose, controller.magnetics, controller.cached_matrix)
     _supervise(controller, t)
-    asks_law = watchdog.halt[0] == GO and not controller.manual.on
-    if asks_law and not _ask_law(controller, law, t, reference, measurement):
+    law_active = watchdog.halt[0] == GO and not controller.manual.on
+    if law_active and not _call_law(controller, law, t, reference, measurement):
         if not watchdog.on:
-            return LOST
+            return NO_TORQUE
         trip(watchdog, _COMMAND)
     share = 1.0
-    if asks_law and watchdog.halt[0] == GO:
+    if law_active and watchdog.halt[0] == GO:
         share = _allocate(controller, allocate, command)
     else:
-        _ask_nothing(controller, command)
+        _command_zero(controller, command)
         if watchdog.halt[0] == GO:
-            share = ask_by_hand(controller.manual, controller.current_limit_A, command)
-    if controller.belief.asked:
-        believe(controller.belief, pose, controller.kept.G, command)
+            share = command_manual_currents(controller.manual, controller.current_limit_A, command)
+    if controller.applied_torque.on:
+        estimate_applied_torque(controller.applied_torque, pose, controller.cached_matrix.G, command)
     return share
 
 
 @compilable
-def _ask_law(
+def _call_law(
     controller: Controller,
     law: Any,
     t: float,
     reference: NDArray[np.float64],
     measurement: NDArray[np.float64],
 ) -> bool:
-    """Let the law write its torque; whether that, and all that it logs and is handed, are numbers."""
-    torque_q, around = controller.torque_q, controller.around
+    """Call the law; return True if its inputs, its torque and its logged values are finite."""
+    torque_q, compensators = controller.torque_q, controller.compensators
     for i in range(3):
-        torque_q[i] = np.nan  # a law that writes no torque, or raises, must not go unnoticed
-        measurement[2, i] = controller.belief.torque_q[i]
-    if around.on and not prepare(around, controller.belief, controller.magnetics, measurement, reference):
+        torque_q[i] = np.nan  # detects a law that writes no torque, or raises
+        measurement[2, i] = controller.applied_torque.torque_q[i]
+    if compensators.on and not apply_compensators(
+        compensators, controller.applied_torque, controller.magnetics, measurement, reference
+    ):
         return False
     law_at(law)(t, reference, measurement, controller.parameters, controller.memory, torque_q)
-    if around.feed.on:
+    if compensators.feed_forward.on:
         for i in range(3):
-            torque_q[i] += around.feed.torque_q[i]
+            torque_q[i] += compensators.feed_forward.torque_q[i]
     for i in range(3):
         if not abs(torque_q[i]) < LARGEST_TORQUE_Nm:  # also where it is not a number
             return False
@@ -226,34 +231,36 @@ def _ask_law(
 
 @compilable
 def _supervise(controller: Controller, t: float) -> None:
-    """Look for groups that do not follow, where that is wanted, and while they are driven."""
+    """Run the fault detector if it is on and the groups are driven."""
     groups, detector, watchdog = controller.supervision
     if detector.on and watchdog.halt[0] == GO:
-        G, believed = controller.kept.G, controller.belief.current
-        find(detector, groups, believed, G, controller.pose, controller.rates, t)
+        G, current = controller.cached_matrix.G, controller.applied_torque.current
+        detect_faults(detector, groups, current, G, controller.pose, controller.rates, t)
 
 
 @compilable
 def _allocate(controller: Controller, allocate: Any, command: NDArray[np.float64]) -> float:
-    """Currents for the law's torque, from the groups that may be used.
+    """Compute currents for the law's torque from the enabled groups.
 
-    The allocation is handed a copy of the torque matrix: what it writes reaches nothing else.
+    The allocation receives a copy of the torque matrix, so that its writes have no other effect.
     """
-    groups, pose, G = controller.supervision.groups, controller.pose, controller.kept.G
-    if controller.around.prediction.on:
-        pose, G = controller.around.prediction.pose, controller.around.prediction.kept.G
+    groups, pose, G = controller.supervision.groups, controller.pose, controller.cached_matrix.G
+    if controller.compensators.prediction.on:
+        pose, G = controller.compensators.prediction.pose, controller.compensators.prediction.cached_matrix.G
     cartesian_torque(pose, controller.torque_q, controller.torque_S)
-    leave_out(groups, G)
+    mask_disabled_groups(groups, G)
     return allocation_at(allocate)(
         groups.G, controller.torque_S, controller.current_limit_A, command, controller.scratch
     )
 
 
 @compilable
-def _ask_nothing(controller: Controller, command: NDArray[np.float64]) -> None:
-    """No torque and no currents; what a law logs stays what it was, unless that is no number."""
+def _command_zero(controller: Controller, command: NDArray[np.float64]) -> None:
+    """Command no torque and no currents; logged values of the law stay unless they are not finite."""
     for i in range(3):
-        controller.torque_q[i] = controller.torque_S[i] = controller.around.feed.torque_q[i] = 0.0
+        controller.torque_q[i] = controller.torque_S[i] = controller.compensators.feed_forward.torque_q[i] = (
+            0.0
+        )
     for j in range(command.shape[0]):
         command[j] = 0.0
     for i in range(controller.logged):

@@ -1,4 +1,4 @@
-"""What a control law is to the loop: one function of fixed signature, its numbers, its state."""
+"""Control law as the loop sees it: a function of fixed signature, its parameters and its state."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field
 
 from spheretwin.control import lti
-from spheretwin.models.base.errors import InputError, is_plain, shown, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts, is_plain, shown
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal, width
 
 _vector = types.float64[::1]
@@ -21,12 +21,12 @@ _matrix = types.float64[:, ::1]
 SIGNATURE = types.void(types.float64, _matrix, _matrix, _vector, _vector, _vector)
 """Compiled signature: t, reference (3, 3), measurement (3, 3), parameters, state, torque (3,)."""
 
-# Periods are built from decimal fractions; two that are the same are so to rounding only.
+# Periods are decimal fractions; equal periods are equal to rounding only.
 SAME_PERIOD = 1e-9
 
 
-class Known(NamedTuple):
-    """What a law is told when it is built: the nominal model, never the plant itself.
+class NominalModel(NamedTuple):
+    """Nominal model that a law is built for; it holds nothing of the plant.
 
     Compiled functions of the equations of motion, for use inside a law: `inertia_matrix`, `coriolis_matrix`
     and `gravity_torque` of `models.lagrangian`, `rate_jacobian` and `cartesian_torque` of
@@ -36,16 +36,16 @@ class Known(NamedTuple):
     period_s: float
     """Control period."""
     delay_s: float
-    """From a measurement to the currents that answer it, as the controller reckons with it."""
+    """Nominal delay from a measurement to the currents that respond to it."""
     inertia: NDArray[np.float64]
     """Principal inertias, (3,) in kg·m²."""
     ahead_s: float = 0.0
-    """How far what the law is handed lies ahead of what was measured, where the delay is predicted over."""
+    """Time from the measurement to the motion that the law receives, if the prediction is on; otherwise 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A control law, ready for the loop.
+    """Control law, ready for the loop.
 
     Attributes
     ----------
@@ -55,32 +55,33 @@ class Law:
         ``step(t, reference, measurement, parameters, state, torque)`` writes the generalised torque
         (N·m) on (alpha, beta, gamma) into `torque` and returns nothing. `reference` holds the desired
         angle, rate and acceleration as rows (rad, rad/s, rad/s²), `measurement` angle, rate, and the
-        generalised torque (N·m) of the coils over the last period, as the controller believes it. Where
-        the delay is predicted over, three more rows hold what was measured: `control.around.prediction`.
+        applied torque (N·m, generalised) of the coils over the last period, as the controller estimates
+        it. If the prediction is on, three more rows hold the measured values; see
+        `control.compensators.prediction`.
         `state` is the law's memory, changed in place. A plain Python function works; one that numba
         compiles runs at the speed of the shipped laws. It must write all three torques at every call:
-        one that is left out, or is no number, ends the run as ``diverged``. So does an exception in
-        compiled code, which `Session.law_error` and `Run.law_error` hold; an exception in plain Python is
-        raised to the caller, one that would end the process, such as `SystemExit`, as `LawError`.
-        Compiled code is not checked for reads and writes outside the arrays: they change other memory of
+        a missing or non-finite torque ends the run as ``diverged``. So does an exception in compiled
+        code; `Session.law_error` and `Run.law_error` hold it. An exception in plain Python is raised to
+        the caller; one that would end the process, such as `SystemExit`, is raised as `LawError`.
+        Compiled code is not checked for reads and writes outside the arrays: they corrupt other memory of
         the process or end it. With ``controller.check_bounds`` they are exceptions.
     parameters : (n,) array
-        Numbers handed to every call; copied, so that what becomes of the caller's array is no matter.
+        Numbers passed to every call; copied.
     state : (m,) array
-        Memory at the start of a run, copied too; the run works on a copy of its own.
+        Memory at the start of a run; copied. Each run works on its own copy.
     signals : tuple of Signal
-        Names of the leading entries of the state, which the loop logs after every call.
+        Signals of the leading entries of the state, which the loop logs after every call.
     asks_torque : bool
-        Whether the third row of `measurement` is wanted. What is not asked for is not computed: the row
-        holds no numbers then. It begins at 0 at the first tick under the law.
+        True if the law uses the third row of `measurement`, the applied torque. Otherwise the row is not
+        computed and holds NaN. It is 0 at the first tick under the law.
     period_s : float, optional
-        Control period that it is made for, s: under another it is refused. Any unless given.
+        Control period that the law is designed for, s; any other is refused. Without it, any period is valid.
 
     Raises
     ------
     InputError
-        The name is no text or has control characters, the step is no function, the numbers are not real,
-        finite and in one dimension, the signals do not fit the state, or the period is none.
+        The name is not a text or has control characters, the step is not a function, the numbers are not
+        real, finite and one-dimensional, the signals do not fit the state, or the period is invalid.
     """
 
     name: str
@@ -100,7 +101,7 @@ class Law:
         inertia_kg_m2: ArrayLike | None = None,
         constant_torque_Nm: ArrayLike = 0.0,
     ) -> Law:
-        """Law that runs a discrete linear system, from errors to torques.
+        """Return a law that runs a discrete linear system, from errors to torques.
 
         Parameters
         ----------
@@ -112,9 +113,10 @@ class Law:
         name : str
             For tables and figures.
         inertia_kg_m2 : float or (3,) array, kg·m², optional
-            Where given, as `Known.inertia`, the outputs are accelerations (rad/s²): it multiplies them.
+            If given, such as `NominalModel.inertia`, the outputs are accelerations (rad/s²) and are
+            multiplied by it.
         constant_torque_Nm : float or (3,) array, N·m
-            Added to the outputs: what holds the rotor where the errors are 0.
+            Added to the outputs: torque that holds the rotor at zero error.
 
         Raises
         ------
@@ -122,8 +124,8 @@ class Law:
             The system is continuous or improper, has another number of inputs or outputs, or holds a number
             that is not finite.
         """
-        made = lti.running(name, system, inertia_kg_m2, constant_torque_Nm)
-        return cls(name, lti.step, made.parameters, made.state, period_s=made.period_s)
+        numbers = lti.lti_law(name, system, inertia_kg_m2, constant_torque_Nm)
+        return cls(name, lti.step, numbers.parameters, numbers.state, period_s=numbers.period_s)
 
     def __repr__(self) -> str:
         return f"Law({self.name}: {self.parameters.size} parameters, {self.state.size} state numbers)"
@@ -148,40 +150,40 @@ class Law:
         names = [*COMMON_NAMES, *(signal.name for signal in self.signals)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(f"law {self.name}: expected new names of signals, received {', '.join(twice)}")
-        given = self.period_s
-        if given is not None and not (isinstance(given, int | float) and 0 < given < np.inf):
+        period_s = self.period_s
+        if period_s is not None and not (isinstance(period_s, int | float) and 0 < period_s < np.inf):
             raise InputError(
-                f"law {self.name}: expected period_s as a number above 0, received {shown(given)}"
+                f"law {self.name}: expected period_s as a number above 0, received {shown(period_s)}"
             )
 
     def check_period(self, period_s: float) -> None:
-        """Hold a control period (s) against the one that the law is made for.
+        """Check a control period (s) against the one that the law is designed for.
 
         Raises
         ------
         InputError
-            It is made for another.
+            The law is designed for another period.
         """
         if self.period_s is not None and abs(period_s - self.period_s) > SAME_PERIOD * self.period_s:
-            own, received = told_apart(self.period_s, period_s)
+            own, received = distinct_texts(self.period_s, period_s)
             raise InputError(f"law {self.name}: expected a control period of {own} s, received {received} s")
 
 
-def _numbers(law: str, field: str, given: ArrayLike) -> NDArray[np.float64]:
-    """A copy of what was given, in the one layout that compiled code takes."""
+def _numbers(law: str, field: str, value: ArrayLike) -> NDArray[np.float64]:
+    """Return a copy of an array in the layout that compiled code takes."""
     try:
-        found = np.asarray(given)
+        array = np.asarray(value)
     except ValueError:  # rows of different lengths
-        raise InputError(f"law {law}: expected {field} as an array, received {shown(given)}") from None
-    # Anything else would be parsed, or lose its imaginary part, without a word.
-    if found.dtype.kind not in "biuf":
-        raise InputError(f"law {law}: expected {field} as real numbers, received {shown(given)}")
-    if found.ndim != 1:
+        raise InputError(f"law {law}: expected {field} as an array, received {shown(value)}") from None
+    # Anything else would be parsed, or lose its imaginary part, silently.
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"law {law}: expected {field} as real numbers, received {shown(value)}")
+    if array.ndim != 1:
         raise InputError(
-            f"law {law}: expected {field} as a one-dimensional array, received shape {found.shape}"
+            f"law {law}: expected {field} as a one-dimensional array, received shape {array.shape}"
         )
     with np.errstate(over="ignore"):  # a wider float becomes infinite, and is refused below
-        numbers = np.array(found, dtype=np.float64, order="C")
+        numbers = np.array(array, dtype=np.float64, order="C")
     if not np.all(np.isfinite(numbers)):
         entry = int(np.argmin(np.isfinite(numbers)))
         raise InputError(
@@ -190,15 +192,15 @@ def _numbers(law: str, field: str, given: ArrayLike) -> NDArray[np.float64]:
     return numbers
 
 
-def _signals(law: str, given: Iterable[Signal]) -> tuple[Signal, ...]:
-    signals = tuple(given) if isinstance(given, Iterable) else (given,)
+def _signals(law: str, values: Iterable[Signal]) -> tuple[Signal, ...]:
+    signals = tuple(values) if isinstance(values, Iterable) else (values,)
     for signal in signals:
         if not isinstance(signal, Signal):
             raise InputError(f"law {law}: expected signals of type Signal, received {shown(signal)}")
     return signals
 
 
-# Gains and times beyond this are slips of the pen; their products would overflow.
+# Gains and times beyond this are mistakes; their products would overflow.
 LARGEST = 1e9
 
 NonNegative = Annotated[float, Field(ge=0, le=LARGEST)]
@@ -206,7 +208,7 @@ Positive = Annotated[float, Field(gt=0, le=LARGEST)]
 
 
 def each(value: Any) -> Any:
-    """One number for each of (alpha, beta, gamma) where only one is given for all."""
+    """Return a number for each of (alpha, beta, gamma); a single number is repeated."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return (value,) * 3
     return tuple(value) if isinstance(value, list) else value

@@ -1,11 +1,11 @@
-r"""A discrete linear system as a law: ``x' = A x + B e, torque = C x + D e``, once a control period.
+r"""Law that runs a discrete linear system: ``x' = A x + B e, torque = C x + D e``, once per control period.
 
-The error is *reference minus measured*, as the sum in front of a controller in a textbook's loop has it, so
-that a gain that stabilises is positive; the telemetry's `error_rad` has the other sign. Of one output, the
-same system runs on each axis. It is told of no limit of the currents: an integrator in it winds up.
+The error is *reference minus measured*, as at the summing point of a textbook loop, so
+that a stabilising gain is positive; `error_rad` of the telemetry has the opposite sign. A system with one
+output runs on each axis. It does not know the current limit: an integrator in it winds up.
 
-A system is known by what it has: matrices, polynomials, or a method that makes matrices of it. So neither
-python-control nor scipy need be there for a law that is none of theirs.
+A system is recognised by its attributes: matrices, polynomials, or a method that returns matrices. Neither
+python-control nor scipy is therefore required.
 """
 
 from __future__ import annotations
@@ -36,52 +36,52 @@ class StateSpace(NamedTuple):
     D: Array  # (p, m)
 
 
-class Running(NamedTuple):
-    """What a law is made of."""
+class LtiLaw(NamedTuple):
+    """Parameters and state of a law that runs a linear system."""
 
     parameters: Array
     state: Array
     period_s: float
 
 
-def running(
+def lti_law(
     law: str, system: Any, inertia_kg_m2: ArrayLike | None = None, constant_torque_Nm: ArrayLike = 0.0
-) -> Running:
-    """Numbers that `step` runs a system by, its state at 0.
+) -> LtiLaw:
+    """Return the parameters with which `step` runs a system, and the state 0.
 
     Parameters
     ----------
     law : str
-        Name of the law, for complaints.
+        Name of the law, for messages.
     system : discrete linear system
         Of python-control or scipy, or with their attributes.
     inertia_kg_m2 : float or (3,) array, kg·m², optional
-        What the outputs are multiplied by, where they are accelerations.
+        Factor of the outputs, if they are accelerations.
     constant_torque_Nm : float or (3,) array, N·m
         Added to the outputs.
 
     Raises
     ------
     InputError
-        The system is no discrete one, is improper, has other inputs and outputs than an error and a torque,
-        or a number of it is not finite.
+        The system is not discrete, is improper, has inputs and outputs other than an error and a torque, or
+        holds a number that is not finite.
     """
     period_s = _period(law, system)
-    matrices = _for_all_axes(law, _checked(law, _state_space(law, system)))
-    factor = np.ones(3) if inertia_kg_m2 is None else _each(law, "inertia_kg_m2", inertia_kg_m2)
-    constant = _each(law, "constant_torque_Nm", constant_torque_Nm)
+    matrices = _for_all_axes(law, _validated(law, _state_space(law, system)))
+    factor = np.ones(3) if inertia_kg_m2 is None else _per_axis(law, "inertia_kg_m2", inertia_kg_m2)
+    constant = _per_axis(law, "constant_torque_Nm", constant_torque_Nm)
     A, B, C, D = matrices
     joined = np.block([[A, B], [factor[:, None] * C, factor[:, None] * D]])
-    return Running(np.concatenate([constant, joined.ravel()]), np.zeros(2 * len(A)), period_s)
+    return LtiLaw(np.concatenate([constant, joined.ravel()]), np.zeros(2 * len(A)), period_s)
 
 
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says.
+    """Write the torque of one control tick; see `control.law.Law`.
 
-    The second half of the state is where the next one is put together. Sizes follow from those of the arrays,
-    never from numbers in them, which a scenario may set: what fits no system gives no torque.
+    The second half of the state is working space for the next state. Sizes follow from the arrays, never from
+    their values, which a scenario may set: arrays that fit no system give no torque.
     """
     states = state.shape[0] // 2
     width = (parameters.shape[0] - MATRIX) // (states + 3)
@@ -105,7 +105,7 @@ def step(
 
 
 def _period(law: str, system: Any) -> float:
-    """Sampling time of a system, s."""
+    """Return the sampling time of a system, s."""
     dt: Any = getattr(system, "dt", None)
     is_number = isinstance(dt, int | float | np.integer | np.floating) and not isinstance(dt, bool)
     if not is_number or not 0 < dt < np.inf:  # None marks a continuous one of scipy, 0 one of python-control
@@ -117,15 +117,15 @@ def _period(law: str, system: Any) -> float:
 
 
 def _state_space(law: str, system: Any) -> tuple[Any, ...]:
-    """Matrices of a system, as it has them or as its polynomials give them."""
+    """Return the matrices of a system, from its matrices or its polynomials."""
     try:
         if hasattr(system, "A"):
             return system.A, system.B, system.C, system.D
         if hasattr(system, "num"):
-            return _realised(law, *_polynomials(system))
+            return _realisation(law, *_polynomials(system))
         if hasattr(system, "to_ss"):
-            made = system.to_ss()
-            return made.A, made.B, made.C, made.D
+            matrices = system.to_ss()
+            return matrices.A, matrices.B, matrices.C, matrices.D
     except InputError:
         raise
     except (TypeError, ValueError, AttributeError) as error:
@@ -134,34 +134,37 @@ def _state_space(law: str, system: Any) -> tuple[Any, ...]:
 
 
 def _polynomials(system: Any) -> tuple[Any, Any]:
-    """Numerators and denominators by output and input; coefficients of falling powers of z."""
+    """Return numerators and denominators by output and input, with falling powers of z."""
     if isinstance(system.num, np.ndarray):  # of scipy: one input, and one denominator for all outputs
         rows = np.atleast_2d(system.num)
         return [[row] for row in rows], [[system.den] for _ in rows]
     return getattr(system, "num_list", system.num), getattr(system, "den_list", system.den)
 
 
-def _realised(law: str, numerators: Any, denominators: Any) -> StateSpace:
-    """Controllable canonical form of every entry, side by side: as many states as all entries have."""
+def _realisation(law: str, numerators: Any, denominators: Any) -> StateSpace:
+    """Return the controllable canonical forms of all entries in one system, with the states of all."""
     outputs, inputs = len(numerators), len(numerators[0])
     entries = [
         (i, j, _canonical(law, numerators[i][j], denominators[i][j]))
         for i in range(outputs)
         for j in range(inputs)
     ]
-    states = sum(len(each.A) for _, _, each in entries)
+    states = sum(len(block.A) for _, _, block in entries)
     A, B = np.zeros((states, states)), np.zeros((states, inputs))
     C, D = np.zeros((outputs, states)), np.zeros((outputs, inputs))
     first = 0
-    for i, j, each in entries:
-        own = slice(first, first + len(each.A))
-        A[own, own], B[own, j], C[i, own], D[i, j] = each.A, each.B[:, 0], each.C[0], each.D[0, 0]
+    for i, j, block in entries:
+        own = slice(first, first + len(block.A))
+        A[own, own], B[own, j], C[i, own], D[i, j] = block.A, block.B[:, 0], block.C[0], block.D[0, 0]
         first = own.stop
     return StateSpace(A, B, C, D)
 
 
 def _canonical(law: str, numerator: Any, denominator: Any) -> StateSpace:
-    b, a = (np.trim_zeros(_real(law, "a transfer function", each), "f") for each in (numerator, denominator))
+    b, a = (
+        np.trim_zeros(_real(law, "a transfer function", coefficients), "f")
+        for coefficients in (numerator, denominator)
+    )
     if len(b) > len(a) or not len(a):
         raise InputError(
             f"law {law}: expected {KINDS}, received a numerator of {len(b)} coefficients"
@@ -174,19 +177,21 @@ def _canonical(law: str, numerator: Any, denominator: Any) -> StateSpace:
     return StateSpace(A, np.eye(order, 1), (b[1:] - b[0] * a[1:])[None], b[:1, None])
 
 
-def _checked(law: str, matrices: tuple[Any, ...]) -> StateSpace:
-    """Matrices of finite real numbers whose sizes fit each other."""
-    A, B, C, D = (np.atleast_2d(_real(law, name, each)) for name, each in zip("ABCD", matrices, strict=True))
+def _validated(law: str, matrices: tuple[Any, ...]) -> StateSpace:
+    """Return matrices of finite real numbers whose sizes fit each other."""
+    A, B, C, D = (
+        np.atleast_2d(_real(law, name, matrix)) for name, matrix in zip("ABCD", matrices, strict=True)
+    )
     n, (p, m) = len(A) if A.size else 0, D.shape
     shapes = {"A": (n, n), "B": (n, m), "C": (p, n)}
-    for (name, shape), each in zip(shapes.items(), (A, B, C), strict=True):
-        if each.shape != shape and (each.size or n):
-            raise InputError(f"law {law}: expected {name} of shape {shape}, received {each.shape}")
+    for (name, shape), matrix in zip(shapes.items(), (A, B, C), strict=True):
+        if matrix.shape != shape and (matrix.size or n):
+            raise InputError(f"law {law}: expected {name} of shape {shape}, received {matrix.shape}")
     return StateSpace(A.reshape(n, n), B.reshape(n, m), C.reshape(p, n), D)
 
 
 def _for_all_axes(law: str, single: StateSpace) -> StateSpace:
-    """Matrices from the errors of all axes to the torque on all."""
+    """Return matrices from the errors of all axes to the torque on all axes."""
     outputs, inputs = single.D.shape
     if outputs == 3 and inputs in (3, 6):
         return single
@@ -196,27 +201,27 @@ def _for_all_axes(law: str, single: StateSpace) -> StateSpace:
             f" or 1 output of 1 or 2 for every axis, received {outputs} of {inputs}"
         )
     # Inputs come by row of the reference, then by axis, as `step` takes them.
-    B = np.concatenate([_thrice(single.B[:, [row]]) for row in range(inputs)], axis=1)
-    D = np.concatenate([_thrice(single.D[:, [row]]) for row in range(inputs)], axis=1)
-    return StateSpace(_thrice(single.A), B, _thrice(single.C), D)
+    B = np.concatenate([_for_three_axes(single.B[:, [row]]) for row in range(inputs)], axis=1)
+    D = np.concatenate([_for_three_axes(single.D[:, [row]]) for row in range(inputs)], axis=1)
+    return StateSpace(_for_three_axes(single.A), B, _for_three_axes(single.C), D)
 
 
-def _thrice(block: Array) -> Array:
+def _for_three_axes(block: Array) -> Array:
     return np.asarray(np.kron(np.eye(3), block), np.float64)
 
 
-def _each(law: str, name: str, given: ArrayLike) -> Array:
-    numbers = _real(law, name, given)
+def _per_axis(law: str, name: str, value: ArrayLike) -> Array:
+    numbers = _real(law, name, value)
     if numbers.shape not in ((), (3,)):
         raise InputError(f"law {law}: expected {name} as one number or three, received shape {numbers.shape}")
     return np.broadcast_to(numbers, 3)
 
 
-def _real(law: str, name: str, given: Any) -> Array:
+def _real(law: str, name: str, value: Any) -> Array:
     try:
-        found = np.asarray(given)
+        array = np.asarray(value)
     except ValueError:  # rows of different lengths
-        raise InputError(f"law {law}: expected {name} as an array, received {shown(given)}") from None
-    if found.dtype.kind not in "biuf" or not np.all(np.isfinite(found)):
-        raise InputError(f"law {law}: expected finite real numbers in {name}, received {shown(given)}")
-    return found.astype(np.float64)
+        raise InputError(f"law {law}: expected {name} as an array, received {shown(value)}") from None
+    if array.dtype.kind not in "biuf" or not np.all(np.isfinite(array)):
+        raise InputError(f"law {law}: expected finite real numbers in {name}, received {shown(value)}")
+    return array.astype(np.float64)

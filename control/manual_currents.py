@@ -1,7 +1,7 @@
-"""Currents by hand: each group is asked for a stated current, and the law for nothing.
+"""Manual currents: each group is commanded a given current, and the law is not called.
 
-What looks after the actuator goes on: sensors, estimator, detector, watchdog, and what the controller
-believes of the currents. A law that takes over again begins anew: it knows nothing of the time between.
+Sensors, estimator, fault detector, watchdog and the estimate of the applied torque stay active. The law
+starts again from its initial state when it resumes control.
 """
 
 from __future__ import annotations
@@ -16,48 +16,48 @@ from spheretwin.models.base.compiled import allocation_free
 
 Array = NDArray[np.float64]
 
-# Far beyond what any coil bears.
+# Far beyond the rating of any coil.
 LARGEST_A = 1e3
 
 Current = Annotated[float, Field(ge=-LARGEST_A, le=LARGEST_A)]
 
 
 class ManualSection(BaseModel):
-    """Currents by hand; the law has the actuator unless some are given."""
+    """Manual currents; the law controls the actuator unless they are given."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     currents_A: tuple[Current, ...] | None = Field(
         None,
-        description="current that each group is asked for instead of what the law wants, A; cut at"
+        description="current commanded to each group instead of that of the law, A; limited to"
         " nominal.current_limit_A",
     )
 
     @property
     def on(self) -> bool:
-        """Whether there are any."""
+        """True if currents are given."""
         return self.currents_A is not None
 
 
 class Manual(NamedTuple):
-    """Currents by hand in a run, for compiled code."""
+    """Manual currents of a run, for compiled code."""
 
     on: bool
     currents_A: Array  # (n,)
 
 
 def manual(section: ManualSection, groups: int) -> Manual:
-    """Currents of a section whose length has been checked."""
+    """Return the manual currents of a section whose length has been checked."""
     return Manual(section.on, np.array(section.currents_A or np.zeros(groups), dtype=np.float64))
 
 
 @allocation_free
-def ask_by_hand(manual: Manual, limit_A: float, command: Array) -> float:
-    """Write the currents (n,), A, each cut at a limit; returns the least share that the cut left of one."""
+def command_manual_currents(manual: Manual, limit_A: float, command: Array) -> float:
+    """Write the currents (n,), A, each limited; return the least share of a current that the limit leaves."""
     share = 1.0
     for j in range(command.shape[0]):
-        wanted = manual.currents_A[j]
-        command[j] = min(max(wanted, -limit_A), limit_A)
-        if command[j] != wanted:
-            share = min(share, limit_A / abs(wanted))
+        desired = manual.currents_A[j]
+        command[j] = min(max(desired, -limit_A), limit_A)
+        if command[j] != desired:
+            share = min(share, limit_A / abs(desired))
     return share

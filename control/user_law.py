@@ -1,4 +1,4 @@
-"""A law from a file of its user's, named ``FILE.py:NAME``; its parameters are fields like any other's."""
+"""Law from a user's file, named ``FILE.py:NAME``; its parameters are fields like those of shipped laws."""
 
 from __future__ import annotations
 
@@ -12,59 +12,59 @@ from typing import Any, Literal, cast
 import numpy as np
 from pydantic import Field, create_model
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.law_components.parameters import AROUND, LawParameters, named
+from spheretwin.control.law import Law, NominalModel
+from spheretwin.control.law_components.parameters import COMPENSATORS, LawParameters, named
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.user_code import load_with_digest
 
 
 def parameters_of(reference: str) -> type[LawParameters]:
-    """Parameters of a user's law.
+    """Return the parameter class of a user's law.
 
     Parameters
     ----------
     reference : str
-        ``FILE.py:NAME``. The name is that of a subclass of `LawParameters`; or of a `Law`, or of a step
-        function (plain, or compiled by numba) without memory, which get one field `parameters`: the
-        numbers that are handed to every call.
+        ``FILE.py:NAME``. NAME is a subclass of `LawParameters`, or a `Law`, or a step function (plain, or
+        compiled by numba) without memory. The last two get one field `parameters`: the numbers passed to
+        every call.
 
     Raises
     ------
     InputError
-        The file cannot be run, or the name is none of a law.
+        The file cannot be run, or the name is not that of a law.
     """
-    found, digest = load_with_digest(reference, "law")
-    key = reference, id(found)
+    law_object, digest = load_with_digest(reference, "law")
+    key = reference, id(law_object)
     if key not in _CLASSES:
-        _CLASSES[key] = found, _class_of(reference, found, digest)
+        _CLASSES[key] = law_object, _parameter_class(reference, law_object, digest)
     return _CLASSES[key][1]
 
 
-# One class for one law: sections of two scenarios can only be equal where their classes are. What a class
-# was made of is held, so that nothing else gets its identity.
+# One class per law: sections of two scenarios are equal only if their classes are. The object of each class
+# is stored, so that no other object gets its identity.
 _CLASSES: dict[tuple[str, int], tuple[Any, type[LawParameters]]] = {}
 
 
-def _class_of(reference: str, found: Any, digest: str) -> type[LawParameters]:
-    if isinstance(found, type) and issubclass(found, LawParameters):
-        if isabstract(found):
+def _parameter_class(reference: str, law_object: Any, digest: str) -> type[LawParameters]:
+    if isinstance(law_object, type) and issubclass(law_object, LawParameters):
+        if isabstract(law_object):
             raise InputError(f"law {reference}: expected a class with build(known), received one without")
-        common, own = LawParameters.model_fields, found.model_fields
-        if taken := [name for name in AROUND if own[name].annotation != common[name].annotation]:
-            raise InputError(f"law {reference}: expected no parameter named {taken[0]}, received one")
-        base = found
-    elif isinstance(found, Law):
-        base = _of_law(found)
-    elif callable(found) and not isinstance(found, type):
-        base = _of_law(_without_memory(reference, found))
+        common, own = LawParameters.model_fields, law_object.model_fields
+        if taken_names := [name for name in COMPENSATORS if own[name].annotation != common[name].annotation]:
+            raise InputError(f"law {reference}: expected no parameter named {taken_names[0]}, received one")
+        base = law_object
+    elif isinstance(law_object, Law):
+        base = _parameters_of_law(law_object)
+    elif callable(law_object) and not isinstance(law_object, type):
+        base = _parameters_of_law(_without_memory(reference, law_object))
     else:
         raise InputError(
             f"law {reference}: expected a subclass of LawParameters, a Law, or a function,"
-            f" received {shown(found)}"
+            f" received {shown(law_object)}"
         )
     fields: Any = {"law": (Literal[reference], named(reference))}
-    made = create_model(base.__name__, __base__=(_FromFile, base), __module__=base.__module__, **fields)
-    kind = cast("type[LawParameters]", made)
+    model = create_model(base.__name__, __base__=(_FromFile, base), __module__=base.__module__, **fields)
+    kind = cast("type[LawParameters]", model)
     kind.source = digest
     return kind
 
@@ -87,10 +87,10 @@ def reference_of(law: Law | None) -> str | None:
 
 
 class _FromFile(LawParameters):
-    """Parameters of a class that is made for a file, and made anew where they are unpickled."""
+    """Base of the parameter classes of user files; unpickling builds the class again from the file."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Class by its file, then what the parameters hold."""
+        """Return the reference to the file, then the values of the parameters."""
         return _blank, (self.law,), self.__getstate__()
 
 
@@ -103,14 +103,14 @@ def _without_memory(reference: str, step: Callable[..., Any]) -> Law:
     return Law(reference.rpartition(":")[2], step, np.zeros(0), np.zeros(0))
 
 
-def _of_law(law: Law) -> type[LawParameters]:
+def _parameters_of_law(law: Law) -> type[LawParameters]:
     numbers = tuple(law.parameters.tolist())
 
-    class OfLaw(LawParameters):
-        parameters: tuple[float, ...] = Field(numbers, description=f"numbers handed to {law.name}")
+    class FixedLaw(LawParameters):
+        parameters: tuple[float, ...] = Field(numbers, description=f"numbers passed to {law.name}")
 
-        def build(self, known: Known) -> Law:
+        def build(self, known: NominalModel) -> Law:
             return replace(law, parameters=np.array(self.parameters))
 
-    OfLaw.__name__ = law.name
-    return OfLaw
+    FixedLaw.__name__ = law.name
+    return FixedLaw

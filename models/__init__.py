@@ -1,1 +1,1 @@
-"""What the actuator is, and what it says: geometry, dynamics, magnetics, signals."""
+"""Actuator: geometry, dynamics, magnetics and telemetry."""

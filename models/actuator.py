@@ -1,4 +1,4 @@
-"""The actuator as data: read once from the MJCF and the torque curve, then frozen."""
+"""Actuator data: read once from the MJCF and the torque curve, then immutable."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
-from spheretwin.models.base.errors import InputError, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.models.mjcf_reader import (
     LARGEST_LENGTH_M,
@@ -33,22 +33,22 @@ TORQUE_CURVE_PATH = FOLDER / "torque_curve.csv"
 
 FRONT_RADIUS = "pole_front_radius_m"
 
-# Axes of one group are exact opposites in the MJCF; rotations built from degrees keep 1e-15.
+# Axes of one group are exact opposites in the MJCF; rotations from degrees have errors of 1e-15.
 COLLINEAR_TOLERANCE = 1e-9
 
 # A torque has three components.
 LEAST_GROUPS = 3
 
-# Beyond this an inductance or a resistance is a slip of its unit.
+# Beyond this an inductance or a resistance is a mistake of its unit.
 LONGEST_TIME_CONSTANT_S = 1e3
 
 
 @dataclass(frozen=True)
 class Magnet:
-    """One pole magnet, magnetised along its axis: a cylinder whose front is flat, or ground to a sphere.
+    """Pole magnet, magnetised along its axis: a cylinder with a front that is flat or ground to a sphere.
 
-    Radius, length and distance are those of the blank, the cylinder before it is ground: grinding takes off
-    the front's edge and leaves the middle of the front where it was.
+    Radius, length and distance are those of the blank, the cylinder before grinding: grinding removes the
+    edge of the front and does not move its middle.
     """
 
     remanence_T: float
@@ -57,7 +57,7 @@ class Magnet:
     distance_m: float
     """From the joint centre to the middle of the blank."""
     front_radius_m: float = 0.0
-    """Radius of the sphere to which the front is ground, its centre on the axis; 0 where it is flat."""
+    """Radius of the sphere to which the front is ground, its centre on the axis; 0 for a flat front."""
 
     @property
     def front_m(self) -> float:
@@ -71,7 +71,7 @@ class Magnet:
 
     @property
     def sagitta_m(self) -> float:
-        """How far the front's rim lies behind its middle, m."""
+        """Distance of the rim of the front behind its middle, m."""
         return self.sagitta_at_m(self.radius_m)
 
     @property
@@ -86,17 +86,17 @@ class Magnet:
 
     @property
     def volume_m3(self) -> float:
-        """Volume of what is left of the blank, m³."""
+        """Volume of the ground magnet, m³."""
         return self.volume_within_m3(self.radius_m)
 
     def volume_within_m3(self, rho_m: float) -> float:
-        """Volume of what is left of the blank within a distance from its axis, m³."""
+        """Return the volume of the ground magnet within a distance from its axis, m³."""
         sagitta = self.sagitta_at_m(rho_m)
         cap = pi / 6 * sagitta * (3 * rho_m**2 + sagitta**2)
         return pi * rho_m**2 * (self.length_m - sagitta) + cap
 
     def sagitta_at_m(self, rho_m: float) -> float:
-        """How far the front lies behind its middle at a distance from the axis, m."""
+        """Return the distance of the front behind its middle at a distance from the axis, m."""
         if not self.front_radius_m:
             return 0.0
         depth = sqrt(max(0.0, self.front_radius_m**2 - rho_m**2))  # rho may round past the sphere
@@ -104,8 +104,8 @@ class Magnet:
 
 
 @dataclass(frozen=True)
-class Coil:
-    """One air-core coil of rectangular winding section."""
+class CoilGeometry:
+    """Air-core coil of rectangular winding section."""
 
     inner_radius_m: float
     outer_radius_m: float
@@ -116,7 +116,7 @@ class Coil:
 
 
 @dataclass(frozen=True)
-class Group:
+class CoilGroup:
     """Two collinear coils in series, and the amplifier that drives them."""
 
     resistance_ohm: float
@@ -141,7 +141,7 @@ class Actuator:
     groups : (n, 2) int array
         The two coils of each group, as indices into the coils.
     hinge_range_rad : (3, 2) array, rad
-        Least and greatest angle of each hinge; infinite where the hinge turns freely.
+        Least and greatest angle of each hinge; infinite for a free hinge.
     shaft_tip_m, payload_mount_m : (3,) array, m
         In the rotor frame.
     magnet, coil, group
@@ -159,8 +159,8 @@ class Actuator:
     shaft_tip_m: NDArray[np.float64]
     payload_mount_m: NDArray[np.float64]
     magnet: Magnet
-    coil: Coil
-    group: Group
+    coil: CoilGeometry
+    group: CoilGroup
     torque_curve: TorqueCurve
 
     @property
@@ -185,18 +185,18 @@ def load(mjcf: Path = MJCF_PATH, curve: Path = TORQUE_CURVE_PATH) -> Actuator:
         A file cannot be read, or the model lacks a part of the actuator.
     """
     if (mjcf, curve) == (MJCF_PATH, TORQUE_CURVE_PATH):
-        return _shipped()  # read once: another file, or one that it includes, may change meanwhile
-    return _kept(read(mjcf), curve, torque_curve.read_bytes(curve))
+        return _shipped()  # read once; other files, and their includes, may change during the process
+    return _cached(read(mjcf), curve, torque_curve.read_bytes(curve))
 
 
 @lru_cache(maxsize=8)
-def _kept(mjcf: Mjcf, curve: Path, content: bytes) -> Actuator:
-    """One object for files that have not changed: what is made of an actuator is kept with it."""
+def _cached(mjcf: Mjcf, curve: Path, content: bytes) -> Actuator:
+    """Return one object for unchanged files: caches depend on the identity of the actuator."""
     return from_model(mjcf.described, torque_curve.parse(curve, content))
 
 
 def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
-    """Read the actuator out of a compiled model.
+    """Read the actuator from a compiled model.
 
     Raises
     ------
@@ -227,8 +227,8 @@ def from_model(model: mujoco.MjModel, curve: TorqueCurve) -> Actuator:
     )
 
 
-def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, Coil]:
-    """Read what the torque curve is computed from, before there is a curve.
+def read_magnet_and_coil(mjcf: Path) -> tuple[Magnet, CoilGeometry]:
+    """Read the geometry of magnet and coil, from which the torque curve is computed.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def _polarity(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
     polarity = model.site_user[poles, 0] if model.nuser_site else np.zeros(len(poles))
     for pole, value in zip(poles, polarity, strict=True):
         if value not in (-1.0, 1.0):
-            north, south, received = told_apart(1.0, -1.0, value)
+            north, south, received = distinct_texts(1.0, -1.0, value)
             raise InputError(
                 f"model: expected polarity {north} or {south} as user value of {model.site(pole).name},"
                 f" received {received}"
@@ -268,7 +268,7 @@ def _polarity(model: mujoco.MjModel, poles: list[int]) -> NDArray[np.float64]:
 
 
 def _collinear_pairs(model: mujoco.MjModel, coils: list[int], axes: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Coils whose axes are exact opposites form one group in series."""
+    """Return the groups: two coils in series whose axes are exact opposites."""
     opposite = axes @ axes.T < -1 + COLLINEAR_TOLERANCE
     for index, count in enumerate(opposite.sum(axis=1)):
         if count != 1:
@@ -294,14 +294,14 @@ def _magnet(model: mujoco.MjModel, poles: list[int]) -> Magnet:
 
 
 def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
-    """Radius to which the poles' fronts are ground; 0, a flat face, where the model does not say."""
+    """Return the radius of the ground fronts of the poles; 0 (flat) if the model does not give it."""
     if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, FRONT_RADIUS) < 0:
         return 0.0
     value = float(model.numeric(FRONT_RADIUS).data[0])
-    depth = min(blank.radius_m, blank.length_m)  # of the deepest cap that the blank holds
+    depth = min(blank.radius_m, blank.length_m)  # of the deepest possible cap
     smallest = (blank.radius_m**2 + depth**2) / (2 * depth)
     if value != 0.0 and not smallest <= value <= LARGEST_LENGTH_M:
-        low, high, received = told_apart(smallest, LARGEST_LENGTH_M, value)
+        low, high, received = distinct_texts(smallest, LARGEST_LENGTH_M, value)
         raise InputError(
             f"model: expected {FRONT_RADIUS} of 0, for a flat face, or from {low} to {high} for poles of this"
             f" radius and length, received {received}"
@@ -309,8 +309,8 @@ def _front_radius(model: mujoco.MjModel, blank: Magnet) -> float:
     return value
 
 
-def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
-    coil = Coil(
+def _coil(model: mujoco.MjModel, coils: list[int]) -> CoilGeometry:
+    coil = CoilGeometry(
         inner_radius_m=number(model, "coil_inner_radius_m"),
         outer_radius_m=shared(model.site_size[coils, 0], "radius of the coils"),
         length_m=2 * shared(model.site_size[coils, 1], "length of the coils"),
@@ -318,22 +318,22 @@ def _coil(model: mujoco.MjModel, coils: list[int]) -> Coil:
         turns=number(model, "coil_turns"),
     )
     if coil.inner_radius_m >= coil.outer_radius_m:
-        outer, inner = told_apart(coil.outer_radius_m, coil.inner_radius_m)
+        outer, inner = distinct_texts(coil.outer_radius_m, coil.inner_radius_m)
         raise InputError(
             f"model: expected coil_inner_radius_m below the coils' radius of {outer} m, received {inner}"
         )
     return coil
 
 
-def _group(model: mujoco.MjModel) -> Group:
-    group = Group(
+def _group(model: mujoco.MjModel) -> CoilGroup:
+    group = CoilGroup(
         resistance_ohm=number(model, "group_resistance_ohm"),
         inductance_H=number(model, "group_inductance_H"),
         current_limit_A=number(model, "group_current_limit_A"),
     )
     time_constant_s = group.inductance_H / group.resistance_ohm
     if time_constant_s > LONGEST_TIME_CONSTANT_S:
-        longest, received = told_apart(LONGEST_TIME_CONSTANT_S, time_constant_s)
+        longest, received = distinct_texts(LONGEST_TIME_CONSTANT_S, time_constant_s)
         raise InputError(
             f"model: expected group_inductance_H / group_resistance_ohm of at most {longest} s,"
             f" received {received}"

@@ -1,4 +1,4 @@
-"""Orientation and angular rates of the rotor on its three serial revolutes.
+"""Kinematics of the rotor on its three serial hinges.
 
 The pose is ``q = [alpha, beta, gamma]``: intrinsic rotations about x, y, z. Frame S is the stator,
 frame R the rotor; ``R_SR`` maps rotor-frame vectors into the stator frame.
@@ -16,7 +16,7 @@ Row = tuple[float, float, float]
 
 @compiled
 def rotation(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotation matrix ``R_SR = Rx(alpha) Ry(beta) Rz(gamma)``.
+    """Return the rotation matrix ``R_SR = Rx(alpha) Ry(beta) Rz(gamma)``.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def rotation(q: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @allocation_free
 def rotation_rows(q: NDArray[np.float64]) -> tuple[Row, Row, Row]:
-    """Rows of `rotation` as tuples: allocating an array would be a third of a torque matrix's time."""
+    """Return the rows of `rotation` as tuples: an array would take a third of the time of a torque matrix."""
     ca, sa = cos(q[0]), sin(q[0])
     cb, sb = cos(q[1]), sin(q[1])
     cg, sg = cos(q[2]), sin(q[2])
@@ -52,7 +52,7 @@ def rotation_rows(q: NDArray[np.float64]) -> tuple[Row, Row, Row]:
 
 @compiled
 def rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rate Jacobian E: stator-frame angular velocity ``w_SR_S = E(q) qdot``.
+    """Return the rate Jacobian E: stator-frame angular velocity ``w_SR_S = E(q) qdot``.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @compiled
 def rotor_rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rate Jacobian B: rotor-frame angular velocity ``w_SR_R = B(q) qdot``.
+    """Return the rate Jacobian B: rotor-frame angular velocity ``w_SR_R = B(q) qdot``.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def rotor_rate_jacobian(q: NDArray[np.float64]) -> NDArray[np.float64]:
 def cartesian_torque(
     q: NDArray[np.float64], torque_q: NDArray[np.float64], torque_S: NDArray[np.float64]
 ) -> None:
-    """Cartesian torque that has a given effect on the hinges: ``torque_S = E^-T torque_q``.
+    """Compute the Cartesian torque of a generalised torque: ``torque_S = E^-T torque_q``.
 
     The paper equates the two; they differ wherever the rotor is tilted, because virtual power gives
     ``torque_q = E^T torque_S``.
@@ -116,7 +116,7 @@ def cartesian_torque(
     """
     ca, sa = cos(q[0]), sin(q[0])
     cb, sb = cos(q[1]), sin(q[1])
-    # Along the gamma hinge's direction within the plane normal to the alpha hinge.
+    # Along the direction of the gamma hinge within the plane normal to the alpha hinge.
     in_plane = (torque_q[2] - sb * torque_q[0]) / cb
     torque_S[0] = torque_q[0]
     torque_S[1] = ca * torque_q[1] - sa * in_plane
@@ -127,7 +127,7 @@ def cartesian_torque(
 def generalised_torque(
     q: NDArray[np.float64], torque_S: NDArray[np.float64], torque_q: NDArray[np.float64]
 ) -> None:
-    """Effect of a Cartesian torque on the hinges: ``torque_q = E^T torque_S``.
+    """Compute the generalised torque of a Cartesian torque: ``torque_q = E^T torque_S``.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def generalised_torque(
 
 @allocation_free
 def angular_velocity(q: NDArray[np.float64], qdot: NDArray[np.float64], rate_S: NDArray[np.float64]) -> None:
-    """Angular velocity of the rotor in the stator frame: ``w_SR_S = E(q) qdot``.
+    """Compute the angular velocity of the rotor in the stator frame: ``w_SR_S = E(q) qdot``.
 
     Parameters
     ----------

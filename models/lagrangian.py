@@ -8,8 +8,8 @@ angular velocity (w1, w2, w3) in its own frame the mass moves at ``l sqrt(w1**2 
 energy ``m l**2 (w1**2 + w2**2) / 2`` adds ``m l**2`` to J1 and J2 and changes the form of neither M nor C;
 its potential energy is ``V = m g l cos(alpha) cos(beta)``, whose gradient is G.
 
-Each formula stands once, on scalars: a plant that steps the motion some thousand times a second cannot
-afford arrays of three. The functions that take and return arrays hand over to those and fill in.
+Each formula is implemented once, on scalars: arrays of three are too slow for a plant with thousands of steps
+per second. The functions with arrays call those on scalars.
 """
 
 from math import cos, sin
@@ -26,7 +26,7 @@ Triple = tuple[float, float, float]  # an entry for each of alpha, beta, gamma
 
 
 class Turns(NamedTuple):
-    """Cosines and sines of a pose; it enters the equations of motion through nothing else."""
+    """Cosines and sines of a pose, its only terms in the equations of motion."""
 
     ca: float
     sa: float
@@ -37,7 +37,7 @@ class Turns(NamedTuple):
 
 
 class InertiaEntries(NamedTuple):
-    """The inertia matrix without what symmetry repeats and without its zero, (beta, gamma); kg·m²."""
+    """Distinct non-zero entries of the inertia matrix, kg·m²; (beta, gamma) is zero."""
 
     alpha: float
     beta: float
@@ -48,7 +48,7 @@ class InertiaEntries(NamedTuple):
 
 @compiled
 def inertia_matrix(q: NDArray[np.float64], inertia: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inertia matrix ``M(q) = B^T diag(J) B`` (2).
+    """Return the inertia matrix ``M(q) = B^T diag(J) B`` (2).
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def inertia_matrix(q: NDArray[np.float64], inertia: NDArray[np.float64]) -> NDAr
 def coriolis_matrix(
     q: NDArray[np.float64], qdot: NDArray[np.float64], inertia: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Coriolis and centrifugal matrix in Christoffel form, so that ``Mdot - 2C`` is skew-symmetric.
+    """Return the Coriolis and centrifugal matrix in Christoffel form: ``Mdot - 2C`` is skew-symmetric.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def coriolis_matrix(
 
 
 def loaded_inertia(inertia: NDArray[np.float64], payload_kg: float, height_m: float) -> NDArray[np.float64]:
-    """Principal inertias about the joint centre with a point mass on the third axis.
+    """Return the principal inertias about the joint centre with a point mass on the third axis.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def loaded_inertia(inertia: NDArray[np.float64], payload_kg: float, height_m: fl
 
 @compiled
 def gravity_torque(q: NDArray[np.float64], weight_moment: float) -> NDArray[np.float64]:
-    """Gravity's generalised torque G, the gradient of ``weight_moment cos(alpha) cos(beta)``.
+    """Return the generalised torque G of gravity, the gradient of ``weight_moment cos(alpha) cos(beta)``.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def gravity_torque(q: NDArray[np.float64], weight_moment: float) -> NDArray[np.f
     Returns
     -------
     (3,) array, N·m
-        On the left side of (1), so that a positive entry has to be held by a positive torque.
+        On the left side of (1): a positive entry requires a positive torque at rest.
     """
     G = np.empty(3)
     G[0], G[1], G[2] = gravity_entries(turns(triple(q)), weight_moment)
@@ -138,7 +138,7 @@ def gravity_torque(q: NDArray[np.float64], weight_moment: float) -> NDArray[np.f
 
 
 def gravity_stiffness(q: NDArray[np.float64], weight_moment: float) -> NDArray[np.float64]:
-    """Derivative of `gravity_torque` with respect to the pose: what gravity is to small motions.
+    """Return the derivative of `gravity_torque` with respect to the pose, for small motions.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def gravity_stiffness(q: NDArray[np.float64], weight_moment: float) -> NDArray[n
     Returns
     -------
     (3, 3) array, N·m/rad
-        The Hessian of the potential energy; negative definite in (alpha, beta) where a payload is upright.
+        The Hessian of the potential energy; negative definite in (alpha, beta) for an upright payload.
     """
     at = turns(triple(q))
     stiffness = np.zeros((3, 3))
@@ -167,7 +167,7 @@ def acceleration(
     inertia: NDArray[np.float64],
     weight_moment: float,
 ) -> NDArray[np.float64]:
-    """Hinge accelerations that solve the equation of motion (1).
+    """Return the hinge accelerations that solve the equation of motion (1).
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def acceleration(
 def coupling_torques(
     q: NDArray[np.float64], qdot: NDArray[np.float64], qddot: NDArray[np.float64], inertia: float
 ) -> NDArray[np.float64]:
-    """Torques that the axes exert on each other where the three inertias are equal, (6) to (10).
+    """Return the coupling torques between the axes for three equal inertias, (6) to (10).
 
     Parameters
     ----------
@@ -225,19 +225,19 @@ def coupling_torques(
 
 @compiled
 def triple(vector: NDArray[np.float64]) -> Triple:
-    """Entries of a (3,) array."""
+    """Return the entries of a (3,) array."""
     return vector[0], vector[1], vector[2]
 
 
 @compiled
 def turns(q: Triple) -> Turns:
-    """Cosines and sines of a pose (rad)."""
+    """Return the cosines and sines of a pose (rad)."""
     return Turns(cos(q[0]), sin(q[0]), cos(q[1]), sin(q[1]), cos(q[2]), sin(q[2]))
 
 
 @compiled
 def inertia_entries(at: Turns, inertia: Triple) -> InertiaEntries:
-    """Entries of `inertia_matrix` (kg·m²)."""
+    """Return the entries of `inertia_matrix` (kg·m²)."""
     J1, J2, J3 = inertia
     return InertiaEntries(
         alpha=(J1 * at.cg**2 + J2 * at.sg**2) * at.cb**2 + J3 * at.sb**2,
@@ -250,7 +250,7 @@ def inertia_entries(at: Turns, inertia: Triple) -> InertiaEntries:
 
 @compiled
 def coriolis_rows(at: Turns, qdot: Triple, inertia: Triple) -> tuple[Triple, Triple, Triple]:
-    """Rows of `coriolis_matrix` (kg·m²/s)."""
+    """Return the rows of `coriolis_matrix` (kg·m²/s)."""
     J1, J2, J3 = inertia
     alpha_rate, beta_rate, gamma_rate = qdot
     cb, sb, cg, sg = at.cb, at.sb, at.cg, at.sg
@@ -279,7 +279,7 @@ def coriolis_rows(at: Turns, qdot: Triple, inertia: Triple) -> tuple[Triple, Tri
 
 @compiled
 def gravity_entries(at: Turns, weight_moment: float) -> Triple:
-    """Entries of `gravity_torque` (N·m)."""
+    """Return the entries of `gravity_torque` (N·m)."""
     return -weight_moment * at.sa * at.cb, -weight_moment * at.ca * at.sb, 0.0
 
 
@@ -287,7 +287,7 @@ def gravity_entries(at: Turns, weight_moment: float) -> Triple:
 def acceleration_entries(
     at: Turns, qdot: Triple, torque: Triple, inertia: Triple, weight_moment: float
 ) -> Triple:
-    """Entries of `acceleration` (rad/s²)."""
+    """Return the entries of `acceleration` (rad/s²)."""
     C_alpha, C_beta, C_gamma = coriolis_rows(at, qdot, inertia)
     G = gravity_entries(at, weight_moment)
     net = (
@@ -300,10 +300,10 @@ def acceleration_entries(
 
 @compiled
 def solve_inertia(M: InertiaEntries, torque: Triple) -> Triple:
-    """Vector x with ``M x = torque``, for an inertia matrix or any other with its zero.
+    """Solve ``M x = torque`` for an inertia matrix, or any other matrix with the same zero.
 
-    M is eliminated from its last row upward. It is positive definite, so that no order needs pivots, and
-    as its entry (beta, gamma) is zero this order divides by two diagonal entries that never vanish.
+    M is eliminated from its last row upward. It is positive definite, so that no pivoting is needed. As its
+    entry (beta, gamma) is zero, this order divides by two diagonal entries that never vanish.
     """
     to_beta, to_gamma = M.alpha_beta / M.beta, M.alpha_gamma / M.gamma
     left = M.alpha - to_beta * M.alpha_beta - to_gamma * M.alpha_gamma

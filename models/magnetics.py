@@ -1,4 +1,4 @@
-"""Torque matrix: from group currents to the torque on the rotor (12)-(15)."""
+"""Torque matrix: maps group currents to the torque on the rotor (12)-(15)."""
 
 from dataclasses import asdict
 from functools import lru_cache
@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil, Magnet
-from spheretwin.models.base.cache import kept_array
+from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
+from spheretwin.models.base.cache import cached_array
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
-from spheretwin.models.base.errors import InputError, one_line, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts, one_line
 from spheretwin.models.kinematics import rotation_rows
 from spheretwin.models.torque_curve import TorqueCurve
 
@@ -21,21 +21,21 @@ KNEE = 0.95
 WIDE_PER_UNIT = 200
 NARROW_PER_UNIT = 4000
 
-# What a curve's file says of a number that it does not name: before poles could be ground they were flat.
+# Numbers that older curve files do not name: before poles could be ground they were flat.
 UNSAID = {"magnet front_radius_m": 0.0}
 
-# The model's lengths come from sums and rotations, and keep 1e-15; a torque follows its numbers as a
-# small power. So this is equality, while the millionth part of a percent is told.
+# The model's lengths come from sums and rotations, with errors of 1e-15; the torque is a low power of them.
+# This tolerance means equality; a difference of a millionth of a percent is reported.
 SAME = 1e-9
 
 
 class TorqueModel(NamedTuple):
-    """What the compiled torque matrix needs, and no more.
+    """Data of the compiled torque matrix.
 
     The two coils of a group have axes s and -s, so a pole axis r enters a group's column as
     ``h(r.s) r x s`` with the odd function ``h(c) = g(c) - g(-c)``, ``g = f_t / sin``. Because h is
     odd, the poles at r and -r add: the shipped 16 poles are 8 *pole lines*, each with the sum of the two
-    polarities as its weight. 144 look-ups give what 576 pairs of coil and pole would.
+    polarities as its weight. 144 look-ups replace 576 pairs of coil and pole.
     """
 
     line_axes: NDArray[np.float64]  # (n_lines, 3), rotor frame
@@ -45,7 +45,7 @@ class TorqueModel(NamedTuple):
 
 
 def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
-    """Torque matrix G_t(q): ``torque_S = G_t(q) @ current`` (15).
+    """Return the torque matrix G_t(q): ``torque_S = G_t(q) @ current`` (15).
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
     Raises
     ------
     InputError
-        `q` is no pose.
+        `q` is not a pose.
     """
     q = np.asarray(q, dtype=np.float64)
     if q.shape != (3,) or not np.all(np.isfinite(q)):
@@ -74,21 +74,21 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
 
 @lru_cache(maxsize=8)
 def torque_model(actuator: Actuator) -> TorqueModel:
-    """Compile-ready form of an actuator's magnetics, kept for the actuators used last."""
+    """Return the data of an actuator for compiled code, cached for the actuators used last."""
     axes, weights = _pole_lines(actuator)
     return TorqueModel(
         line_axes=axes,
         line_weights=weights,
         group_axes=np.ascontiguousarray(actuator.group_axes.T),
-        table=_kept_table(actuator.torque_curve),
+        table=_cached_table(actuator.torque_curve),
     )
 
 
 def lookup_table(curve: TorqueCurve) -> NDArray[np.float64]:
-    """Cubics for ``h(c) = g(c) - g(-c)`` on intervals of c from -1 to 1; `place` finds a cosine's row.
+    """Return cubics for ``h(c) = g(c) - g(-c)`` on intervals of c from -1 to 1; `place` finds a cosine's row.
 
-    Each cubic meets h at four Chebyshev points of its interval. The last row repeats the end of the one
-    before it: the cosine of a pole straight in front of a coil may round past 1.
+    Each cubic interpolates h at four Chebyshev points of its interval. The last row repeats the end of the
+    previous one: the cosine of a pole directly in front of a coil may round past 1.
 
     Returns
     -------
@@ -109,14 +109,14 @@ def lookup_table(curve: TorqueCurve) -> NDArray[np.float64]:
 
 @allocation_free
 def place(cosine: float) -> float:
-    """Row of a cosine in the look-up table, the fraction being t: two slopes, joined at the knee."""
+    """Return the row of a cosine in the look-up table, with fraction t: two slopes, joined at the knee."""
     beyond = cosine - min(max(cosine, -KNEE), KNEE)
     centre = KNEE * WIDE_PER_UNIT + (1 - KNEE) * NARROW_PER_UNIT
     return centre + WIDE_PER_UNIT * cosine + (NARROW_PER_UNIT - WIDE_PER_UNIT) * beyond
 
 
 def scratch_of(model: TorqueModel) -> NDArray[np.float64]:
-    """Working space of `fill_torque_matrix`.
+    """Return the working space of `fill_torque_matrix`.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def scratch_of(model: TorqueModel) -> NDArray[np.float64]:
 def fill_torque_matrix(
     q: NDArray[np.float64], model: TorqueModel, G: NDArray[np.float64], scratch: NDArray[np.float64]
 ) -> None:
-    """Compiled torque matrix, written into `G`.
+    """Write the torque matrix into `G`.
 
     Parameters
     ----------
@@ -141,17 +141,17 @@ def fill_torque_matrix(
     G : (3, n) array, N·m/A
         Result.
     scratch : (5, lines × n) array
-        Of `scratch_of`; what it holds does not matter.
+        Of `scratch_of`; its content does not matter.
 
     Notes
     -----
-    `g(cos phi)` is looked up, never `f_t(phi)`: no arc cosine, and no singular case where a pole
-    stands in front of a coil.
+    `g(cos phi)` is looked up, never `f_t(phi)`: no arc cosine, and no singular case for a pole
+    in front of a coil.
 
-    One pose of the shipped actuator takes about 0.27 µs on a 2024 server core, where all 576 pairs in one
-    plain loop took 1.1. Pairs of opposite coils and of opposite poles leave 144 look-ups (see
-    `TorqueModel`), which stand in one loop of their own: the compiler does the arithmetic before and after
-    the table's scattered reads on several groups at once.
+    One pose of the shipped actuator takes about 0.27 µs on a 2024 server core, compared with 1.1 µs for all
+    576 pairs in one plain loop. Pairs of opposite coils and of opposite poles leave 144 look-ups (see
+    `TorqueModel`), in a separate loop: the compiler vectorises the arithmetic before and after the
+    scattered reads of the table over several groups.
     """
     R_x, R_y, R_z = rotation_rows(q)
     table, row, h = model.table, scratch[0], scratch[1]
@@ -186,22 +186,22 @@ def fill_torque_matrix(
         G_z[j] = x * s_y[j] - y * s_x[j]
 
 
-class KeptMatrix(NamedTuple):
-    """A torque matrix and the pose it belongs to: at the same pose it need not be filled again."""
+class CachedMatrix(NamedTuple):
+    """Torque matrix with its pose: at the same pose it is not computed again."""
 
-    q: NDArray[np.float64]  # (3,) rad; NaN as long as nothing is kept
+    q: NDArray[np.float64]  # (3,) rad; NaN before the first update
     G: NDArray[np.float64]  # (3, n) N·m/A
     scratch: NDArray[np.float64]  # (5, lines × n), of `scratch_of`
 
 
-def kept_matrix(model: TorqueModel) -> KeptMatrix:
-    """Room for the torque matrix of a model, nothing kept as yet."""
-    return KeptMatrix(np.full(3, np.nan), np.empty((3, model.group_axes.shape[1])), scratch_of(model))
+def cached_matrix(model: TorqueModel) -> CachedMatrix:
+    """Return an empty cache of the torque matrix of a model."""
+    return CachedMatrix(np.full(3, np.nan), np.empty((3, model.group_axes.shape[1])), scratch_of(model))
 
 
 @part_of_its_caller
-def keep_torque_matrix(q: NDArray[np.float64], model: TorqueModel, kept: KeptMatrix) -> None:
-    """Keep the torque matrix at a pose, filled anew only where the pose is another than the kept one.
+def update_cached_matrix(q: NDArray[np.float64], model: TorqueModel, cached: CachedMatrix) -> None:
+    """Compute the torque matrix at a pose, unless it is the cached pose.
 
     Parameters
     ----------
@@ -209,17 +209,17 @@ def keep_torque_matrix(q: NDArray[np.float64], model: TorqueModel, kept: KeptMat
         Pose; finite.
     model : TorqueModel
         Of n groups.
-    kept : KeptMatrix
+    cached : CachedMatrix
         Changed in place.
     """
-    if not (q[0] == kept.q[0] and q[1] == kept.q[1] and q[2] == kept.q[2]):
-        fill_torque_matrix(q, model, kept.G, kept.scratch)
-        kept.q[0], kept.q[1], kept.q[2] = q[0], q[1], q[2]
+    if not (q[0] == cached.q[0] and q[1] == cached.q[1] and q[2] == cached.q[2]):
+        fill_torque_matrix(q, model, cached.G, cached.scratch)
+        cached.q[0], cached.q[1], cached.q[2] = q[0], q[1], q[2]
 
 
 @allocation_free
 def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S: NDArray[np.float64]) -> None:
-    """``torque_S = G current`` (15).
+    """Compute ``torque_S = G current`` (15).
 
     Parameters
     ----------
@@ -237,10 +237,10 @@ def rotor_torque(G: NDArray[np.float64], current: NDArray[np.float64], torque_S:
         torque_S[i] = total
 
 
-def _kept_table(curve: TorqueCurve) -> NDArray[np.float64]:
-    """Look-up table from the cache where possible: the spline is slow to import."""
+def _cached_table(curve: TorqueCurve) -> NDArray[np.float64]:
+    """Return the look-up table, from the cache if possible: the spline is slow to import."""
     samples = curve.phi_rad.tobytes() + curve.torque_Nm_per_A.tobytes()
-    return kept_array(samples, lambda: lookup_table(curve))
+    return cached_array(samples, lambda: lookup_table(curve))
 
 
 def _pole_lines(actuator: Actuator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -258,25 +258,25 @@ def _pole_lines(actuator: Actuator) -> tuple[NDArray[np.float64], NDArray[np.flo
     return np.ascontiguousarray(axes), np.array(weights)
 
 
-def computed_from(magnet: Magnet, coil: Coil) -> dict[str, float]:
-    """Every number that a computed curve depends on, by part and name, such as ``coil turns``."""
+def computed_from(magnet: Magnet, coil: CoilGeometry) -> dict[str, float]:
+    """Return every number that a computed curve depends on, by part and name, such as ``coil turns``."""
     parts = {"magnet": asdict(magnet), "coil": asdict(coil)}
     return {f"{part} {name}": value for part, data in parts.items() for name, value in data.items()}
 
 
 def disagreements(actuator: Actuator) -> list[str]:
-    """Where the actuator differs from what its torque curve was computed for, one line a number.
+    """Return the differences between an actuator and the geometry of its torque curve, one line per number.
 
     Parameters
     ----------
     actuator : Actuator
-        With the curve that its torque is taken from.
+        The actuator, with its torque curve.
 
     Returns
     -------
     list of str
-        Empty where both agree, and for a curve that does not say what it was computed for: measured, or
-        from another program. One that says so, but not of the front, was computed for flat poles.
+        Empty if both agree, and for a curve without the numbers of its geometry: measured, or from another
+        program. A curve with these numbers, but without the front radius, was computed for flat poles.
     """
     curve = actuator.torque_curve
     computed_for = UNSAID | dict(curve.computed_for) if curve.computed_for else {}
@@ -284,6 +284,6 @@ def disagreements(actuator: Actuator) -> list[str]:
     for name, has in computed_from(actuator.magnet, actuator.coil).items():
         had = computed_for.get(name, has)
         if abs(had - has) > SAME * max(abs(had), abs(has)):
-            first, second = told_apart(had, has)
+            first, second = distinct_texts(had, has)
             lines.append(one_line(f"{curve.name} was computed for {name} {first}, the model has {second}"))
     return lines

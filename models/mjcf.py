@@ -1,9 +1,9 @@
-"""An MJCF file read once: checked by the engine's compiler, and none of its physics dropped in silence.
+"""Loader of MJCF files: each is read once, checked by the engine's compiler, and none of its physics is lost.
 
-Three models are kept of a file. One still has its sites, which the actuator is read from. The two that a run
-steps have neither sites nor sensors nor what is only drawn, because each costs time in every stage of a step;
-what is only drawn is decided by the engine (`MjSpec.discard_visual`): geoms that neither collide nor are
-referenced, whose inertia it keeps.
+A file gives three models. One has its sites, from which the actuator is read. The two models for simulation
+have no sites, no sensors and no visual geoms, because each costs time in every stage of a step. The engine
+decides which geoms are visual (`MjSpec.discard_visual`): those that neither collide nor are referenced; their
+inertia stays.
 """
 
 from __future__ import annotations
@@ -30,29 +30,29 @@ ROTOR = "rotor"
 
 OTHER_GRAVITY = "gravity other than along -z"
 
-# Share of the rotor's inertia that is not worth naming. The gimbal rings of the shipped model hold 5e-13 of
-# it, which is what the engine needs; the cross-check sees 1e-12.
+# Share of the rotor's inertia that is not reported. The gimbal rings of the shipped model have 5e-13 of it,
+# which the engine requires; the cross-check detects 1e-12.
 NEGLIGIBLE = 1e-6
 
-# Quaternions of quarter turns keep 1e-15.
+# Quaternions of quarter turns have errors of 1e-15.
 QUARTER_TURN_TOLERANCE = 1e-12
 
-MOST_KEPT = 8
+MOST_MODELS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Mjcf:
-    """What is kept of a file; a model is copied by whoever changes it.
+    """Models of a file, shared: a user that changes one must copy it.
 
     Attributes
     ----------
     described : MjModel
-        With sites: pose of poles, coils, shaft tip.
+        With sites: poses of poles, coils, shaft tip.
     bare, loaded : MjModel
-        To be stepped, without and with the body that carries the payload; the same where anything else
-        hangs on that body.
+        For simulation, without and with the body of the payload; the same model if anything else is attached
+        to that body.
     warnings : tuple of str
-        What the engine's compiler warns of, a line each.
+        Warnings of the engine's compiler, one line each.
     """
 
     described: mujoco.MjModel
@@ -62,38 +62,38 @@ class Mjcf:
 
     @cached_property
     def unknown_to_the_lagrangian(self) -> tuple[str, ...]:
-        """What `beyond_a_free_rotor` finds in the model to be stepped with a payload."""
+        """Result of `beyond_a_free_rotor` for the loaded model."""
         return tuple(beyond_a_free_rotor(self.loaded))
 
 
 def read(path: Path) -> Mjcf:
-    """Read a model file, or return what was kept of it while no file that it names has changed.
+    """Read a model file, or return the cached models if no file that it names has changed.
 
     Raises
     ------
     InputError
-        The file is missing or broken; the engine's complaint on one line.
+        The file is missing or invalid; the message of the engine is on one line.
     """
     try:
         if not path.is_file():
             raise InputError(f"model: expected an MJCF file, received {path}, which does not exist")
         key = (path.resolve(), fingerprint(path))
-    except OSError as error:  # a name that no file can have, here or in the file
+    except OSError as error:  # an invalid file name, here or in the file
         raise InputError(f"model: expected an MJCF file, {without_breaks(error)}") from None
-    if key not in _KEPT:
-        _KEPT[key] = _read(path)
-        while len(_KEPT) > MOST_KEPT:
-            _KEPT.popitem(last=False)
-    return _KEPT[key]
+    if key not in _MODELS:
+        _MODELS[key] = _read(path)
+        while len(_MODELS) > MOST_MODELS:
+            _MODELS.popitem(last=False)
+    return _MODELS[key]
 
 
-_KEPT: OrderedDict[tuple[Path, str], Mjcf] = OrderedDict()
+_MODELS: OrderedDict[tuple[Path, str], Mjcf] = OrderedDict()
 
 
 def beyond_a_free_rotor(model: mujoco.MjModel) -> list[str]:
-    """Physics that a model holds beside a rigid rotor on three ideal hinges under gravity along -z, by name.
+    """Return the names of physics beyond a rigid rotor on three ideal hinges under gravity along -z.
 
-    The engine computes all of it; the Lagrangian model knows none of it.
+    The engine computes all of it, the Lagrangian model none.
     """
     names = [name for name, present in _stages(model).items() if present]
     if np.any(model.dof_armature):
@@ -104,7 +104,7 @@ def beyond_a_free_rotor(model: mujoco.MjModel) -> list[str]:
 
 
 def gravity(option: mujoco.MjOption) -> tuple[float, float, float]:
-    """Gravity of a model's options, m/s²; none where its flag is off."""
+    """Return the gravity of a model's options, m/s²; 0 if its flag is off."""
     if option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
         return 0.0, 0.0, 0.0
     x, y, z = option.gravity.tolist()
@@ -112,13 +112,13 @@ def gravity(option: mujoco.MjOption) -> tuple[float, float, float]:
 
 
 def idle_stages(model: mujoco.MjModel) -> int:
-    """Disable bits of the stages of a step in which a model has nothing to do, a tenth of the step's time.
+    """Return the disable bits of the stages of a step that a model does not need, a tenth of the step's time.
 
-    The run ends where a hinge reaches its range, so that a limit without a margin needs no solver; and
-    sensors move nothing.
+    A run ends when a hinge reaches its range, so that a limit without a margin needs no solver. Sensors do
+    not affect the motion.
     """
     holds, bits = _stages(model), mujoco.mjtDisableBit
-    # An actuator's own damping is not among its forces: it is taken with the joints'.
+    # The damping of an actuator is not among its forces: it is computed with that of the joints.
     passive = ("tendon", "fluid", "gravity compensation", "actuator", "plugin", "flex", "plasticity")
     needed_by = {
         bits.mjDSBL_CONSTRAINT: ("frictionloss", "equality", "tendon", "contact", "flex", "limit margin"),
@@ -134,7 +134,7 @@ def idle_stages(model: mujoco.MjModel) -> int:
 
 
 def _stages(model: mujoco.MjModel) -> dict[str, bool]:
-    """Whether a model holds what the stages of a step are there for."""
+    """Return the kinds of physics, and whether a model has each."""
     contact_off = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT)
     touching = np.any(model.geom_contype[:, None] & model.geom_conaffinity[None, :])
     limited = model.jnt_limited.astype(bool)
@@ -156,13 +156,14 @@ def _stages(model: mujoco.MjModel) -> dict[str, bool]:
 
 
 def _other_masses(model: mujoco.MjModel) -> Iterator[str]:
-    """Moving bodies, beside rotor and payload, that hold inertia worth naming."""
+    """Yield the names of moving bodies with relevant inertia, except rotor and payload."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     rotor = model.body(ROTOR).inertia.max() if ROTOR in _body_names(model) else 0.0
     for i, name in enumerate(_body_names(model)):
         moves = model.body_weldid[i] != 0
-        # Rotational inertia about the joint centre, at most; a point mass has none but by its place.
+        # Upper bound of the rotational inertia about the joint centre; a point mass has only that of its
+        # position.
         size = model.body_inertia[i].max() + model.body_mass[i] * np.sum(data.xipos[i] ** 2)
         if moves and name not in (ROTOR, PAYLOAD) and size > NEGLIGIBLE * rotor:
             yield name or f"number {i}"
@@ -174,7 +175,7 @@ def _body_names(model: mujoco.MjModel) -> list[str]:
 
 def _read(path: Path) -> Mjcf:
     silence_warnings()
-    mujoco.mj_clearCache(mujoco.mj_getCache())  # the engine's own misses a mesh edited within a second
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # the engine's cache misses a mesh edited within a second
     with compiler_warnings() as lines:
         compiled = _compiled(path)
     for model in compiled:
@@ -183,15 +184,15 @@ def _read(path: Path) -> Mjcf:
 
 
 def _compiled(path: Path) -> tuple[mujoco.MjModel, mujoco.MjModel, mujoco.MjModel]:
-    """Models of a file: described, bare, loaded."""
+    """Return the models of a file: described, bare, loaded."""
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
-            spec.discard_visual()  # there it is an error: what is drawn says what is heavy
+            spec.discard_visual()  # an error in that case: visual geoms define the inertia
         described = spec.compile()
         for sensor in list(spec.sensors):
             spec.delete(sensor)
-        if not (spec.tendons or spec.equalities or spec.actuators or spec.plugins):  # they may hold sites
+        if not (spec.tendons or spec.equalities or spec.actuators or spec.plugins):  # they may refer to sites
             for site in list(spec.sites):
                 spec.delete(site)
         loaded = spec.compile()
@@ -200,15 +201,15 @@ def _compiled(path: Path) -> tuple[mujoco.MjModel, mujoco.MjModel, mujoco.MjMode
     return described, _without_mount(spec, loaded), loaded
 
 
-# Whatever can hang on a body, or refer to one.
+# Elements that can be attached to a body, or refer to one.
 _HANGING = ("njnt", "ngeom", "nsite", "ncam", "nlight", "nflex", "nskin", "neq", "nwrap", "nactuator",
             "npair", "nexclude", "ntupledata", "ngravcomp")  # fmt: skip
 
 
 def _without_mount(spec: mujoco.MjSpec, loaded: mujoco.MjModel) -> mujoco.MjModel:
-    """Model without the body that carries the payload; with it where anything else would go with it.
+    """Return the model without the body of the payload, or with it if its removal would remove anything else.
 
-    Whatever refers to a body that is deleted is deleted too, without a word.
+    Elements that refer to a deleted body are deleted silently.
     """
     mount = spec.body(PAYLOAD)
     if not mount or mount.bodies:
@@ -216,14 +217,14 @@ def _without_mount(spec: mujoco.MjSpec, loaded: mujoco.MjModel) -> mujoco.MjMode
     spec.delete(mount)
     try:
         bare = spec.compile()
-    except ValueError:  # some references are not deleted, and lead nowhere
+    except ValueError:  # some references are not deleted, and become invalid
         return loaded
     alone = all(getattr(bare, size) == getattr(loaded, size) for size in _HANGING)
     return bare if alone else loaded
 
 
 def _turn_principal_axes_back(model: mujoco.MjModel) -> None:
-    """Name the rotor's principal axes as its own where they are these in another order.
+    """Restore the order of the rotor's principal axes if it is a permutation of its own axes.
 
     The compiler sorts the principal inertias that it computes, greatest first.
     """
@@ -244,21 +245,21 @@ _OTHER_KINDS = (".obj", ".stl", ".msh", ".png", ".ktx", ".skn")
 
 
 def fingerprint(path: Path) -> str:
-    """Digest of a file and its includes, and of when the other files that it names were changed."""
+    """Return a digest of a file and its includes, and of the change times of the other files they name."""
     texts, named = _texts_and_named(path)
     digest = hashlib.sha256()
     for source, text in sorted(texts.items()):
         digest.update(f"{source} {len(text)} ".encode(errors="surrogateescape") + text)
     for source in sorted(named):
         state = source.stat()
-        # Copying can keep the time of a change and a size, but neither the inode nor its own time.
-        told = f"{source} {state.st_ino} {state.st_mtime_ns} {state.st_ctime_ns} {state.st_size} "
-        digest.update(told.encode(errors="surrogateescape"))
+        # A copy can keep the modification time and the size, but neither the inode nor its change time.
+        state_text = f"{source} {state.st_ino} {state.st_mtime_ns} {state.st_ctime_ns} {state.st_size} "
+        digest.update(state_text.encode(errors="surrogateescape"))
     return digest.hexdigest()
 
 
 def contents_digest(path: Path) -> str:
-    """Digest of the contents of a file and of all that it names, wherever they lie and since when."""
+    """Return a digest of the contents of a file and of all files that it names, without paths and times."""
     texts, named = _texts_and_named(path)
     contents = {hashlib.sha256(content).digest() for content in texts.values()}
     contents |= {hashlib.sha256(source.read_bytes()).digest() for source in named}
@@ -266,7 +267,7 @@ def contents_digest(path: Path) -> str:
 
 
 def _texts_and_named(path: Path) -> tuple[dict[Path, bytes], set[Path]]:
-    """A model's own text and those of its includes, and every file that they name."""
+    """Return the texts of a model and its includes, and every file that they name."""
     texts = {path.resolve(): path.read_bytes()}
     named = _named(path, texts)
     while includes := {source.resolve() for source in named if _is_xml(source)} - texts.keys():
@@ -276,7 +277,7 @@ def _texts_and_named(path: Path) -> tuple[dict[Path, bytes], set[Path]]:
 
 
 def _named(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:
-    """Files that a model's texts name, wherever the engine may look for them."""
+    """Return the files that the texts of a model name, in all folders that the engine may search."""
     names = {_decoded(name) for text in texts.values() for name in _NAMED_FILE.findall(text)}
     names |= {os.path.basename(name) for name in names}  # strippath
     folders = {path.parent.resolve(), *(source.parent for source in texts)}
@@ -286,7 +287,7 @@ def _named(path: Path, texts: Mapping[Path, bytes]) -> set[Path]:
 
 
 def _is_xml(source: Path) -> bool:
-    """Whether a file is one to look into: an include may end in anything but what meshes and images do."""
+    """Return True for XML: an include may have any suffix except those of meshes and images."""
     if source.suffix.lower() in _OTHER_KINDS:
         return False
     with source.open("rb") as file:

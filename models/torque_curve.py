@@ -1,4 +1,4 @@
-"""The torque curve f_t(phi): torque of one coil on one pole per ampere, against their angle."""
+"""Torque curve f_t(phi): torque of one coil on one pole per ampere, as a function of their angle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError, shown, told_apart, without_breaks
+from spheretwin.models.base.errors import InputError, distinct_texts, shown, without_breaks
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 COLUMNS = ("phi_deg", "torque_Nm_per_A")
 FEWEST_ROWS = 8
 
-# Begins a comment that names a number of the geometry.
+# Start of a comment that names a number of the geometry.
 COMPUTED_FOR = "Computed for"
 HEAD_LINE = re.compile(rf"^# *{COMPUTED_FOR} ((?:magnet|coil) \w+):[ \t]*(.*?)[ \t]*\r?$", re.MULTILINE)
 
-# Angles closer than this are one angle twice; peaks beyond these are slips of the unit.
+# Angles closer than this are duplicates; peaks beyond these are mistakes of the unit.
 CLOSEST_DEG = 1e-6
 LEAST_PEAK, LARGEST_PEAK = 1e-12, 1e6
 
-# Symmetry leaves no torque on a pole straight in front of a coil, or behind it. A measured curve may be
-# off by its noise; more would be divided by a vanishing sine.
+# By symmetry there is no torque on a pole directly in front of a coil, or behind it. A measured curve may
+# have noise there; a larger value would be divided by a vanishing sine.
 LARGEST_END_SHARE = 0.01
 
 
@@ -46,10 +46,10 @@ class TorqueCurve:
     torque_Nm_per_A : (n,) array, N·m/A
         Positive where a positive current pulls a north pole towards the coil's axis.
     computed_for : mapping of str to float, optional
-        Numbers of the geometry that it was computed for, such as ``coil turns``; None where it does not
-        say, as data from a bench.
+        Numbers of the geometry that it was computed for, such as ``coil turns``; None if unknown, as for
+        measured data.
     name : str
-        What warnings call it.
+        Name in warnings.
     """
 
     phi_rad: NDArray[np.float64]
@@ -60,7 +60,7 @@ class TorqueCurve:
     @cached_property
     def spline(self) -> CubicSpline:
         """Cubic spline through the samples; f_t is odd about 0 and pi, so its second derivative ends at 0."""
-        from scipy.interpolate import CubicSpline  # slow to import, needed once a process
+        from scipy.interpolate import CubicSpline  # slow to import, used once per process
 
         return CubicSpline(self.phi_rad, self.torque_Nm_per_A, bc_type="natural")
 
@@ -70,7 +70,7 @@ class TorqueCurve:
         return float(np.max(np.abs(self.torque_Nm_per_A)))
 
     def over_sine(self, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-        """g(cos phi) = f_t(phi) / sin phi, finite at 0 and at pi.
+        """Return g(cos phi) = f_t(phi) / sin phi, finite at 0 and at pi.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class TorqueCurve:
         Returns
         -------
         (n,) array, N·m/A
-            The quotient; its limit where the sine vanishes.
+            The quotient, or its limit if the sine vanishes.
         """
         cosine = np.clip(cosine, -1.0, 1.0)
         phi = np.arccos(cosine)
@@ -92,21 +92,21 @@ class TorqueCurve:
 
 
 def read(path: Path) -> TorqueCurve:
-    """Read a torque curve from CSV: a header, then ``phi_deg`` and ``torque_Nm_per_A`` a row.
+    """Read a torque curve from CSV: a header, then ``phi_deg`` and ``torque_Nm_per_A`` per row.
 
-    Lines that begin with ``#`` are comments (the provenance); those that `head` wrote are read back.
+    Lines that begin with ``#`` are comments (the provenance); those written by `head` are read.
 
     Raises
     ------
     InputError
-        The file cannot be read, lacks a column, its samples are no curve from 0 to 180 degrees, or its head
-        names a number that is none.
+        The file cannot be read, lacks a column, its samples are not a curve from 0 to 180 degrees, or its
+        head holds an invalid number.
     """
     return parse(path, read_bytes(path))
 
 
 def read_bytes(path: Path) -> bytes:
-    """Content of a curve's file.
+    """Return the content of the file of a curve.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def parse(path: Path, content: bytes) -> TorqueCurve:
-    """Torque curve of a file's content, as `read` takes it; the path is for messages alone."""
+    """Return the torque curve of the content of a file; see `read`. The path is for messages only."""
     try:
         text = content.decode("utf-8-sig")  # spreadsheets write a byte-order mark
     except UnicodeDecodeError as error:
@@ -132,19 +132,19 @@ def parse(path: Path, content: bytes) -> TorqueCurve:
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     rows = csv.DictReader(lines, skipinitialspace=True)
     try:
-        found = [name or "" for name in rows.fieldnames or ()]
-        missing = [name for name in COLUMNS if name not in found]
+        header = [name or "" for name in rows.fieldnames or ()]
+        missing = [name for name in COLUMNS if name not in header]
         records = list(rows)
     except csv.Error as error:
         raise InputError(f"torque curve {path}: expected numbers only, received {error}") from None
     if missing:
         raise InputError(
             f"torque curve {path}: expected the columns {', '.join(COLUMNS)},"
-            f" received {', '.join(found) or 'none'}"
+            f" received {', '.join(header) or 'none'}"
         )
     samples = np.array([[_number(path, row[name]) for name in COLUMNS] for row in records])
     uneven = next((i for i, row in enumerate(records) if None in row or None in row.values()), None)
-    if uneven is not None or len(set(found)) < len(found):
+    if uneven is not None or len(set(header)) < len(header):
         where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
         raise InputError(f"torque curve {path}: expected each column once in every row, received {where}")
     _check(path, samples)
@@ -155,18 +155,18 @@ def parse(path: Path, content: bytes) -> TorqueCurve:
 def _number(path: Path, text: Any) -> float:
     try:
         return float(text)
-    except (TypeError, ValueError):  # a row that ends too early has none
+    except (TypeError, ValueError):  # a row that is too short has None
         raise InputError(f"torque curve {path}: expected numbers only, received {shown(text)}") from None
 
 
 def head(computed_for: Mapping[str, float]) -> list[str]:
-    """Lines of provenance that tell, to a person and to `read`, what a curve was computed for."""
-    # 12 digits hide the rounding of a length that was a sum, and nothing that `read` is asked to tell.
+    """Return the lines of provenance with the geometry of a curve, for readers and for `read`."""
+    # 12 digits hide the rounding of a length that was a sum, but no difference that `disagreements` reports.
     return [f"{COMPUTED_FOR} {name}: {value:.12g}" for name, value in computed_for.items()]
 
 
 def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
-    """Text of the CSV file of a curve, its provenance as leading comments."""
+    """Return the text of the CSV file of a curve, with its provenance as leading comments."""
     text = io.StringIO()
     for line in provenance:
         text.write(f"# {line}\n")
@@ -178,19 +178,19 @@ def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
 
 
 def _computed_for(path: Path, text: str) -> dict[str, float] | None:
-    """Numbers in the lines that `head` wrote."""
-    found = {}
+    """Return the numbers in the lines written by `head`."""
+    numbers = {}
     for name, number in HEAD_LINE.findall(text):
         try:
-            found[name] = float(number)
+            numbers[name] = float(number)
         except ValueError:
-            found[name] = np.nan
-        if not np.isfinite(found[name]):
+            numbers[name] = np.nan
+        if not np.isfinite(numbers[name]):
             raise InputError(
                 f"torque curve {path}: expected a finite number after {COMPUTED_FOR} {name}:,"
                 f" received {number or 'none'}"
             )
-    return found or None
+    return numbers or None
 
 
 def _check(path: Path, samples: NDArray[np.float64]) -> None:
@@ -203,24 +203,24 @@ def _check(path: Path, samples: NDArray[np.float64]) -> None:
     angles, torque = samples.T
     outside = (angles < 0.0) | (angles > 180.0)
     if np.any(outside):
-        least, largest, received = told_apart(0.0, 180.0, angles[np.argmax(outside)])
+        least, largest, received = distinct_texts(0.0, 180.0, angles[np.argmax(outside)])
         raise InputError(
             f"torque curve {path}: expected angles from {least} to {largest} degrees,"
             f" received {received}, which is outside"
         )
     if np.any(np.diff(angles) < CLOSEST_DEG):
         row = int(np.argmax(np.diff(angles) < CLOSEST_DEG))
-        first, then = told_apart(angles[row], angles[row + 1])
+        first, then = distinct_texts(angles[row], angles[row + 1])
         raise InputError(f"torque curve {path}: expected rising angles, received {first} then {then} degrees")
     if angles[0] != 0.0 or angles[-1] != 180.0:
-        least, largest, first, last = told_apart(0.0, 180.0, angles[0], angles[-1])
+        least, largest, first, last = distinct_texts(0.0, 180.0, angles[0], angles[-1])
         raise InputError(
             f"torque curve {path}: expected angles from {least} to {largest} degrees,"
             f" received {first} to {last}"
         )
     peak = np.max(np.abs(torque))
     if not (peak == 0.0 or LEAST_PEAK < peak < LARGEST_PEAK):
-        least, largest, received = told_apart(LEAST_PEAK, LARGEST_PEAK, peak)
+        least, largest, received = distinct_texts(LEAST_PEAK, LARGEST_PEAK, peak)
         raise InputError(
             f"torque curve {path}: expected a peak between {least} and {largest} N·m/A, received {received}"
         )

@@ -24,7 +24,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law
+from spheretwin.control.law import NominalModel, Law
 from spheretwin.control.law_components.parameters import LawParameters, PositiveEach, each, named
 
 
@@ -34,7 +34,7 @@ class Lazy(LawParameters):
     law: Literal["lazy"] = named("lazy")
     slackness: PositiveEach = Field(each(2.0), description="torque a unit of error, N·m")
 
-    def build(self, known: Known) -> Law:
+    def build(self, known: NominalModel) -> Law:
         return Law(self.law, step, np.array(self.slackness), np.zeros(0))
 
 

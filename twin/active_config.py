@@ -11,15 +11,15 @@ from pydantic import BaseModel
 
 from spheretwin import assembly
 from spheretwin.control.law import Law
-from spheretwin.control.law_components.parameters import AROUND
+from spheretwin.control.law_components.parameters import COMPENSATORS
 from spheretwin.control.laws import LAWS
 from spheretwin.electronics.data_sheet import drive_sheet, sensor_sheet
 from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
 from spheretwin.electronics.sensor_chain import SensorsSection
 from spheretwin.faults.fault import Fault
 from spheretwin.models import mjcf
-from spheretwin.models.actuator import Actuator, Group
-from spheretwin.models.base.errors import InputError, told_apart
+from spheretwin.models.actuator import Actuator, CoilGroup
+from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import disagreements
@@ -79,7 +79,7 @@ def resolved(
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
             parameters=tuple(law.parameters.tolist()),
-            **scenario.controller.around,
+            **scenario.controller.compensators,
         )
         made = made.model_copy(update={"controller": controller})
     if trajectory:
@@ -97,7 +97,7 @@ def _with(kind: type[Section], section: BaseModel, **values: Any) -> Section:
     return kind.model_construct(**{**dict(section), **values})
 
 
-def _drive(section: DriveSection, group: Group) -> ResolvedDrive:
+def _drive(section: DriveSection, group: CoilGroup) -> ResolvedDrive:
     """Drive whose coils and limit are the model file's unless given, and so its lag without a supply."""
     sheet = {
         "resistance_ohm": group.resistance_ohm,
@@ -176,7 +176,7 @@ def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
     """What a model file says and a scenario says otherwise; what a file does not say is not overridden."""
     found = []
     if option.timestep not in (section.step_s, UNWRITTEN_STEP_s):
-        own, used = told_apart(option.timestep, section.step_s)
+        own, used = distinct_texts(option.timestep, section.step_s)
         found.append(f"the model's own timestep of {own} s is not used: plant.step_s is {used} s")
     integrator = integrator_name(option.integrator)
     if integrator not in (section.integrator, UNWRITTEN_INTEGRATOR):
@@ -212,7 +212,7 @@ def _gravity(section: PlantSection, model: Mjcf) -> float | None:
 def _check_pose(pose: Triple, actuator: Actuator) -> None:
     for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
         if not low <= angle <= high:
-            least, most, received = told_apart(low, high, angle)
+            least, most, received = distinct_texts(low, high, angle)
             raise InputError(
                 f"scenario: expected a first pose with {hinge} from {least} to {most} rad,"
                 f" received {received}"
@@ -270,7 +270,7 @@ class InForce(NamedTuple):
                 f" {self.own_trajectory.name} is followed instead"
             )
         own_law = None if name == "controller.law" else self.own_law
-        of_the_law = name.startswith("controller.") and name.split(".")[1] not in AROUND
+        of_the_law = name.startswith("controller.") and name.split(".")[1] not in COMPENSATORS
         if own_law and of_the_law:
             raise InputError(f"session: expected no field of a shipped law, as {own_law.name} is not one")
         scenario = changed(self.scenario, name, value)

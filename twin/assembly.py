@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.channels import CHANNELS
-from spheretwin.control.applied_torque import belief
-from spheretwin.control.compensators import Around
+from spheretwin.control.applied_torque import applied_torque
+from spheretwin.control.compensators import Compensators
 from spheretwin.control.compensators.feed_forward import NominalRotor, feed_forward
-from spheretwin.control.compensators.prediction import Delayed, prediction
+from spheretwin.control.compensators.prediction import DelayModel, prediction
 from spheretwin.control.compensators.reference_governor import governor
 from spheretwin.control.controller import Controller, Supervision, controller
 from spheretwin.control.estimators.estimator import Estimator, Sampling
-from spheretwin.control.law import Known, Law
+from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.manual_currents import manual
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.faults.schedule import part_names
@@ -65,12 +65,12 @@ def same_known(scenario: ResolvedScenario, other: ResolvedScenario) -> bool:
     return same and first._replace(inertia=second.inertia) == second
 
 
-def _known(scenario: ResolvedScenario) -> Known:
+def _known(scenario: ResolvedScenario) -> NominalModel:
     nominal, period_s = scenario.nominal, scenario.controller.period_s
     delay_s, inertia = nominal.delay_s, np.array(nominal.inertia_kg_m2)
     if scenario.controller.prediction.on:
-        return Known(period_s, 0.0, inertia, ahead_s=delay_s)
-    return Known(period_s, delay_s, inertia)
+        return NominalModel(period_s, 0.0, inertia, ahead_s=delay_s)
+    return NominalModel(period_s, delay_s, inertia)
 
 
 def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
@@ -127,32 +127,34 @@ def controller_of(
 ) -> Controller:
     """Controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
-    asked = law.asks_torque or scenario.detects or scenario.controller.prediction.on
-    believed = belief(asked, groups, scenario.controller.period_s, nominal.delay_s, nominal.time_constant_s)
-    around = _around_of(scenario, magnetics)
+    on = law.asks_torque or scenario.detects or scenario.controller.prediction.on
+    applied = applied_torque(
+        on, groups, scenario.controller.period_s, nominal.delay_s, nominal.time_constant_s
+    )
+    compensators = _compensators_of(scenario, magnetics)
     by_hand = manual(scenario.manual, groups)
     return controller(
         law,
         magnetics,
         nominal.current_limit_A,
         width(law.signals),
-        believed,
-        around,
+        applied,
+        compensators,
         supervision,
         by_hand,
         estimator,
     )
 
 
-def _around_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Around:
+def _compensators_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Compensators:
     """What stands around the law of a resolved scenario."""
     section, nominal, known = scenario.controller, scenario.nominal, _known(scenario)
-    delayed = Delayed(known.period_s, known.ahead_s, nominal.time_constant_s, known.inertia)
+    delay = DelayModel(known.period_s, known.ahead_s, nominal.time_constant_s, known.inertia)
     rotor = NominalRotor(known.inertia, np.array(nominal.coulomb_Nm), np.array(nominal.viscous_Nm_s))
-    return Around(
+    return Compensators(
         section.governor.on or section.prediction.on or section.feed_forward.on,
         governor(section.governor, known.period_s),
-        prediction(section.prediction, delayed, magnetics),
+        prediction(section.prediction, delay, magnetics),
         feed_forward(section.feed_forward, rotor, known.period_s, known.delay_s),
     )
 

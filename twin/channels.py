@@ -122,7 +122,7 @@ FEED_FORWARD_SIGNALS = (
 def write_feed_forward(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
     for i in range(3):
-        row[i] = controller.around.feed.torque_q[i]
+        row[i] = controller.compensators.feed_forward.torque_q[i]
 
 
 def _logs_feed_forward(scenario: Scenario) -> bool:
@@ -163,7 +163,7 @@ REFERENCE_GOVERNOR_SIGNALS = (
 @part_of_its_caller
 def write_reference_governor(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    motion = controller.around.governor.motion
+    motion = controller.compensators.governor.motion
     for part in range(3):
         for i in range(3):
             row[3 * part + i] = motion[part, i]
@@ -207,7 +207,7 @@ PREDICTION_SIGNALS = (
 @part_of_its_caller
 def write_prediction(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    prediction = controller.around.prediction
+    prediction = controller.compensators.prediction
     for i in range(3):
         row[i], row[3 + i] = prediction.pose[i], prediction.rates[i]
 
@@ -225,7 +225,7 @@ WATCHDOG_SIGNALS = (
         "1",
         1,
         "why the watchdog has taken the currents away",
-        states=tuple(reason.told for reason in REASONS.values()),
+        states=tuple(reason.text for reason in REASONS.values()),
     ),
 )
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
-from spheretwin.models.telemetry.csv_series import TIME, LONGEST_s, Series, check_rising, read
+from spheretwin.models.telemetry.csv_series import TIME, LONGEST_s, TimeSeries, check_rising, read
 
 Array = NDArray[np.float64]
 
@@ -189,7 +189,7 @@ class Steps(Term):
     def sample(  # noqa: D102
         self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
-        return Series(np.array(self.times_s), np.array(self.torques_Nm)).held(t, ZERO)
+        return TimeSeries(np.array(self.times_s), np.array(self.torques_Nm)).zero_order_hold(t, ZERO)
 
     @model_validator(mode="after")
     def _usable(self) -> Steps:
@@ -225,14 +225,14 @@ class Table(Term):
         "linear", description="torque between two rows: on a straight line, or the earlier one"
     )
 
-    _torques: Series = PrivateAttr()
+    _torques: TimeSeries = PrivateAttr()
 
     def sample(  # noqa: D102
         self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
         if self.between == "held":
-            return self._torques.held(t, self._torques.values[0])
-        return self._torques.linear(t)
+            return self._torques.zero_order_hold(t, self._torques.values[0])
+        return self._torques.interpolate(t)
 
     @model_validator(mode="after")
     def _read(self) -> Table:

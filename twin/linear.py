@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from spheretwin import assembly
 from spheretwin.active_config import at_start
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.base.errors import InputError, shown, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf_reader import HINGES
@@ -344,7 +344,7 @@ def _held(known: Knowledge, pose: Array) -> Actuation:
         ) from None
     current_A = float(np.abs(coils.holding_current_A).max())
     if current_A > known.current_limit_A:
-        most, received = told_apart(known.current_limit_A, current_A)
+        most, received = distinct_texts(known.current_limit_A, current_A)
         raise InputError(
             f"linear model: expected a pose that the coils hold within {most} A,"
             f" received one that takes {received} A"
@@ -382,7 +382,7 @@ def _pose(given: Any, actuator: Actuator) -> Array:
     # A model whose beta reaches +-90 degrees, where the joint locks, is none of an actuator.
     for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
         if not low <= angle <= high:
-            least, most, received = told_apart(low, high, angle)
+            least, most, received = distinct_texts(low, high, angle)
             raise InputError(
                 f"linear model: expected a pose with {hinge} from {least} to {most} rad, received {received}"
             )

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from spheretwin.channels import write_channels
 from spheretwin.control import allocation as allocations
 from spheretwin.control import law as laws
-from spheretwin.control.controller import LOST, Controller, control_tick
+from spheretwin.control.controller import NO_TORQUE, Controller, control_tick
 from spheretwin.control.estimators import estimator as estimators
 from spheretwin.control.law import Law
-from spheretwin.control.supervision.watchdog import GO, Reason, mend, over, trip
+from spheretwin.control.supervision.watchdog import GO, Reason, count_rundown, replace_invalid, trip
 from spheretwin.electronics.sensors import Sensors, sense
 from spheretwin.electronics.transducers import sense_currents
 from spheretwin.models.base.compiled import (
@@ -114,7 +114,7 @@ def loop(
         copy_rows(inputs.reference[tick], reference)
         # Logged before the law is called: it may write into all that it is handed.
         write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
-        if not (measured or mend(watchdog, measurement)):
+        if not (measured or replace_invalid(watchdog, measurement)):
             return tick, DIVERGED
         if plant.current_sensors.on:
             sense_currents(plant.current_sensors, plant.current, plant.draws)
@@ -122,7 +122,7 @@ def loop(
                 copy_into(detector.measured_A, 0, plant.current_sensors.measured_A, groups)
         command = row[CURRENT_COMMAND:first_current]
         share = control_tick(controller, law, allocate, estimate, t, reference, measurement, command)
-        if share == LOST:
+        if share == NO_TORQUE:
             return tick, DIVERGED
         row[scale] = share
         copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
@@ -136,7 +136,7 @@ def loop(
             return tick, DIVERGED
         if status == FAILSAFE and watchdog.on:
             status = GOING  # the currents run down first
-        if over(watchdog) or (status == LEFT_WORKSPACE and watchdog.halt[0] != GO):
+        if count_rundown(watchdog) or (status == LEFT_WORKSPACE and watchdog.halt[0] != GO):
             status = FAILSAFE
         if status != GOING:
             return tick + 1, status

@@ -368,7 +368,7 @@ def summary(
     return {
         "scenario": scenario.model_dump(mode="json"),
         "status": status,
-        "reason": session.reason.told if session.reason else None,
+        "reason": session.reason.text if session.reason else None,
         "simulated_s": simulated_s,
         **figures,
         "wall_s": wall_s,

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from spheretwin import assembly
 from spheretwin import loop as loops
 from spheretwin import shared_buffers as wiring
-from spheretwin.control import applied_torque as beliefs
-from spheretwin.control import compensators as arounds
 from spheretwin.control.allocation import ALLOCATIONS
+from spheretwin.control.applied_torque import transfer_applied_torque
+from spheretwin.control.compensators import transfer_compensators
 from spheretwin.control.controller import Supervision
 from spheretwin.control.law import Law
-from spheretwin.control.supervision import watchdog
-from spheretwin.control.supervision.watchdog import REASONS, Reason
+from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_watchdog
 from spheretwin.electronics import drive as drivings
 from spheretwin.electronics import sensors as senses
 from spheretwin.loop import is_own, matching
@@ -177,7 +176,7 @@ class Machine:
             ticks, code = self._loop(inputs, *self._parts, log)
         if raised and self.law_error is None:
             # A watchdog lets the currents run down from the tick on.
-            t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.since[0])]
+            t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.ticks_since_trip[0])]
             self.law_error = LawError.of(self.law.name, t_s, raised[0])
         return ticks, code
 
@@ -200,9 +199,9 @@ class Machine:
         _supervised_on(self._controller.supervision, made._controller.supervision)
         if scenario.manual.on or not self._scenario.manual.on:
             self._law_carried_on(made, own_law)
-        beliefs.carried_on(self._controller.belief, made._controller.belief)
+        transfer_applied_torque(self._controller.applied_torque, made._controller.applied_torque)
         if type(scenario.estimator) is type(self._scenario.estimator):
-            made._controller.estimates.memory[:] = self._controller.estimates.memory
+            made._controller.estimator_state.memory[:] = self._controller.estimator_state.memory
         return made
 
     def _law_carried_on(self, made: Machine, own_law: Law | None) -> None:
@@ -213,12 +212,12 @@ class Machine:
             after.parameters[:] = before.parameters
         if made.law is self.law or (same_kind and len(after.memory) == len(before.memory)):
             after.memory[:] = before.memory
-        arounds.carried_on(before.around, after.around)
+        transfer_compensators(before.compensators, after.compensators)
 
     def _law_for(self, scenario: ResolvedScenario) -> Law:
         """Law that a scenario names: the present one where nothing that it is made from has changed."""
         before = self._scenario
-        same = before.controller.alone() == scenario.controller.alone()
+        same = before.controller.without_compensators() == scenario.controller.without_compensators()
         same = same and assembly.same_known(before, scenario)
         return self.law if same else assembly.law_of(scenario)
 
@@ -237,9 +236,9 @@ class Machine:
             "the drive's state": self._plant.driving,
             "the law's parameters": controller.parameters,
             "the law's memory": controller.memory,
-            "the applied torque": controller.belief,
-            "the governor, the prediction and the feed-forward": controller.around,
-            "the estimator's memory": controller.estimates.memory,
+            "the applied torque": controller.applied_torque,
+            "the governor, the prediction and the feed-forward": controller.compensators,
+            "the estimator's memory": controller.estimator_state.memory,
             "the sensors' state": self._sensors,
             "the groups' states": supervision.groups,
             "the detector's state": supervision.detector,
@@ -286,4 +285,4 @@ def _supervised_on(before: Supervision, after: Supervision) -> None:
     transfer_state(before.groups, after.groups)
     if before.detector.on:
         transfer_state(before.detector, after.detector)
-    watchdog.carried_on(before.watchdog, after.watchdog)
+    transfer_watchdog(before.watchdog, after.watchdog)

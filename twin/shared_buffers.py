@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.controller import Supervision
-from spheretwin.control.supervision.enabled_groups import Groups
+from spheretwin.control.supervision.enabled_groups import EnabledGroups
 from spheretwin.control.supervision.enabled_groups import groups as all_in_use
-from spheretwin.control.supervision.fault_detector import Followed, detector
-from spheretwin.control.supervision.watchdog import Watched, watchdog
+from spheretwin.control.supervision.fault_detector import NominalCurrents, detector
+from spheretwin.control.supervision.watchdog import MeasurementLimits, watchdog
 from spheretwin.electronics import drive
 from spheretwin.electronics import sensors as senses
 from spheretwin.electronics.drive import Stages
@@ -91,17 +91,17 @@ def supervision_of(scenario: ResolvedScenario, actuator: Actuator, wires: Wires)
     """
     groups, period_s, nominal = len(actuator.groups), scenario.controller.period_s, scenario.nominal
     noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
-    watched = Watched(period_s, noise_rad, quantum_rad, actuator.hinge_range_rad)
+    limits = MeasurementLimits(period_s, noise_rad, quantum_rad, actuator.hinge_range_rad)
     return Supervision(
         all_in_use(groups),
-        detector(scenario.detector, scenario.detects, groups, _followed(nominal, period_s)),
-        watchdog(scenario.watchdog, watched, wires.fresh, wires.halt),
+        detector(scenario.detector, scenario.detects, groups, _nominal_currents(nominal, period_s)),
+        watchdog(scenario.watchdog, limits, wires.fresh, wires.halt),
     )
 
 
-def _followed(nominal: ResolvedNominal, period_s: float) -> Followed:
+def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurrents:
     """How well healthy currents follow, by the controller's data sheet."""
-    return Followed(
+    return NominalCurrents(
         period_s=period_s,
         current_limit_A=nominal.current_limit_A,
         static_error_A=nominal.offset_error_A + nominal.gain_error * nominal.current_limit_A,
@@ -113,7 +113,9 @@ def _followed(nominal: ResolvedNominal, period_s: float) -> Followed:
     )
 
 
-def faults_of(scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: Groups) -> FaultInjector:
+def faults_of(
+    scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: EnabledGroups
+) -> FaultInjector:
     """Faults of a scenario, and the stages of its loop that they modify."""
     period_s, count = scenario.controller.period_s, len(plant.current)
     plan = FaultPlan(scenario.fault, count, period_s, scenario.seed)

@@ -16,7 +16,7 @@ from spheretwin.faults.fault_injector import FaultLines
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import KeptTelemetry, Table, allocated
+from spheretwin.models.telemetry.table import Table, TelemetryBuffer, allocated
 from spheretwin.provenance import change_text, record_of
 from spheretwin.run import Run
 from spheretwin.scenario import load
@@ -76,7 +76,7 @@ def simulate(
     with Session(scenario, law, trajectory) as session:
         begun = record_of(session)  # what the files hold when the run starts
         if scenario.event:  # which may change the columns
-            kept = KeptTelemetry(session.signals, scenario.ticks)
+            kept = TelemetryBuffer(session.signals, scenario.ticks)
             status = follow(session, scenario.ticks, [kept, *sinks])
             telemetry = kept.table
         else:

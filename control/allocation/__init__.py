@@ -1,4 +1,4 @@
-"""From a torque to group currents within their limit, one way a file, and their names."""
+"""Allocations: group currents within their limit for a torque, one method per file, and the list of them."""
 
 from numba import types
 
@@ -10,7 +10,7 @@ _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]
 
 SIGNATURE = types.float64(_matrix, _vector, types.float64, _vector, _matrix)
-"""G (3, n), torque_S (3,), current limit, current (n,), scratch (5, n); the share given."""
+"""G (3, n), torque_S (3,), current limit, current (n,), scratch (5, n); returns the share given."""
 
 
 def least_norm(G: Array, torque_S: Array, limit: float, current: Array, scratch: Array) -> float:
@@ -19,7 +19,7 @@ def least_norm(G: Array, torque_S: Array, limit: float, current: Array, scratch:
 
 
 def bounded(G: Array, torque_S: Array, limit: float, current: Array, scratch: Array) -> float:
-    """All that the limit allows."""
+    """Smallest currents within the limit for the torque, or for the largest share of it."""
     return allocate_bounded(G, torque_S, limit, current, scratch)
 
 

@@ -1,26 +1,27 @@
-"""From a torque on the rotor to currents within their limit, using all that the limit allows.
+"""Bounded allocation: currents for a torque on the rotor that use the whole range of the limit.
 
 `control.allocation.least_norm` scales the least-norm currents as a whole: the first group at its limit
-holds back all others. Here the others go on. Of all currents within the limit that give the torque, the
-smallest are found; where none give it, those that give the most torque in its direction. That is the
-direct allocation of Durham (1993, doi:10.2514/3.21072), which Bodson (2002, doi:10.2514/2.4937) solves as a
+limits all others. Here the other groups continue. Of all currents within the limit that give the torque, the
+smallest are computed; if there are none, those with the most torque in its direction. That is the direct
+allocation of Durham (1993, doi:10.2514/3.21072), which Bodson (2002, doi:10.2514/2.4937) solves as a
 linear programme.
 
-The way taken here is a path. In units of the limit, the smallest z with ``G z = v`` and ``|z_j| <= 1`` are
-``z = clip(G^T y)`` with three multipliers y. While v grows from zero along the wanted torque, y moves on
+The method follows a path. In units of the limit, the smallest z with ``G z = v`` and ``|z_j| <= 1`` are
+``z = clip(G^T y)`` with three multipliers y. While v grows from zero along the desired torque, y moves on
 straight lines, ``F F^T dy = dv`` with F the columns of the free groups, those below their limits. A line ends
-where a group meets its limit or comes back from it. Where the free columns no longer span v, torque waits and
-y moves along n, the part of v normal to all of them, until a group comes back. If none ever does, every group
-at its limit has the sign of ``g_j.n``: then ``n.G z`` is the sum of all ``|g_j.n|``, which no currents
+where a group reaches its limit or leaves it. Where the free columns no longer span v, torque waits and
+y moves along n, the part of v normal to all of them, until a group leaves its limit. If none does, every
+group at its limit has the sign of ``g_j.n``: then ``n.G z`` is the sum of all ``|g_j.n|``, which no currents
 exceed, and the torque is the largest. It is the parametric active-set method for quadratic programmes (Best
-1996, in Applied Mathematics and Parallel Computing, Physica-Verlag, 57-76), with three equations. Its answer
-is checked: among columns that are almost in one plane it may fail, and then a simplex method steps in.
+1996, in Applied Mathematics and Parallel Computing, Physica-Verlag, 57-76), with three equations. Its result
+is checked: for columns that are almost in one plane it may fail, and then a simplex method is used.
 
 A simplex method alone would reach the same torque, but along a path the currents change continuously with the
-torque, also where it passes out of reach. Continuous is not slow. Close to the largest torque, groups with
-little torque an ampere go from limit to limit within a thousandth of the torque. Out of reach they jump as
-the rotor turns, where their columns pass through the plane of the free ones: there the largest torque has
-several answers. A torque some hundredths short of the largest has one answer, and calm currents.
+torque, also where it becomes infeasible. Continuous does not mean slow. Close to the largest torque, groups
+with little torque an ampere go from limit to limit within a thousandth of the torque. For an infeasible
+torque they jump as the rotor turns, where their columns pass through the plane of the free ones: there the
+largest torque has several solutions. A torque some hundredths below the largest has one solution and smooth
+currents.
 """
 
 from math import copysign, inf, isfinite
@@ -32,22 +33,22 @@ from spheretwin.control.allocation.simplex import (
     TIE,
     Array,
     Vector,
-    climb,
+    add_multiple,
     column,
     dot,
+    increase_share,
     length,
-    off,
-    plus,
+    orthogonal_part,
     unit,
 )
 from spheretwin.models.base.compiled import compiled
 
-# Demands (currents wanted of each group, in limits; past ±1 where it is held at its limit), their rates along
-# the line, the limit that holds each group (-1, 1, or 0 where it is free), lengths of the columns, and steps.
+# Demands (desired currents of each group, in limits; beyond ±1 if it is at its limit), their rates along the
+# line, the active limit of each group (-1, 1, or 0 if it is free), lengths of the columns, and steps.
 SCRATCH_ROWS = 5
 
 # A step takes one group to its limit or back. Poses of the actuator took at most 1.4 steps a group, symmetric
-# and nearly singular matrices 1.9, but for one in thousands: there this ends the path's going in circles.
+# and nearly singular matrices 1.9, except one in thousands: there this bound ends a cycle of the path.
 STEPS_PER_GROUP = 2
 
 # Shares of a vector's length that count as none: as a column's height over the plane of others, and as
@@ -55,13 +56,13 @@ STEPS_PER_GROUP = 2
 FLAT = 1e-10
 EXACT = 1e-11
 
-# Where the pivots of F F^T, as shares of its trace, are above this, it may be solved as it stands.
+# If the pivots of F F^T, as shares of its trace, are above this, it may be solved directly.
 SOUND = 1e-6
 
 
 @compiled
 def allocate_bounded(G: Array, torque_S: Array, limit: float, current: Array, scratch: Array) -> float:
-    """Smallest currents within the limit that give the torque, or else the most torque in its direction.
+    """Compute the smallest currents within the limit for the torque, or else for the largest share of it.
 
     Never less torque than `control.allocation.least_norm.allocate` gives, and the same currents where they
     respect the limit.
@@ -71,19 +72,19 @@ def allocate_bounded(G: Array, torque_S: Array, limit: float, current: Array, sc
     G : (3, n) array, N·m/A
         Torque matrix at the present pose.
     torque_S : (3,) array, N·m
-        Torque wanted on the rotor, stator frame.
+        Desired torque on the rotor, stator frame.
     limit : float, A
         Largest magnitude of any current.
     current : (n,) array, A
         Result.
     scratch : (5, n) array
-        Working space, `SCRATCH_ROWS` rows; what it holds does not matter.
+        Working space, `SCRATCH_ROWS` rows; its content does not matter.
 
     Returns
     -------
     float
-        Share of the wanted torque that the currents give: 1, or less where no currents within the limit give
-        it whole; 0 where the torque matrix has lost a direction, or an argument is no number.
+        Share of the desired torque that the currents give: 1, or less if no currents within the limit give
+        the whole torque; 0 if the torque matrix has lost rank, or an argument is not finite.
     """
     scale = allocate(G, torque_S, limit, current)
     for j in range(current.shape[0]):
@@ -98,7 +99,7 @@ def allocate_bounded(G: Array, torque_S: Array, limit: float, current: Array, sc
     start = (torque_S[0] / largest, torque_S[1] / largest, torque_S[2] / largest)  # what `allocate` gives
     end = 1.0 / scale
     share = reach(G, start, end, scratch)
-    if not share >= 1.0:  # by rounding, or for want of steps
+    if not share >= 1.0:  # by rounding, or because of the bound on steps
         return scale
     for j in range(current.shape[0]):
         current[j] = clipped(scratch[0, j]) * limit
@@ -107,7 +108,7 @@ def allocate_bounded(G: Array, torque_S: Array, limit: float, current: Array, sc
 
 @compiled
 def reach(G: Array, torque: Vector, end: float, scratch: Array) -> float:
-    """Demands within ±1, the first row of `scratch`, for `end` times a torque or for the most there is of it.
+    """Compute demands within ±1 (first row of `scratch`) for `end` times a torque or for the largest share.
 
     Returns
     -------
@@ -123,7 +124,7 @@ def reach(G: Array, torque: Vector, end: float, scratch: Array) -> float:
     if not gives_share:
         demand[:] = 0.0
         share = 0.0
-    share, _ = climb(G, torque, end, share, most_steps, demand)
+    share, _ = increase_share(G, torque, end, share, most_steps, demand)
     return share
 
 
@@ -131,18 +132,18 @@ def reach(G: Array, torque: Vector, end: float, scratch: Array) -> float:
 def follow_path(
     G: Array, torque: Vector, end: float, most_steps: int, scratch: Array
 ) -> tuple[float, Vector, int]:
-    """Smallest demands within ±1 for a torque that grows from zero to `end` times the given one.
+    """Compute the smallest demands within ±1 for a torque that grows from zero to `end` times the given one.
 
     Parameters
     ----------
     G : (3, n) array
         Torque matrix, of full rank.
     torque : tuple of three floats
-        Torque in units of G: what the currents give, divided by their limit.
+        Torque in units of G: the torque of the currents, divided by their limit.
     end : float
         Multiple of `torque` at which to stop.
     most_steps : int
-        Bound on the steps. Wherever the path is left, the demands give the share returned.
+        Bound on the steps. Wherever the path ends, the demands give the share returned.
     scratch : (5, n) array
         The first row is the result: demands in units of the limit.
 
@@ -170,7 +171,7 @@ def follow_path(
         elif grows:
             share += stride
         if share < end:
-            # Of groups that meet their limits at once the first is taken, always the same: no cycles (Bland).
+            # Of groups that reach their limits at once the first is taken, which avoids cycles (Bland).
             for j in range(groups):
                 if step[j] < inf and (step[j] - nearest) * abs(rate[j]) <= TIE:
                     demand[j] = side[j] if side[j] != 0.0 else copysign(1.0, rate[j])
@@ -182,7 +183,7 @@ def follow_path(
 
 @compiled
 def start_path(G: Array, scratch: Array) -> float:
-    """Set out from zero demands, all groups free; return the length of the longest column."""
+    """Start from zero demands, all groups free; return the length of the longest column."""
     demand, side, size = scratch[0], scratch[2], scratch[3]
     longest = 0.0
     for j in range(G.shape[1]):
@@ -196,8 +197,8 @@ def start_path(G: Array, scratch: Array) -> float:
 def nearest_event(G: Array, y: Vector, grows: bool, scratch: Array) -> float:
     """Fill the demands' rates ``g_j.y`` and the steps to each group's next event; return the least step.
 
-    A free group meets the limit it moves towards; a held one comes back if it moves inwards. Rates that
-    rounding alone may have made are none: they would free a group and hold it again without end.
+    A free group reaches the limit it moves towards; a group at its limit leaves it if it moves inwards. Rates
+    of the size of rounding count as zero: they would free a group and limit it again without end.
     """
     demand, rate, side, size, step = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     G_x, G_y, G_z = G[0], G[1], G[2]
@@ -218,12 +219,12 @@ def nearest_event(G: Array, y: Vector, grows: bool, scratch: Array) -> float:
 
 @compiled
 def line_direction(G: Array, side: Array, torque: Vector, small: float) -> tuple[Vector, bool]:
-    """Direction of the multipliers' next line, and whether the torque grows along it."""
+    """Return the direction of the multipliers' next line, and whether the torque grows along it."""
     y, sound = multipliers(G, side, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), torque)
     if sound:
         return y, True
     e1, e2, e3 = free_frame(G, side, small)
-    normal = off(off(torque, e1, e2), e3, NONE)
+    normal = orthogonal_part(orthogonal_part(torque, e1, e2), e3, NONE)
     if length(normal) > FLAT * length(torque):
         return normal, False
     y, _ = multipliers(G, side, e1, e2, e3, torque)
@@ -269,12 +270,12 @@ def multipliers(
     z = (z - l31 * x - l32 * y) / pivot_3
     y = y / pivot_2 - l32 * z
     x = x / pivot_1 - l21 * y - l31 * z
-    return plus(plus(plus(NONE, x, e1), y, e2), z, e3), min(a, d, f) > least
+    return add_multiple(add_multiple(add_multiple(NONE, x, e1), y, e2), z, e3), min(a, d, f) > least
 
 
 @compiled
 def free_frame(G: Array, side: Array, small: float) -> tuple[Vector, Vector, Vector]:
-    """Orthonormal axes of the free columns' span, the widest extent first; zeros where there are fewer."""
+    """Return orthonormal axes of the free columns' span, widest extent first; zeros for missing axes."""
     e1 = farthest(G, side, NONE, NONE, small)
     e2 = farthest(G, side, e1, NONE, small)
     e3 = farthest(G, side, e1, e2, small)
@@ -283,22 +284,22 @@ def free_frame(G: Array, side: Array, small: float) -> tuple[Vector, Vector, Vec
 
 @compiled
 def farthest(G: Array, side: Array, e1: Vector, e2: Vector, small: float) -> Vector:
-    """Unit vector to the free column farthest off two axes; zeros where none is farther than `small`."""
+    """Return the unit vector to the free column farthest from two axes; zeros if none is beyond `small`."""
     best, square = NONE, small * small
     for j in range(G.shape[1]):
         if side[j] == 0.0:
-            rest = off(column(G, j), e1, e2)
+            rest = orthogonal_part(column(G, j), e1, e2)
             if dot(rest, rest) > square:
                 best, square = rest, dot(rest, rest)
-    # A second time: what rounding left along the axes may be much of a short vector.
-    return unit(off(unit(best), e1, e2))
+    # A second time: the rounding error along the axes may be large relative to a short vector.
+    return unit(orthogonal_part(unit(best), e1, e2))
 
 
 @compiled
 def remove_residual(
     G: Array, torque: Vector, share: float, end: float, small: float, scratch: Array
 ) -> tuple[float, Vector]:
-    """Clip the demands; correct the free ones and the share by what rounding along the path has left.
+    """Clip the demands; correct the free ones and the share for rounding along the path.
 
     Returns
     -------
@@ -310,7 +311,7 @@ def remove_residual(
         demand[j] = clipped(demand[j])
     rest = residual(G, demand, torque, share)
     e1, e2, e3 = free_frame(G, side, small)
-    normal = off(off(torque, e1, e2), e3, NONE)
+    normal = orthogonal_part(orthogonal_part(torque, e1, e2), e3, NONE)
     if share < end and dot(normal, normal) > SOUND * dot(torque, torque):
         # The free groups cannot change the torque along the normal; the share can.
         share -= dot(normal, rest) / dot(normal, torque)
@@ -324,16 +325,16 @@ def remove_residual(
 
 @compiled
 def residual(G: Array, demand: Array, torque: Vector, share: float) -> Vector:
-    """What the demands leave of the torque."""
-    rest = plus(NONE, share, torque)
+    """Return the part of the torque that the demands do not give."""
+    rest = add_multiple(NONE, share, torque)
     for j in range(G.shape[1]):
-        rest = plus(rest, -demand[j], column(G, j))
+        rest = add_multiple(rest, -demand[j], column(G, j))
     return rest
 
 
 @compiled
 def is_largest(G: Array, demand: Array, torque: Vector, share: float, normal: Vector) -> bool:
-    """Whether the normal proves that no demands within ±1 give a larger share."""
+    """Return True if the normal proves that no demands within ±1 give a larger share."""
     unused = 0.0
     for j in range(G.shape[1]):
         along = dot(column(G, j), normal)
@@ -344,5 +345,5 @@ def is_largest(G: Array, demand: Array, torque: Vector, share: float, normal: Ve
 
 @compiled
 def clipped(demand: float) -> float:
-    """What a group gives of a demand, in units of the limit."""
+    """Clip a demand to ±1, in units of the limit."""
     return min(max(demand, -1.0), 1.0)

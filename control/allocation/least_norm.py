@@ -1,4 +1,4 @@
-"""From a torque on the rotor to group currents within their limit (16)."""
+"""Least-norm allocation of a torque on the rotor to group currents within their limit (16)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,16 @@ SINGULAR = 1e-12
 def allocate(
     G: NDArray[np.float64], torque_S: NDArray[np.float64], limit: float, current: NDArray[np.float64]
 ) -> float:
-    """Least-norm currents ``I = G^T (G G^T)^-1 torque`` (16), scaled as a whole to respect the limit.
+    """Compute least-norm currents ``I = G^T (G G^T)^-1 torque`` (16), scaled as a whole to respect the limit.
 
-    Scaling every current alike keeps the direction of the torque.
+    Equal scaling of all currents keeps the direction of the torque.
 
     Parameters
     ----------
     G : (3, n) array, N·m/A
         Torque matrix at the present pose.
     torque_S : (3,) array, N·m
-        Torque wanted on the rotor, stator frame.
+        Desired torque on the rotor, stator frame.
     limit : float, A
         Largest magnitude of any current.
     current : (n,) array, A
@@ -32,8 +32,8 @@ def allocate(
     Returns
     -------
     float
-        Share of the wanted torque that the currents give: 1, or less where the limit acted;
-        0 where the torque matrix has lost a direction.
+        Share of the desired torque that the currents give: 1, or less if the limit is active;
+        0 if the torque matrix has lost rank.
     """
     groups = G.shape[1]
     a = b = c = d = e = f = 0.0

@@ -1,4 +1,4 @@
-"""The most torque in a direction that bounded currents give, by a simplex method with bounds."""
+"""Simplex method with bounds: the largest torque in a direction that bounded currents give."""
 
 from math import copysign, inf, sqrt
 
@@ -15,61 +15,61 @@ NONE: Vector = (0.0, 0.0, 0.0)
 
 @compiled
 def column(G: Array, j: int) -> Vector:
-    """Torque of one ampere in a group."""
+    """Return the torque of one ampere in a group."""
     return G[0, j], G[1, j], G[2, j]
 
 
 @compiled
-def off(a: Vector, e1: Vector, e2: Vector) -> Vector:
-    """What is left of a vector without its parts along two orthonormal axes (or zeros)."""
-    return plus(plus(a, -dot(a, e1), e1), -dot(a, e2), e2)
+def orthogonal_part(a: Vector, e1: Vector, e2: Vector) -> Vector:
+    """Return a vector without its components along two orthonormal axes (or zeros)."""
+    return add_multiple(add_multiple(a, -dot(a, e1), e1), -dot(a, e2), e2)
 
 
 @compiled
 def unit(a: Vector) -> Vector:
-    """Vector of length 1, or of zeros as it was."""
+    """Return the vector scaled to length 1; a zero vector stays zero."""
     square = dot(a, a)
-    return plus(NONE, 1.0 / sqrt(square) if square > 0.0 else 0.0, a)
+    return add_multiple(NONE, 1.0 / sqrt(square) if square > 0.0 else 0.0, a)
 
 
 @compiled
-def plus(a: Vector, factor: float, b: Vector) -> Vector:
-    """Sum of a vector and a multiple of another."""
+def add_multiple(a: Vector, factor: float, b: Vector) -> Vector:
+    """Return the sum of a vector and a multiple of another."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @compiled
 def length(a: Vector) -> float:
-    """Euclidean length."""
+    """Return the Euclidean length."""
     return sqrt(dot(a, a))
 
 
 @compiled
 def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
 def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
+    """Return the vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 # Share of the terms' size below which a rate or a gain is rounding.
 NOISE = 1e-12
 
-# Groups within this of their limits (in limits) are taken to meet them at once.
+# Groups within this distance of their limits (in limits) count as being at them.
 TIE = 1e-12
 
 
 @compiled
-def climb(
+def increase_share(
     G: Array, torque: Vector, end: float, share: float, most_steps: int, demand: Array
 ) -> tuple[float, int]:
-    """Raise the share, by a simplex method with bounds, to `end` or to the largest there is.
+    """Increase the share, by a simplex method with bounds, to `end` or to its maximum.
 
-    Two groups and the share are basic: they balance what one other group at a time is changed by.
+    Two groups and the share are basic: they balance the change of one other group at a time.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def climb(
     torque : tuple of three floats
     end : float
     share : float
-        What the demands give of the torque at the start.
+        Share of the torque that the demands give at the start.
     most_steps : int
     demand : (n,) array
         Within ±1, changed in place.
@@ -97,13 +97,13 @@ def climb(
         if c < 0:
             break
         rate_c, growth = copysign(1.0, growth), abs(growth)
-        rest = plus(plus(NONE, growth, torque), -rate_c, column(G, c))  # for a and b to give
+        rest = add_multiple(add_multiple(NONE, growth, torque), -rate_c, column(G, c))  # a and b balance it
         rate_a = dot(cross(rest, g_b), plane) / dot(plane, plane)
         rate_b = dot(cross(g_a, rest), plane) / dot(plane, plane)
         noise = NOISE * (growth * length(torque) + length(column(G, c)))
-        room_a = room(demand[a], rate_a, noise / length(g_a))
-        room_b = room(demand[b], rate_b, noise / length(g_b))
-        room_c = room(demand[c], rate_c, 0.0)
+        room_a = steps_to_limit(demand[a], rate_a, noise / length(g_a))
+        room_b = steps_to_limit(demand[b], rate_b, noise / length(g_b))
+        room_c = steps_to_limit(demand[c], rate_c, 0.0)
         remaining = (end - share) / growth
         stride = min(room_a, room_b, room_c, remaining)
         demand[a] += stride * rate_a
@@ -114,7 +114,9 @@ def climb(
         b_meets = (room_b - stride) * abs(rate_b) <= TIE
         if stride == room_c:
             demand[c] = rate_c
-        elif a_meets and (abs(rate_a) >= abs(rate_b) or not b_meets):  # the faster: the next basis is sounder
+        elif a_meets and (
+            abs(rate_a) >= abs(rate_b) or not b_meets
+        ):  # the faster: the next basis is better conditioned
             demand[a] = copysign(1.0, rate_a)
             a = c
         elif b_meets:
@@ -125,7 +127,7 @@ def climb(
 
 @compiled
 def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
-    """Two groups whose columns and the torque are far from lying in one plane."""
+    """Return two groups whose columns and the torque are far from coplanar."""
     a = b = 0
     for j in range(G.shape[1]):
         if length(cross(column(G, j), torque)) > length(cross(column(G, a), torque)):
@@ -139,19 +141,19 @@ def first_basis(G: Array, torque: Vector) -> tuple[int, int]:
 
 @compiled
 def entering(G: Array, demand: Array, plane: Vector, torque: Vector, a: int, b: int) -> tuple[int, float]:
-    """Group with the most to add to the share (-1 if none has), and the share's growth with its demand."""
-    best, found, found_growth, total = 0.0, -1, 0.0, 0.0
+    """Return the group that can add most to the share (-1: none), and the share's growth with its demand."""
+    best, best_group, best_growth, total = 0.0, -1, 0.0, 0.0
     for j in range(G.shape[1]):
         growth = dot(column(G, j), plane) / dot(torque, plane)
         gain = abs(growth) - growth * demand[j]
         total += abs(growth)
         if gain > best and j != a and j != b:
-            best, found, found_growth = gain, j, growth
-    return (found if best > NOISE * total else -1), found_growth
+            best, best_group, best_growth = gain, j, growth
+    return (best_group if best > NOISE * total else -1), best_growth
 
 
 @compiled
-def room(demand: float, rate: float, noise: float) -> float:
-    """Steps of a rate until a demand meets its limit; at a rate of rounding's size it never does."""
-    left = 1.0 - demand if rate > 0.0 else 1.0 + demand
-    return max(left, 0.0) / abs(rate) if abs(rate) > noise else inf
+def steps_to_limit(demand: float, rate: float, noise: float) -> float:
+    """Return the steps of a rate until a demand reaches its limit; infinity for a rate near rounding."""
+    distance = 1.0 - demand if rate > 0.0 else 1.0 + demand
+    return max(distance, 0.0) / abs(rate) if abs(rate) > noise else inf

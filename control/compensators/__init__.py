@@ -1,4 +1,4 @@
-"""What stands around any law, shipped or its user's, each part off unless asked for."""
+"""Compensators around any law: reference governor, delay prediction, feed-forward; each is off by default."""
 
 from __future__ import annotations
 
@@ -7,63 +7,70 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.applied_torque import Belief
-from spheretwin.control.compensators import reference_governor
-from spheretwin.control.compensators.feed_forward import FeedForward, reckon, take_off
+from spheretwin.control.applied_torque import AppliedTorque
+from spheretwin.control.compensators.feed_forward import (
+    FeedForward,
+    compute_feed_forward,
+    subtract_feed_forward,
+)
 from spheretwin.control.compensators.prediction import Prediction, advance, predict
-from spheretwin.control.compensators.reference_governor import Governor, govern
+from spheretwin.control.compensators.reference_governor import Governor, govern, transfer_governor
 from spheretwin.models.base.compiled import allocation_free, transfer_state
 from spheretwin.models.magnetics import TorqueModel
 
 Array = NDArray[np.float64]
 
 
-class Around(NamedTuple):
-    """What a control tick does before and after it calls the law."""
+class Compensators(NamedTuple):
+    """Compensators of a run, for compiled code."""
 
     on: bool
-    """Whether there is any of it."""
+    """True if any compensator is on."""
     governor: Governor
     prediction: Prediction
-    feed: FeedForward
+    feed_forward: FeedForward
 
 
 @allocation_free
-def prepare(
-    around: Around, belief: Belief, magnetics: TorqueModel, measurement: Array, reference: Array
+def apply_compensators(
+    compensators: Compensators,
+    applied_torque: AppliedTorque,
+    magnetics: TorqueModel,
+    measurement: Array,
+    reference: Array,
 ) -> bool:
-    """Make of measurement and reference what the law is to be handed.
+    """Apply the compensators to the measurement and the reference that the law receives.
 
     Parameters
     ----------
-    around : Around
+    compensators : Compensators
         Changed in place.
-    belief : Belief
-        Of the currents, at the time of the measurement.
+    applied_torque : AppliedTorque
+        Estimate at the time of the measurement.
     magnetics : TorqueModel
         Nominal.
     measurement, reference : (3, 3) arrays
-        The result too; of the measurement (6, 3) where the delay is predicted over.
+        Changed in place; the measurement is (6, 3) if the prediction is on.
 
     Returns
     -------
     bool
-        Whether these are numbers.
+        True if both are finite.
     """
-    if around.governor.on and not govern(around.governor, measurement, reference):
+    if compensators.governor.on and not govern(compensators.governor, measurement, reference):
         return False
-    if around.prediction.on:
-        if not predict(around.prediction, belief, magnetics, measurement):
+    if compensators.prediction.on:
+        if not predict(compensators.prediction, applied_torque, magnetics, measurement):
             return False
-        advance(around.prediction, reference)
-    if around.feed.on:
-        take_off(around.feed, measurement[2])
-        reckon(around.feed, reference)
+        advance(compensators.prediction, reference)
+    if compensators.feed_forward.on:
+        subtract_feed_forward(compensators.feed_forward, measurement[2])
+        compute_feed_forward(compensators.feed_forward, reference)
     return True
 
 
-def carried_on(before: Around, after: Around) -> None:
-    """Go on with what each part is in the midst of, under other figures."""
-    reference_governor.carried_on(before.governor, after.governor)
+def transfer_compensators(before: Compensators, after: Compensators) -> None:
+    """Copy the state of each compensator into compensators with other parameters."""
+    transfer_governor(before.governor, after.governor)
     transfer_state(before.prediction, after.prediction)
-    transfer_state(before.feed, after.feed)
+    transfer_state(before.feed_forward, after.feed_forward)

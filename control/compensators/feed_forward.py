@@ -1,17 +1,17 @@
-r"""Torque that a law need not find out by its error: friction and inertia of the nominal model, fed forward.
+r"""Feed-forward of friction and inertia torques of the nominal model.
 
-Both are taken along the reference that the law is handed, governed where there is a governor:
+Both torques are computed along the reference that the law receives (after the governor, if there is one):
 
-- *friction*: a share of ``(viscous + coulomb / √(q̇² + smoothing²)) q̇``, as the plant has it. Less than all of
-  it cannot overcompensate where the nominal friction is too high by some percent.
-- *inertia*: a share of ``M̂(q) q̈ + Ĉ(q, q̇) q̇``, for a law that makes no use of the acceleration itself. It
-  makes the governor's bounded acceleration a pulse of torque.
+- *friction*: a share of ``(viscous + coulomb / √(q̇² + smoothing²)) q̇``, as in the plant. A share below 1
+  avoids overcompensation if the nominal friction is too high by some percent.
+- *inertia*: a share of ``M̂(q) q̈ + Ĉ(q, q̇) q̇``, for a law that does not use the acceleration itself. It
+  turns the governor's bounded acceleration into a pulse of torque.
 
-*What a law is told of it.* Nothing: what was fed forward is taken off the torque that the controller believes
-its currents gave, as old as the known delay makes it. A law's account of its own torque thus closes, be it
-for back-calculation or for an observer: what an observer of the load then finds is the friction that is left.
+*Applied torque.* The law does not see the feed-forward: the torque fed forward, delayed by the nominal delay,
+is subtracted from the applied torque. The law's balance of its own torque stays closed, for back-calculation
+and for an observer. An observer of the load then estimates the remaining friction.
 
-*What it is worth.* The study `compensators` measures it on the prototype's tilt, with and without a governor.
+*Benefit.* The study `compensators` measures it on the prototype's tilt, with and without a governor.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.applied_torque import whole_periods
+from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries, triple, turns
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 class FeedForwardSection(BaseModel):
-    """Nominal torques that are fed forward; off at shares of 0."""
+    """Feed-forward of nominal torques; off if all shares are 0."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -50,7 +50,7 @@ class FeedForwardSection(BaseModel):
 
     @property
     def on(self) -> bool:
-        """Whether anything is fed forward."""
+        """True if any share is above 0."""
         return any(self.friction) or any(self.inertia)
 
 
@@ -63,17 +63,17 @@ class FeedForward(NamedTuple):
     coulomb_Nm: Array  # (3,) share of the nominal
     viscous_Nm_s: Array  # (3,) likewise
     smoothing_rad_s: float
-    late: float  # share of a period in which the older torque still acts
-    given: Array  # (n + 2, 3) N·m, what was fed forward, newest first
+    fraction: float  # share of a period in which the older torque acts
+    history: Array  # (n + 2, 3) N·m, torques fed forward, newest first
     torque_q: Array  # (3,) N·m, in this tick
 
     def state_arrays(self) -> tuple[Array, ...]:
-        """Arrays that it goes on from."""
-        return self.given, self.torque_q
+        """Return the arrays that hold the state."""
+        return self.history, self.torque_q
 
 
 class NominalRotor(NamedTuple):
-    """What is fed forward is reckoned with."""
+    """Nominal inertia and friction of the rotor."""
 
     inertia: Array  # (3,) kg·m²
     coulomb_Nm: Array  # (3,)
@@ -83,16 +83,16 @@ class NominalRotor(NamedTuple):
 def feed_forward(
     section: FeedForwardSection, rotor: NominalRotor, period_s: float, delay_s: float
 ) -> FeedForward:
-    """Feed-forward before the first tick.
+    """Return the feed-forward before the first tick.
 
     Parameters
     ----------
     section : FeedForwardSection
     rotor : NominalRotor
     period_s, delay_s : float, s
-        Control period, and the delay that the law is told of.
+        Control period, and the delay that the law receives.
     """
-    whole, late = whole_periods(delay_s, period_s)
+    whole, fraction = split_delay(delay_s, period_s)
     return FeedForward(
         on=section.on,
         share=np.array(section.inertia),
@@ -100,23 +100,25 @@ def feed_forward(
         coulomb_Nm=np.array(section.friction) * rotor.coulomb_Nm,
         viscous_Nm_s=np.array(section.friction) * rotor.viscous_Nm_s,
         smoothing_rad_s=section.smoothing_rad_s,
-        late=late,
-        given=np.zeros((whole + 2, 3)),
+        fraction=fraction,
+        history=np.zeros((whole + 2, 3)),
         torque_q=np.zeros(3),
     )
 
 
 @allocation_free
-def take_off(feed: FeedForward, torque_q: Array) -> None:
-    """Take what was fed forward off the torque (N·m) that is believed of the last period."""
-    last = feed.given.shape[0] - 1
+def subtract_feed_forward(feed: FeedForward, torque_q: Array) -> None:
+    """Subtract the torque fed forward from the applied torque (N·m) of the last period."""
+    last = feed.history.shape[0] - 1
     for i in range(3):
-        torque_q[i] -= feed.late * feed.given[last, i] + (1.0 - feed.late) * feed.given[last - 1, i]
+        torque_q[i] -= (
+            feed.fraction * feed.history[last, i] + (1.0 - feed.fraction) * feed.history[last - 1, i]
+        )
 
 
 @allocation_free
-def reckon(feed: FeedForward, reference: Array) -> None:
-    """Reckon the torque of this tick.
+def compute_feed_forward(feed: FeedForward, reference: Array) -> None:
+    """Compute the feed-forward torque of this tick and store it in the history.
 
     Parameters
     ----------
@@ -126,8 +128,8 @@ def reckon(feed: FeedForward, reference: Array) -> None:
         Angle, rate and acceleration as rows.
     """
     q, v, a = triple(reference[0]), triple(reference[1]), triple(reference[2])
-    at, moments = turns(q), triple(feed.inertia)
-    M, C = inertia_entries(at, moments), coriolis_rows(at, v, moments)
+    pose_turns, moments = turns(q), triple(feed.inertia)
+    M, C = inertia_entries(pose_turns, moments), coriolis_rows(pose_turns, v, moments)
     inertial = (
         M.alpha * a[0] + M.alpha_beta * a[1] + M.alpha_gamma * a[2],
         M.alpha_beta * a[0] + M.beta * a[1],
@@ -135,8 +137,8 @@ def reckon(feed: FeedForward, reference: Array) -> None:
     )
     for i in range(3):
         k = feed.viscous_Nm_s[i] + feed.coulomb_Nm[i] / sqrt(v[i] ** 2 + feed.smoothing_rad_s**2)
-        turning = C[i][0] * v[0] + C[i][1] * v[1] + C[i][2] * v[2]
-        feed.torque_q[i] = k * v[i] + feed.share[i] * (inertial[i] + turning)
-        for row in range(feed.given.shape[0] - 1, 0, -1):
-            feed.given[row, i] = feed.given[row - 1, i]
-        feed.given[0, i] = feed.torque_q[i]
+        coriolis = C[i][0] * v[0] + C[i][1] * v[1] + C[i][2] * v[2]
+        feed.torque_q[i] = k * v[i] + feed.share[i] * (inertial[i] + coriolis)
+        for row in range(feed.history.shape[0] - 1, 0, -1):
+            feed.history[row, i] = feed.history[row - 1, i]
+        feed.history[0, i] = feed.torque_q[i]

@@ -1,24 +1,25 @@
-r"""Where the rotor will be when the command of this tick begins to act: the delay taken out of the loop.
+r"""Delay compensation: predicts the rotor's motion at the time at which the command of this tick acts.
 
-From a measurement to the currents that answer it a known delay passes. Over it the nominal equations of
-motion move the measured angles and rates on, under the torque of the commands on their way, which the belief
-knows. Load and friction are left out: over 1 ms the prototype's friction changes a rate by 1 mrad/s.
+The currents respond to a measurement after the nominal delay. The nominal equations of motion advance the
+measured angles and rates over that delay, under the torque of the pending commands in `AppliedTorque`. Load
+and friction are left out: over 1 ms the prototype's friction changes a rate by 1 mrad/s.
 
-*What a law is handed.* Rows 0 to 2 of its measurement (angle, rate, torque over the last period) are those of
-the instant at which its command begins to act, and so are the rows of its reference, moved on by their own
-rate and acceleration. It is told of no delay (`Known.delay_s` is 0): to a law that knows nothing of all this,
-also one with an observer of its own, the delay is gone, and angle and torque belong together. One that would
-rather correct its observer by what was measured, and move that on itself, finds it in rows 3 to 5, in the
-same order, with the torque that belongs to it, and in `Known.ahead_s` how far rows 0 to 2 are ahead of them.
+*Inputs of the law.* Rows 0 to 2 of the measurement (angle, rate, torque over the last period) are those of
+the time at which the command begins to act. The rows of the reference are advanced to the same time by their
+own rate and acceleration. `NominalModel.delay_s` is 0. For a law that is not aware of the prediction, also
+one with its own observer, there is no delay, and angle and torque belong to the same time. A law that
+corrects its observer with the measured values and predicts the motion itself finds these values in rows 3 to
+5, in the same order, with the torque that belongs to them. `NominalModel.ahead_s` is the time from rows 3 to
+5 to rows 0 to 2.
 
-*Allocation.* The currents are found for the pose at which they begin to act.
+*Allocation.* The currents are computed for the pose at which they begin to act.
 
-*Steps.* One for each command on its way: its mean current, solved exactly through the lag, acts on the rotor
-over the midpoint rule. With the shape of the current within a period left out, both are of second order in
-the period.
+*Steps.* One step for each pending command: its mean current, solved exactly through the lag, acts on the
+rotor over the midpoint rule. The shape of the current within a period is left out. Both errors are of second
+order in the period.
 
-*What it is worth.* A known delay no longer unsettles a loop; the start and the corners of a reference are
-still answered late, and noise of the rates is carried over the delay. The study `delays` measures it on the
+*Benefit.* A known delay no longer destabilises the loop. The start and the corners of a reference are still
+followed late, and noise of the rates is extrapolated over the delay. The study `delays` measures it on the
 prototype's tilt.
 """
 
@@ -31,26 +32,30 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.applied_torque import Belief, Lag, lag
+from spheretwin.control.applied_torque import AppliedTorque, LagStep, lag_step
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.lagrangian import acceleration_entries, triple, turns
-from spheretwin.models.magnetics import KeptMatrix, TorqueModel, keep_torque_matrix, kept_matrix, rotor_torque
+from spheretwin.models.magnetics import (
+    CachedMatrix,
+    TorqueModel,
+    cached_matrix,
+    rotor_torque,
+    update_cached_matrix,
+)
 
 Array = NDArray[np.float64]
 
 MEASURED = 3
-"""First of the rows that hold what was measured."""
+"""First row of the measured values."""
 
 
 class PredictionSection(BaseModel):
-    """Prediction over the known delay; off unless asked for."""
+    """Prediction over the nominal delay; off by default."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    on: bool = Field(
-        False, description="whether the law is handed the rotor as it will be after nominal.delay_s"
-    )
+    on: bool = Field(False, description="whether the law receives the predicted motion after nominal.delay_s")
 
 
 class Prediction(NamedTuple):
@@ -60,24 +65,24 @@ class Prediction(NamedTuple):
     ahead_s: float
     period_s: float
     inertia: Array  # (3,) kg·m², nominal
-    over_a_period: Lag
+    full_lag: LagStep
     pose: Array  # (3,) rad, predicted
-    rates: Array  # (3,) rad/s, likewise
-    kept: KeptMatrix  # nominal, at that pose
-    middle: Array  # (3,) rad, pose in the middle of a step
+    rates: Array  # (3,) rad/s, predicted
+    cached_matrix: CachedMatrix  # nominal, at the predicted pose
+    midpoint: Array  # (3,) rad, pose in the middle of a step
     current: Array  # (groups,) A, at the end of a step
-    mean: Array  # (groups,) A, over it
-    torque_S: Array  # (3,) N·m, likewise
+    mean: Array  # (groups,) A, over a step
+    torque_S: Array  # (3,) N·m, over a step
     torque_q: Array  # (3,) N·m, the same on the hinges
-    before_q: Array  # (3,) N·m, over the first step that was made in the last tick
+    first_step_torque_q: Array  # (3,) N·m, over the first step of the last tick
 
     def state_arrays(self) -> tuple[Array, ...]:
-        """Arrays that it goes on from."""
-        return self.pose, self.rates, self.before_q
+        """Return the arrays that hold the state."""
+        return self.pose, self.rates, self.first_step_torque_q
 
 
-class Delayed(NamedTuple):
-    """What a prediction reckons with."""
+class DelayModel(NamedTuple):
+    """Nominal delay, lag and inertia."""
 
     period_s: float
     delay_s: float
@@ -85,54 +90,56 @@ class Delayed(NamedTuple):
     inertia: Array  # (3,) kg·m²
 
 
-def prediction(section: PredictionSection, delayed: Delayed, magnetics: TorqueModel) -> Prediction:
-    """Prediction with no torque on its way.
+def prediction(section: PredictionSection, model: DelayModel, magnetics: TorqueModel) -> Prediction:
+    """Return a prediction without pending commands.
 
     Parameters
     ----------
     section : PredictionSection
-    delayed : Delayed
+    model : DelayModel
     magnetics : TorqueModel
         Nominal.
     """
     groups = magnetics.group_axes.shape[1]
     return Prediction(
         on=section.on,
-        ahead_s=delayed.delay_s,
-        period_s=delayed.period_s,
-        inertia=delayed.inertia,
-        over_a_period=lag(delayed.period_s, delayed.time_constant_s),
+        ahead_s=model.delay_s,
+        period_s=model.period_s,
+        inertia=model.inertia,
+        full_lag=lag_step(model.period_s, model.time_constant_s),
         pose=np.zeros(3),
         rates=np.zeros(3),
-        kept=kept_matrix(magnetics),
-        middle=np.zeros(3),
+        cached_matrix=cached_matrix(magnetics),
+        midpoint=np.zeros(3),
         current=np.zeros(groups),
         mean=np.zeros(groups),
         torque_S=np.zeros(3),
         torque_q=np.zeros(3),
-        before_q=np.zeros(3),
+        first_step_torque_q=np.zeros(3),
     )
 
 
 @allocation_free
-def predict(prediction: Prediction, belief: Belief, magnetics: TorqueModel, measurement: Array) -> bool:
-    """Put what is predicted into the rows of a measurement, and what was measured into those behind them.
+def predict(
+    prediction: Prediction, applied_torque: AppliedTorque, magnetics: TorqueModel, measurement: Array
+) -> bool:
+    """Write the predicted values into rows 0 to 2 of a measurement and the measured values into rows 3 to 5.
 
     Parameters
     ----------
     prediction : Prediction
         Changed in place.
-    belief : Belief
-        Of the currents, at the time of the measurement.
+    applied_torque : AppliedTorque
+        Estimate at the time of the measurement.
     magnetics : TorqueModel
         Nominal.
     measurement : (6, 3) array
-        Angle, rate and torque of the last period as rows; the result.
+        Angle, rate and torque of the last period as rows; changed in place.
 
     Returns
     -------
     bool
-        Whether these are numbers; where not, none is kept.
+        True if the prediction is finite; otherwise its state is set to 0.
     """
     pose, rates = prediction.pose, prediction.rates
     for i in range(3):
@@ -140,35 +147,35 @@ def predict(prediction: Prediction, belief: Belief, magnetics: TorqueModel, meas
         for row in range(MEASURED):
             measurement[MEASURED + row, i] = measurement[row, i]
     for j in range(prediction.current.shape[0]):
-        prediction.current[j] = belief.current[j]
-    whole, late, finite = belief.commands.shape[0] - 2, belief.late, True
-    if late > 0.0:
-        command = belief.commands[whole]
-        finite = _step(prediction, magnetics, command, late * prediction.period_s, belief.before)
+        prediction.current[j] = applied_torque.current[j]
+    whole, fraction, finite = applied_torque.commands.shape[0] - 2, applied_torque.fraction, True
+    if fraction > 0.0:
+        command = applied_torque.commands[whole]
+        finite = _step(
+            prediction, magnetics, command, fraction * prediction.period_s, applied_torque.older_lag
+        )
         for i in range(3):
             if whole == 0:  # the period that ends there began within the last one
-                measurement[2, i] += late * (prediction.torque_q[i] - prediction.before_q[i])
-            prediction.before_q[i] = prediction.torque_q[i]
+                measurement[2, i] += fraction * (prediction.torque_q[i] - prediction.first_step_torque_q[i])
+            prediction.first_step_torque_q[i] = prediction.torque_q[i]
     for row in range(whole - 1, -1, -1):
-        command = belief.commands[row]
-        finite = finite and _step(
-            prediction, magnetics, command, prediction.period_s, prediction.over_a_period
-        )
-    finite = finite and _matrix_at(prediction, magnetics, pose)
+        command = applied_torque.commands[row]
+        finite = finite and _step(prediction, magnetics, command, prediction.period_s, prediction.full_lag)
+    finite = finite and _update_matrix(prediction, magnetics, pose)
     for i in range(3):
         if whole > 0:
             measurement[2, i] = prediction.torque_q[i]
         finite = finite and isfinite(rates[i])
     for i in range(3):
         if not finite:
-            pose[i] = rates[i] = prediction.before_q[i] = 0.0
+            pose[i] = rates[i] = prediction.first_step_torque_q[i] = 0.0
         measurement[0, i], measurement[1, i] = pose[i], rates[i]
     return finite
 
 
 @allocation_free
 def advance(prediction: Prediction, reference: Array) -> None:
-    """Move the rows of a reference on by the same time."""
+    """Advance the rows of a reference by the same time."""
     ahead = prediction.ahead_s
     for i in range(3):
         reference[0, i] += ahead * (reference[1, i] + 0.5 * ahead * reference[2, i])
@@ -177,25 +184,25 @@ def advance(prediction: Prediction, reference: Array) -> None:
 
 @allocation_free
 def _step(
-    prediction: Prediction, magnetics: TorqueModel, command: Array, duration_s: float, lagging: Lag
+    prediction: Prediction, magnetics: TorqueModel, command: Array, duration_s: float, lag: LagStep
 ) -> bool:
-    """Move pose, rates and currents on while one command acts; whether the pose is finite on the way."""
-    q, v, middle = prediction.pose, prediction.rates, prediction.middle
+    """Advance pose, rates and currents while one command acts; return True if the pose stays finite."""
+    q, v, midpoint = prediction.pose, prediction.rates, prediction.midpoint
     for i in range(3):
-        middle[i] = q[i] + 0.5 * duration_s * v[i]
-    if not _matrix_at(prediction, magnetics, middle):
+        midpoint[i] = q[i] + 0.5 * duration_s * v[i]
+    if not _update_matrix(prediction, magnetics, midpoint):
         return False
     for j in range(command.shape[0]):
         distance = prediction.current[j] - command[j]
-        prediction.mean[j] = command[j] + lagging.mean_share * distance
-        prediction.current[j] = command[j] + lagging.decay * distance
-    rotor_torque(prediction.kept.G, prediction.mean, prediction.torque_S)
-    generalised_torque(middle, prediction.torque_S, prediction.torque_q)
+        prediction.mean[j] = command[j] + lag.mean_share * distance
+        prediction.current[j] = command[j] + lag.decay * distance
+    rotor_torque(prediction.cached_matrix.G, prediction.mean, prediction.torque_S)
+    generalised_torque(midpoint, prediction.torque_S, prediction.torque_q)
     torque, inertia = triple(prediction.torque_q), triple(prediction.inertia)
     first = acceleration_entries(turns(triple(q)), triple(v), torque, inertia, 0.0)
     half = 0.5 * duration_s
     between = v[0] + half * first[0], v[1] + half * first[1], v[2] + half * first[2]
-    second = acceleration_entries(turns(triple(middle)), between, torque, inertia, 0.0)
+    second = acceleration_entries(turns(triple(midpoint)), between, torque, inertia, 0.0)
     for i in range(3):
         q[i] += duration_s * between[i]
         v[i] += duration_s * second[i]
@@ -203,10 +210,10 @@ def _step(
 
 
 @allocation_free
-def _matrix_at(prediction: Prediction, magnetics: TorqueModel, pose: Array) -> bool:
-    """Keep the torque matrix at a pose, if that is finite."""
+def _update_matrix(prediction: Prediction, magnetics: TorqueModel, pose: Array) -> bool:
+    """Update the torque matrix at a pose; return False if the pose is not finite."""
     for i in range(3):
         if not isfinite(pose[i]):
             return False
-    keep_torque_matrix(pose, magnetics, prediction.kept)
+    update_cached_matrix(pose, magnetics, prediction.cached_matrix)
     return True

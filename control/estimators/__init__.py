@@ -1,4 +1,4 @@
-"""Rates from sampled angles, one way a file, and their names: on the near side of the wires."""
+"""Estimators of the rates from sampled angles, one per file, and the list of them."""
 
 from typing import Annotated, get_args
 
@@ -10,7 +10,7 @@ from spheretwin.control.estimators.estimator import EstimatorParameters, Ideal
 from spheretwin.control.estimators.kalman import Kalman
 
 AnyEstimator = Annotated[
-    Ideal  # one row each
+    Ideal  # one row per estimator
     | Difference
     | Kalman
     | Differentiator,

@@ -1,20 +1,20 @@
-"""What an estimator of rates is to the loop: one function of fixed signature, its numbers, its memory.
+"""Estimator of rates as the loop sees it: a function of fixed signature, its parameters and its memory.
 
 Estimators are compared by two figures, which each derives in its own file and gives in `derived`:
 
 - *noise gain*, 1/s: standard deviation of the rate over that of white noise on the angle;
-- *lag*, s: how far the rate stays behind, in the limit, while the rate itself rises steadily. An error of
-  the rate by lag times acceleration follows.
+- *lag*, s: steady-state delay of the estimate under a ramp of the rate. The error of the rate is lag times
+  acceleration.
 
-An estimator's *bandwidth* ω is where its gain from the true rate to the estimated one has fallen by 3 dB.
-Every estimator is told it, so that they compare. It does not say which is fast enough: the phase that a loop
-loses counts, and that differs with the order.
+The *bandwidth* ω of an estimator is the frequency at which its gain from the true rate to the estimated one
+has fallen by 3 dB. Every estimator has it as a parameter, for comparison. It does not determine which one is
+fast enough: the phase loss in the loop counts, which differs with the order.
 
 The defaults come from the loop: AFSM with the paper's gains at 1 kHz, angles with the prototype's noise
-(0.02° rms on α and β, 0.18° a count on γ), one period of delay. Noise costs little but current; what is too
-slow makes the sliding variable swing, which shows first in the largest errors. The study `estimators`
-measures each over its bandwidth on the sinusoid and the nutation; `spheretwin reproduce figure11` draws error
-and lag of the rates alone.
+(0.02° rms on α and β, 0.18° a count on γ), one period of delay. Noise costs little except current; an
+estimator that is too slow makes the sliding variable oscillate, which first shows in the largest errors. The
+study `estimators` measures each over its bandwidth on the sinusoid and the nutation; `spheretwin reproduce
+figure11` draws error and lag of the rates alone.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ SIGNATURE = types.void(_vector, _vector, _vector, _vector)
 """Compiled signature: angle (3,), parameters, state, rate (3,)."""
 
 LARGEST_ANGLE_rad = 1e100
-"""What an angle beyond it is taken for: differences of larger ones would overflow."""
+"""Limit to which an angle is clipped: differences of larger ones would overflow."""
 
-SLOWEST_rad_s, FASTEST_rad_s = 1e-3, 1e6  # beyond these a bandwidth is a slip of the pen
+SLOWEST_rad_s, FASTEST_rad_s = 1e-3, 1e6  # a bandwidth beyond these is a mistake
 
 Bandwidth = Annotated[float, Field(ge=SLOWEST_rad_s, le=FASTEST_rad_s)]
 BandwidthEach = Annotated[tuple[Bandwidth, Bandwidth, Bandwidth], BeforeValidator(each)]
@@ -51,43 +51,43 @@ estimator_at = function_at(SIGNATURE)
 
 
 class Estimator(NamedTuple):
-    """An estimator of rates, ready for the loop."""
+    """Estimator of rates, ready for the loop."""
 
     name: str
     """For tables and figures."""
     step: Callable[..., Any]
     """``step(angle, parameters, state, rate)``, called once a control tick with the measured angles, writes
-    the estimated rates, rad/s. The first call starts at the first angle, with rate 0. An angle that is no
-    finite number gives a rate that is no number, on that axis alone, which then starts anew."""
+    the estimated rates, rad/s. The first call starts at the first angle, with rate 0. An angle that is not
+    finite gives a rate of NaN on that axis only, which then starts again."""
     parameters: NDArray[np.float64]
-    """(n,) handed to every call."""
+    """(n,) passed to every call."""
     state: NDArray[np.float64]
-    """(m,) memory, zeros before the first tick; a run works on a copy of its own."""
+    """(m,) memory, zeros before the first tick; each run works on its own copy."""
 
 
 class Sampling(NamedTuple):
-    """How the angles are sampled, as the controller reckons with it."""
+    """Nominal sampling of the angles."""
 
     period_s: float
     noise_rad: NDArray[np.float64]
-    """(3,) standard deviation of each measured angle; 0 where it is not known, or there is none."""
+    """(3,) standard deviation of each measured angle; 0 if unknown, or if there is no noise."""
     quantum_rad: NDArray[np.float64]
-    """(3,) step from one measured angle to the next; 0 where there is none."""
+    """(3,) resolution of each measured angle; 0 if there is none."""
 
     def deviation_rad(self) -> NDArray[np.float64]:
-        """(3,) noise and rounding together: a uniform error of one step has the variance step²/12."""
+        """Return noise and rounding together, (3,): a uniform error of one step has the variance step²/12."""
         return np.sqrt(self.noise_rad**2 + self.quantum_rad**2 / 12)
 
 
 class Derived(NamedTuple):
-    """What an estimator's docstring derives, for one tuning."""
+    """Derived noise gain and lag of an estimator, for one tuning."""
 
     noise_gain_1_s: NDArray[np.float64]  # (3,)
     lag_s: NDArray[np.float64]  # (3,)
 
 
 class EstimatorParameters(BaseModel):
-    """Parameters of an estimator, each with its range and meaning; `build` makes the estimator."""
+    """Base class of the parameters of an estimator, each with its range and meaning."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -95,25 +95,27 @@ class EstimatorParameters(BaseModel):
 
     @abstractmethod
     def build(self, sampling: Sampling) -> Estimator | None:
-        """Estimator with these parameters; None where the rates are handed over as they are."""
+        """Return an estimator with these parameters; None if the law receives the true rates."""
 
     @abstractmethod
     def derived(self, sampling: Sampling) -> Derived:
-        """Noise gain and lag."""
+        """Return noise gain and lag."""
 
 
 def named(kind: str) -> Any:
-    """Field of an estimator's name."""
-    return Field(kind, description="where the law's rates come from")
+    """Return the field of an estimator's name."""
+    return Field(kind, description="source of the rates that the law receives")
 
 
 def bandwidth_field(default_rad_s: float) -> Any:
-    """Field of the bandwidth, which every estimator but the ideal one has."""
-    return Field(each(default_rad_s), description="where the rate's gain has fallen by 3 dB, rad/s")
+    """Return the field of the bandwidth, which every estimator except the ideal one has."""
+    return Field(
+        each(default_rad_s), description="frequency at which the gain of the rate has fallen by 3 dB, rad/s"
+    )
 
 
 def within_range(kind: str, name: str, values: NDArray[np.float64], low: float, high: float) -> None:
-    """Refuse a tuning that other parameters lead to, where it is beyond what can be computed with.
+    """Check a derived tuning parameter.
 
     Raises
     ------
@@ -130,21 +132,21 @@ def within_range(kind: str, name: str, values: NDArray[np.float64], low: float, 
 
 @allocation_free
 def usable(angle: float) -> float:
-    """An angle that can be computed with: clipped to `LARGEST_ANGLE_rad`; NaN for one that is not finite."""
+    """Return an angle clipped to `LARGEST_ANGLE_rad`; NaN if it is not finite."""
     if not abs(angle) < np.inf:
         return np.nan
     return min(max(angle, -LARGEST_ANGLE_rad), LARGEST_ANGLE_rad)
 
 
 def estimates(estimator: Estimator, angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rates that an estimator makes of a whole record, from its start.
+    """Return the rates that an estimator gives for a whole record.
 
     Parameters
     ----------
     estimator : Estimator
         Its memory is copied.
     angle_rad : (n, 3) array, rad
-        One row a control tick; not changed, even by an estimator that filters angles.
+        One row per control tick; not changed, even by an estimator that filters angles.
 
     Returns
     -------
@@ -173,14 +175,14 @@ def _follow(
 
 
 class Ideal(EstimatorParameters):
-    """The true rates."""
+    """Ideal estimator: the true rates."""
 
     kind: Literal["ideal"] = named("ideal")
 
     def build(self, sampling: Sampling) -> Estimator | None:
-        """No estimator: the rates that are handed over stay as they are."""
+        """Return None: the law receives the true rates."""
         return None
 
     def derived(self, sampling: Sampling) -> Derived:
-        """No noise of the angles, no lag."""
+        """Return no noise gain and no lag."""
         return Derived(np.zeros(3), np.zeros(3))

@@ -1,1 +1,1 @@
-"""What several laws are made of: gains, the sliding surface, the fuzzy approximator."""
+"""Components shared by laws: parameters, feedback, sliding surface, observer, fuzzy approximator."""

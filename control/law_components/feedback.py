@@ -1,80 +1,84 @@
 """Feedback of an axis's error, rate and integral: ``v = -stiffness e - damping edot - integral ∫e dt``.
 
-The integral is kept as the torque that it asks for, and back-calculated from what the controller believes
-that its currents gave,
+The integral is stored as a torque, with back-calculation from the applied torque:
 
-    I' = −J integral e + (believed − asked) √(integral/damping),
+    I' = −J integral e + (applied − commanded) √(integral/damping),
 
-with `asked` as old as the known delay makes it. While the allocation gives all that is asked, the bracket is
-what the lag of the currents still owes, and 0 at rest: a constant load leaves no error. At the current limit
-it holds the integral where the torque is just at the limit. The time constant √(damping/integral) is the
-root of integral time and derivative time, as is usual; it is √3/ω for a triple pole at −ω. What lowers the
-torque beyond the wires, as a drive whose limit is below the nominal one, a controller does not know.
+with `commanded` delayed by the nominal delay. While the allocation gives the whole command, the bracket is
+the effect of the lag of the currents, and 0 at rest: a constant load leaves no error. At the current limit
+the bracket stops the integral where the torque just reaches the limit (anti-windup). The time constant
+√(damping/integral) is the root of integral time and derivative time, as is usual; it is √3/ω for a triple
+pole at −ω. The controller does not know of a loss of torque in the drive, such as a limit below the nominal
+one.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.law import Known, Law
-from spheretwin.control.law_components.extended_state_observer import asked_before, lateness, remember
+from spheretwin.control.law import Law, NominalModel
+from spheretwin.control.law_components.extended_state_observer import (
+    delayed_command,
+    history_layout,
+    store_command,
+)
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 
 
-def tracking_rate(rate: NDArray[np.float64], known: Known) -> NDArray[np.float64]:
-    """Rates of back-calculation (1/s), none faster than the tick can follow."""
+def tracking_rate(rate: NDArray[np.float64], known: NominalModel) -> NDArray[np.float64]:
+    """Limit rates of back-calculation (1/s) to one over the control period."""
     return np.minimum(rate, 1 / known.period_s)
 
 
 Array = NDArray[np.float64]
 
 INTEGRAL_SIGNAL = Signal("integral_torque_Nm", "N·m", 3, "torque of the integral", ANGLES)
-STIFFNESS, DAMPING, INTEGRAL, TRACKING, LATE, PERIOD = 0, 3, 6, 9, 12, 13  # layout of the parameters
-TORQUE, ASKED = 0, 3  # layout of the state
+STIFFNESS, DAMPING, INTEGRAL, TRACKING, FRACTION, PERIOD = 0, 3, 6, 9, 12, 13  # layout of the parameters
+TORQUE, HISTORY = 0, 3  # layout of the state
 
 
 def triple_pole(bandwidth_rad_s: float) -> tuple[float, float, float]:
-    """Stiffness, damping and integral that put all three poles of an axis at minus the bandwidth."""
+    """Return stiffness, damping and integral with all three poles of an axis at minus the bandwidth."""
     return 3 * bandwidth_rad_s**2, 3 * bandwidth_rad_s, bandwidth_rad_s**3
 
 
-def tracking(damping: Array, integral: Array, known: Known) -> Array:
-    """Rates of back-calculation, (3,) in 1/s: √(integral/damping)."""
+def tracking(damping: Array, integral: Array, known: NominalModel) -> Array:
+    """Return the rates of back-calculation, (3,) in 1/s: √(integral/damping)."""
     return tracking_rate(np.sqrt(integral / damping), known)
 
 
-def feedback(name: str, gains: Array, known: Known) -> Law:
-    """Law whose integral starts at 0.
+def feedback(name: str, gains: Array, known: NominalModel) -> Law:
+    """Return a law with integral, which starts at 0.
 
     Parameters
     ----------
     name : str
     gains : (3, 3) array
-        Stiffness, damping and integral as rows, 1/s², 1/s and 1/s³: acceleration a unit of error, of its
+        Stiffness, damping and integral as rows, 1/s², 1/s and 1/s³: acceleration per unit of error, of its
         rate and of its integral.
-    known : Known
+    known : NominalModel
     """
-    late, kept = lateness(known)
+    fraction, size = history_layout(known)
     torques = (gains * known.inertia).ravel()
-    parameters = [*torques, *tracking(gains[1], gains[2], known), late, known.period_s]
-    state = np.zeros(ASKED + kept)
+    parameters = [*torques, *tracking(gains[1], gains[2], known), fraction, known.period_s]
+    state = np.zeros(HISTORY + size)
     return Law(name, step, np.array(parameters), state, (INTEGRAL_SIGNAL,), asks_torque=True)
 
 
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
-    late, period, asked = parameters[LATE], parameters[PERIOD], state[ASKED:]
+    """Write the torque of one control tick; see `control.law.Law`."""
+    fraction, period, history = parameters[FRACTION], parameters[PERIOD], state[HISTORY:]
     for axis in range(3):
         error = measurement[0, axis] - reference[0, axis]
         error_rate = measurement[1, axis] - reference[1, axis]
-        owed = measurement[2, axis] - asked_before(asked, axis, late)
-        state[TORQUE + axis] += period * parameters[TRACKING + axis] * owed
+        torque_error = measurement[2, axis] - delayed_command(history, axis, fraction)
+        state[TORQUE + axis] += period * parameters[TRACKING + axis] * torque_error
         stiffness, damping = parameters[STIFFNESS + axis], parameters[DAMPING + axis]
         torque[axis] = state[TORQUE + axis] - stiffness * error - damping * error_rate
         state[TORQUE + axis] -= period * parameters[INTEGRAL + axis] * error
-    remember(asked, torque)
+    store_command(history, torque)
 
 
 SLIDING_SIGNAL = Signal("sliding_s", "rad/s", 3, "sliding variable s = λe + ė (30)", ANGLES)
@@ -82,5 +86,5 @@ SLIDING_SIGNAL = Signal("sliding_s", "rad/s", 3, "sliding variable s = λe + ė 
 
 @allocation_free
 def sliding_surface(error: float, error_rate: float, slope: float) -> float:
-    """Distance from the surface on one axis, rad/s: zero where the error decays at rate `slope`."""
+    """Return the sliding variable of one axis, rad/s; it is 0 if the error decays at the rate `slope`."""
     return slope * error + error_rate

@@ -22,11 +22,11 @@ CONSEQUENTS = 3 * RULES
 
 @allocation_free
 def memberships(x: float) -> tuple[float, float, float, float, float]:
-    """Degrees of membership of `x` in the five sets, normalised to sum 1.
+    """Return the degrees of membership of `x` in the five sets, normalised to sum 1.
 
-    The nearest set's exponent is taken off before the exponential (which divides numerator and
-    denominator alike), so at least one degree is 1 before normalising: nothing underflows, wherever the
-    square of `x` is a number (up to 1e150).
+    The exponent of the nearest set is subtracted before the exponential, which divides numerator and
+    denominator alike. At least one degree is then 1 before normalisation, and nothing underflows as long as
+    the square of `x` is finite (up to 1e150).
     """
     a, b, c, d, e = exponent(x, 0), exponent(x, 1), exponent(x, 2), exponent(x, 3), exponent(x, 4)
     nearest = max(a, b, c, d, e)
@@ -38,13 +38,13 @@ def memberships(x: float) -> tuple[float, float, float, float, float]:
 
 @allocation_free
 def exponent(x: float, k: int) -> float:
-    """Logarithm of the membership of `x` in set `k` (57)."""
+    """Return the logarithm of the membership of `x` in set `k` (57)."""
     return -SHAPE * ((x - CENTRES[k]) / (2.0 * WIDTH)) ** 2
 
 
 @allocation_free
 def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: NDArray[np.float64]) -> float:
-    """Output ``theta^T Psi`` (33), then one Euler step ``theta += drive Psi`` of its adaptation (43).
+    """Compute the output ``theta^T Psi`` (33), then one Euler step ``theta += drive Psi`` of (43).
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: 
     Returns
     -------
     float
-        The approximator's output before the adaptation.
+        Output of the approximator before the adaptation.
     """
     of_rate, of_angle = memberships(rate), memberships(angle)
     output = 0.0
@@ -76,8 +76,8 @@ def approximate_and_adapt(rate: float, angle: float, drive: float, consequents: 
     return output
 
 
-class Restraint(NamedTuple):
-    """What keeps the consequents from drifting."""
+class AdaptationLimits(NamedTuple):
+    """Limits of the adaptation that prevent drift of the consequents."""
 
     dead_zone: float  # of |s|, rad/s
     leakage: float  # 1/s
@@ -90,11 +90,11 @@ def approximate_within_bounds(
     angle: float,
     s: float,
     adaptation_rate: float,
-    restraint: Restraint,
+    limits: AdaptationLimits,
     period_s: float,
     consequents: NDArray[np.float64],
 ) -> float:
-    """Output ``theta^T Psi``, then one Euler step of the restrained adaptation.
+    """Compute the output ``theta^T Psi``, then one Euler step of the limited adaptation.
 
     Parameters
     ----------
@@ -103,22 +103,22 @@ def approximate_within_bounds(
     s : float, rad/s
         Sliding variable.
     adaptation_rate : float
-        eta; 0 learns nothing, and what was learnt leaks away.
-    restraint : Restraint
+        eta; with 0 nothing is learnt, and the consequents leak away.
+    limits : AdaptationLimits
     period_s : float, s
     consequents : (75,) array
         theta, changed in place.
     """
-    learnt_from = s if abs(s) > restraint.dead_zone else 0.0
-    drive = -adaptation_rate * learnt_from * period_s
+    s_effective = s if abs(s) > limits.dead_zone else 0.0
+    drive = -adaptation_rate * s_effective * period_s
     output = approximate_and_adapt(rate, angle, drive, consequents)
     squares = 0.0
     for k in range(consequents.shape[0]):
         squares += consequents[k] * consequents[k]
-    kept = max(0.0, 1.0 - restraint.leakage * period_s)
-    norm = kept * sqrt(squares)
-    if norm > restraint.bound:
-        kept *= restraint.bound / norm
+    factor = max(0.0, 1.0 - limits.leakage * period_s)
+    norm = factor * sqrt(squares)
+    if norm > limits.bound:
+        factor *= limits.bound / norm
     for k in range(consequents.shape[0]):
-        consequents[k] *= kept
+        consequents[k] *= factor
     return output

@@ -1,4 +1,4 @@
-"""The nominal rotor's motion both ways: where a torque takes it, and what torque an acceleration takes."""
+"""Forward and inverse dynamics of the nominal rotor."""
 
 from typing import NamedTuple
 
@@ -22,25 +22,25 @@ UPRIGHT = Turns(1.0, 0.0, 1.0, 0.0, 1.0, 0.0)
 AT_REST = (0.0, 0.0, 0.0)
 
 
-class Nominal(NamedTuple):
-    """The rotor as a law has it."""
+class RotorModel(NamedTuple):
+    """Nominal rotor of a law."""
 
     inertia: Triple  # principal inertias, kg·m²
     coupled: bool
-    """Whether its axes act on each other; else each is a double integrator of its own inertia."""
+    """True if the axes are coupled; otherwise each is a double integrator of its own inertia."""
 
 
-class Motion(NamedTuple):
-    """Where the rotor is, and how it moves."""
+class RotorMotion(NamedTuple):
+    """Angles and rates of the rotor."""
 
     angle: Triple  # rad
     rate: Triple  # rad/s
 
 
 @allocation_free
-def moved_on(motion: Motion, torque: Triple, nominal: Nominal, time_s: float) -> Motion:
-    """Motion after some time (s) under a constant torque (N·m), at the acceleration of its beginning."""
-    at, rate = _coupled(motion, nominal)
+def advance_motion(motion: RotorMotion, torque: Triple, nominal: RotorModel, time_s: float) -> RotorMotion:
+    """Return the motion after some time (s) under a constant torque (N·m), with the initial acceleration."""
+    at, rate = _operating_point(motion, nominal)
     push = acceleration_entries(at, rate, torque, nominal.inertia, 0.0)
     half = 0.5 * time_s * time_s
     (q1, q2, q3), (v1, v2, v3) = motion.angle, motion.rate
@@ -49,13 +49,13 @@ def moved_on(motion: Motion, torque: Triple, nominal: Nominal, time_s: float) ->
         q2 + time_s * v2 + half * push[1],
         q3 + time_s * v3 + half * push[2],
     )
-    return Motion(angle, (v1 + time_s * push[0], v2 + time_s * push[1], v3 + time_s * push[2]))
+    return RotorMotion(angle, (v1 + time_s * push[0], v2 + time_s * push[1], v3 + time_s * push[2]))
 
 
 @allocation_free
-def torque_for(motion: Motion, acceleration: Triple, nominal: Nominal) -> Triple:
-    """Torque ``M a + C qdot`` (N·m) that an acceleration (rad/s²) takes."""
-    at, rate = _coupled(motion, nominal)
+def required_torque(motion: RotorMotion, acceleration: Triple, nominal: RotorModel) -> Triple:
+    """Return the torque ``M a + C qdot`` (N·m) for an acceleration (rad/s²)."""
+    at, rate = _operating_point(motion, nominal)
     C_alpha, C_beta, C_gamma = coriolis_rows(at, rate, nominal.inertia)
     alpha, beta, gamma = _times(inertia_entries(at, nominal.inertia), acceleration)
     return (
@@ -66,15 +66,15 @@ def torque_for(motion: Motion, acceleration: Triple, nominal: Nominal) -> Triple
 
 
 @allocation_free
-def inertial_torque(angle: Triple, acceleration: Triple, nominal: Nominal) -> Triple:
-    """Torque ``M a`` (N·m), without Coriolis terms."""
-    at, _ = _coupled(Motion(angle, AT_REST), nominal)
+def inertial_torque(angle: Triple, acceleration: Triple, nominal: RotorModel) -> Triple:
+    """Return the torque ``M a`` (N·m), without Coriolis terms."""
+    at, _ = _operating_point(RotorMotion(angle, AT_REST), nominal)
     return _times(inertia_entries(at, nominal.inertia), acceleration)
 
 
 @allocation_free
-def _coupled(motion: Motion, nominal: Nominal) -> tuple[Turns, Triple]:
-    """What the equations of motion are taken at: upright and at rest, no axis acts on another."""
+def _operating_point(motion: RotorMotion, nominal: RotorModel) -> tuple[Turns, Triple]:
+    """Return pose and rates for the equations of motion; upright and at rest, the axes are not coupled."""
     if nominal.coupled:
         return turns(motion.angle), motion.rate
     return UPRIGHT, AT_REST
@@ -94,14 +94,14 @@ Array = NDArray[np.float64]
 
 @compiled
 def model_torque(measurement: Array, acceleration: Array, rate: Array, inertia: Array, torque: Array) -> None:
-    """Write the torque at the measured pose and rates.
+    """Write the torque ``M acceleration + C rate`` at the measured pose and rates.
 
     Parameters
     ----------
     measurement : (3, 3) array
-        As a law is handed it: angle and rate as its first rows.
+        Angle and rate as the first rows, as a law receives it.
     acceleration, rate : (3,) array, rad/s² and rad/s
-        What M and C are multiplied with.
+        Factors of M and C.
     inertia : (3,) array, kg·m²
         Nominal principal inertias.
     torque : (3,) array, N·m

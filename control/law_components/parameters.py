@@ -1,4 +1,4 @@
-"""Parameters of laws: the base of every law's own, and the kinds of numbers they are made of."""
+"""Parameters of laws: base class and types of numbers."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from spheretwin.control.compensators.feed_forward import FeedForwardSection
 from spheretwin.control.compensators.prediction import PredictionSection
 from spheretwin.control.compensators.reference_governor import GovernorSection
 from spheretwin.control.law import LARGEST as LARGEST
-from spheretwin.control.law import Known, Law
+from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.law import NonNegative as NonNegative
 from spheretwin.control.law import NonNegativeEach as NonNegativeEach
 from spheretwin.control.law import Positive as Positive
 from spheretwin.control.law import PositiveEach as PositiveEach
 from spheretwin.control.law import each as each
 
-# The file of a law, shipped or its user's, finds here all that it needs of these.
+# A law file, shipped or of a user, imports all of these from here.
 
-AROUND = ("governor", "prediction", "feed_forward")
-"""Sections of a controller that stand around its law."""
+COMPENSATORS = ("governor", "prediction", "feed_forward")
+"""Sections of a controller that hold the compensators around its law."""
 
 Level = Annotated[
     Literal["acceleration", "torque"],
-    Field(description="what (41) is read as; acceleration is scaled by nominal inertia"),
+    Field(description="quantity that (41) gives; acceleration is scaled by nominal inertia"),
 ]
 
 
 def named(law: str) -> Any:
-    """Field of a law's name."""
-    meaning = "control law; FILE.py:NAME for one of your own"
+    """Return the field of a law's name."""
+    meaning = "control law; FILE.py:NAME for a law of your own"
     return Field(law, description=meaning, json_schema_extra={"path": "code"})
 
 
 class ControllerSection(BaseModel):
-    """What a scenario says of its controller, whatever law runs."""
+    """Controller section of a scenario, common to all laws."""
 
     source: ClassVar[str] = ""
-    """Digest of the file of one of the user's."""
+    """Digest of the file of a user's law."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -51,41 +51,41 @@ class ControllerSection(BaseModel):
     )
     check_bounds: bool = Field(
         False,
-        description="compile the law with bounds checks: one that reads or writes outside its arrays then"
-        " ends the run with an error; to debug, it is slower",
+        description="compile the law with bounds checks, for debugging: a read or write outside its arrays"
+        " then ends the run with an error; slower",
     )
     governor: GovernorSection = Field(
-        GovernorSection(), description="bounds the acceleration of the reference"
+        GovernorSection(), description="limits the acceleration of the reference"
     )
     prediction: PredictionSection = Field(
-        PredictionSection(), description="takes the known delay out of what the law is handed"
+        PredictionSection(), description="compensates the nominal delay in the inputs of the law"
     )
     feed_forward: FeedForwardSection = Field(
         FeedForwardSection(), description="adds torques of the nominal model to the law's"
     )
 
     @property
-    def around(self) -> dict[str, Any]:
-        """Sections of what stands around the law, by name."""
-        return {name: getattr(self, name) for name in AROUND}
+    def compensators(self) -> dict[str, Any]:
+        """Sections of the compensators, by name."""
+        return {name: getattr(self, name) for name in COMPENSATORS}
 
-    def alone(self) -> Self:
-        """The same with nothing around the law."""
-        return self.model_copy(update={name: type(self).model_fields[name].default for name in AROUND})
+    def without_compensators(self) -> Self:
+        """Return a copy with all compensators off."""
+        return self.model_copy(update={name: type(self).model_fields[name].default for name in COMPENSATORS})
 
 
 class LawParameters(ControllerSection):
-    """Parameters that every law has; each law's own add to them, each with its range and meaning.
+    """Base class of the parameters of a law, each with its range and meaning.
 
-    A subclass makes the law in `build`, and a shipped one names itself in `law`. That is all that a law is,
-    here or in a file of its user's.
+    A subclass adds its own parameters and builds the law in `build`. A shipped law also sets its name in
+    `law`.
     """
 
     @abstractmethod
-    def build(self, known: Known) -> Law:
-        """Law with these parameters, for what is known of the rotor."""
+    def build(self, known: NominalModel) -> Law:
+        """Return a law with these parameters for the nominal model `known`."""
 
 
-def torque_factor(level: str, known: Known) -> NDArray[np.float64]:
-    """Factor from the output of (41) to a torque on each axis, (3,)."""
+def torque_factor(level: str, known: NominalModel) -> NDArray[np.float64]:
+    """Return the factor from the output of (41) to a torque on each axis, (3,)."""
     return known.inertia if level == "acceleration" else np.ones(3)

@@ -1,4 +1,4 @@
-"""The control laws, one a file, and their names."""
+"""Control laws, one per file, and the list of them."""
 
 from typing import Annotated, get_args
 
@@ -17,7 +17,7 @@ from spheretwin.control.laws.pid import PID
 from spheretwin.control.laws.super_twisting import SuperTwisting
 
 AnyLaw = Annotated[
-    PD  # one row each
+    PD  # one row per law
     | PID
     | LQI
     | ComputedTorque

@@ -1,6 +1,6 @@
 """Adaptive fuzzy law (AF): AFSM without its switching terms, ``v = theta^T Psi - K s``.
 
-`spheretwin reproduce figure11` has its errors with the printed gains; the study `tuning` searches others.
+`spheretwin reproduce figure11` reports its errors with the printed gains; the study `tuning` searches others.
 """
 
 from typing import Literal
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
 from spheretwin.control.law_components.fuzzy import CONSEQUENTS, approximate_and_adapt
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
@@ -34,8 +34,8 @@ class AdaptiveFuzzy(LawParameters):
     reaching_gain: NonNegativeEach = Field(each(20.0), description="K of the reaching term K s, 1/s")
     fuzzy_rate: NonNegativeEach = Field(each(10.0), description="η, adaptation rate of the fuzzy consequents")
 
-    def build(self, known: Known) -> Law:
-        """Law whose consequents all start at 0."""
+    def build(self, known: NominalModel) -> Law:
+        """Return a law whose consequents all start at 0."""
         gains = [*self.surface_slope, *self.reaching_gain, *self.fuzzy_rate]
         parameters = np.array([*gains, *torque_factor(self.level, known), known.period_s])
         return Law(self.law, step, parameters, np.zeros(THETA + 3 * CONSEQUENTS), SIGNALS)
@@ -44,7 +44,7 @@ class AdaptiveFuzzy(LawParameters):
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     for axis in range(3):
         angle, rate = measurement[0, axis], measurement[1, axis]
         error, error_rate = angle - reference[0, axis], rate - reference[1, axis]

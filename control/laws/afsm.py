@@ -1,11 +1,11 @@
-"""Adaptive fuzzy sliding mode law (AFSM) of the paper, one subsystem an axis (40)-(43).
+"""Adaptive fuzzy sliding mode law (AFSM) of the paper, one subsystem per axis (40)-(43).
 
 ``v = theta^T Psi - xi sgn(s) - zeta sgn(s) S - K s`` with ``S = 1 + |s| + s^2``; the estimates adapt as
 ``theta' = -eta s Psi``, ``xi' = sigma |s|``, ``zeta' = varsigma |s| S``, all from 0. As in the paper, xi and
 zeta only ever grow.
 
-`spheretwin reproduce figure11` has its errors with the printed gains, `spheretwin reproduce stability` what
-the growth of ξ and ζ leads to; the study `tuning` searches other gains.
+`spheretwin reproduce figure11` reports its errors with the printed gains, `spheretwin reproduce stability`
+the effects of the growth of ξ and ζ; the study `tuning` searches other gains.
 """
 
 from typing import Literal
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface
 from spheretwin.control.law_components.fuzzy import CONSEQUENTS, approximate_and_adapt
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
@@ -45,8 +45,8 @@ class AFSM(LawParameters):
     switching_rate: NonNegativeEach = Field(each(10.0), description="σ, growth rate of the switching gain ξ̂")
     bound_rate: NonNegativeEach = Field(each(10.0), description="ς, growth rate of the coupling bound ζ̂")
 
-    def build(self, known: Known) -> Law:
-        """Law whose estimates all start at 0."""
+    def build(self, known: NominalModel) -> Law:
+        """Return a law whose estimates all start at 0."""
         gains = [*self.surface_slope, *self.reaching_gain, *self.fuzzy_rate]
         rates = [*self.switching_rate, *self.bound_rate]
         parameters = np.array([*gains, *rates, *torque_factor(self.level, known), known.period_s])
@@ -56,7 +56,7 @@ class AFSM(LawParameters):
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     period = parameters[PERIOD]
     for axis in range(3):
         angle, rate = measurement[0, axis], measurement[1, axis]

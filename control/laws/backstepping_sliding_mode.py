@@ -1,29 +1,29 @@
-"""Adaptive backstepping sliding mode: a surface found in two steps, and an estimate of what disturbs.
+"""Adaptive backstepping sliding mode: a surface designed in two steps, and a disturbance estimate.
 
-After Liu and others, *Aerospace Science and Technology* 67 (2017), doi 10.1016/j.ast.2017.03.032. Its first
-step makes −c e of ė, its second puts a surface σ = k e + (ė + c e) on what is left. c and k enter the law by
-their sum alone, so λ = c + k is the parameter: σ = ė + λe, and with the rate q̇_r = q̇_d − λe
+After Liu and others, *Aerospace Science and Technology* 67 (2017), doi 10.1016/j.ast.2017.03.032. The
+first step sets ė to −c e, the second defines the surface σ = k e + (ė + c e) on the remainder. Only the sum
+of c and k enters the law, so λ = c + k is the parameter: σ = ė + λe, and with the rate q̇_r = q̇_d − λe
 
     τ = M q̈_r + C q̇_r − J h (σ + β sat(σ/δ)) + D,   D' = −J γ σ.
 
-*Why it holds.* With the true model and a constant load d, M σ̇ + C σ = −J h (σ + β sat) + D − d, and Ṁ − 2C is
+*Stability.* With the true model and a constant load d, M σ̇ + C σ = −J h (σ + β sat) + D − d, and Ṁ − 2C is
 skew-symmetric. So for 0 < w < 4λh
 
     V  = ½ σᵀMσ + ½ w Σ J e² + ½ Σ (D − d)²/(Jγ)
     V' = −Σ J (h σ² − w e σ + wλ e²) − h β Σ J |σ sat(σ/δ)| ≤ 0,
 
-on the coupled rotor, not on three axes apart; e and σ go to 0 by Barbalat's lemma, under any constant load.
-The sign of the paper's switching is smoothed over the layer δ; |D| is held by back-calculation, as in
-`control.parts.integral_feedback`, at the rate √(λγ/(λ + h)) of the integral and damping that the law has near
+on the coupled rotor, not on three separate axes; e and σ go to 0 by Barbalat's lemma, under any constant
+load. The sign function of the paper is smoothed over the layer δ; |D| is limited by back-calculation, as in
+`control.law_components.feedback`, at the rate √(λγ/(λ + h)) of the integral and damping of the law near
 rest.
 
-*Tuning by one number.* Within the layer the characteristic polynomial of an axis at rest is
+*Tuning by one parameter.* Within the layer the characteristic polynomial of an axis at rest is
 (s + λ)(s² + h(1 + β/δ) s + γ): with λ = ω, h(1 + β/δ) = 2ω and γ = ω² three poles at −ω. β/δ = ½ leaves
 h = 4ω/3 outside.
 
 *Default.* ω = 40 1/s, β = 0.05 rad/s, δ = 0.1 rad/s, chosen for the tilt (60) with the prototype's hardware;
-on ideal hardware a faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning`
-searches ω and the layer.
+on ideal hardware a faster one is better. `spheretwin reproduce rivals` reports the figures; the study
+`tuning` searches ω and the layer.
 """
 
 from typing import Literal
@@ -32,8 +32,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
-from spheretwin.control.law_components.extended_state_observer import asked_before, lateness, remember
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law_components.extended_state_observer import (
+    delayed_command,
+    history_layout,
+    store_command,
+)
 from spheretwin.control.law_components.feedback import SLIDING_SIGNAL, sliding_surface, tracking_rate
 from spheretwin.control.law_components.nominal_motion import model_torque
 from spheretwin.control.law_components.parameters import LawParameters, named
@@ -43,13 +47,13 @@ Array = NDArray[np.float64]
 
 SIGNALS = (
     SLIDING_SIGNAL,
-    Signal("adapted_torque_Nm", "N·m", 3, "estimate D of what disturbs", ANGLES),
+    Signal("adapted_torque_Nm", "N·m", 3, "estimate D of the disturbance", ANGLES),
 )
 # Layout of the parameters.
-SURFACE_SLOPE, REACHING_GAIN, SWITCHING, LAYER, ADAPTATION, TRACKING, INERTIA, LATE, PERIOD = (
+SURFACE_SLOPE, REACHING_GAIN, SWITCHING, LAYER, ADAPTATION, TRACKING, INERTIA, FRACTION, PERIOD = (
     0, 3, 6, 9, 12, 15, 18, 21, 22,
 )  # fmt: skip
-SLIDING, ADAPTED, ASKED = 0, 3, 6  # layout of the state
+SLIDING, ADAPTED, HISTORY = 0, 3, 6  # layout of the state
 
 BANDWIDTH_rad_s = 40.0
 
@@ -62,28 +66,30 @@ class BacksteppingSlidingMode(LawParameters):
     reaching_gain: PositiveEach = Field(
         each(4 * BANDWIDTH_rad_s / 3), description="h of the reaching term, 1/s"
     )
-    switching: NonNegativeEach = Field(each(0.05), description="β, reaching beside σ, rad/s")
+    switching: NonNegativeEach = Field(
+        each(0.05), description="β, switching part of the reaching term, rad/s"
+    )
     layer: PositiveEach = Field(each(0.1), description="δ, boundary layer of the switching, rad/s")
     adaptation_rate: NonNegativeEach = Field(
         each(BANDWIDTH_rad_s**2), description="γ, adaptation rate of the disturbance's estimate, 1/s²"
     )
 
-    def build(self, known: Known) -> Law:
-        """Law whose estimate starts at 0."""
-        late, kept = lateness(known)
+    def build(self, known: NominalModel) -> Law:
+        """Return a law whose estimate starts at 0."""
+        fraction, size = history_layout(known)
         slope, reaching = np.array(self.surface_slope), np.array(self.reaching_gain)
         tracking = tracking_rate(np.sqrt(slope * self.adaptation_rate / (slope + reaching)), known)
         gains = [*self.surface_slope, *self.reaching_gain, *self.switching, *self.layer]
         rates = [*self.adaptation_rate, *tracking]
-        parameters = np.array([*gains, *rates, *known.inertia, late, known.period_s])
-        return Law(self.law, step, parameters, np.zeros(ASKED + kept), SIGNALS, asks_torque=True)
+        parameters = np.array([*gains, *rates, *known.inertia, fraction, known.period_s])
+        return Law(self.law, step, parameters, np.zeros(HISTORY + size), SIGNALS, asks_torque=True)
 
 
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
-    period, asked, inertia = parameters[PERIOD], state[ASKED:], parameters[INERTIA : INERTIA + 3]
+    """Write the torque of one control tick; see `control.law.Law`."""
+    period, history, inertia = parameters[PERIOD], state[HISTORY:], parameters[INERTIA : INERTIA + 3]
     rate, acceleration = np.empty(3), np.empty(3)
     for axis in range(3):
         slope = parameters[SURFACE_SLOPE + axis]
@@ -92,8 +98,8 @@ def step(
         state[SLIDING + axis] = sliding_surface(error, error_rate, slope)
         rate[axis] = reference[1, axis] - slope * error
         acceleration[axis] = reference[2, axis] - slope * error_rate
-        owed = measurement[2, axis] - asked_before(asked, axis, parameters[LATE])
-        state[ADAPTED + axis] += period * parameters[TRACKING + axis] * owed
+        torque_error = measurement[2, axis] - delayed_command(history, axis, parameters[FRACTION])
+        state[ADAPTED + axis] += period * parameters[TRACKING + axis] * torque_error
     model_torque(measurement, acceleration, rate, inertia, torque)
     for axis in range(3):
         s = state[SLIDING + axis]
@@ -101,4 +107,4 @@ def step(
         reaching = parameters[REACHING_GAIN + axis] * (s + switched)
         torque[axis] += state[ADAPTED + axis] - inertia[axis] * reaching
         state[ADAPTED + axis] -= period * parameters[ADAPTATION + axis] * inertia[axis] * s
-    remember(asked, torque)
+    store_command(history, torque)

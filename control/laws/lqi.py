@@ -1,20 +1,20 @@
-"""Linear quadratic with integral (LQI): PID's feedback with the gains of the least cost.
+"""Linear quadratic regulator with integral (LQI): PID feedback with the gains of least cost.
 
-The regulator is that of Anderson and Moore, *Optimal Control: Linear Quadratic Methods* (1990).
+The regulator follows Anderson and Moore, *Optimal Control: Linear Quadratic Methods* (1990).
 
-An axis is a double integrator to it, and the error's integral a third state. Of all feedbacks of (e, ė, ∫e)
-it has the one with the least of Σ ((w_e e)² + (w_r ė)² + (w_i ∫e)² + v²) over the ticks, v the acceleration,
-held over each: a discrete Riccati equation, solved where the law is built. The weights are in the units of
-the gains. Integral and windup are those of `control.parts.integral_feedback`.
+An axis is a double integrator, and the integral of the error is a third state. Of all feedbacks of
+(e, ė, ∫e) the regulator minimises Σ ((w_e e)² + (w_r ė)² + (w_i ∫e)² + v²) over the ticks, with v the
+acceleration, constant over each tick. The discrete Riccati equation is solved when the law is built. The
+weights are in the units of the gains. Integral and windup are those of `control.law_components.feedback`.
 
 *Tuning.* For fast ticks the identity of the return difference gives integral = w_i,
-stiffness² = w_e² + 2 integral damping and damping² = w_r² + 2 stiffness. The integral's weight alone, ω³,
-places Butterworth's poles of radius ω; w_e as a share of ω² damps them more; and w_e = √3ω², w_r = √3ω,
-w_i = ω³ are those of PID's triple pole.
+stiffness² = w_e² + 2 integral damping and damping² = w_r² + 2 stiffness. The integral weight alone, ω³,
+places Butterworth poles of radius ω; w_e as a share of ω² increases their damping; w_e = √3ω², w_r = √3ω,
+w_i = ω³ give the triple pole of PID.
 
 *Default.* ω = 60 1/s, no other weight, chosen for the tilt (60) with the prototype's hardware; on ideal
-hardware a faster one is better. `spheretwin reproduce rivals` has the figures; the study `tuning` searches ω
-and w_e.
+hardware a faster one is better. `spheretwin reproduce rivals` reports the figures; the study `tuning`
+searches ω and w_e.
 """
 
 from typing import Literal
@@ -22,37 +22,37 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.feedback import feedback
 from spheretwin.control.law_components.parameters import LawParameters, named
 from spheretwin.models.base.errors import InputError
 
 BANDWIDTH_rad_s = 60.0
 
-# Radians a period: poles that are faster are at 0, and the Riccati equation ever worse to solve.
+# Radians per period: faster poles are at 0, and the Riccati equation becomes ill-conditioned.
 FASTEST = 10.0
 
 
 def regulator(
     error_weight: float, rate_weight: float, integral_weight: float, period_s: float
 ) -> tuple[float, float, float]:
-    """Stiffness (1/s²), damping (1/s) and integral (1/s³) of the least cost.
+    """Return stiffness (1/s²), damping (1/s) and integral (1/s³) of least cost.
 
     Parameters
     ----------
     error_weight, rate_weight, integral_weight : float, 1/s², 1/s and 1/s³
-        Of the acceleration's, which is 1.
+        Relative to the weight of the acceleration, which is 1.
     period_s : float, s
         Control period.
 
     Raises
     ------
     InputError
-        The weights ask for what no tick can follow, or are too far apart for the equation to be solved.
+        The weights are too large for the control period, or too far apart for the equation to be solved.
     """
-    from scipy.linalg import solve_discrete_are  # slow to import, and needed by this law alone
+    from scipy.linalg import solve_discrete_are  # slow to import, used by this law only
 
-    # In units of time in which the weights are about 1: the equation is as well-posed as can be.
+    # In units of time in which the weights are about 1, the equation is best conditioned.
     scale = max(error_weight**0.5, rate_weight, integral_weight ** (1 / 3))
     h = scale * period_s
     weighed = f"received {error_weight:g}, {rate_weight:g} and {integral_weight:g}"
@@ -70,7 +70,7 @@ def regulator(
 
 
 class LQI(LawParameters):
-    """Linear quadratic with integral."""
+    """Linear quadratic regulator with integral."""
 
     law: Literal["lqi"] = named("lqi")
     error_weight: NonNegativeEach = Field(each(0.0), description="weight of the error, 1/s²")
@@ -79,8 +79,8 @@ class LQI(LawParameters):
         each(BANDWIDTH_rad_s**3), description="weight of its integral, 1/s³"
     )
 
-    def build(self, known: Known) -> Law:
-        """Law whose integral starts at 0."""
+    def build(self, known: NominalModel) -> Law:
+        """Return a law whose integral starts at 0."""
         weights = zip(self.error_weight, self.rate_weight, self.integral_weight, strict=True)
-        gains = np.array([regulator(*each, known.period_s) for each in weights])
+        gains = np.array([regulator(*axis_weights, known.period_s) for axis_weights in weights])
         return feedback(self.law, gains.T, known)

@@ -1,7 +1,7 @@
 """Proportional-derivative law, the paper's baseline: ``v = -stiffness e - damping edot``.
 
-The gains are λ and K of (58), as the paper gives none. `spheretwin reproduce figure11` has its errors with
-them; the study `tuning` searches others.
+The gains are λ and K of (58), as the paper gives none for PD. `spheretwin reproduce figure11` reports the
+errors with them; the study `tuning` searches others.
 """
 
 from typing import Literal
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.control.law import Known, Law, NonNegativeEach, PositiveEach, each
+from spheretwin.control.law import Law, NominalModel, NonNegativeEach, PositiveEach, each
 from spheretwin.control.law_components.parameters import LawParameters, Level, named, torque_factor
 
 Array = NDArray[np.float64]
@@ -23,11 +23,11 @@ class PD(LawParameters):
 
     law: Literal["pd"] = named("pd")
     level: Level = "acceleration"
-    stiffness: PositiveEach = Field(each(50.0), description="torque or acceleration a unit of error, 1/s²")
-    damping: NonNegativeEach = Field(each(20.0), description="the same a unit of its rate, 1/s")
+    stiffness: PositiveEach = Field(each(50.0), description="torque or acceleration per unit of error, 1/s²")
+    damping: NonNegativeEach = Field(each(20.0), description="the same per unit of its rate, 1/s")
 
-    def build(self, known: Known) -> Law:
-        """Law without memory."""
+    def build(self, known: NominalModel) -> Law:
+        """Return a law without memory."""
         factor = torque_factor(self.level, known)
         return Law(self.law, step, np.array([*self.stiffness, *self.damping, *factor]), np.zeros(0))
 
@@ -35,7 +35,7 @@ class PD(LawParameters):
 def step(
     t: float, reference: Array, measurement: Array, parameters: Array, state: Array, torque: Array
 ) -> None:
-    """Write the torque of one control tick, as `control.law.Law` says."""
+    """Write the torque of one control tick; see `control.law.Law`."""
     for axis in range(3):
         error = measurement[0, axis] - reference[0, axis]
         error_rate = measurement[1, axis] - reference[1, axis]

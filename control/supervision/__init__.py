@@ -1,1 +1,1 @@
-"""What a controller does about faults: groups left out, a detector of them, and a watchdog."""
+"""Reaction of the controller to faults: enabled groups, fault detector and watchdog."""

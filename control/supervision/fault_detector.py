@@ -1,30 +1,30 @@
-"""Finds groups whose current no longer follows: open ones and shorted ones.
+"""Fault detector: finds open and shorted groups, whose current no longer follows the command.
 
-Each tick the measured current of a group is held against three accounts of it:
+At each tick the measured current of a group is compared with three model currents:
 
-- *driven*: what the controller believes, its command through the nominal delay and lag, as far as the swing
-  of the amplifier carries it through the coil;
-- *open*: nothing;
-- *shorted*: what the back-EMF drives through the coil alone, ``L di/dt = -R i - e`` with ``e = G^T w``.
+- *driven*: the command through the nominal delay and lag (applied torque), limited to the current that the
+  voltage swing of the amplifier drives through the coil;
+- *open*: zero;
+- *shorted*: the current of the back-EMF in the coil alone, ``L di/dt = -R i - e`` with ``e = G^T w``.
 
-A tick speaks for a fault where the measured current is within a threshold of an undriven account, and that
-account is further than twice the threshold from the driven one: it could not be both. A tick at which the
-current is near neither undriven account speaks for health, and what was counted before is forgotten. Ticks at
-which little is commanded say nothing. So many ticks that speak for a fault, with none between that speaks
-against, and the group is taken to be out, as open or as shorted, whichever account was closer (the mean
-square of the difference). Where the rotor is slow the two accounts are one but for noise, and the first name
-is a guess. So both go on being held against the current of a group that is out, which nothing drives any
-more, and the name changes where the sum of squares of the other one has become less by the square of the
-threshold. Whatever the account of a shorted coil, noise does that to a true name at six standard deviations.
+A tick indicates a fault if the measured current is within a threshold of the open or the shorted model, and
+that model is further than twice the threshold from the driven one, so that both cannot hold. A tick at which
+the current is near neither fault model indicates a healthy group and resets the count. Ticks with a small
+command indicate nothing. After a given number of ticks that indicate a fault, without one that indicates
+health, the group is disabled as open or as shorted, whichever model was closer (mean square of the
+difference). At low rotor speed the two models differ by noise only, and the first classification is a guess.
+Therefore both models are still compared with the current of a disabled group, which is not driven. The
+classification changes if the sum of squares of the other model is smaller by the square of the threshold.
+For any shorted current, noise causes this for a correct classification at six standard deviations.
 
-*Threshold.* A healthy group that is believed to carry more than twice the threshold must not be measured
-below it: the threshold is at least the largest static error of command and measurement together, and six
-standard deviations of the measurement's noise, which a sample passes twice in 10⁹. The account of a shorted
-coil has errors too (warm copper, estimated rates): no less than 1 % of the current limit.
+*Threshold.* The measured current of a healthy group with a driven current of more than twice the threshold
+must exceed the threshold. The threshold is therefore at least the largest static error of command and
+measurement together, plus six standard deviations of the measurement noise, which a sample exceeds twice in
+10⁹. The shorted model has errors too (warm copper, estimated rates): at least 1 % of the current limit.
 
-*Ticks.* A healthy current is late where the voltage limits its rate: from one limit to the other it needs
-``2 i L / (V - R i)``, of the swing V that is left to the amplifier, and five time constants of the lag to
-settle. It may look like none for so long. The detector waits for that many ticks, and one more.
+*Ticks.* A healthy current is delayed if the voltage limits its rate: from one limit to the other it needs
+``2 i L / (V - R i)``, with the swing V of the amplifier, and five time constants of the lag to settle. For
+that time it may look like no current. The detector waits for that many ticks, and one more.
 """
 
 from __future__ import annotations
@@ -36,7 +36,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.control.supervision.enabled_groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, Groups
+from spheretwin.control.supervision.enabled_groups import (
+    DETECTED_OPEN,
+    DETECTED_SHORTED,
+    IN_USE,
+    REPORTED,
+    EnabledGroups,
+)
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.kinematics import angular_velocity
 
@@ -48,22 +54,24 @@ Array = NDArray[np.float64]
 
 
 class DetectorSection(BaseModel):
-    """Detector of open and shorted groups; off unless asked for here or by a fault."""
+    """Detector of open and shorted groups; off unless switched on here or by a fault."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    detect: bool = Field(False, description="whether the controller looks for groups that do not follow")
+    detect: bool = Field(
+        False, description="whether the controller detects groups whose current does not follow"
+    )
     threshold_A: Annotated[float, Field(ge=1e-6, le=1e3)] | None = Field(
         None,
-        description="current below which a group may carry none, A; derived from `nominal` unless given",
+        description="threshold of the difference of currents, A; derived from `nominal` unless given",
     )
     ticks: Annotated[int, Field(ge=1, le=1000)] | None = Field(
         None,
-        description="control ticks in a row that must speak for a fault; derived from `nominal` unless given",
+        description="control ticks that must indicate a fault; derived from `nominal` unless given",
     )
 
 
-class Followed(NamedTuple):
+class NominalCurrents(NamedTuple):
     """Nominal drive and nominal sensors of the currents."""
 
     period_s: float
@@ -74,7 +82,7 @@ class Followed(NamedTuple):
     """Standard deviation of a measured current."""
     time_constant_s: float
     swing_V: float
-    """Of the amplifiers; infinite where none is known."""
+    """Of the amplifiers; infinite if unknown."""
     resistance_ohm: float
     inductance_H: float
 
@@ -87,57 +95,57 @@ class Detector(NamedTuple):
     ticks: int
     decay: float  # of the current of a shorted coil, over a control period
     resistance_ohm: float
-    reach_A: float  # that the swing carries through the coil
-    measured_A: Array  # (n,) what the sensors of the currents say
-    shorted_A: Array  # (n,) what a shorted coil would carry
-    counted: NDArray[np.int64]  # (n,) ticks that speak for a fault
-    open_A2: Array  # (n,) squared differences over these ticks
+    reach_A: float  # current that the swing drives through the coil
+    measured_A: Array  # (n,) measured currents
+    shorted_A: Array  # (n,) current of the shorted model
+    indications: NDArray[np.int64]  # (n,) ticks that indicate a fault
+    open_A2: Array  # (n,) sum of squared differences over these ticks
     shorted_A2: Array  # (n,)
     rate_S: Array  # (3,) rad/s
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Arrays that it goes on from."""
-        return self.shorted_A, self.counted, self.open_A2, self.shorted_A2
+        """Return the arrays that hold the state."""
+        return self.shorted_A, self.indications, self.open_A2, self.shorted_A2
 
 
-def derived_threshold_A(followed: Followed) -> float:
-    """Threshold that keeps healthy groups healthy, as the head of this file says."""
-    errors = followed.static_error_A + DEVIATIONS * followed.noise_A
-    return max(LEAST_SHARE * followed.current_limit_A, errors)
+def derived_threshold_A(nominal: NominalCurrents) -> float:
+    """Return the threshold that avoids false alarms; see the module's docstring."""
+    errors = nominal.static_error_A + DEVIATIONS * nominal.noise_A
+    return max(LEAST_SHARE * nominal.current_limit_A, errors)
 
 
-def derived_ticks(followed: Followed) -> int:
-    """Ticks for which a healthy current may look like none, and one more."""
-    spare_V = followed.swing_V - followed.resistance_ohm * followed.current_limit_A
-    # Where the swing does not carry the limit at all, the current gets there with L/R at best.
-    natural_s = SETTLING * followed.inductance_H / followed.resistance_ohm
-    swing_s = 2 * followed.current_limit_A * followed.inductance_H / spare_V if spare_V > 0 else natural_s
-    slow_s = min(swing_s, natural_s) + SETTLING * followed.time_constant_s
-    return 1 + ceil(slow_s / followed.period_s)
+def derived_ticks(nominal: NominalCurrents) -> int:
+    """Return the ticks for which a healthy current may look like none, plus one."""
+    spare_V = nominal.swing_V - nominal.resistance_ohm * nominal.current_limit_A
+    # If the swing cannot drive the limit at all, the current settles with L/R at best.
+    natural_s = SETTLING * nominal.inductance_H / nominal.resistance_ohm
+    swing_s = 2 * nominal.current_limit_A * nominal.inductance_H / spare_V if spare_V > 0 else natural_s
+    slow_s = min(swing_s, natural_s) + SETTLING * nominal.time_constant_s
+    return 1 + ceil(slow_s / nominal.period_s)
 
 
-def detector(section: DetectorSection, on: bool, groups: int, followed: Followed) -> Detector:
-    """Detector that has seen nothing yet.
+def detector(section: DetectorSection, on: bool, groups: int, nominal: NominalCurrents) -> Detector:
+    """Return a detector before the first measurement.
 
     Parameters
     ----------
     section : DetectorSection
     on : bool
-        Whether it looks.
+        Whether it is on.
     groups : int
-    followed : Followed
-        What healthy groups do.
+    nominal : NominalCurrents
+        Nominal currents of healthy groups.
     """
     return Detector(
         on=on,
-        threshold_A=section.threshold_A or derived_threshold_A(followed),
-        ticks=section.ticks or derived_ticks(followed),
-        decay=exp(-followed.period_s * followed.resistance_ohm / followed.inductance_H),
-        resistance_ohm=followed.resistance_ohm,
-        reach_A=followed.swing_V / followed.resistance_ohm,
+        threshold_A=section.threshold_A or derived_threshold_A(nominal),
+        ticks=section.ticks or derived_ticks(nominal),
+        decay=exp(-nominal.period_s * nominal.resistance_ohm / nominal.inductance_H),
+        resistance_ohm=nominal.resistance_ohm,
+        reach_A=nominal.swing_V / nominal.resistance_ohm,
         measured_A=np.zeros(groups),
         shorted_A=np.zeros(groups),
-        counted=np.zeros(groups, dtype=np.int64),
+        indications=np.zeros(groups, dtype=np.int64),
         open_A2=np.zeros(groups),
         shorted_A2=np.zeros(groups),
         rate_S=np.zeros(3),
@@ -145,77 +153,77 @@ def detector(section: DetectorSection, on: bool, groups: int, followed: Followed
 
 
 @allocation_free
-def find(
-    detector: Detector, groups: Groups, believed: Array, G: Array, q: Array, qdot: Array, t: float
+def detect_faults(
+    detector: Detector, groups: EnabledGroups, applied: Array, G: Array, q: Array, qdot: Array, t: float
 ) -> None:
-    """Hold the measured currents of one control tick against what they would be.
+    """Compare the measured currents of one control tick with the model currents.
 
     Parameters
     ----------
     detector : Detector
         Changed in place.
-    groups : Groups
-        What is found is left out from now on.
-    believed : (n,) array, A
-        Currents at this tick as the controller believes them.
+    groups : EnabledGroups
+        Groups found faulty are disabled.
+    applied : (n,) array, A
+        Estimated driven currents at this tick.
     G : (3, n) array, N·m/A
-        Nominal torque matrix, whole.
+        Nominal torque matrix of all groups.
     q, qdot : (3,) arrays, rad and rad/s
-        As the controller has them.
+        Pose and rates of the controller.
     t : float, s
     """
     threshold = detector.threshold_A
     angular_velocity(q, qdot, detector.rate_S)
-    for j in range(believed.shape[0]):
+    for j in range(applied.shape[0]):
         emf = G[0, j] * detector.rate_S[0] + G[1, j] * detector.rate_S[1] + G[2, j] * detector.rate_S[2]
         settled = -emf / detector.resistance_ohm
         shorted = settled + (detector.shorted_A[j] - settled) * detector.decay
         detector.shorted_A[j] = shorted
-        measured, out = detector.measured_A[j], groups.out[j]
-        driven = min(max(believed[j], -detector.reach_A), detector.reach_A)
-        as_open, as_shorted = abs(measured), abs(measured - shorted)
-        if out == TOLD:
-            _forget(detector, j)
+        measured, state = detector.measured_A[j], groups.out[j]
+        driven = min(max(applied[j], -detector.reach_A), detector.reach_A)
+        open_error, shorted_error = abs(measured), abs(measured - shorted)
+        if state == REPORTED:
+            _reset(detector, j)
             continue
-        if out != IN_USE:
-            _compare(detector, j, as_open, as_shorted)
-            groups.out[j] = _name(detector, j, out)
+        if state != IN_USE:
+            _accumulate(detector, j, open_error, shorted_error)
+            groups.out[j] = _classify(detector, j, state)
             continue
-        if not min(as_open, as_shorted) <= threshold:
-            _forget(detector, j)
+        if not min(open_error, shorted_error) <= threshold:
+            _reset(detector, j)
             continue
-        speaks = (as_open <= threshold and abs(driven) > 2.0 * threshold) or (
-            as_shorted <= threshold and abs(driven - shorted) > 2.0 * threshold
+        indicates_fault = (open_error <= threshold and abs(driven) > 2.0 * threshold) or (
+            shorted_error <= threshold and abs(driven - shorted) > 2.0 * threshold
         )
-        if not speaks:
+        if not indicates_fault:
             continue
-        detector.counted[j] += 1
-        _compare(detector, j, as_open, as_shorted)
-        if detector.counted[j] >= detector.ticks:
-            opened = detector.open_A2[j] <= detector.shorted_A2[j]
-            groups.out[j] = FOUND_OPEN if opened else FOUND_SHORTED
+        detector.indications[j] += 1
+        _accumulate(detector, j, open_error, shorted_error)
+        if detector.indications[j] >= detector.ticks:
+            is_open = detector.open_A2[j] <= detector.shorted_A2[j]
+            groups.out[j] = DETECTED_OPEN if is_open else DETECTED_SHORTED
             groups.out_s[j] = t
             groups.some_out[0] = True
 
 
 @allocation_free
-def _forget(detector: Detector, group: int) -> None:
-    """Begin anew with a group."""
-    detector.counted[group] = 0
+def _reset(detector: Detector, group: int) -> None:
+    """Reset the count and the sums of a group."""
+    detector.indications[group] = 0
     detector.open_A2[group] = detector.shorted_A2[group] = 0.0
 
 
 @allocation_free
-def _compare(detector: Detector, group: int, as_open: float, as_shorted: float) -> None:
-    """Add the differences (A) of one tick to what speaks against either account."""
-    detector.open_A2[group] += as_open * as_open
-    detector.shorted_A2[group] += as_shorted * as_shorted
+def _accumulate(detector: Detector, group: int, open_error: float, shorted_error: float) -> None:
+    """Add the squared differences (A) of one tick to the sums of both models."""
+    detector.open_A2[group] += open_error * open_error
+    detector.shorted_A2[group] += shorted_error * shorted_error
 
 
 @allocation_free
-def _name(detector: Detector, group: int, name: int) -> int:
-    """How a group that was found stands: as before, unless the other account has become closer by far."""
-    closer = detector.open_A2[group] - detector.shorted_A2[group]
-    if abs(closer) <= detector.threshold_A * detector.threshold_A:
-        return name
-    return FOUND_SHORTED if closer > 0.0 else FOUND_OPEN
+def _classify(detector: Detector, group: int, state: int) -> int:
+    """Return the state of a detected group: unchanged, unless the other model has become clearly closer."""
+    difference = detector.open_A2[group] - detector.shorted_A2[group]
+    if abs(difference) <= detector.threshold_A * detector.threshold_A:
+        return state
+    return DETECTED_SHORTED if difference > 0.0 else DETECTED_OPEN

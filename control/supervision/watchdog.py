@@ -1,12 +1,12 @@
-"""The watchdog: looks at each measurement and command, and takes the currents away where one cannot be true.
+"""Watchdog: checks each measurement and command, and removes the currents if one is implausible.
 
-It trips for one of the reasons below, once. From then on the drive is asked for nothing, whatever is on its
-way, or it shorts the coils so that their back-EMF brakes the rotor; after a stated time more the run ends.
-The law is not called again.
+It trips once, for one of the reasons below. From then on the drive receives no current command, whatever is
+pending, or it shorts the coils so that their back-EMF brakes the rotor. After a given time the run ends. The
+law is not called again.
 
-*Jump.* No angle moves further in a control period than the largest rate takes it, plus what noise and
-resolution of its sensor add: six standard deviations of the difference of two samples, and one step. Where
-samples were missing, the time since the last one counts.
+*Jump.* In a control period an angle moves at most by the largest rate times the period, plus noise and
+resolution of its sensor: six standard deviations of the difference of two samples, and one step. If samples
+were missing, the time since the last one counts.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ DEVIATIONS = 6.0
 
 
 class Reason(IntEnum):
-    """Why it tripped; the telemetry has the number, a summary the text."""
+    """Reason of a trip: a number for the telemetry, a text for the summary."""
 
-    told: str
+    text: str
 
-    def __new__(cls, code: int, told: str) -> Reason:
-        """Number with its text."""
+    def __new__(cls, code: int, text: str) -> Reason:
+        """Create a number with its text."""
         reason = int.__new__(cls, code)
         reason._value_ = code
-        reason.told = told
+        reason.text = text
         return reason
 
     NONE = 0, "nothing"
@@ -49,10 +49,10 @@ class Reason(IntEnum):
 
 
 REASONS = {int(reason): reason for reason in Reason}
-"""By number."""
+"""Reasons by number."""
 
 GO, RELEASE, SHORT = 0, 1, 2
-"""What the drive is told: go on, no currents, shorted coils."""
+"""Commands to the drive: go on, no currents, shorted coils."""
 
 _STALE, _JUMP, _MEASUREMENT, _SPEED, _EDGE = (
     int(Reason.STALE),
@@ -64,26 +64,26 @@ _STALE, _JUMP, _MEASUREMENT, _SPEED, _EDGE = (
 
 
 class WatchdogSection(BaseModel):
-    """Watchdog of the controller; off unless asked for."""
+    """Watchdog of the controller; off by default."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    on: bool = Field(False, description="whether there is one (prototype: assumed)")
+    on: bool = Field(False, description="whether the watchdog is on (prototype: assumed)")
     action: Literal["release", "short"] = Field(
         "release",
-        description="what it does: release the rotor (currents to zero), or short the coils (brake)",
+        description="action: release the rotor (currents to zero), or short the coils (brake)",
     )
     rundown_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
-        0.05, description="time that the run goes on afterwards, s (assumed)"
+        0.05, description="time from the trip to the end of the run, s (assumed)"
     )
     stale_ticks: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
         5, description="control ticks in a row without a fresh measurement of an angle (assumed)"
     )
     largest_rate_rad_s: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
-        60.0, description="rate of a hinge that the rotor cannot have, rad/s (assumed; the nutation has 7)"
+        60.0, description="largest plausible rate of a hinge, rad/s (assumed; the nutation has 7)"
     )
     edge_margin_rad: Annotated[float, Field(ge=-10, le=10)] = Field(
-        0.02, description="how far from the end of a hinge's range it must stay, rad (assumed)"
+        0.02, description="distance to keep from the end of a hinge's range, rad (assumed)"
     )
 
 
@@ -95,24 +95,24 @@ class Watchdog(NamedTuple):
     rundown_ticks: int
     stale_ticks: int
     largest_rate_rad_s: float
-    step_rad: float  # that the largest rate takes an angle in a control period
-    noise_rad: Array  # (3,) that two samples may differ by besides
+    step_rad: float  # angle at the largest rate in a control period
+    noise_rad: Array  # (3,) further difference of two samples by noise and resolution
     lowest_rad: Array  # (3,)
     highest_rad: Array  # (3,)
-    fresh: Array  # (3,) 1 where the measurement of an angle is new, 0 where it is the last one again
-    last_rad: Array  # (3,) last fresh measurement; no number before the first
-    missing: NDArray[np.int64]  # (3,) ticks since then
+    fresh: Array  # (3,) 1 if the measurement of an angle is new, 0 if it repeats the last one
+    last_rad: Array  # (3,) last fresh measurement; NaN before the first
+    missing: NDArray[np.int64]  # (3,) ticks since the last fresh measurement
     halt: NDArray[np.int64]  # (1,) `GO`, `RELEASE` or `SHORT`: the drive reads it
     reason: NDArray[np.int64]  # (1,)
-    since: NDArray[np.int64]  # (1,) ticks since it tripped
+    ticks_since_trip: NDArray[np.int64]  # (1,)
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Arrays that it goes on from."""
-        return self.last_rad, self.missing, self.halt, self.reason, self.since
+        """Return the arrays that hold the state."""
+        return self.last_rad, self.missing, self.halt, self.reason, self.ticks_since_trip
 
 
-class Watched(NamedTuple):
-    """What a watchdog reckons with of the sensors and the rotor."""
+class MeasurementLimits(NamedTuple):
+    """Sampling, sensor errors and hinge ranges that bound a plausible measurement."""
 
     period_s: float
     noise_rad: Array  # (3,) standard deviation of each measured angle
@@ -120,27 +120,29 @@ class Watched(NamedTuple):
     hinge_range_rad: Array  # (3, 2) nominal
 
 
-def watchdog(section: WatchdogSection, watched: Watched, fresh: Array, halt: NDArray[np.int64]) -> Watchdog:
-    """Watchdog that has seen nothing yet.
+def watchdog(
+    section: WatchdogSection, limits: MeasurementLimits, fresh: Array, halt: NDArray[np.int64]
+) -> Watchdog:
+    """Return a watchdog before the first measurement.
 
     Parameters
     ----------
     section : WatchdogSection
-    watched : Watched
+    limits : MeasurementLimits
     fresh : (3,) array
         The sensors write into it.
     halt : (1,) array
         The drive reads it.
     """
-    low, high = watched.hinge_range_rad.T
+    low, high = limits.hinge_range_rad.T
     return Watchdog(
         on=section.on,
         action=SHORT if section.action == "short" else RELEASE,
-        rundown_ticks=round(section.rundown_s / watched.period_s),
+        rundown_ticks=round(section.rundown_s / limits.period_s),
         stale_ticks=section.stale_ticks,
         largest_rate_rad_s=section.largest_rate_rad_s,
-        step_rad=section.largest_rate_rad_s * watched.period_s,
-        noise_rad=DEVIATIONS * sqrt(2) * watched.noise_rad + watched.quantum_rad,
+        step_rad=section.largest_rate_rad_s * limits.period_s,
+        noise_rad=DEVIATIONS * sqrt(2) * limits.noise_rad + limits.quantum_rad,
         lowest_rad=low + section.edge_margin_rad,
         highest_rad=high - section.edge_margin_rad,
         fresh=fresh,
@@ -148,13 +150,13 @@ def watchdog(section: WatchdogSection, watched: Watched, fresh: Array, halt: NDA
         missing=np.zeros(3, dtype=np.int64),
         halt=halt,
         reason=np.zeros(1, dtype=np.int64),
-        since=np.zeros(1, dtype=np.int64),
+        ticks_since_trip=np.zeros(1, dtype=np.int64),
     )
 
 
 @allocation_free
 def watch(watchdog: Watchdog, angle: Array, rate: Array) -> None:
-    """Look at the finite angles (3,), rad, and the rates (3,), rad/s, that the law is to be handed."""
+    """Check the finite angles (3,), rad, and the rates (3,), rad/s, that the law receives."""
     for i in range(3):
         if watchdog.fresh[i] == 0.0:
             watchdog.missing[i] += 1
@@ -164,7 +166,7 @@ def watch(watchdog: Watchdog, angle: Array, rate: Array) -> None:
         if not isfinite(rate[i]):
             rate[i] = 0.0  # telemetry holds numbers
             trip(watchdog, _MEASUREMENT)
-        # A first measurement is compared with no number, which nothing exceeds.
+        # A first measurement is compared with NaN: the comparison is False.
         moved = abs(angle[i] - watchdog.last_rad[i])
         if moved > watchdog.step_rad * (watchdog.missing[i] + 1) + watchdog.noise_rad[i]:
             trip(watchdog, _JUMP)
@@ -176,13 +178,13 @@ def watch(watchdog: Watchdog, angle: Array, rate: Array) -> None:
 
 
 @allocation_free
-def mend(watchdog: Watchdog, measurement: Array) -> bool:
-    """Put the last angle, and no rate, in the places of a measurement (3, 3) that hold no number, and trip.
+def replace_invalid(watchdog: Watchdog, measurement: Array) -> bool:
+    """Replace values of a measurement (3, 3) that are not finite by the last angle and rate 0, and trip.
 
     Returns
     -------
     bool
-        Whether there is a watchdog to do so.
+        True if the watchdog is on.
     """
     if not watchdog.on:
         return False
@@ -196,22 +198,22 @@ def mend(watchdog: Watchdog, measurement: Array) -> bool:
 
 @allocation_free
 def trip(watchdog: Watchdog, reason: int) -> None:
-    """Take the currents away for a reason; a second one changes nothing."""
+    """Remove the currents for a reason; a second reason has no effect."""
     if watchdog.halt[0] == GO:
         watchdog.halt[0], watchdog.reason[0] = watchdog.action, reason
 
 
 @allocation_free
-def over(watchdog: Watchdog) -> bool:
-    """Whether a tick was the last one, as it has tripped so long ago; counts the tick."""
+def count_rundown(watchdog: Watchdog) -> bool:
+    """Count a tick after a trip; return True if it was the last one of the run."""
     if watchdog.halt[0] == GO:
         return False
-    watchdog.since[0] += 1
-    return watchdog.since[0] > watchdog.rundown_ticks
+    watchdog.ticks_since_trip[0] += 1
+    return watchdog.ticks_since_trip[0] > watchdog.rundown_ticks
 
 
-def carried_on(before: Watchdog, after: Watchdog) -> None:
-    """Go on as before with other figures; what one has seen that was off since is too old to compare with."""
+def transfer_watchdog(before: Watchdog, after: Watchdog) -> None:
+    """Copy the state into a watchdog with other limits; the measurements of one that was off are dropped."""
     transfer_state(before, after)
     if not before.on:
         after.last_rad[:], after.missing[:] = np.nan, 0

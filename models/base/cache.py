@@ -1,11 +1,11 @@
-"""A folder for what is expensive to make and can always be made again.
+"""Cache folder for results that are expensive to compute and can always be computed again.
 
-Its name is a digest of every source file that can hold compiled code, and of the versions of what it is
-made with, so that nothing in it can be stale: numba itself keys a cached function by its own file alone, and
-an edited callee in another file would go on returning its old answer.
+The name of the folder is a digest of every source file that can hold compiled code, and of the versions of
+the packages involved, so that no entry can be stale. Numba itself keys a cached function by its own file
+alone: an edited callee in another file would still give the old result.
 
-Each entry begins with a digest of what follows: one that was cut short or damaged is made again. A folder
-that cannot be written is done without.
+Each entry begins with a digest of its content: a truncated or damaged entry is computed again. Without a
+writable folder nothing is cached.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ WITHOUT_COMPILED_CODE = ("analysis", "bench", "cli", "study", "viz")
 
 
 def cache_folder() -> Path | None:
-    """Folder for these sources and versions, None where none can be had.
+    """Return the folder for these sources and versions; None if there is no writable one.
 
     `SPHERETWIN_CACHE_DIR` moves it elsewhere.
     """
@@ -39,8 +39,8 @@ def cache_folder() -> Path | None:
     return root and root / sources_digest()
 
 
-def kept(name: str) -> bytes | None:
-    """What was kept under a name; None if nothing was, or if it is damaged."""
+def load_entry(name: str) -> bytes | None:
+    """Return the content of an entry; None if there is none, or if it is damaged."""
     folder = cache_folder()
     if folder is None:
         return None
@@ -52,8 +52,8 @@ def kept(name: str) -> bytes | None:
     return content if digest == hashlib.sha256(content).digest() else None
 
 
-def keep(name: str, content: bytes) -> None:
-    """Keep something under a name, unless the folder cannot take it: it can always be made again."""
+def store_entry(name: str, content: bytes) -> None:
+    """Store the content of an entry; a folder that cannot be written is ignored."""
     if folder := cache_folder():
         with suppress(OSError, SpheretwinError):
             folder.mkdir(parents=True, exist_ok=True)
@@ -61,23 +61,23 @@ def keep(name: str, content: bytes) -> None:
                 temporary.write_bytes(hashlib.sha256(content).digest() + content)
 
 
-def kept_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Array from the cache, or computed and then kept there.
+def cached_array(key: bytes, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return an array from the cache, or compute it and store it there.
 
     Parameters
     ----------
     key : bytes
-        Everything beside the sources that the array depends on.
+        Everything that the array depends on, except the sources.
     compute : callable
-        Makes the array.
+        Computes the array.
     """
     name = f"{hashlib.sha256(key).hexdigest()[:32]}.npy"
-    if content := kept(name):
-        with suppress(ValueError, EOFError):  # whole, but no array
+    if content := load_entry(name):
+        with suppress(ValueError, EOFError):  # complete, but not an array
             return np.load(io.BytesIO(content))
-    array, made = compute(), io.BytesIO()
-    np.save(made, array)
-    keep(name, made.getvalue())
+    array, buffer = compute(), io.BytesIO()
+    np.save(buffer, array)
+    store_entry(name, buffer.getvalue())
     return array
 
 
@@ -97,17 +97,17 @@ def _root() -> Path | None:
 
 
 def _candidates() -> Iterator[Path]:
-    if chosen := os.environ.get("SPHERETWIN_CACHE_DIR"):
-        yield Path(chosen)
-    if chosen := os.environ.get("XDG_CACHE_HOME"):
-        yield Path(chosen) / "spheretwin"
+    if folder := os.environ.get("SPHERETWIN_CACHE_DIR"):
+        yield Path(folder)
+    if folder := os.environ.get("XDG_CACHE_HOME"):
+        yield Path(folder) / "spheretwin"
     with suppress(RuntimeError):  # a user without a home
         yield Path.home() / ".cache" / "spheretwin"
 
 
 @cache
 def sources_digest() -> str:
-    """Digest of all sources that can hold compiled code, and of the versions of what it is made with."""
+    """Return a digest of all sources with compiled code, and of the versions of the packages involved."""
     digest = hashlib.sha256((sys.implementation.cache_tag or sys.version).encode())
     for package in ("numba", "llvmlite", "mujoco", "numpy", "scipy"):
         digest.update(importlib.metadata.version(package).encode())

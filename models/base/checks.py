@@ -1,4 +1,4 @@
-"""A figure, the bound it has to keep, and why the bound is what it is."""
+"""Checks: a figure, its bound and the reason for the bound."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Check:
-    """A measured figure against its bound.
+    """Measured figure and its bound.
 
     Attributes
     ----------
     name : str
         Stable name of the check.
     compares : str
-        What is held against what, and how the difference is measured.
+        Compared quantities, and the measure of their difference.
     states : int
-        States, samples or runs that the figure is taken over.
+        Number of states, samples or runs of the figure.
     value : float or None
-        The figure, the worst of all; None where it could not be taken.
+        Worst value of the figure; None if it could not be computed.
     bound : float or None
         The largest value that passes; None for a figure that is only reported.
     why : str
-        Why the bound has its value, or why there is none.
+        Reason for the bound, or for its absence.
     unit : str
         Of value and bound.
     at_least : float or None
-        The least value that passes, where that is not minus infinity.
+        The least value that passes, if there is one.
     detail : mapping
         The figures behind the value, by name.
     """
@@ -46,13 +46,13 @@ class Check:
 
     @property
     def ok(self) -> bool:
-        """Whether the value keeps its bound; a value that is not a number does not."""
+        """True if the value is within its bound; False for NaN."""
         if self.value is None or self.bound is None:
             return True
         return self.value <= self.bound and (self.at_least is None or self.value >= self.at_least)
 
     def row(self) -> dict[str, Any]:
-        """The check as JSON has it: every number finite, others null."""
+        """Return the check for JSON: numbers that are not finite are null."""
         return {
             "name": self.name,
             "compares": self.compares,
@@ -67,11 +67,11 @@ class Check:
         }
 
     def value_text(self) -> str:
-        """The value for a table."""
+        """Return the value for a table."""
         return "not taken" if self.value is None else _text(self.value, self.unit)
 
     def bound_text(self) -> str:
-        """The bound for a table."""
+        """Return the bound for a table."""
         if self.bound is None:
             return "reported"
         if self.at_least is not None:
@@ -80,7 +80,7 @@ class Check:
 
 
 def broken(checks: Iterable[Check]) -> list[str]:
-    """Names of the checks that do not keep their bound."""
+    """Return the names of the checks that exceed their bound."""
     return [check.name for check in checks if not check.ok]
 
 

@@ -1,4 +1,4 @@
-"""The one `compiled` decorator: numba with a cache that cannot go stale."""
+"""Decorators for compiled functions, with a cache that cannot become stale, and the state of tuples."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from spheretwin.models.base.numba_internals import MachineCode
 F = TypeVar("F", bound=Callable[..., Any])
 
 COMPILES = not numba.config.DISABLE_JIT
-"""Whether functions are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as they are written, to debug them."""
+"""Whether functions are compiled; ``NUMBA_DISABLE_JIT=1`` runs them as plain Python, for debugging."""
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 
-# Where a plain function has its compiled callbacks: they hold it, and must not outlive it.
+# Attribute of a plain function with its compiled callbacks: they refer to it, and must not outlive it.
 _CALLBACKS = "__spheretwin_callbacks__"
 
 
 def compiled(function: F) -> F:
-    """Compile a function at its first call and keep the machine code between processes.
+    """Compile a function at its first call and cache the machine code between processes.
 
-    The uncompiled function stays reachable with `uncompiled`. The interpreter lock is released while
+    The uncompiled function stays available with `uncompiled`. The interpreter lock is released while
     compiled code runs; division by zero gives inf or NaN, as in NumPy; a product and a sum may be fused
     into one instruction, which rounds once instead of twice.
     """
@@ -43,18 +43,18 @@ def compiled(function: F) -> F:
 
 
 def allocation_free(function: F) -> F:
-    """Compile a function, as `compiled` does, that makes no array: it fills those that it is handed.
+    """Compile a function, as `compiled` does, that creates no array: it fills its arguments.
 
-    Nothing in it then needs its references counted, which would be a third of the loop's own time: each
-    array in a tuple is counted up and down, with a locked instruction, wherever the tuple is handed on.
+    It then needs no reference counting, which would be a third of the loop's own time: each array in a tuple
+    is counted up and down, with a locked instruction, whenever the tuple is passed.
     """
     return _compiled(function, _nrt=False)
 
 
 def rounding_each(function: F) -> F:
-    """Compile a function, as `allocation_free` does, with each product and each sum rounded by itself.
+    """Compile a function, as `allocation_free` does, with each product and each sum rounded separately.
 
-    For what has to be the same to the last bit as what NumPy makes of the same numbers.
+    For results that must equal those of NumPy to the last bit.
     """
     return _compiled(function, _nrt=False, fastmath=False)
 
@@ -62,17 +62,17 @@ def rounding_each(function: F) -> F:
 def part_of_its_caller(function: F) -> F:
     """Compile a function, as `allocation_free` does, into each compiled function that calls it.
 
-    For what is called once a tick or a step with tuples of many arrays: handed over, each array is seven
-    numbers, a quarter of the loop's own time.
+    For functions that are called once per tick or step with tuples of many arrays: passing an array copies
+    seven numbers, a quarter of the loop's own time.
     """
     return _compiled(function, _nrt=False, inline="always")
 
 
 def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
-    """The machine code of a compiled function for arguments of given types, to be called with such alone.
+    """Return the machine code of a compiled function for the types of the given arguments.
 
-    Numba looks at the type of every argument at every call, 8 µs for the many arrays of a loop. What is
-    returned does not look: with other types it would read memory that is not there.
+    Numba checks the type of every argument at every call, 8 µs for the many arrays of a loop. The returned
+    function does not check: with other types it would read invalid memory.
     """
     if not isinstance(function, Dispatcher):
         return uncompiled(function)
@@ -82,16 +82,16 @@ def for_types_of(function: Any, *arguments: Any) -> Callable[..., Any]:
     return _ENTRIES[key]
 
 
-# Numba's own look at a hundred arrays in nested tuples takes half of what a session takes until it is ready.
+# Numba's type check of a hundred arrays in nested tuples takes half of the start-up time of a session.
 _ENTRIES: dict[tuple[Any, ...], Callable[..., Any]] = {}
 
 
-# C-contiguous, Fortran-contiguous, aligned, writeable: of NumPy's flags those that a type depends on.
+# C-contiguous, Fortran-contiguous, aligned, writeable: the flags of NumPy that a type depends on.
 _TYPE_FLAGS = 0x0001 | 0x0002 | 0x0100 | 0x0400
 
 
 def _kind_of(value: Any) -> Any:
-    """All that numba's type of a value depends on."""
+    """Return a key of numba's type of a value."""
     if isinstance(value, np.ndarray):
         return value.dtype, value.ndim, value.flags.num & _TYPE_FLAGS
     if isinstance(value, tuple):
@@ -108,8 +108,8 @@ def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
 def compiled_callback(signature: Any, function: Callable[..., Any], *, check_bounds: bool = False) -> Any:
     """Compile a function behind a fixed signature, so that callers need no compilation of their own.
 
-    It is compiled once for a function and a signature, with the values that global variables have then,
-    and kept as long as the function.
+    It is compiled once for a function and a signature, with the present values of global variables, and
+    stored as long as the function exists.
 
     Parameters
     ----------
@@ -118,8 +118,8 @@ def compiled_callback(signature: Any, function: Callable[..., Any], *, check_bou
     function : callable
         A plain function, or one that numba has already wrapped.
     check_bounds : bool
-        Raise `IndexError` where the function, or a compiled function that it names, reads or writes outside
-        an array.
+        Raise `IndexError` if the function, or a compiled function that it calls by name, reads or writes
+        outside an array.
     """
     plain = uncompiled(function)
     if not COMPILES:
@@ -135,7 +135,7 @@ def _callback(signature: Any, function: Callable[..., Any], check_bounds: bool) 
     options = {"nopython": True, **_OPTIONS, "boundscheck": check_bounds}
     step = _with_bounds_checks(function, {}) if check_bounds else function
     callback: Any = CFunc(step, (signature.args, signature.return_type), {}, options)
-    # Only these sources are watched by the cache; another's would go stale.
+    # The cache tracks these sources only; entries of others would become stale.
     if function.__module__.startswith("spheretwin.") and not check_bounds:
         callback._cache = MachineCode(function, "callback")
     callback.compile()
@@ -143,9 +143,9 @@ def _callback(signature: Any, function: Callable[..., Any], check_bounds: bool) 
 
 
 def _with_bounds_checks(function: Any, copies: dict[int, Any]) -> FunctionType:
-    """Copy a plain function so that the compiled functions that it names check bounds.
+    """Copy a plain function so that the compiled functions that it calls by name check bounds.
 
-    Numba checks bounds in the function that it compiles, and in none that this function calls.
+    Numba checks bounds in the function that it compiles, but not in functions that this function calls.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _with_bounds_checks(function: Any, copies: dict[int, Any]) -> FunctionType:
 
 
 def _dispatcher_with_bounds_checks(value: Any, copies: dict[int, Any]) -> Any:
-    """Copy a compiled function so that it checks bounds; return any other value as it is."""
+    """Copy a compiled function so that it checks bounds; return any other value unchanged."""
     if not isinstance(value, Dispatcher):
         return value
     if id(value) not in copies:
@@ -171,7 +171,7 @@ def _dispatcher_with_bounds_checks(value: Any, copies: dict[int, Any]) -> Any:
 
 
 def _copied(function: Any) -> FunctionType:
-    """Copy a function, with global variables of its own and with empty cells."""
+    """Copy a function, with its own global variables and with empty cells."""
     cells = tuple(CellType() for _ in function.__closure__ or ())
     copy = FunctionType(
         function.__code__, dict(function.__globals__), function.__name__, function.__defaults__, cells
@@ -189,7 +189,7 @@ def _name_copies(function: Any, copy: FunctionType, copies: dict[int, Any]) -> N
 
 
 class _CallbackErrors(threading.local):
-    """Function of each thread that its compiled callbacks' exceptions are passed to."""
+    """Receiver of the exceptions of compiled callbacks, one for each thread."""
 
     receiver: Callable[[BaseException], None] | None = None
 
@@ -197,7 +197,7 @@ class _CallbackErrors(threading.local):
 _CALLBACK_ERRORS = _CallbackErrors()
 _HOOK_LOCK = threading.Lock()
 _HOOKS: list[Callable[[Any], object]] = []
-"""The hook that was there before ours, once for each block that runs."""
+"""Previous hook, once for each running block."""
 
 
 @contextmanager
@@ -245,7 +245,7 @@ _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 def compile_error(error: Exception, function: Callable[..., Any]) -> str:
     """Return why a function does not compile, in one line with its line number: numba's reason alone."""
     lines = [line.strip() for line in _COLOURS.sub("", str(error)).splitlines()]
-    # A function of NumPy that is refused gives its own reason further down, as the last of several.
+    # An unsupported function of NumPy gives its reason further down, as the last of several.
     nested = [place for place, line in enumerate(lines) if line.endswith("raised a specific error:")]
     lines = lines[nested[-1] + 1 :] if nested else lines
     reasons = [line for line in lines if line and not _HEADINGS.match(line)] or [type(error).__name__]
@@ -257,7 +257,7 @@ def compile_error(error: Exception, function: Callable[..., Any]) -> str:
 
 
 def _line_of(error: Exception, function: Callable[..., Any]) -> int | None:
-    """Line of a function's file that an error of the compiler names first: the innermost of those named."""
+    """Return the line of a function's file that an error of the compiler names first, the innermost one."""
     file = Path(function.__code__.co_filename).name
     for place in _PLACE.finditer(_COLOURS.sub("", str(error))):
         if Path(place["file"]).name == file:
@@ -267,9 +267,9 @@ def _line_of(error: Exception, function: Callable[..., Any]) -> int | None:
 
 
 def compilable(function: F) -> F:
-    """Leave a function to Python, and make it part of the compiled code that calls it.
+    """Keep a function in plain Python, and inline it into the compiled code that calls it.
 
-    For what calls functions of its users: in the uncompiled loop these are plain Python.
+    For functions that call user functions: in the uncompiled loop these are plain Python.
     """
     return cast("F", register_jitable(_nrt=False, inline="always", **_OPTIONS)(function))
 
@@ -284,7 +284,7 @@ def _compiled(function: F, **more: Any) -> F:
 
 @allocation_free
 def copy_into(target: NDArray[np.float64], first: int, values: NDArray[np.float64], count: int) -> None:
-    """Copy leading values into a vector; a slice would be checked for overlap, at twice the time."""
+    """Copy leading values into a vector; a slice would be checked for overlap, in twice the time."""
     for i in range(count):
         target[first + i] = values[i]
 
@@ -298,23 +298,27 @@ def copy_rows(source: NDArray[np.float64], target: NDArray[np.float64]) -> None:
 
 
 def arrays_of(part: Any, method: str = "state_arrays") -> list[NDArray[Any]]:
-    """Arrays that a method of a part, and of the parts in it, returns, in a fixed order."""
+    """Return the arrays that a method of a part and of its nested parts gives, in a fixed order."""
     if isinstance(part, np.ndarray):
         return [part]
     if hasattr(part, method):
         inner = getattr(part, method)()
     else:
-        inner = [each for each in part if isinstance(each, tuple)] if isinstance(part, tuple) else []
-    return [array for each in inner for array in arrays_of(each, method)]
+        inner = (
+            [inner_part for inner_part in part if isinstance(inner_part, tuple)]
+            if isinstance(part, tuple)
+            else []
+        )
+    return [array for inner_part in inner for array in arrays_of(inner_part, method)]
 
 
 def save_state(part: Any) -> NDArray[np.float64]:
-    """Return the numbers that a part goes on from: a copy."""
+    """Return a copy of the state of a part, as numbers."""
     return np.concatenate([np.empty(0), *(array.ravel() for array in arrays_of(part))])
 
 
 def restore_state(part: Any, state: NDArray[np.float64], name: str) -> None:
-    """Write saved numbers into a part of the same size.
+    """Write a saved state into a part of the same size.
 
     Parameters
     ----------
@@ -322,12 +326,12 @@ def restore_state(part: Any, state: NDArray[np.float64], name: str) -> None:
     state : array
         From `save_state`.
     name : str
-        The part's, for the message.
+        Name of the part, for the message.
 
     Raises
     ------
     InputError
-        There are more or fewer numbers than the part has; nothing is written.
+        The numbers of values differ; nothing is written.
     """
     arrays = arrays_of(part)
     check_length(name, state, sum(array.size for array in arrays))
@@ -340,7 +344,7 @@ def restore_state(part: Any, state: NDArray[np.float64], name: str) -> None:
 def transfer_state(before: Any, after: Any) -> None:
     """Copy the state of a part into another of the same kind.
 
-    Arrays of different lengths have their newest row first: rows that are missing repeat the oldest one.
+    Arrays of different lengths have their newest row first: missing rows repeat the oldest one.
     """
     for source, target in zip(arrays_of(before), arrays_of(after), strict=True):
         rows = min(len(source), len(target))
@@ -350,12 +354,12 @@ def transfer_state(before: Any, after: Any) -> None:
 
 
 def check_length(name: str, state: NDArray[np.float64], expected: int) -> None:
-    """Refuse a state with another number of numbers.
+    """Check the length of a state.
 
     Raises
     ------
     InputError
-        It has more or fewer than expected.
+        It is not the expected one.
     """
     if np.shape(state) != (expected,):
         raise InputError(

@@ -1,4 +1,4 @@
-"""The errors this package raises: one root, so that a caller can catch them all."""
+"""Errors of this package, with a common base class, and the wording of values in messages."""
 
 from __future__ import annotations
 
@@ -9,22 +9,24 @@ from itertools import islice
 
 import numpy as np
 
-# A path or a name of everyday length stays whole; digits by the thousand do not.
+# A path or a name of usual length stays complete; thousands of digits do not.
 LONGEST_VALUE, LONGEST_WORD, LONGEST_LINE = 120, 300, 2000
 
-# Entries and levels of a list or a table beyond which its text is cut in any case.
+# Entries and levels of a list or a table beyond which its text is always cut.
 MOST_ENTRIES, DEEPEST = 60, 10
 
-FEWEST_DIGITS, MOST_DIGITS = 6, 17  # 17 significant digits tell any two floats apart
+FEWEST_DIGITS, MOST_DIGITS = 6, 17  # 17 significant digits distinguish any two floats
 
 
 def one_line(text: str) -> str:
-    """A message as a terminal can show it: one line, no control characters, nothing without end.
+    """Return a message for a terminal: one line of limited length without control characters.
 
-    Line breaks, escape sequences and whatever else cannot be printed appear as Python's own `ascii` writes
-    them. What is too long keeps both its ends.
+    Line breaks, escape sequences and other characters that cannot be printed appear as in Python's `ascii`. A
+    text that is too long is cut in the middle.
     """
-    printable = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    printable = "".join(
+        character if character.isprintable() else ascii(character)[1:-1] for character in text
+    )
     return shortened(" ".join(shortened(word, LONGEST_WORD) for word in printable.split(" ")), LONGEST_LINE)
 
 
@@ -42,13 +44,13 @@ def without_breaks(error: BaseException) -> str:
 
 
 def exception_text(error: BaseException) -> str:
-    """Type and message of an exception, as ``ValueError: lost``; the type alone if there is no message."""
+    """Return type and message of an exception, as ``ValueError: lost``; the type alone without a message."""
     message = without_breaks(error)
     return f"{type(error).__name__}: {message}" if message else type(error).__name__
 
 
 def shortened(text: str, longest: int) -> str:
-    """A text of at most `longest` characters, its middle left out where it is longer."""
+    """Return a text cut in the middle to at most `longest` characters."""
     if len(text) <= longest:
         return text
     head = (longest - 1) // 2
@@ -56,17 +58,17 @@ def shortened(text: str, longest: int) -> str:
 
 
 def shown(value: object) -> str:
-    """Return what was received as JSON or TOML write it: on one line, and not without end.
+    """Return a received value as in JSON or TOML, on one line of limited length.
 
-    What neither of them has is written as Python writes it.
+    Other types are written as in Python.
     """
     try:
         text = _written(value)
-    except ValueError:  # an integer of more digits than Python writes
+    except ValueError:  # an integer with more digits than Python writes
         return "a number of too many digits"
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # an object of the user's, which may raise anything
+    except BaseException as error:  # an object of the user, which may raise anything
         return (
             f"a value of class {type(value).__name__}, which raises {type(error).__name__} when it is written"
         )
@@ -74,9 +76,9 @@ def shown(value: object) -> str:
 
 
 def _written(value: object, above: tuple[int, ...] = ()) -> str:
-    """Text of a value; what is nested too deeply is left out, and so is what is behind many entries.
+    """Return the text of a value; entries that are nested too deeply, or too many, are left out.
 
-    `above` has the identities of the lists and tables that the value is in.
+    `above` holds the identities of the lists and tables that contain the value.
     """
     if isinstance(value, np.ndarray | np.generic):
         value = value.ravel()[:MOST_ENTRIES].tolist() if value.size > MOST_ENTRIES else value.tolist()
@@ -97,17 +99,17 @@ def _written(value: object, above: tuple[int, ...] = ()) -> str:
 
 
 def is_plain(text: str) -> bool:
-    """Whether a text has neither control characters nor bytes that are no text (lone surrogates)."""
-    return not any(unicodedata.category(each) in ("Cc", "Cs") for each in text)
+    """Return True if a text has neither control characters nor undecodable bytes (lone surrogates)."""
+    return not any(unicodedata.category(character) in ("Cc", "Cs") for character in text)
 
 
-def told_apart(*numbers: float) -> list[str]:
-    """Numbers in as few digits as tell those apart that differ, and in no fewer than six.
+def distinct_texts(*numbers: float) -> list[str]:
+    """Return texts of numbers with the fewest digits, at least six, that distinguish different numbers.
 
     Parameters
     ----------
     *numbers : float
-        What one message names: what it received beside the bounds that it expected.
+        Numbers of one message: the received one and the expected bounds.
     """
     different = len(set(numbers))
     for digits in range(FEWEST_DIGITS, MOST_DIGITS):
@@ -118,20 +120,20 @@ def told_apart(*numbers: float) -> list[str]:
 
 
 def did_you_mean(received: str, valid: Iterable[str]) -> str:
-    """``"; did you mean NAME?"`` for the valid name nearest to what was received, or nothing."""
-    # Beyond this length no name is meant, and the comparison would take seconds.
+    """Return ``"; did you mean NAME?"`` for the valid name nearest to the received one, or an empty text."""
+    # A longer text is not a name, and the comparison would take seconds.
     near = difflib.get_close_matches(received, valid, n=1) if len(received) < LONGEST_WORD else []
     return f"; did you mean {near[0]}?" if near else ""
 
 
 class SpheretwinError(Exception):
-    """Root of every error raised on purpose; its message is one line that any terminal can show.
+    """Base class of all errors of this package; the message is one line that any terminal can show.
 
     Parameters
     ----------
     message : str
-        What was expected, what was received, the valid names; control characters in it are escaped, and
-        values without end are shortened.
+        Expected value, received value, valid names; control characters are escaped, and long values are
+        shortened.
     """
 
     def __init__(self, message: str) -> None:
@@ -139,18 +141,18 @@ class SpheretwinError(Exception):
 
 
 class InputError(SpheretwinError):
-    """What the user gave (a scenario, a flag, a file, a law) cannot be used as it is."""
+    """Invalid input of the user: a scenario, a flag, a file or a law."""
 
 
 class LawError(SpheretwinError):
-    """A control law raised an exception instead of writing a torque."""
+    """Exception of a control law instead of a torque."""
 
     @classmethod
     def of(cls, law: str, t_s: float, error: BaseException) -> LawError:
-        """Error of a law by its name, at a time, s; the exception becomes the cause."""
-        made = cls(f"law {law}: expected a torque at {t_s:g} s, received {exception_text(error)}")
-        made.__cause__ = error
-        return made
+        """Return the error of a law by its name, at a time, s; the exception becomes the cause."""
+        law_error = cls(f"law {law}: expected a torque at {t_s:g} s, received {exception_text(error)}")
+        law_error.__cause__ = error
+        return law_error
 
 
 class EngineError(SpheretwinError):

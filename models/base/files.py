@@ -1,4 +1,4 @@
-"""Output files: found writable before work begins, and written whole or not at all."""
+"""Output files: checked for write access before work begins, and written completely or not at all."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from spheretwin.models.base.errors import InputError, SpheretwinError, without_b
 
 
 class OutputFile:
-    """A file that is written under a hidden name of its own beside the place where it is to appear.
+    """File that is written under a unique hidden name in the folder of its target.
 
-    Whoever else writes to the same place at the same time has another hidden name: each file is whole, and
-    the last to be kept stays. A link stays a link: the file it points to is replaced.
+    Another writer of the same target has another hidden name: each file is complete, and the last one
+    remains. A link stays a link: the file it points to is replaced.
 
     Parameters
     ----------
     target : Path
-        Where the file is to appear.
+        Path of the complete file.
 
     Attributes
     ----------
     path : Path
-        Where to write it; an empty file is there.
+        Hidden path to write to; an empty file exists there.
 
     Raises
     ------
@@ -47,12 +47,12 @@ class OutputFile:
             raise InputError(f"output: expected a writable path, {without_breaks(error)}") from None
 
     def keep(self) -> None:
-        """Put the file in its place, with the permissions of the file that it replaces.
+        """Move the file to its target, with the permissions of the file that it replaces.
 
         Raises
         ------
         SpheretwinError
-            It cannot be put there, as where a folder has come in between; it stays under its hidden name.
+            It cannot be moved, for example if a folder now has that name; it stays under its hidden name.
         """
         try:
             with suppress(FileNotFoundError):
@@ -64,29 +64,29 @@ class OutputFile:
             ) from None
 
     def discard(self) -> None:
-        """Remove the file, unless it was kept."""
+        """Remove the file, unless it was moved to its target."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
 
 
 class PartialFile(NamedTuple):
-    """What there is of a file that is being written."""
+    """Incomplete file that is being written."""
 
     path: Path
-    """Where it is."""
+    """Present path."""
     target: Path
-    """Name that the complete file was to have."""
+    """Intended path of the complete file."""
     rows: int
-    """Rows of telemetry in it."""
+    """Rows of telemetry in the file."""
 
 
 class FileWriter(Protocol):
     """Writer of a file that can be recovered when it was not completed."""
 
     def partial(self) -> PartialFile | None:
-        """Flush the rows that wait in memory; return what can be recovered then, if there are rows.
+        """Flush the rows in memory; return the recoverable file, if there are rows.
 
-        It is called in another thread than the writer's, before the process ends.
+        It is called in another thread than that of the writer, before the process ends.
         """
 
 
@@ -98,17 +98,17 @@ class OpenFiles:
         self._lock = threading.Lock()
 
     def add(self, writer: FileWriter) -> None:
-        """Add the writer of a file that was begun."""
+        """Add the writer of a new file."""
         with self._lock:
             self._writers.append(writer)
 
     def remove(self, writer: FileWriter) -> None:
-        """Remove the writer of a file that is complete, or was given up."""
+        """Remove the writer of a complete or abandoned file."""
         with self._lock, suppress(ValueError):
             self._writers.remove(writer)
 
     def partial(self) -> Iterator[PartialFile]:
-        """Flush all files; yield what can be recovered of each."""
+        """Flush all files; yield the recoverable file of each."""
         with self._lock:
             writers = list(self._writers)
         for writer in writers:
@@ -120,12 +120,12 @@ OPEN_FILES = OpenFiles()
 
 
 def check_writable(path: Path) -> None:
-    """Find out whether a file can be put at `path`, leaving no trace.
+    """Check that a file can be written at `path`, without a change on disk.
 
     Raises
     ------
     InputError
-        A folder or something else than a file is there, or its folder is missing or read-only.
+        The path is not that of a file, or its folder is missing or read-only.
     """
     target = _behind_links(path)
     try:
@@ -144,7 +144,7 @@ def check_writable(path: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside `path`; it takes the name `path` when the block ends well.
+    """Yield a temporary path in the same folder; it is renamed to `path` if the block succeeds.
 
     A link stays a link: the file it points to is replaced.
 
@@ -153,7 +153,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     InputError
         No file can be made there.
     SpheretwinError
-        Writing failed, as on a full disk; what was at `path` before is untouched.
+        Writing failed, for example on a full disk; an earlier file at `path` is unchanged.
     """
     output = OutputFile(path)
     try:
@@ -166,12 +166,12 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder for output files, unless it is there, and find out whether it takes them.
+    """Create a folder for output files, if it does not exist, and check that it is writable.
 
     Raises
     ------
     InputError
-        It cannot be made or written to.
+        It cannot be created or written to.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -182,7 +182,7 @@ def make_folder(path: Path) -> None:
 
 
 def _hidden(target: Path) -> Path:
-    """A name beside a file that nobody else has; none that is made of the file's name elsewhere is longer."""
+    """Return a unique hidden path in the folder of a file; no other derived name is longer."""
     return target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
 
 

@@ -1,4 +1,4 @@
-"""Numba's cache of compiled functions, kept in the package's own folder."""
+"""Numba internals: cache of compiled functions in the package's cache folder, and functions by address."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from numba.extending import intrinsic, overload
 
 from spheretwin.models.base import cache
 
-# What machine code needs when it is loaded, beside the math and the run-time library, is there once these
-# are imported: the symbols of hashes, and the type of a callback that is handed to compiled code.
+# Loaded machine code needs the symbols of hashes and the type of a callback, in addition to the math and
+# run-time libraries. These imports register them.
 _REGISTERED = hashing, function_type
 
 
 class MachineCode(NullCache):
-    """Machine code of one function, one entry for each signature.
+    """Cache of the machine code of one function, one entry for each signature.
 
-    Numba's own cache finds its folder through a setting that all packages share, and an entry that is
-    damaged, or cannot be written, is an error at every call. Here it is compiled anew.
+    Numba's own cache takes its folder from a setting that all packages share, and an entry that is damaged or
+    cannot be written is an error at every call. Here the function is compiled again.
 
     Parameters
     ----------
     function : callable
-        A plain function of this package: only its sources are watched by the cache.
+        A plain function of this package: the cache tracks only its sources.
     kind : str
-        Tells apart what is compiled in different ways from one function.
+        Distinguishes different compilations of one function.
     """
 
     def __init__(self, function: Callable[..., Any], kind: str) -> None:
@@ -53,30 +53,31 @@ class MachineCode(NullCache):
         return str(folder) if folder else None
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        """Machine code for a signature, None if there is none that can be used."""
-        # Numba's cache would import all that can be compiled, with scipy.linalg: a third of a short run.
+        """Return the machine code for a signature; None if there is no usable entry."""
+        # Numba's cache would import everything that can be compiled, with scipy.linalg: a third of a short
+        # run.
         rtsys.initialize(target_context)
-        content = cache.kept(self._entry(sig, target_context.codegen()))
+        content = cache.load_entry(self._entry(sig, target_context.codegen()))
         if content is None:
             return None
         try:
             signature, parts = pickle.loads(content)
-            if signature != sig:  # another that reads the same
+            if signature != sig:  # a different signature with the same text
                 return None
             return CompileResult._rebuild(target_context, *parts)
-        except Exception:  # whatever is wrong with it, compiling mends it
+        except Exception:  # an unusable entry is compiled again
             return None
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
-        """Keep the machine code for a signature."""
+        """Store the machine code for a signature."""
         if data.library.has_dynamic_globals:
             complaint = f"{self._name} is compiled in every process: it holds an address or a large array"
             warnings.warn(complaint, NumbaWarning, stacklevel=2)
             return
-        cache.keep(self._entry(sig, data.codegen), dumps((sig, data._reduce())))
+        cache.store_entry(self._entry(sig, data.codegen), dumps((sig, data._reduce())))
 
     def _entry(self, sig: Any, codegen: Any) -> str:
-        """Name of an entry: of a function, its signature and the processor; readable at its beginning."""
+        """Return the name of an entry: function, then a digest of function, signature and processor."""
         line = self._function.__code__.co_firstlineno
         closure = dumps([cell.cell_contents for cell in self._function.__closure__ or ()])
         key = repr((self._name, line, closure, self._kind, str(sig), codegen.magic_tuple()))
@@ -85,18 +86,18 @@ class MachineCode(NullCache):
 
 
 def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
-    """Make the way from an address back to a function of one signature.
+    """Return a converter from an address to a function of one signature.
 
     Parameters
     ----------
     signature : numba signature
-        Of every function whose address will be handed over.
+        Signature of every function that is passed by address.
 
     Returns
     -------
     callable
         In compiled code it takes the address of a C callback and returns a function; in Python it returns
-        the function that it is given.
+        its argument.
     """
     function_type = types.FunctionType(signature)
 

@@ -1,4 +1,4 @@
-"""Python of the user's: an object in a file, named ``FILE.py:NAME`` on a command line or in a scenario."""
+"""User code: an object in a Python file, named ``FILE.py:NAME`` on a command line or in a scenario."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ _REFERENCE = re.compile(r"(?P<file>.+\.py):(?P<name>[^\W\d]\w*)", re.DOTALL)
 
 
 def is_reference(text: object) -> bool:
-    """Whether a text has the form ``FILE.py:NAME``."""
+    """Return True if a text has the form ``FILE.py:NAME``."""
     return isinstance(text, str) and _REFERENCE.fullmatch(text) is not None
 
 
 def file_of(reference: str) -> str:
-    """File of a reference."""
+    """Return the file of a reference."""
     return reference.rpartition(":")[0]
 
 
 def load_function(reference: str, what: str) -> Callable[..., Any]:
-    """Function that a reference names, as `load_named` finds it.
+    """Load the function that a reference names; see `load_named`.
 
     Raises
     ------
     InputError
-        There is none, or it is no function.
+        The object does not exist, or is not a function.
     """
     function = load_named(reference, what)
     if not callable(function):
@@ -44,31 +44,31 @@ def load_function(reference: str, what: str) -> Callable[..., Any]:
 
 
 def load_named(reference: str, what: str) -> Any:
-    """Object that a reference names, as `load_with_digest` finds it.
+    """Load the object that a reference names; see `load_with_digest`.
 
     Raises
     ------
     InputError
-        There is none.
+        The object does not exist.
     """
     return load_with_digest(reference, what)[0]
 
 
 def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
-    """Object that a reference names, and a digest of the file that it was found in.
+    """Load the object that a reference names, and compute the digest of its file.
 
     Parameters
     ----------
     reference : str
-        ``FILE.py:NAME``; ``~`` is the user's home. The file is run once for what it holds: an edit is seen
-        by the next call.
+        ``FILE.py:NAME``; ``~`` is the user's home. The file is run once for each content: the next call
+        after an edit runs it again.
     what : str
-        What the object is to be, as the first words of a complaint.
+        Kind of object, as the first words of a message.
 
     Raises
     ------
     InputError
-        It is no reference, the file cannot be read or does not run, or holds no such name.
+        The text is not a reference, the file cannot be read or run, or does not define the name.
     """
     match = _REFERENCE.fullmatch(reference)
     if match is None:
@@ -82,29 +82,31 @@ def load_with_digest(reference: str, what: str) -> tuple[Any, str]:
     module = _module(path, source, digest, what)
     defined = vars(module)
     if name not in defined:
-        known = [key for key, value in defined.items() if callable(value) and _is_of(module, value)]
-        expected = f"one of {', '.join(known)}" if known else "a function"
-        raise InputError(f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, known)}")
+        candidates = [key for key, value in defined.items() if callable(value) and _is_of(module, value)]
+        expected = f"one of {', '.join(candidates)}" if candidates else "a function"
+        raise InputError(
+            f"{what}: expected {expected} in {path}, received {name}{did_you_mean(name, candidates)}"
+        )
     return defined[name], digest
 
 
 def _is_of(module: ModuleType, value: Any) -> bool:
-    """Whether an object was defined in a module, not imported into it."""
+    """Return True if an object was defined in a module, not imported into it."""
     return getattr(value, "__module__", None) == module.__name__
 
 
 @lru_cache(maxsize=32)
 def _module(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
-    """Module of a file, run once as long as its content stays the same.
+    """Run a file as a module, once for each content.
 
-    Compiled from that content: the import system would take an older `.pyc` for a file that was edited
-    within the second, and leave a folder beside it.
+    It is compiled from that content: the import system would use an older `.pyc` for a file that was edited
+    within the same second, and would create a cache folder.
     """
     module = ModuleType(f"spheretwin_user_{path.stem}_{digest[:12]}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses and pickles look their module up by its name
     try:
-        with contextlib.redirect_stdout(sys.stderr):  # what it prints is none of the figures on stdout
+        with contextlib.redirect_stdout(sys.stderr):  # its output must not mix with the figures on stdout
             exec(compile(source, str(path), "exec"), vars(module))
     except KeyboardInterrupt:
         del sys.modules[module.__name__]
@@ -112,13 +114,13 @@ def _module(path: Path, source: bytes, digest: str, what: str) -> ModuleType:
     except BaseException as error:  # the user's code may raise anything
         del sys.modules[module.__name__]
         raise InputError(
-            f"{what}: expected a file of Python that runs, received {path}: {_told(error, path)}"
+            f"{what}: expected a file of Python that runs, received {path}: {_error_text(error, path)}"
         ) from None
     return module
 
 
-def _told(error: BaseException, path: Path) -> str:
-    """What went wrong, and in which line of the file."""
+def _error_text(error: BaseException, path: Path) -> str:
+    """Return the error and the line of the file."""
     if isinstance(error, SyntaxError) and error.filename == str(path):
         return f"{type(error).__name__} in line {error.lineno}: {error.msg}"
     lines = [

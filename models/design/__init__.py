@@ -1,1 +1,1 @@
-"""Offline design: field integrals, the torque curve, the torque within reach, and what judges them."""
+"""Offline design of magnets and coils: field integrals, torque curve, torque map and their checks."""

@@ -1,4 +1,4 @@
-"""What torque the actuator can give in a pose, in its worst direction, within the current limit."""
+"""Torque capability of the actuator in a pose: worst direction, within the current limit."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, scratch
 Array = NDArray[np.float64]
 
 # A direction whose singular value is below this share of the largest one counts as lost: a millionth of
-# the torque for the same current is rounding and model error, not torque.
+# the torque for the same current is rounding and model error.
 LOST = 1e-6
 
-# Two columns span a facet where the sine of their angle is above this; below, rounding would turn it.
+# Two columns span a facet if the sine of their angle is above this; below, its direction is rounding.
 PARALLEL = 1e-9
 
-# Poses in hand at once: their matrices stay in the processor's cache.
+# Poses evaluated at once: their matrices stay in the cache of the processor.
 BLOCK = 4096
 
 
@@ -29,25 +29,25 @@ class Capability(NamedTuple):
     """Figures of n poses; "worst" is over all directions of the torque."""
 
     singular_value_Nm_per_A: Array  # (n,), the smallest: torque per ampere of the current vector's norm
-    condition: Array  # (n,), largest singular value over smallest; infinite where a direction is lost
+    condition: Array  # (n,), largest singular value over smallest; infinite if a direction is lost
     weak_direction: Array  # (n, 3), unit vector, stator frame, of the smallest singular value
     copper_W_per_Nm2: Array  # (n,), heat per torque squared in that direction, least possible
     least_norm_Nm: Array  # (n,), worst torque that least-norm currents (16) reach at the limit
-    least_norm_direction: Array  # (n, 3), where it is worst
+    least_norm_direction: Array  # (n, 3), of that torque
     best_Nm: Array  # (n,), worst torque that any currents within the limit reach
-    best_direction: Array  # (n, 3), where it is worst
+    best_direction: Array  # (n, 3), of that torque
 
     def at(self, index: Any) -> Capability:
-        """The figures of some of the poses."""
+        """Return the figures of some poses."""
         return Capability(*(figures[index] for figures in self))
 
     def reshaped(self, shape: tuple[int, ...]) -> Capability:
-        """The figures on a grid of this shape."""
+        """Return the figures in the shape of a grid."""
         return Capability(*(figures.reshape(*shape, *figures.shape[1:]) for figures in self))
 
 
 def capability(q: Array, actuator: Actuator, track: Callable[[range], Iterable[int]] = iter) -> Capability:
-    """Torque capability of some poses.
+    """Return the torque capability of poses.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def capability(q: Array, actuator: Actuator, track: Callable[[range], Iterable[i
     actuator : Actuator
         Magnetics, current limit and resistance.
     track : callable
-        Passes on the numbers of the blocks of poses, and may show progress.
+        Iterates over the numbers of the blocks of poses, and may show progress.
 
     Notes
     -----
@@ -66,7 +66,7 @@ def capability(q: Array, actuator: Actuator, track: Callable[[range], Iterable[i
     All torques within the limit form a zonotope ``{G I: |I_j| <= limit}``. The torque available in every
     direction is the radius of the ball inscribed in it, the distance of its nearest facet. A facet's
     normal is the cross product of two columns, its distance ``limit sum_k |g_k . n|``: trying all pairs
-    is exact, no linear programme is needed.
+    is exact; no linear programme is needed.
     """
     starts = range(0, len(q), BLOCK)
     blocks = [_capability(q[starts[i] : starts[i] + BLOCK], actuator) for i in track(range(len(starts)))]
@@ -74,7 +74,7 @@ def capability(q: Array, actuator: Actuator, track: Callable[[range], Iterable[i
 
 
 def torque_matrices(q: Array, actuator: Actuator) -> Array:
-    """Torque matrices of many poses: (n, 3) in rad to (n, 3, groups) in N·m/A."""
+    """Return the torque matrices of many poses: (n, 3) in rad to (n, 3, groups) in N·m/A."""
     model, G = torque_model(actuator), np.empty((len(q), 3, len(actuator.groups)))
     _fill_torque_matrices(np.ascontiguousarray(q), model, G, scratch_of(model))
     return G
@@ -92,7 +92,10 @@ def _capability(q: Array, actuator: Actuator) -> Capability:
         condition = np.where(lost, np.inf, sigma[:, 2] / sigma[:, 0])
         copper = np.where(lost, np.inf, actuator.group.resistance_ohm / squared[:, 0])
     weak = U[:, :, 0]
-    first = np.arange(len(q)), np.argmax(rows, axis=1)  # of each pose, the group that is at its limit first
+    first = (
+        np.arange(len(q)),
+        np.argmax(rows, axis=1),
+    )  # for each pose, the group that reaches its limit first
     least_norm = np.where(lost, 0.0, limit / np.where(lost, 1.0, rows[first]))
     direction = np.where(lost[:, None], weak, inverse[first] / np.where(lost, 1.0, rows[first])[:, None])
     best, best_direction = np.empty(len(q)), np.empty((len(q), 3))
@@ -117,7 +120,7 @@ def _fill_torque_matrices(q: Array, model: TorqueModel, G: Array, scratch: Array
 
 @compiled
 def _fill_inscribed(G: Array, radius: Array, direction: Array) -> None:
-    """Radius of the inscribed ball, and the normal of the facet it touches, of each matrix."""
+    """Write the radius of the inscribed ball and the normal of the facet that it touches, for each matrix."""
     for i in range(G.shape[0]):
         radius[i], direction[i, 0], direction[i, 1], direction[i, 2] = _nearest_facet(G[i])
 

@@ -1,4 +1,4 @@
-"""How well the twin's torque curve stands for the samples it was made from."""
+"""Checks of a torque curve: smoothness, look-up error and agreement with the geometry."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.models import torque_curve
-from spheretwin.models.actuator import MJCF_PATH, Coil, Magnet, read_magnet_and_coil
+from spheretwin.models.actuator import MJCF_PATH, CoilGeometry, Magnet, read_magnet_and_coil
 from spheretwin.models.base.checks import Check
 from spheretwin.models.design import geometry_check, pole_torque
 from spheretwin.models.design.pole_torque import Mesh, compute_curve
@@ -19,10 +19,10 @@ from spheretwin.models.torque_curve import TorqueCurve
 
 Array = NDArray[np.float64]
 
-# Angles at which the look-up table is held against the spline: 64 or more in each of its intervals.
+# Angles at which the look-up table is compared with the spline: 64 or more in each of its intervals.
 LOOKUP_POINTS = 50_001
 
-# Samples compared with the geometry's own curve at most: each costs 23 ms, of a flat pole 16.
+# Largest number of samples compared with the curve of the geometry: 23 ms each, 16 ms for a flat pole.
 COMPARED = 181
 
 
@@ -35,20 +35,20 @@ class Misfit(NamedTuple):
     """Angle of the largest difference."""
 
 
-class Difference(NamedTuple):
-    """Samples against the curve computed from a geometry, in units of the computed peak."""
+class CurveDifference(NamedTuple):
+    """Difference of samples and the curve computed from a geometry, in units of the computed peak."""
 
     as_given: Misfit
     scale: float
-    """Factor on the computed curve that brings it closest to the samples, by least squares."""
+    """Factor of the computed curve with the least squared difference from the samples."""
     scaled: Misfit
-    """What is left after that: a difference in shape."""
+    """Remaining difference with that factor: a difference in shape."""
 
 
 def leave_one_out(curve: TorqueCurve) -> Misfit:
-    """Leave out one inner sample at a time: how far the spline through the others misses it.
+    """Return the error of the spline through the other samples at each left-out inner sample.
 
-    Noise shows, and samples that are too far apart. It overstates the error of the curve itself, whose
+    It shows noise, and samples that are too far apart. It overestimates the error of the curve itself, whose
     gaps are half as wide.
 
     Parameters
@@ -67,9 +67,9 @@ def leave_one_out(curve: TorqueCurve) -> Misfit:
 
 
 def largest_lookup_error(curve: TorqueCurve) -> float:
-    """Largest distance of the compiled look-up table from the spline, in units of the curve's peak.
+    """Return the largest distance of the compiled look-up table from the spline, in units of the peak.
 
-    The table holds a coil and its opposite together (see `models.magnetics`), and so does this figure.
+    The table combines a coil and its opposite (see `models.magnetics`), and so does this figure.
 
     Parameters
     ----------
@@ -88,11 +88,11 @@ def largest_lookup_error(curve: TorqueCurve) -> float:
 def difference(
     curve: TorqueCurve,
     magnet: Magnet,
-    coil: Coil,
+    coil: CoilGeometry,
     mesh: Mesh | None = None,
     track: Callable[[range], Iterable[int]] = iter,
-) -> Difference:
-    """Compare samples with the curve computed from a geometry, at the samples' own angles.
+) -> CurveDifference:
+    """Compare samples with the curve computed from a geometry, at the angles of the samples.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def difference(
     computed = compute_curve(magnet, coil, phi, mesh, track)
     expected, peak = computed.torque_Nm_per_A, computed.peak_Nm_per_A
     scale = float(sample @ expected / (expected @ expected))
-    return Difference(
+    return CurveDifference(
         as_given=_misfit(sample - expected, phi, peak),
         scale=scale,
         scaled=_misfit(sample - scale * expected, phi, peak),
@@ -130,21 +130,21 @@ MESH_BOUND = 5e-3
 LOOKUP_BOUND = 1e-6
 
 
-class Peak(NamedTuple):
-    """Where a curve is largest."""
+class CurvePeak(NamedTuple):
+    """Peak of a curve."""
 
     peak_Nm_per_A: float
     peak_deg: float
 
 
 class ComputedCurve(NamedTuple):
-    """A curve computed from a geometry, and what is known of it."""
+    """Curve computed from a geometry, with its checks."""
 
     curve: TorqueCurve
     csv: str
-    """Text of its file, which says what it was computed from."""
-    peak: Peak
-    doubled_mesh: pole_torque.Convergence
+    """Text of its file, with its provenance."""
+    peak: CurvePeak
+    doubled_mesh: pole_torque.MeshConvergence
     lookup_error: float
     """Distance of the compiled table from the spline, over the peak."""
     checks: list[Check]
@@ -152,25 +152,25 @@ class ComputedCurve(NamedTuple):
 
 
 class JudgedCurve(NamedTuple):
-    """A curve beside the one that the geometry gives. Nothing is bounded: its owner judges the data."""
+    """Curve compared with that of the geometry. There are no bounds: the user judges the data."""
 
     rows: int
-    peak: Peak
+    peak: CurvePeak
     leave_one_out: Misfit
-    geometry: Difference
+    geometry: CurveDifference
     lookup_error: float
     warnings: list[str]
 
 
 def compute(mjcf: Path = MJCF_PATH, track: Callable[[range], Iterable[int]] = iter) -> ComputedCurve:
-    """Compute the torque curve of a model file's poles and coils, and how sure it is.
+    """Compute the torque curve of the poles and coils of a model file, and check it.
 
     Parameters
     ----------
     mjcf : Path
-        Model file; it may lack what is no pole and no coil.
+        Model file; parts other than poles and coils may be missing.
     track : callable
-        Passes on the numbers of the samples, first of the curve, then of some of them on a doubled mesh,
+        Iterates over the numbers of the samples, first of the curve, then of some of them on a doubled mesh,
         and may show progress.
 
     Raises
@@ -196,12 +196,12 @@ def compute(mjcf: Path = MJCF_PATH, track: Callable[[range], Iterable[int]] = it
 def judge(
     curve: TorqueCurve, mjcf: Path = MJCF_PATH, track: Callable[[range], Iterable[int]] = iter
 ) -> JudgedCurve:
-    """Tell how smooth a curve is, and how far it is from the geometry's.
+    """Report the smoothness of a curve, and its distance from the curve of the geometry.
 
     Parameters
     ----------
     curve : TorqueCurve
-        From a bench or another program.
+        Measured, or from another program.
     mjcf, track
         As in `compute`.
 
@@ -222,12 +222,12 @@ def judge(
     )
 
 
-def _peak(curve: TorqueCurve) -> Peak:
+def _peak(curve: TorqueCurve) -> CurvePeak:
     top = int(np.argmax(np.abs(curve.torque_Nm_per_A)))
-    return Peak(curve.peak_Nm_per_A, float(np.degrees(curve.phi_rad[top])))
+    return CurvePeak(curve.peak_Nm_per_A, float(np.degrees(curve.phi_rad[top])))
 
 
-def _mesh(measured: pole_torque.Convergence) -> Check:
+def _mesh(measured: pole_torque.MeshConvergence) -> Check:
     return Check(
         name="mesh",
         compares="peak of the curve against the one on half the mesh, over the peak",

@@ -1,6 +1,6 @@
-"""The torque matrix by direct summation: the field of the pole magnets on the current of all windings.
+"""Torque matrix by direct summation: the field of the pole magnets on the current of all windings.
 
-It shares nothing with the torque curve but the geometry: no angle between axes, no curve, no look-up. The
+It has only the geometry in common with the torque curve: no angle between axes, no curve, no look-up. The
 field of each magnet (magpylib) acts on every conductor of every coil, ``I dl x B``, and the rotor turns by
 the reaction. A flat magnet's field is exact; one that is ground to a sphere is a stack of cylinders of the
 same volume, whose field tends to its own with the square of their number.
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil, Magnet
+from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design.workspace import pose
 from spheretwin.models.kinematics import rotation
@@ -73,17 +73,17 @@ FLAT = Quadrature(near=Rule(24, 24, 96), far=Rule(8, 8, 32))
 
 
 class Comparison(NamedTuple):
-    """Torque matrices of the same n poses, three ways."""
+    """Torque matrices of the same n poses, computed in three ways."""
 
     tilt_rad: Array  # (n,)
     q: Array  # (n, 3), rad
     model: Array  # (n, 3, groups), N·m/A, by the torque curve
     direct: Array  # (n, 3, groups), by direct summation
-    coarse: Array  # (n, 3, groups), the same with half the points in each direction
+    coarse: Array  # (n, 3, groups), by direct summation with half the points in each direction
 
 
 class Errors(NamedTuple):
-    """Torques of random currents compared, n poses times m currents."""
+    """Differences of the torques of random currents, n poses times m currents."""
 
     torque_Nm: Array  # (n, m), magnitude by direct summation
     model_Nm: Array  # (n, m), distance from there to the model's torque
@@ -91,7 +91,7 @@ class Errors(NamedTuple):
 
 
 def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | None = None) -> Array:
-    """Torque matrix G_t(q) by direct summation over all poles and all conductors.
+    """Return the torque matrix G_t(q) by direct summation over all poles and all conductors.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
     actuator : Actuator
         Its geometry; its torque curve is not used.
     quadrature : Quadrature
-        Points in the windings; unless given, what suits flat or ground magnets.
+        Points in the windings; the default depends on whether the magnets are flat or ground.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def compare(
     quadrature : Quadrature
         The finer of the two sums.
     track : callable
-        Passes on the numbers of the poses, and may show progress.
+        Iterates over the numbers of the poses, and may show progress.
     """
     quadrature = quadrature or _standard(actuator.magnet)
     azimuth, spin = np.random.default_rng(seed).uniform(-np.pi, np.pi, (2, len(tilt_rad)))
@@ -153,11 +153,13 @@ def compare(
     for i in track(range(len(q))):
         direct[i] = direct_torque_matrix(q[i], actuator, quadrature)
         coarse[i] = direct_torque_matrix(q[i], actuator, quadrature.halved())
-    return Comparison(tilt_rad, q, np.array([torque_matrix(each, actuator) for each in q]), direct, coarse)
+    return Comparison(
+        tilt_rad, q, np.array([torque_matrix(pose_q, actuator) for pose_q in q]), direct, coarse
+    )
 
 
 def errors(compared: Comparison, limit_A: float, currents: int = 200, seed: int = 0) -> Errors:
-    """Torques of random currents, evenly distributed within the limit.
+    """Return the differences of the torques of random currents, evenly distributed within the limit.
 
     Parameters
     ----------
@@ -188,7 +190,7 @@ def _standard(magnet: Magnet) -> Quadrature:
 
 
 def _magnet(actuator: Actuator, axis: Array, polarity: float, stacked: int) -> Any:
-    """One pole as magpylib's homogeneously magnetised cylinders, in the stator frame."""
+    """Return a pole as homogeneously magnetised cylinders of magpylib, in the stator frame."""
     try:
         from magpylib import Collection
         from magpylib.magnet import Cylinder
@@ -213,10 +215,10 @@ def _magnet(actuator: Actuator, axis: Array, polarity: float, stacked: int) -> A
 
 @lru_cache(maxsize=8)
 def _cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]:
-    """Radius, lower and upper end of cylinders that stand for a magnet, m from the joint centre.
+    """Return radius, lower and upper end of cylinders that represent a magnet, m from the joint centre.
 
-    A ground front becomes steps: rings of equal width, each at the mean height of the front over it. So the
-    charge on the front moves up or down by a little and by nothing on the whole, and the volume stays.
+    A ground front becomes steps: rings of equal width, each at the mean height of the front over it. The
+    charge on the front moves slightly up or down, with mean zero, and the volume is unchanged.
     """
     if not magnet.front_radius_m:
         return [(magnet.radius_m, magnet.back_m, magnet.front_m)]
@@ -227,8 +229,8 @@ def _cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]
     return [(float(r), float(b), float(t)) for r, b, t in zip(edges[1:], lower, heights, strict=True)]
 
 
-def _torque_on_coils(magnet: Any, axes: Array, coil: Coil, rule: Rule) -> Array:
-    """Torque of the magnet's field on one ampere in each of k coils, about the joint centre: (k, 3), N·m."""
+def _torque_on_coils(magnet: Any, axes: Array, coil: CoilGeometry, rule: Rule) -> Array:
+    """Return the torque of a magnet on one ampere in each of k coils, about the joint centre: (k, 3), N·m."""
     turned = np.array([_frame(axis).T for axis in axes]).reshape(-1, 3, 3)
     position, element = ((vectors @ turned).reshape(-1, 3) for vectors in _conductors(coil, rule))
     torque = np.empty_like(position)
@@ -240,15 +242,15 @@ def _torque_on_coils(magnet: Any, axes: Array, coil: Coil, rule: Rule) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _conductors(coil: Coil, rule: Rule) -> tuple[Array, Array]:
-    """Elements of one coil whose axis is z.
+def _conductors(coil: CoilGeometry, rule: Rule) -> tuple[Array, Array]:
+    """Return the conductor elements of a coil whose axis is z.
 
     Returns
     -------
     (n, 3) array, m
         Positions.
     (n, 3) array, m
-        Length of conductor, times the turns it stands for, along a positive current.
+        Length of conductor times the turns that it represents, along a positive current.
     """
     u, share_u = np.polynomial.legendre.leggauss(rule.across)
     v, share_v = np.polynomial.legendre.leggauss(rule.along)
@@ -265,7 +267,7 @@ def _conductors(coil: Coil, rule: Rule) -> tuple[Array, Array]:
 
 
 def _rim_reaches_winding(actuator: Actuator) -> float:
-    """Angle between two axes below which the magnet's rim and the coil's edge are next to each other."""
+    """Return the angle between two axes below which the magnet's rim is next to the coil's edge."""
     magnet, coil = actuator.magnet, actuator.coil
     rim = np.arctan2(magnet.radius_m, magnet.rim_m)
     edge = np.arctan2(coil.outer_radius_m, coil.distance_m - coil.length_m / 2)
@@ -273,7 +275,7 @@ def _rim_reaches_winding(actuator: Actuator) -> float:
 
 
 def _frame(axis: Array) -> Array:
-    """Rotation matrix (3, 3) whose third column is the axis."""
+    """Return a rotation matrix (3, 3) whose third column is the axis."""
     least = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(least, axis)
     first /= np.linalg.norm(first)

@@ -1,4 +1,4 @@
-"""Whether the torque matrix is what the field of all poles on all windings gives, in random poses."""
+"""Check of the torque matrix against the field of all poles on all windings, in random poses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BANDS_DEG = (0.0, 12.0, 24.0, 36.0, 48.0, 57.0)
 TORQUE_BOUND = 0.01
 QUADRATURE_BOUND = 5e-3
 
-# Halfway between samples of the shipped curve, where its spline is least sure, and where f_t is large.
+# Halfway between samples of the shipped curve, where its spline is least accurate, and where f_t is large.
 BETWEEN_SAMPLES_DEG = np.arange(0.125, 30.0, 1.25)
 
 
@@ -36,18 +36,18 @@ class Band(NamedTuple):
 
 
 class Sources(NamedTuple):
-    """Where the errors come from."""
+    """Sources of the errors."""
 
     quadrature_of_largest_torque: float
-    """What half the points in each direction change, of the direct sum that judges."""
+    """Change of the direct sum with half the points in each direction."""
     curve_between_samples_of_peak: float
-    """Distance of the curve's spline from the geometry's own f_t."""
+    """Distance of the curve's spline from f_t of the geometry."""
     lookup_of_peak: float
     """Distance of the compiled table from that spline."""
 
 
 class FieldVerdict(NamedTuple):
-    """The torque matrix judged by direct sums."""
+    """Result of the comparison of the torque matrix with direct sums."""
 
     largest_torque_Nm: float
     """Of all poses and currents."""
@@ -58,7 +58,7 @@ class FieldVerdict(NamedTuple):
 
     @property
     def curve_is_of_another_geometry(self) -> bool:
-        """Whether the torque breaks its bound and the curve alone is as far from the model's geometry."""
+        """True if the torque exceeds its bound and the curve alone differs as much from the geometry."""
         torque, _ = self.checks
         return not torque.ok and self.sources.curve_between_samples_of_peak > TORQUE_BOUND
 
@@ -69,18 +69,18 @@ def judge(
     seed: int = 0,
     track: Callable[[range], Iterable[int]] = iter,
 ) -> FieldVerdict:
-    """Hold G_t(q)·I against the exact field of every magnet on every winding.
+    """Compare G_t(q)·I with the exact field of every magnet on every winding.
 
     Parameters
     ----------
     actuator : Actuator
-        With the torque curve that is judged.
+        Actuator with the torque curve to check.
     poses : int
         Random poses, from each of `BANDS_DEG` in turn; some seconds each.
     seed : int
         Of poses and currents.
     track : callable
-        Passes on the numbers of the poses, and may show progress.
+        Iterates over the numbers of the poses, and may show progress.
 
     Raises
     ------
@@ -105,14 +105,14 @@ def judge(
 
 
 def _tilts_deg(poses: int, seed: int) -> NDArray[np.float64]:
-    """One random tilt after the other from each band in turn, so that few poses cover all bands."""
+    """Return random tilts from each band in turn, so that few poses cover all bands."""
     band = np.arange(poses) % (len(BANDS_DEG) - 1)
     low, high = np.array(BANDS_DEG)[band], np.array(BANDS_DEG)[band + 1]
     return np.asarray(np.random.default_rng([seed, 2]).uniform(low, high))
 
 
 def _curve_error(actuator: Actuator) -> float:
-    """Distance of the curve's spline from the geometry's f_t, between samples, over the curve's peak."""
+    """Return the distance of the spline from f_t of the geometry, between samples, over the curve's peak."""
     phi = np.radians(BETWEEN_SAMPLES_DEG)
     exact = compute_curve(actuator.magnet, actuator.coil, phi).torque_Nm_per_A
     curve = actuator.torque_curve
@@ -123,7 +123,7 @@ def _by_tilt(compared: Comparison, errors: Errors) -> list[Band]:
     band = np.digitize(np.degrees(compared.tilt_rad), BANDS_DEG[1:-1])
     rows = []
     for i in np.unique(band):
-        here = Errors(*(each[band == i] for each in errors))
+        here = Errors(*(values[band == i] for values in errors))
         relative = here.model_Nm / here.torque_Nm
         rows.append(
             Band(
@@ -161,5 +161,5 @@ def _quadrature(errors: Errors) -> Check:
         states=errors.torque_Nm.size,
         value=_of_largest(errors.quadrature_Nm, errors),
         bound=QUADRATURE_BOUND,
-        why="half the bound above: the sum that judges must be surer than what it judges",
+        why="half the bound above: the reference sum must be more accurate than the torque matrix",
     )

@@ -1,4 +1,4 @@
-"""Whether the parts fit: coils beside coils in the stator, poles beside poles in the rotor."""
+"""Geometry check: overlap of coils in the stator, of poles in the rotor, and the air gap."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Actuator, Coil, Magnet, from_model
+from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet, from_model
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import disagreements
 from spheretwin.models.mjcf import read
 from spheretwin.models.torque_curve import TorqueCurve
 
-# Cylinders drawn to touch differ by rounding alone.
+# Cylinders that touch by design differ by rounding alone.
 TOUCHING_M = 1e-9
 
 
 class Overlap(NamedTuple):
-    """Two cylinders that share room."""
+    """Two cylinders that overlap."""
 
     part: str
     """``coil`` or ``pole``."""
@@ -27,26 +27,26 @@ class Overlap(NamedTuple):
     second: int
     """Indices into the actuator's axes."""
     depth_m: float
-    """How far the two would have to part."""
+    """Distance by which the two would have to separate."""
 
 
 def overlaps(actuator: Actuator) -> list[Overlap]:
-    """Pairs of coils and pairs of poles that overlap, deepest first.
+    """Return pairs of coils and pairs of poles that overlap, deepest first.
 
     Parameters
     ----------
     actuator : Actuator
         Axes of its coils and poles, and their common sizes.
     """
-    found = [
+    pairs = [
         *_overlaps("coil", actuator.coil_axes, actuator.coil, actuator.coil.outer_radius_m),
         *_overlaps("pole", actuator.pole_axes, actuator.magnet, actuator.magnet.radius_m),
     ]
-    return sorted(found, key=lambda pair: (-round(pair.depth_m / TOUCHING_M), pair.part, pair.first))
+    return sorted(pairs, key=lambda pair: (-round(pair.depth_m / TOUCHING_M), pair.part, pair.first))
 
 
 def air_gap_m(actuator: Actuator) -> float:
-    """Room between the turning rotor and the coils' faces, m; negative where the rotor cannot turn.
+    """Return the air gap between the rotating rotor and the faces of the coils, m; negative if they collide.
 
     The rotor is the ball through the farthest points of the poles: the whole front of a pole that is ground
     to the ball, the rim of a flat one.
@@ -55,7 +55,7 @@ def air_gap_m(actuator: Actuator) -> float:
 
 
 def clearance(axes: NDArray[np.float64], radius_m: float, length_m: float, distance_m: float) -> NDArray:
-    """Room between equal cylinders whose axes meet at the centre, m; negative where they overlap.
+    """Return the clearance of equal cylinders whose axes meet at the centre, m; negative if they overlap.
 
     Parameters
     ----------
@@ -71,30 +71,32 @@ def clearance(axes: NDArray[np.float64], radius_m: float, length_m: float, dista
 
     Notes
     -----
-    Exact for the question whether they overlap: the two are mirror images in that plane, and a convex
-    body meets its mirror image only where it reaches the mirror. A cylinder does so first with its inner
-    edge, so that a front may be ground.
+    It is exact for the question whether they overlap: the two are mirror images in that plane, and a convex
+    body meets its mirror image only at the mirror. A cylinder reaches it first with its inner edge, so that
+    the front may be ground.
     """
     cosine = np.clip(axes @ axes.T, -1.0, 1.0)
     sine_half, cosine_half = np.sqrt((1 - cosine) / 2), np.sqrt((1 + cosine) / 2)
     return 2 * ((distance_m - length_m / 2) * sine_half - radius_m * cosine_half)
 
 
-def _overlaps(part: str, axes: NDArray[np.float64], size: Coil | Magnet, radius_m: float) -> list[Overlap]:
+def _overlaps(
+    part: str, axes: NDArray[np.float64], size: CoilGeometry | Magnet, radius_m: float
+) -> list[Overlap]:
     room = clearance(axes, radius_m, size.length_m, size.distance_m)
     first, second = np.nonzero(np.triu(room < -TOUCHING_M, k=1))
     return [Overlap(part, int(i), int(j), float(-room[i, j])) for i, j in zip(first, second, strict=True)]
 
 
 def of_model_file(mjcf: Path, curve: TorqueCurve) -> list[str]:
-    """Warnings for a model file that may still lack what the torque curve does not need.
+    """Return warnings for a model file, which may lack parts that the torque curve does not need.
 
     Parameters
     ----------
     mjcf : Path
         Model file.
     curve : TorqueCurve
-        Held against it, or just computed from it.
+        Compared with the model, or computed from it.
     """
     try:
         return of_geometry(from_model(read(mjcf).described, curve))
@@ -103,16 +105,16 @@ def of_model_file(mjcf: Path, curve: TorqueCurve) -> list[str]:
 
 
 def of_geometry(actuator: Actuator) -> list[str]:
-    """Parts that overlap, then numbers that differ from what the torque curve was computed for."""
+    """Return warnings of overlaps, then of differences from the geometry of the torque curve."""
     return [*of_parts(actuator), *disagreements(actuator)]
 
 
 def of_parts(actuator: Actuator) -> list[str]:
-    """Parts that overlap: coils and the ball, coils and coils, poles and poles (the deepest pair)."""
-    found = overlaps(actuator)
+    """Return warnings of overlaps: coils, poles (the deepest pair each), coils and the ball."""
+    all_overlaps = overlaps(actuator)
     lines = []
     for part, axes in (("coil", actuator.coil_axes), ("pole", actuator.pole_axes)):
-        pairs = [overlap for overlap in found if overlap.part == part]
+        pairs = [overlap for overlap in all_overlaps if overlap.part == part]
         if pairs:
             lines.append(_line(pairs, axes))
     if (gap_m := air_gap_m(actuator)) < 0:

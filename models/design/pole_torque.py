@@ -1,11 +1,11 @@
-"""The torque curve from geometry: one coil's pull on one pole magnet, computed with magpylib.
+"""Torque curve from geometry: torque of one coil on one pole magnet, computed with magpylib.
 
-The magnet is its equivalent current sheet ``M x n``: M = Br / mu0 ampere per metre around its side, and on a
-front that is ground to a sphere M times the sine of the angle between axis and normal. The coil is a stack
-of thin solenoids, one for each radius of the winding, whose field magpylib knows in closed form. So the
-Lorentz torque on the sheet is an integral of a continuous function over a surface. The other way round, the
-force on the winding in the magnet's field, the integrand is infinite along the magnet's sharp rim, which
-passes half a millimetre from the winding, or, where the front is flat, through it.
+The magnet is modelled by its equivalent current sheet ``M x n``: M = Br / mu0 ampere per metre around its
+side, and on a front that is ground to a sphere M times the sine of the angle between axis and normal. The
+coil is a stack of thin solenoids, one for each radius of the winding, whose field magpylib has in closed
+form. The Lorentz torque on the sheet is then an integral of a continuous function over a surface. For the
+reverse, the force on the winding in the magnet's field, the integrand is infinite along the magnet's sharp
+rim, which passes half a millimetre from the winding, or, where the front is flat, through it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Coil, Magnet
+from spheretwin.models.actuator import CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import computed_from
 from spheretwin.models.torque_curve import TorqueCurve, head
@@ -32,7 +32,7 @@ STEP_DEG = 0.25
 # Samples between two that `convergence` computes again: 2 degrees apart.
 CONVERGENCE_STRIDE = 8
 
-# Points of the sheet evaluated at once: with their layers they stay in the processor's cache (1.5 times
+# Points of the sheet evaluated at once: with their layers they stay in the cache of the processor (1.5 times
 # as fast as 2048 points).
 BLOCK = 512
 
@@ -50,12 +50,12 @@ class Mesh(NamedTuple):
     """Gauss points over a ground front, from its rim to its middle."""
 
     def doubled(self) -> Mesh:
-        """Twice the points in each direction."""
+        """Return a mesh with twice the points in each direction."""
         return Mesh(*(2 * points for points in self))
 
 
-class Convergence(NamedTuple):
-    """What a doubled mesh changes, in units of the peak."""
+class MeshConvergence(NamedTuple):
+    """Change of the curve by a doubled mesh, in units of the peak."""
 
     peak: float
     """Change of the largest sample."""
@@ -64,12 +64,12 @@ class Convergence(NamedTuple):
 
 
 def sample_angles(step_deg: float = STEP_DEG) -> Array:
-    """Angles of the samples: equal steps from 0 to pi.
+    """Return the angles of the samples: equal steps from 0 to pi.
 
     Parameters
     ----------
     step_deg : float, degrees
-        As near to it as a whole number of steps allows.
+        Desired step; the number of steps is rounded.
 
     Returns
     -------
@@ -80,13 +80,13 @@ def sample_angles(step_deg: float = STEP_DEG) -> Array:
 
 def compute_curve(
     magnet: Magnet,
-    coil: Coil,
+    coil: CoilGeometry,
     phi_rad: Array | None = None,
     mesh: Mesh | None = None,
     track: Callable[[range], Iterable[int]] = iter,
     on_iron: bool = False,
 ) -> TorqueCurve:
-    """Torque of one ampere in a coil on one pole of polarity +1, about the joint centre.
+    """Compute the torque of one ampere in a coil on one pole of polarity +1, about the joint centre.
 
     Parameters
     ----------
@@ -99,17 +99,17 @@ def compute_curve(
     mesh : Mesh
         Quadrature; the default one unless given.
     track : callable
-        Passes on the numbers of the angles, and may show progress.
+        Iterates over the numbers of the angles, and may show progress.
     on_iron : bool
-        Whether the pole's back stands on an infinite plane of iron: what a hoop behind the poles adds at
-        most, at angles that leave the coil wholly in front of that plane (for the shipped sizes up to 27
-        degrees); beyond, the image gives no answer, and what is returned bounds nothing. The curve then does
-        not say what it was computed for, as no model file holds such a plane.
+        True if the back of the pole is on an infinite plane of iron. This is an upper bound of the effect of
+        a hoop behind the poles, at angles with the whole coil in front of that plane (for the shipped sizes
+        up to 27 degrees). Beyond, the image method is invalid, and the result is not a bound. The curve then
+        has no numbers of its geometry, as no model file holds such a plane.
 
     Returns
     -------
     TorqueCurve
-        f_t in N·m/A, positive where it pulls the pole towards the coil's axis, exactly 0 at 0 and pi.
+        f_t in N·m/A, positive if it pulls the pole towards the coil's axis, exactly 0 at 0 and pi.
 
     Raises
     ------
@@ -124,8 +124,8 @@ def compute_curve(
     being the distance from the axis, h the height along it.
 
     Iron of infinite permeability mirrors a magnet that stands on it upright: outside, the field is that of
-    the magnet and its mirror image, magnetised alike, twice as long together. What the coil's own field does
-    to the iron, quadratic in the current, is not in it.
+    the magnet and its mirror image, magnetised alike, twice as long together. The effect of the coil's own
+    field on the iron, quadratic in the current, is left out.
 
     References
     ----------
@@ -149,16 +149,16 @@ def compute_curve(
 def convergence(
     curve: TorqueCurve,
     magnet: Magnet,
-    coil: Coil,
+    coil: CoilGeometry,
     mesh: Mesh | None = None,
     track: Callable[[range], Iterable[int]] = iter,
-) -> Convergence:
+) -> MeshConvergence:
     """Compare a curve with one on a doubled mesh, at its peak and at every eighth sample.
 
     Parameters
     ----------
     curve : TorqueCurve
-        What `compute_curve` returned for the same magnet, coil and mesh.
+        Result of `compute_curve` for the same magnet, coil and mesh.
     magnet, coil, mesh, track
         As in `compute_curve`.
     """
@@ -166,18 +166,20 @@ def convergence(
     again = np.append(np.arange(0, len(curve.phi_rad), CONVERGENCE_STRIDE), top)
     finer = compute_curve(magnet, coil, curve.phi_rad[again], (mesh or Mesh()).doubled(), track)
     change = np.abs(finer.torque_Nm_per_A - curve.torque_Nm_per_A[again]) / curve.peak_Nm_per_A
-    return Convergence(peak=float(change[-1]), worst=float(np.max(change)))
+    return MeshConvergence(peak=float(change[-1]), worst=float(np.max(change)))
 
 
-def provenance(magnet: Magnet, coil: Coil, measured: Convergence, mesh: Mesh | None = None) -> list[str]:
-    """Lines that tell where a torque curve comes from, for the head of its file.
+def provenance(
+    magnet: Magnet, coil: CoilGeometry, measured: MeshConvergence, mesh: Mesh | None = None
+) -> list[str]:
+    """Return lines with the provenance of a torque curve, for the head of its file.
 
     Parameters
     ----------
     magnet, coil, mesh
-        What the curve was computed from.
+        Input of the curve.
     measured : Convergence
-        What a doubled mesh changes.
+        Change by a doubled mesh.
     """
     import magpylib
 
@@ -201,7 +203,7 @@ def provenance(magnet: Magnet, coil: Coil, measured: Convergence, mesh: Mesh | N
 
 
 class _Sheet(NamedTuple):
-    """Circles about the pole's axis that stand for its current sheet."""
+    """Circles about the axis of the pole that represent its current sheet."""
 
     height: Array  # (n,), m, along the axis from the joint centre
     rho: Array  # (n,), m
@@ -209,7 +211,7 @@ class _Sheet(NamedTuple):
 
 
 def _sheet(magnet: Magnet, mesh: Mesh) -> _Sheet:
-    """The side's circles from the rim inward, then those of a ground front from the rim to the middle."""
+    """Return the circles of the side from the rim inward, then those of a ground front from rim to middle."""
     along, d_along = _graded(mesh.along, power=2)
     side = magnet.rim_m - magnet.back_m  # m, of height
     height, rho, weight = (
@@ -232,15 +234,15 @@ def _sheet(magnet: Magnet, mesh: Mesh) -> _Sheet:
 
 
 def _on_iron(sheet: _Sheet, magnet: Magnet) -> _Sheet:
-    """A sheet and its mirror image in the plane of the magnet's back."""
+    """Return a sheet and its mirror image in the plane of the magnet's back."""
     mirrored = _Sheet(2 * magnet.back_m - sheet.height, sheet.rho, sheet.weight)
     return _Sheet(*(np.concatenate(both) for both in zip(sheet, mirrored, strict=True)))
 
 
 def _torque(
-    sheet: _Sheet, remanence_T: float, coil: Coil, phi: float, mesh: Mesh, solenoid: SolenoidField
+    sheet: _Sheet, remanence_T: float, coil: CoilGeometry, phi: float, mesh: Mesh, solenoid: SolenoidField
 ) -> float:
-    """f_t at one angle, N·m/A; the coil's axis is z, the pole's lies in the plane of x and z."""
+    """Return f_t at one angle, N·m/A; the coil's axis is z, the pole's lies in the plane of x and z."""
     psi = (np.arange(mesh.around) + 0.5) * np.pi / mesh.around  # (around,)
     side = np.outer(sheet.rho, np.cos(psi))  # (n, around), in the plane of both axes
     x = sheet.height[:, None] * np.sin(phi) + side * np.cos(phi)
@@ -252,8 +254,8 @@ def _torque(
     return float(-remanence_T * both_halves * (sheet.weight @ np.sum(radial * side, axis=1)))
 
 
-def _radial_field(coil: Coil, rho: Array, z: Array, across: int, solenoid: SolenoidField) -> Array:
-    """Coil field times mu0^-1 per ampere, projected on the position from the joint centre: A/m · m.
+def _radial_field(coil: CoilGeometry, rho: Array, z: Array, across: int, solenoid: SolenoidField) -> Array:
+    """Return the coil field over mu0 per ampere, projected on the position from the joint centre: A/m · m.
 
     Parameters
     ----------
@@ -270,7 +272,9 @@ def _radial_field(coil: Coil, rho: Array, z: Array, across: int, solenoid: Solen
     return np.concatenate([_radial_field_block(coil, rho[b], z[b], across, solenoid) for b in blocks])
 
 
-def _radial_field_block(coil: Coil, rho: Array, z: Array, across: int, solenoid: SolenoidField) -> Array:
+def _radial_field_block(
+    coil: CoilGeometry, rho: Array, z: Array, across: int, solenoid: SolenoidField
+) -> Array:
     layers, weights = _winding_layers(coil, rho, across)
     b_rho, _, b_z = solenoid(
         (0.5 * coil.length_m / layers).ravel(),
@@ -282,10 +286,10 @@ def _radial_field_block(coil: Coil, rho: Array, z: Array, across: int, solenoid:
     return coil.turns / coil.length_m * per_length
 
 
-def _winding_layers(coil: Coil, rho: Array, across: int) -> tuple[Array, Array]:
-    """Radii of the solenoids that stand for the winding at each point, and their shares of the turns.
+def _winding_layers(coil: CoilGeometry, rho: Array, across: int) -> tuple[Array, Array]:
+    """Return radii of the solenoids that represent the winding at each point, and their shares of the turns.
 
-    The rule splits at the point's own radius and crowds there: inside the winding the field of a layer
+    The rule is split at the radius of the point and refined there: inside the winding the field of a layer
     jumps as the layer's radius passes the point, and near its face it has a logarithm there.
 
     Returns
@@ -305,7 +309,7 @@ def _winding_layers(coil: Coil, rho: Array, across: int) -> tuple[Array, Array]:
 
 @cache
 def _graded(points: int, power: int) -> tuple[Array, Array]:
-    """Gauss-Legendre rule on 0 to 1 after the substitution ``x = t**power``: points crowd towards 0."""
+    """Return a Gauss-Legendre rule on 0 to 1 with the substitution ``x = t**power``: finer near 0."""
     t, weight = np.polynomial.legendre.leggauss(points)
     t = 0.5 + 0.5 * t
     return t**power, 0.5 * weight * power * t ** (power - 1)
@@ -316,7 +320,7 @@ SolenoidField = Callable[[Array, Array, Array], Sequence[Array]]
 
 
 def _solenoid_field() -> SolenoidField:
-    """Magpylib's field of an axially magnetised cylinder, which is that of a thin solenoid."""
+    """Return magpylib's field of an axially magnetised cylinder, which is that of a thin solenoid."""
     try:
         from magpylib.core import magnet_cylinder_axial_Bfield
     except ImportError:

@@ -1,4 +1,4 @@
-"""What torque there is in every direction over the workspace, where it is least, and whether it suffices."""
+"""Torque map: available torque in every direction over the workspace, its minimum, and a required torque."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from spheretwin.models.design.capability import Capability, capability
 from spheretwin.models.design.workspace import (
     FIGURES,
     LARGEST_TILT_DEG,
-    Found,
     Workspace,
+    WorstPoses,
     local_minima,
     worst_by_tilt,
 )
 
 TILT_STEP_DEG = 1.0
 
-# Weak poses told of each figure.
-TOLD = {"least_norm": 3, "best": 1, "singular_value": 1}
+# Number of weak poses reported for each figure.
+REPORTED_POSES = {"least_norm": 3, "best": 1, "singular_value": 1}
 
 ROUNDING = 1e-9
 
 
-class Survey(NamedTuple):
-    """All that the verdict and the figures are taken from."""
+class TorqueSurvey(NamedTuple):
+    """Data of the verdict and of the figures."""
 
     actuator: Actuator
     largest_tilt_deg: float
     workspace: Workspace
     on_grid: Capability
-    """Of the workspace's poses, in its shape."""
-    worst: dict[str, Found]
+    """Capability at the poses of the workspace, in its shape."""
+    worst: dict[str, WorstPoses]
     """Worst pose at each tilt, by the names of `FIGURES`."""
-    weakest: dict[str, Found]
+    weakest: dict[str, WorstPoses]
     """Worst poses of all, the worst first, by the names of `TOLD`."""
 
 
-class Tilt(NamedTuple):
-    """The worst, and the median, of all poses at one tilt."""
+class TorqueAtTilt(NamedTuple):
+    """Worst value and median over all poses at one tilt."""
 
     tilt_deg: float
     least_norm_Nm: float
@@ -58,7 +58,7 @@ class Tilt(NamedTuple):
 
 
 class WeakPose(NamedTuple):
-    """A pose in which one of the figures is at its worst."""
+    """Pose with the worst value of a figure."""
 
     figure: str
     q_deg: list[float]
@@ -74,13 +74,13 @@ class WeakPose(NamedTuple):
 
 
 class WorkspaceVerdict(NamedTuple):
-    """The torque within reach, judged."""
+    """Torque over the workspace, with checks."""
 
     largest_tilt_deg: float
     poses: int
-    """Within the hinges' ranges."""
+    """Number of poses within the ranges of the hinges."""
     current_limit_A: float
-    by_tilt: list[Tilt]
+    by_tilt: list[TorqueAtTilt]
     weakest: list[WeakPose]
     checks: list[Check]
     warnings: list[str]
@@ -90,8 +90,8 @@ def survey(
     actuator: Actuator,
     largest_tilt_deg: float = LARGEST_TILT_DEG,
     track: Callable[[range], Iterable[int]] = iter,
-) -> Survey:
-    """Compute the torque capability over the workspace, and look for its worst between the grid's lines.
+) -> TorqueSurvey:
+    """Compute the torque capability over the workspace, and search its minimum between the grid points.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def survey(
     largest_tilt_deg : float, degrees
         Of the shaft.
     track : callable
-        Passes on the numbers of the blocks of poses, and may show progress.
+        Iterates over the numbers of the blocks of poses, and may show progress.
 
     Raises
     ------
@@ -113,19 +113,19 @@ def survey(
     flat = capability(workspace.q.reshape(-1, 3), actuator, track)
     on_grid = flat.reshaped(workspace.reachable.shape)
     worst = {name: worst_by_tilt(workspace, on_grid, figure, actuator) for name, figure in FIGURES.items()}
-    weakest = {name: local_minima(workspace, worst[name], FIGURES[name], actuator) for name in TOLD}
-    return Survey(actuator, largest_tilt_deg, workspace, on_grid, worst, weakest)
+    weakest = {name: local_minima(workspace, worst[name], FIGURES[name], actuator) for name in REPORTED_POSES}
+    return TorqueSurvey(actuator, largest_tilt_deg, workspace, on_grid, worst, weakest)
 
 
-def judge(surveyed: Survey, need_Nm: float | None = None) -> WorkspaceVerdict:
-    """Tell the torque by tilt and in the weakest poses, and hold it against a need.
+def judge(surveyed: TorqueSurvey, need_Nm: float | None = None) -> WorkspaceVerdict:
+    """Report the torque by tilt and in the weakest poses, and compare it with a required torque.
 
     Parameters
     ----------
     surveyed : Survey
-        What `survey` found.
+        Result of `survey`.
     need_Nm : float, N·m
-        Torque that least-norm currents have to give in every pose and direction; none unless given.
+        Torque that least-norm currents must give in every pose and direction, if given.
     """
     actuator = surveyed.actuator
     return WorkspaceVerdict(
@@ -133,14 +133,18 @@ def judge(surveyed: Survey, need_Nm: float | None = None) -> WorkspaceVerdict:
         poses=int(surveyed.workspace.reachable.sum()),
         current_limit_A=actuator.group.current_limit_A,
         by_tilt=_by_tilt(surveyed),
-        weakest=[row for name, count in TOLD.items() for row in _told(name, surveyed.weakest[name], count)],
+        weakest=[
+            row
+            for name, count in REPORTED_POSES.items()
+            for row in _weak_poses(name, surveyed.weakest[name], count)
+        ],
         checks=[_best_currents(surveyed), *([_need(surveyed, need_Nm)] if need_Nm else [])],
         warnings=[*geometry_check.of_geometry(actuator), *_lost(surveyed.worst["condition"])],
     )
 
 
 def direction_text(direction: Sequence[float]) -> str:
-    """A unit vector in a line."""
+    """Return the text of a unit vector."""
     return " ".join(f"{round(part, 2) + 0.0:.2f}" for part in direction)  # no negative zero
 
 
@@ -148,8 +152,8 @@ def _pose_text(q_deg: Sequence[float]) -> str:
     return ", ".join(f"{name} {round(angle, 1) + 0.0:.1f}°" for name, angle in zip("αβγ", q_deg, strict=True))
 
 
-def _lost(worst_condition: Found) -> list[str]:
-    """Whether the torque matrix loses a direction, and where first."""
+def _lost(worst_condition: WorstPoses) -> list[str]:
+    """Return a warning if the torque matrix loses a direction, with the first pose."""
     lost = np.flatnonzero(np.isinf(worst_condition.capability.condition))
     if not len(lost):
         return []
@@ -161,7 +165,7 @@ def _lost(worst_condition: Found) -> list[str]:
     ]
 
 
-def _by_tilt(surveyed: Survey) -> list[Tilt]:
+def _by_tilt(surveyed: TorqueSurvey) -> list[TorqueAtTilt]:
     workspace, on_grid = surveyed.workspace, surveyed.on_grid
     tilts = np.flatnonzero(workspace.reachable.any(axis=(1, 2)))
     least_norm, best, singular, condition = (
@@ -171,7 +175,7 @@ def _by_tilt(surveyed: Survey) -> list[Tilt]:
     for row, tilt in enumerate(tilts):
         here = workspace.reachable[tilt]
         rows.append(
-            Tilt(
+            TorqueAtTilt(
                 tilt_deg=round(float(np.degrees(workspace.tilt_rad[tilt])), 9),
                 least_norm_Nm=float(least_norm.least_norm_Nm[row]),
                 least_norm_median_Nm=float(np.median(on_grid.least_norm_Nm[tilt][here])),
@@ -185,20 +189,20 @@ def _by_tilt(surveyed: Survey) -> list[Tilt]:
     return rows
 
 
-def _told(name: str, found: Found, count: int) -> list[WeakPose]:
+def _weak_poses(name: str, worst: WorstPoses, count: int) -> list[WeakPose]:
     rows = []
-    for i in range(min(count, len(found.q))):
-        here = found.capability.at(i)
+    for i in range(min(count, len(worst.q))):
+        here = worst.capability.at(i)
         direction = {
             "least_norm": here.least_norm_direction,
             "best": here.best_direction,
             "singular_value": here.weak_direction,
         }[name]
-        tilt, azimuth, spin = np.degrees(found.tilt_azimuth_spin_rad[i]).tolist()
+        tilt, azimuth, spin = np.degrees(worst.tilt_azimuth_spin_rad[i]).tolist()
         rows.append(
             WeakPose(
                 figure=name,
-                q_deg=np.degrees(found.q[i]).tolist(),
+                q_deg=np.degrees(worst.q[i]).tolist(),
                 tilt_deg=tilt,
                 azimuth_deg=azimuth % 360,
                 spin_deg=spin,
@@ -212,7 +216,7 @@ def _told(name: str, found: Found, count: int) -> list[WeakPose]:
     return rows
 
 
-def _best_currents(surveyed: Survey) -> Check:
+def _best_currents(surveyed: TorqueSurvey) -> Check:
     reached = surveyed.on_grid.at(surveyed.workspace.reachable)
     least_norm, best = reached.least_norm_Nm, reached.best_Nm
     return Check(
@@ -225,7 +229,7 @@ def _best_currents(surveyed: Survey) -> Check:
     )
 
 
-def _need(surveyed: Survey, need_Nm: float) -> Check:
+def _need(surveyed: TorqueSurvey, need_Nm: float) -> Check:
     available = float(surveyed.weakest["least_norm"].capability.least_norm_Nm.min())
     return Check(
         name="need",
@@ -233,5 +237,5 @@ def _need(surveyed: Survey, need_Nm: float) -> Check:
         states=int(surveyed.workspace.reachable.sum()),
         value=need_Nm / available if available else np.inf,
         bound=1.0,
-        why="asked for by --need",
+        why="required by --need",
     )

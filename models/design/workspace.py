@@ -1,4 +1,4 @@
-"""Poses by the tilt of the shaft: how far, in which direction, and how far spun about itself."""
+"""Workspace: poses by tilt, azimuth and spin of the shaft, and the search for the worst ones."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ LARGEST_TILT_DEG = 57.0
 
 
 class Workspace(NamedTuple):
-    """A grid of poses.
+    """Grid of poses.
 
     Attributes
     ----------
     tilt_rad, azimuth_rad, spin_rad : (t,), (a,), (s,) array, rad
         Axes of the grid.
     q : (t, a, s, 3) array, rad
-        The poses.
+        Poses.
     reachable : (t, a, s) bool array
-        False where a hinge would have to leave its range.
+        False if a hinge would leave its range.
     """
 
     tilt_rad: Array
@@ -39,7 +39,7 @@ class Workspace(NamedTuple):
 
 
 def pose(tilt_rad: Array | float, azimuth_rad: Array | float, spin_rad: Array | float) -> Array:
-    """Pose of a rotor that is spun about its shaft, then tilted without further spin.
+    """Return the pose of a rotor that is spun about its shaft, then tilted without further spin.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def pose(tilt_rad: Array | float, azimuth_rad: Array | float, spin_rad: Array | 
     beta = np.arcsin(np.sin(tilt) * ca)
     alpha = np.arctan2(-np.sin(tilt) * sa, np.cos(tilt))
     versine = 1.0 - np.cos(tilt)
-    # What the two other hinges have turned the rotor about its shaft, to be undone by the last.
+    # Rotation about the shaft by the two other hinges, which the last hinge compensates.
     twist = np.arctan2(versine * ca * sa, 1.0 - versine * ca**2)
     gamma = np.mod(spin + twist + np.pi, 2 * np.pi) - np.pi
     return np.stack([alpha, beta, gamma], axis=-1)
 
 
 def reachable(q: Array, actuator: Actuator) -> NDArray[np.bool_]:
-    """Whether every hinge is within its range, for poses of shape (..., 3)."""
+    """Return True if every hinge is within its range, for poses of shape (..., 3)."""
     low, high = actuator.hinge_range_rad.T
     return np.all((q >= low) & (q <= high), axis=-1)
 
@@ -77,14 +77,14 @@ def grid(
     azimuths: int = 72,
     spins: int = 120,
 ) -> Workspace:
-    """Even grid over tilt, azimuth and a whole turn of spin.
+    """Return an even grid over tilt, azimuth and a full turn of spin.
 
     Parameters
     ----------
     actuator : Actuator
         Its hinge ranges bound the workspace.
     largest_tilt_deg, tilt_step_deg : float, degrees
-        The last step is the shorter one.
+        The last step may be shorter.
     azimuths, spins : int
         Numbers of directions and of spins.
     """
@@ -96,42 +96,44 @@ def grid(
     return Workspace(tilt, azimuth, spin, q, reachable(q, actuator))
 
 
-# Each round halves the steps of a pose that has found no better neighbour: 18 halvings of a 5 degree step
-# leave 0.07 arc seconds, and six rounds are left to walk.
+# Each round halves the steps of a pose without a better neighbour: 18 halvings of a 5 degree step give
+# 0.07 arc seconds, and six rounds remain for moves.
 ROUNDS = 24
 
-# The grid's worst pose need not lie in the deepest valley: one start in each sector of azimuth.
+# The worst pose of the grid may not be near the global minimum: one start in each sector of azimuth.
 SECTORS = 6
 
-# Two poses are one where symmetry maps one onto the other: told by tilt and figure alone.
+# Two poses count as one if symmetry maps one onto the other, which shows in equal tilt and figure.
 SAME_TILT_RAD = np.radians(0.5)
 SAME_FIGURE = 0.01
 
-# What is to be made as small as possible, of each pose.
+# Figure of each pose that is minimised.
 Figure = Callable[[Capability], Array]
 
 FIGURES: dict[str, Figure] = {
-    "least_norm": lambda found: found.least_norm_Nm,
-    "best": lambda found: found.best_Nm,
-    "singular_value": lambda found: found.singular_value_Nm_per_A,
-    "condition": lambda found: -found.condition,
+    "least_norm": lambda poses: poses.least_norm_Nm,
+    "best": lambda poses: poses.best_Nm,
+    "singular_value": lambda poses: poses.singular_value_Nm_per_A,
+    "condition": lambda poses: -poses.condition,
 }
 
 
-class Found(NamedTuple):
-    """Poses, and what the actuator can do there."""
+class WorstPoses(NamedTuple):
+    """Worst poses and their torque capability."""
 
     tilt_azimuth_spin_rad: Array  # (n, 3)
     q: Array  # (n, 3), rad
     capability: Capability
 
-    def at(self, index: Any) -> Found:
-        """Some of the poses."""
-        return Found(self.tilt_azimuth_spin_rad[index], self.q[index], self.capability.at(index))
+    def at(self, index: Any) -> WorstPoses:
+        """Return some of the poses."""
+        return WorstPoses(self.tilt_azimuth_spin_rad[index], self.q[index], self.capability.at(index))
 
 
-def worst_by_tilt(workspace: Workspace, on_grid: Capability, figure: Figure, actuator: Actuator) -> Found:
-    """Worst pose at each tilt of the grid, over all azimuths and spins.
+def worst_by_tilt(
+    workspace: Workspace, on_grid: Capability, figure: Figure, actuator: Actuator
+) -> WorstPoses:
+    """Return the worst pose at each tilt of the grid, over all azimuths and spins.
 
     Parameters
     ----------
@@ -142,40 +144,40 @@ def worst_by_tilt(workspace: Workspace, on_grid: Capability, figure: Figure, act
     figure : callable
         One of `FIGURES`.
     actuator : Actuator
-        For the poses between the grid's.
+        For poses between those of the grid.
     """
     start = _starts(workspace, on_grid, figure)
-    found = _downhill(start, _steps(workspace) * [0, 1, 1], figure, actuator, workspace.tilt_rad[-1])
-    order = np.lexsort((figure(found.capability), start[:, 0]))
+    poses = _downhill(start, _steps(workspace) * [0, 1, 1], figure, actuator, workspace.tilt_rad[-1])
+    order = np.lexsort((figure(poses.capability), start[:, 0]))
     _, first = np.unique(start[order, 0], return_index=True)
-    return found.at(order[first])
+    return poses.at(order[first])
 
 
-def local_minima(workspace: Workspace, by_tilt: Found, figure: Figure, actuator: Actuator) -> Found:
-    """Worst poses of the whole workspace, the worst first; those that symmetry makes alike only once.
+def local_minima(workspace: Workspace, by_tilt: WorstPoses, figure: Figure, actuator: Actuator) -> WorstPoses:
+    """Return the worst poses of the whole workspace, the worst first; equivalent poses by symmetry only once.
 
     Parameters
     ----------
     workspace : Workspace
         The grid.
     by_tilt : Found
-        What `worst_by_tilt` found for the same figure.
+        Result of `worst_by_tilt` for the same figure.
     figure, actuator
-        As there.
+        As in `worst_by_tilt`.
     """
     start = by_tilt.tilt_azimuth_spin_rad
-    found = _downhill(start, _steps(workspace), figure, actuator, workspace.tilt_rad[-1])
-    value, tilt = figure(found.capability), found.tilt_azimuth_spin_rad[:, 0]
-    kept: list[int] = []
+    poses = _downhill(start, _steps(workspace), figure, actuator, workspace.tilt_rad[-1])
+    value, tilt = figure(poses.capability), poses.tilt_azimuth_spin_rad[:, 0]
+    distinct: list[int] = []
     for i in np.argsort(value, kind="stable"):
         near = [
             k
-            for k in kept
+            for k in distinct
             if abs(tilt[i] - tilt[k]) < SAME_TILT_RAD and _alike(float(value[i]), float(value[k]))
         ]
         if not near:
-            kept.append(int(i))
-    return found.at(kept)
+            distinct.append(int(i))
+    return poses.at(distinct)
 
 
 def _alike(a: float, b: float) -> bool:
@@ -183,7 +185,7 @@ def _alike(a: float, b: float) -> bool:
 
 
 def _steps(workspace: Workspace) -> Array:
-    """Half the grid's steps."""
+    """Return half the steps of the grid."""
     return 0.5 * np.array(
         [_spacing(axis) for axis in (workspace.tilt_rad, workspace.azimuth_rad, workspace.spin_rad)]
     )
@@ -194,22 +196,24 @@ def _spacing(axis: Array) -> float:
 
 
 def _starts(workspace: Workspace, on_grid: Capability, figure: Figure) -> Array:
-    """(n, 3) array, rad: tilt, azimuth and spin of the worst pose at each tilt, in each sector of azimuth."""
+    """Return tilt, azimuth and spin, (n, 3) in rad, of the worst pose at each tilt and sector of azimuth."""
     value = np.where(workspace.reachable, figure(on_grid), np.inf)
     sectors = np.array_split(np.arange(len(workspace.azimuth_rad)), min(SECTORS, len(workspace.azimuth_rad)))
     starts = []
     for tilt, at_tilt in zip(workspace.tilt_rad, value, strict=True):
         for sector in sectors:
             azimuth, spin = np.unravel_index(at_tilt[sector].argmin(), at_tilt[sector].shape)
-            if at_tilt[sector][azimuth, spin] < np.inf:  # else the whole sector is out of reach
+            if at_tilt[sector][azimuth, spin] < np.inf:  # otherwise no pose of the sector is reachable
                 starts.append((tilt, workspace.azimuth_rad[sector[azimuth]], workspace.spin_rad[spin]))
     return np.array(starts)
 
 
-def _downhill(start: Array, steps: Array, figure: Figure, actuator: Actuator, largest_tilt: float) -> Found:
-    """Pattern search from each start: go to the best neighbour, or halve the steps where there is none."""
+def _downhill(
+    start: Array, steps: Array, figure: Figure, actuator: Actuator, largest_tilt: float
+) -> WorstPoses:
+    """Run a pattern search from each start: go to the best neighbour, or halve the steps if there is none."""
     offsets = np.array(list(itertools.product(*((-1, 0, 1) if step else (0,) for step in steps))))
-    offsets = offsets[np.argsort(np.any(offsets, axis=1), kind="stable")]  # staying comes first and wins ties
+    offsets = offsets[np.argsort(np.any(offsets, axis=1), kind="stable")]  # no move comes first and wins ties
     at, scale = start.copy(), np.ones(len(start))
     for _ in range(ROUNDS):
         around = at[:, None] + scale[:, None, None] * (offsets * steps)  # (n, offsets, 3)
@@ -220,4 +224,4 @@ def _downhill(start: Array, steps: Array, figure: Figure, actuator: Actuator, la
         at = around[np.arange(len(at)), best]
         scale = np.where(best == 0, scale / 2, scale)
     q = pose(*at.T)
-    return Found(at, q, capability(q, actuator))
+    return WorstPoses(at, q, capability(q, actuator))

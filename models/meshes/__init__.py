@@ -1,1 +1,1 @@
-"""The meshes of the actuator, made from its numbers."""
+"""Meshes of the actuator, generated from its numbers."""

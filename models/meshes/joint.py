@@ -1,4 +1,4 @@
-"""The passive joint: a fork of the stator, two rings on pins, and the bearing that holds the rotor."""
+"""Meshes of the passive joint: fork of the stator, two rings on pins, and bearing of the rotor."""
 
 from manifold3d import Manifold
 
@@ -14,12 +14,13 @@ from spheretwin.models.meshes.solids import (
     flat_ring,
 )
 
-# Fork, outer ring, inner ring, bearing: each turns freely in the next. Drawn, not simulated: the hinges are.
+# Fork, outer ring, inner ring, bearing: each turns freely in the next. They are visual; the hinges are
+# simulated.
 FORK_INNER_RADIUS_M = 28.5 * MM
 FORK_OUTER_RADIUS_M = 33.0 * MM
 FORK_HALF_WIDTH_M = 4.0 * MM
 FORK_EYE_RADIUS_M = 5.0 * MM
-# Solids that touch in a line alone are not watertight once joined.
+# Solids that touch only in a line are not watertight after their union.
 FORK_EYE_SHIFT_M = 0.3 * MM
 OUTER_RING_INNER_RADIUS_M = 21.5 * MM
 OUTER_RING_OUTER_RADIUS_M = 27.0 * MM

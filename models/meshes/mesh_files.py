@@ -1,7 +1,7 @@
-"""The meshes that the MJCF draws, remade from the numbers it holds.
+"""Mesh files of the MJCF, generated from its numbers.
 
-``python -m spheretwin.models.meshes.mesh_files`` writes them again; it needs the extra ``meshes``. Solids are
-built and cut by manifold3d, in metres, in the frame of the body that carries them (pole and coil: origin at
+``python -m spheretwin.models.meshes.mesh_files`` writes them; it needs the extra ``meshes``. Solids are
+built and cut by manifold3d, in metres, in the frame of their body (pole and coil: origin at
 their centre, z outward).
 """
 
@@ -28,14 +28,14 @@ NORMAL_DECIMALS = 3
 
 
 def to_mesh(solid: Manifold) -> Trimesh:
-    """Mesh of a solid in an order that depends on its shape alone."""
+    """Return the mesh of a solid in an order that depends on its shape only."""
     from trimesh import Trimesh  # slow to import
 
     raw = solid.as_original().simplify(10.0**-VERTEX_DECIMALS * 5).to_mesh64()
     corners = np.round(raw.vert_properties[:, :3], VERTEX_DECIMALS) + 0.0  # no negative zero
     vertices, index = np.unique(corners, axis=0, return_inverse=True)
     faces = index.ravel()[raw.tri_verts.astype(np.int64)]
-    # The least vertex first keeps the winding; a face that lost a corner to rounding goes.
+    # The smallest vertex comes first, with the same winding; faces that rounding degenerates are removed.
     first = np.argmin(faces, axis=1)
     faces = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)
     faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
@@ -44,7 +44,7 @@ def to_mesh(solid: Manifold) -> Trimesh:
 
 
 def to_obj(mesh: Trimesh) -> str:
-    """Text of an OBJ file: vertices in metres, and normals that are split along sharp edges.
+    """Return the text of an OBJ file: vertices in metres, and normals that are split along sharp edges.
 
     Without normals of its own a mesh gets one normal per vertex from MuJoCo, and every edge looks worn.
     """
@@ -64,7 +64,7 @@ def to_obj(mesh: Trimesh) -> str:
 
 
 def crease_normals(mesh: Trimesh) -> NDArray[np.float64]:
-    """Normal at each corner of each face: the mean over the vertex's faces that are nearly coplanar.
+    """Return the normal at each corner of each face: the mean over nearly coplanar faces of the vertex.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def meshes(actuator: Actuator) -> dict[str, Trimesh]:
     Parameters
     ----------
     actuator : Actuator
-        Its magnets, coils and shaft give the dimensions that are simulated.
+        Its magnets, coils and shaft give the simulated dimensions.
 
     Returns
     -------
@@ -123,7 +123,7 @@ def write(folder: Path, actuator: Actuator) -> list[Path]:
     Parameters
     ----------
     folder : Path
-        Made if missing; files of the same names are overwritten.
+        Created if missing; files of the same names are overwritten.
     actuator : Actuator
         See `meshes`.
 

@@ -1,6 +1,6 @@
-"""The rotor: poles, the ball around them, the hoop behind them, the shaft.
+"""Meshes of the rotor: poles, the ball around them, the hoop behind them, the shaft.
 
-What is simulated, the poles' shape and the shaft's length, is the actuator's; the rest is drawn alone.
+The shape of the poles and the length of the shaft are those of the actuator; all else is visual.
 """
 
 import numpy as np
@@ -53,12 +53,12 @@ PAYLOAD_FLANGE_HALF_HEIGHT_M = 1.0 * MM
 
 
 def ball_radius(actuator: Actuator) -> float:
-    """Radius of the ball, m: the middles of the poles' fronts lie on it."""
+    """Return the radius of the ball, m, through the middles of the fronts of the poles."""
     return actuator.magnet.front_m
 
 
 def pole(actuator: Actuator) -> Manifold:
-    """One pole as it is modelled, sharp edges and all: a cylinder, its front flat or ground to a sphere."""
+    """Return a pole as modelled, with sharp edges: a cylinder, its front flat or ground to a sphere."""
     magnet = actuator.magnet
     middle = magnet.length_m / 2
     rho = np.linspace(magnet.radius_m, 0.0, FRONT_STEPS) if magnet.front_radius_m else [magnet.radius_m, 0.0]
@@ -67,7 +67,7 @@ def pole(actuator: Actuator) -> Manifold:
 
 
 def ball(actuator: Actuator) -> Manifold:
-    """Hollow ball, cut flat above and below, with a hole for each pole."""
+    """Return the hollow ball, cut flat above and below, with a hole for each pole."""
     radius = ball_radius(actuator)
     shell = spherical_shell(radius - BALL_WALL_M, radius, -60.0, 60.0)
     band = shell.trim_by_plane([0, 0, 1], -BALL_CUT_HEIGHT_M).trim_by_plane([0, 0, -1], -BALL_CUT_HEIGHT_M)
@@ -76,7 +76,7 @@ def ball(actuator: Actuator) -> Manifold:
 
 
 def hoop(actuator: Actuator) -> Manifold:
-    """Back iron behind both layers of poles, with a flat seat for each pole's inner face."""
+    """Return the back iron behind both layers of poles, with a flat seat for the inner face of each pole."""
     groove = HOOP_OUTER_RADIUS_M - HOOP_GROOVE_DEPTH_M
     band = spherical_shell(HOOP_INNER_RADIUS_M, HOOP_OUTER_RADIUS_M, -45.0, 45.0)
     band = band.trim_by_plane([0, 0, 1], -HOOP_HALF_HEIGHT_M).trim_by_plane([0, 0, -1], -HOOP_HALF_HEIGHT_M)
@@ -87,7 +87,7 @@ def hoop(actuator: Actuator) -> Manifold:
 
 
 def shaft(actuator: Actuator) -> Manifold:
-    """Output shaft: journal in the bearing, spider on the ball's upper cut, payload flange, tip."""
+    """Return the output shaft: journal in the bearing, spider on the upper cut of the ball, flange, tip."""
     tip, mount = actuator.shaft_tip_m[2], actuator.payload_mount_m[2]
     journal = BEARING_INNER_RADIUS_M - RUNNING_CLEARANCE_M
     c = RING_CHAMFER_M
@@ -118,10 +118,10 @@ def shaft(actuator: Actuator) -> Manifold:
 
 
 def _spider(actuator: Actuator) -> Manifold:
-    """Rim that is screwed onto the ball's upper cut, and the arms from there up to the hub."""
+    """Return the rim on the upper cut of the ball, and the arms from there up to the hub."""
     thick = SPIDER_THICKNESS_M
     low, high = BALL_CUT_HEIGHT_M, BALL_CUT_HEIGHT_M + thick
-    # The rim's upper edge stays inside the ball's sphere.
+    # The upper edge of the rim stays inside the sphere of the ball.
     rim = float(np.sqrt(ball_radius(actuator) ** 2 - high**2)) - RING_CHAMFER_M
     inside = rim - SPIDER_RIM_WIDTH_M
     ring = revolve([(inside, low), (rim, low), (rim, high), (inside, high)], SECTIONS)

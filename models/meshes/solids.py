@@ -1,4 +1,4 @@
-"""Making solids: revolve, repeat, join; and the shapes that several parts are made of, in metres."""
+"""Solids: revolution, repetition, union, and shapes shared by several parts, in metres."""
 
 from collections.abc import Iterable
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 MM = 1e-3
 
-# How finely circles are drawn, by the size of what they bound.
+# Resolution of circles, by the size of the part.
 SECTIONS = 48
 SMALL_SECTIONS = 32
 PIN_SECTIONS = 24
@@ -21,17 +21,17 @@ Points = list[tuple[float, float]]
 
 
 def revolve(outline: Iterable[tuple[float, float]], sections: int) -> Manifold:
-    """Solid of revolution about z of an outline of points (distance from z, height)."""
+    """Return the solid of revolution about z of an outline of points (distance from z, height)."""
     return Manifold.revolve(section(outline), sections)
 
 
 def around(solid: Manifold, count: int, first_deg: float = 0.0) -> Manifold:
-    """Copies of a solid, evenly spaced about z."""
+    """Return copies of a solid, evenly spaced about z."""
     return union(solid.rotate([0.0, 0.0, first_deg + 360.0 * i / count]) for i in range(count))
 
 
 def along(solid: Manifold, axes: NDArray[np.float64], distance: float = 0.0) -> Manifold:
-    """Copies of a solid, its z turned to each of some unit vectors.
+    """Return copies of a solid, with its z axis rotated to each of the given unit vectors.
 
     Parameters
     ----------
@@ -49,28 +49,28 @@ def along(solid: Manifold, axes: NDArray[np.float64], distance: float = 0.0) -> 
 
 
 def cylinder(radius: float, low: float, high: float, sections: int) -> Manifold:
-    """Cylinder about z between two heights."""
+    """Return a cylinder about z between two heights."""
     return Manifold.cylinder(high - low, radius, radius, sections).translate([0, 0, low])
 
 
 def both(axis: str) -> NDArray[np.float64]:
-    """Both directions along one of the axes x, y, z."""
+    """Return both directions along one of the axes x, y, z."""
     direction = np.eye(3)["xyz".index(axis)]
     return np.array([direction, -direction])
 
 
 def union(solids: Iterable[Manifold]) -> Manifold:
-    """One solid of several."""
+    """Return the union of solids."""
     return Manifold.batch_boolean(list(solids), OpType.Add)
 
 
 def section(outline: Iterable[tuple[float, float]]) -> CrossSection:
-    """Plane figure inside an outline of points."""
+    """Return the plane figure inside an outline of points."""
     return CrossSection([np.array(list(outline), dtype=float)], FillRule.NonZero)
 
 
 def flat_ring(inner: float, outer: float, half_height: float) -> Manifold:
-    """Flat ring about z with chamfered edges."""
+    """Return a flat ring about z with chamfered edges."""
     c, h = RING_CHAMFER_M, half_height
     return revolve(
         [
@@ -88,7 +88,7 @@ def flat_ring(inner: float, outer: float, half_height: float) -> Manifold:
 
 
 def spherical_shell(inner: float, outer: float, lowest_deg: float, highest_deg: float) -> Manifold:
-    """Spherical shell between two latitudes, its rims cut towards the centre."""
+    """Return a spherical shell between two latitudes, with rims cut towards the centre."""
     steps = max(1, round((highest_deg - lowest_deg) / ARC_STEP_DEG))
     latitude = np.radians(np.linspace(lowest_deg, highest_deg, steps + 1))
     circle = np.column_stack([np.cos(latitude), np.sin(latitude)])
@@ -96,12 +96,12 @@ def spherical_shell(inner: float, outer: float, lowest_deg: float, highest_deg: 
 
 
 def tube(inner: float, outer: float, low: float, high: float) -> Manifold:
-    """Hollow cylinder about z between two heights."""
+    """Return a hollow cylinder about z between two heights."""
     return revolve([(inner, low), (outer, low), (outer, high), (inner, high)], SECTIONS)
 
 
 def chamfered_pin(radius: float, low: float, high: float) -> Manifold:
-    """Cylinder about z between two heights, its upper edge chamfered."""
+    """Return a cylinder about z between two heights, with a chamfered upper edge."""
     c = RING_CHAMFER_M
     return revolve(
         [(0.0, low), (radius, low), (radius, high - c), (radius - c, high), (0.0, high)], PIN_SECTIONS

@@ -1,6 +1,6 @@
-"""The stator: coils, the shell around them, and the base that carries the joint's fork.
+"""Meshes of the stator: coils, the shell around them, and the base with the fork of the joint.
 
-The coils' sizes and places are the actuator's; the rest is drawn alone.
+Sizes and positions of the coils are those of the actuator; all else is visual.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ from spheretwin.models.meshes.solids import (
     union,
 )
 
-# Coil: two flanges, and between them a winding whose turns show.
+# Coil: two flanges, and between them a winding with visible turns.
 COIL_FLANGE_M = 1.2 * MM
 COIL_CHAMFER_M = 0.3 * MM
 COIL_RECESS_M = 0.35 * MM
@@ -33,8 +33,8 @@ COIL_RIDGES = 7
 COIL_RIDGE_DEPTH_M = 0.35 * MM
 COIL_SECTIONS = 24
 
-# A shell around the coils, open above so far that the shaft can tilt as the nutation asks. (The upper coils
-# stand in its way where it points at one: they are where the MJCF has them.)
+# A shell around the coils, open above so that the shaft can tilt as far as in the nutation. (The upper coils
+# obstruct it if it points at one: their positions are those of the MJCF.)
 SHAFT_TILT_DEG = 57.0
 SHELL_INNER_RADIUS_M = 57.0 * MM
 SHELL_OUTER_RADIUS_M = 63.0 * MM
@@ -51,12 +51,12 @@ BASE_RADIUS_M = 60.0 * MM
 BASE_HEIGHT_M = 4.0 * MM
 SKIRT_WALL_M = 4.0 * MM
 SKIRT_WINDOWS = 12
-# The neck of the joint passes through the ball's lower opening: the slimmer, the further the ball can tilt.
+# The neck of the joint passes through the lower opening of the ball: a slimmer neck permits more tilt.
 NECK_RADIUS_M = 3.0 * MM
 
 
 def coil(actuator: Actuator) -> Manifold:
-    """One air-core coil: bore, two flanges, and the ridges of its outer turns."""
+    """Return an air-core coil: bore, two flanges, and the ridges of its outer turns."""
     bore, radius = actuator.coil.inner_radius_m, actuator.coil.outer_radius_m
     half = actuator.coil.length_m / 2
     winding = radius - COIL_RECESS_M
@@ -85,12 +85,12 @@ def coil(actuator: Actuator) -> Manifold:
 
 
 def stator(actuator: Actuator) -> Manifold:
-    """Shell around the coils, cut open; base, and the fork that carries the outer ring."""
+    """Return the shell around the coils, cut open, the base, and the fork of the outer ring."""
     return _housing(actuator) + _base(actuator) + fork()
 
 
 def shell_latitudes_deg(actuator: Actuator) -> tuple[float, float]:
-    """Lower and upper rim of the stator shell, degrees.
+    """Return the latitudes of the lower and upper rim of the stator shell, degrees.
 
     Above, the shaft passes at its largest tilt; below, the shell closes around the lowest coils.
     """
@@ -110,7 +110,7 @@ def _housing(actuator: Actuator) -> Manifold:
         actuator.coil.outer_radius_m + COIL_CLEARANCE_M,
         SHELL_INNER_RADIUS_M / 2,
         2 * SHELL_OUTER_RADIUS_M,
-        COIL_SECTIONS,  # as the coil in it: the gap between them is the same all around
+        COIL_SECTIONS,  # as for the coil in it: the gap between them is constant
     )
     return shell - along(hole, actuator.coil_axes)
 
@@ -120,7 +120,7 @@ def _latitudes_deg(actuator: Actuator) -> list[float]:
 
 
 def _sector() -> Manifold:
-    """All that is cut away so that the rotor can be seen."""
+    """Return the sector that is cut out to show the rotor."""
     reach = 2 * SHELL_OUTER_RADIUS_M
     angles = np.radians(np.linspace(CUT_FROM_DEG, CUT_TO_DEG, 5))
     corners = [(0.0, 0.0), *((reach * np.cos(a), reach * np.sin(a)) for a in angles)]
@@ -128,7 +128,7 @@ def _sector() -> Manifold:
 
 
 def _holders(actuator: Actuator) -> Manifold:
-    """What holds the coils where the shell is cut away: slim belts with collars, and the lower rim."""
+    """Return the holders of the coils in the cut: slim belts with collars, and the lower rim."""
     lowest, _ = shell_latitudes_deg(actuator)
     inner, outer = SHELL_INNER_RADIUS_M + BELT_INSET_M, SHELL_OUTER_RADIUS_M - BELT_INSET_M
     belts = [
@@ -161,7 +161,7 @@ def _base(actuator: Actuator) -> Manifold:
         SECTIONS,
     )
     foot = BASE_RADIUS_M - 2 * SKIRT_WALL_M
-    lip = RING_CHAMFER_M  # overlap with the shell: solids that meet in an edge alone are not watertight
+    lip = RING_CHAMFER_M  # overlap with the shell: solids that touch only in an edge are not watertight
     skirt = revolve(
         [
             (outer - lip - SKIRT_WALL_M, rim + 2 * lip),
@@ -182,7 +182,7 @@ def _base(actuator: Actuator) -> Manifold:
 
 
 def _pedestal(actuator: Actuator, top: float) -> Manifold:
-    """Slender where the tilted ball comes close, stout below the ball."""
+    """Return the pedestal: slender near the tilted ball, thick below it."""
     below_ball = -ball_radius(actuator) - 2 * MM
     joint = (FORK_INNER_RADIUS_M + FORK_OUTER_RADIUS_M) / 2
     outline = [

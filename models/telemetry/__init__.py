@@ -1,1 +1,1 @@
-"""What a run says of itself, and series of the user's: signals, tables, and the files they are kept in."""
+"""Telemetry of a run: signals, tables and files; and time series of a user."""

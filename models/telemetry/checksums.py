@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     import pyarrow.parquet
 
 NO_CHECKSUMS = "has no checksums, it was written by an earlier version: damage may be unnoticed"
-"""Said of a file that is read without a check."""
+"""Warning for a file that is read without a check."""
 
 Array = NDArray[np.float64]
 
-# Metadata of a Parquet file. Two names: damage to one of them is not taken for a file without checksums.
+# Metadata of a Parquet file. Two names: damage to one of them does not look like a file without checksums.
 _SEGMENTS, _FOOTER = "row_group_checksums", "footer_checksum"
 METADATA = (_SEGMENTS, _FOOTER)
 
@@ -40,7 +40,7 @@ _UNSIGNED = "0" * 8
 _FOOTER_END = 8  # bytes: length of the footer, magic
 _MAGIC = b"PAR1"
 
-# Rows of a row group at most, as pyarrow has them.
+# Largest number of rows of a row group, the default of pyarrow.
 _GROUP_ROWS = 1 << 20
 _BLOCK_BYTES = 1 << 20
 
@@ -48,14 +48,14 @@ _HALF = np.uint64(32)
 
 
 class Segment(NamedTuple):
-    """A stretch of a file, behind the one before it."""
+    """Section of a file, directly after the previous one."""
 
     size: int
     crc32: int
 
 
 class SegmentedFile:
-    """New file that sums up what is written to it; pyarrow writes to it as to any file object."""
+    """New file that computes the checksum of its bytes; pyarrow writes to it as to any file object."""
 
     def __init__(self, path: Path) -> None:
         import pyarrow as pa  # slow to import, and most runs write no file
@@ -65,7 +65,7 @@ class SegmentedFile:
 
     @property
     def closed(self) -> bool:
-        """True if nothing can be written any more."""
+        """True if the file is closed."""
         return bool(self._file.closed)
 
     def write(self, block: bytes) -> int:
@@ -79,11 +79,11 @@ class SegmentedFile:
         return int(self._file.tell())
 
     def flush(self) -> None:
-        """Hand what was written to the operating system."""
+        """Pass the written bytes to the operating system."""
         self._file.flush()
 
     def end_segment(self) -> Segment:
-        """Return the segment up to here; what is written next begins another."""
+        """Return the segment up to here and begin the next one."""
         segment, self._segment = self._segment, Segment(0, 0)
         return segment
 
@@ -96,7 +96,7 @@ class SegmentedFile:
 
 
 def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table], **options: Any) -> int:
-    """Write a Parquet file with checksums of its pages, row groups and footer, whole or not at all.
+    """Write a Parquet file with checksums of its pages, row groups and footer, completely or not at all.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table], **o
     schema : pa.Schema
         Columns and metadata.
     tables : iterable of pa.Table
-        A row group each, or several where one has more rows than a group holds.
+        One row group each, or several if a table has more rows than a group holds.
     **options
         Of `pyarrow.parquet.ParquetWriter`.
 
@@ -119,7 +119,7 @@ def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table], **o
     InputError
         No file can be made there.
     SpheretwinError
-        Writing failed; what was there before is untouched.
+        Writing failed; an earlier file is unchanged.
     """
     import pyarrow.parquet  # slow to import, and most runs write no file
 
@@ -142,21 +142,21 @@ def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table], **o
 
 
 def open_parquet(path: Path, *, rows: bool = True) -> pyarrow.parquet.ParquetFile:
-    """Open a Parquet file whose bytes are those that were written, as far as it has checksums.
+    """Open a Parquet file and compare its checksums, if it has any.
 
     Parameters
     ----------
     path : Path
         The file.
     rows : bool
-        Without them only the footer is compared.
+        If False, only the footer is compared.
 
     Raises
     ------
     InputError
         A checksum differs: the message names the footer, or the row group and where possible the column.
     OSError, pa.ArrowException
-        The file is missing or no Parquet file.
+        The file is missing, or is not a Parquet file.
     """
     import pyarrow.parquet
 
@@ -173,22 +173,22 @@ def open_parquet(path: Path, *, rows: bool = True) -> pyarrow.parquet.ParquetFil
 
 
 def has_checksums(path: Path) -> bool:
-    """Return whether a Parquet file has checksums; compare that of its footer.
+    """Return True if a Parquet file has checksums; compare the checksum of its footer.
 
     Raises
     ------
     InputError
-        The footer is not the one that was written.
+        The footer differs from the one that was written.
     OSError
         The file cannot be read.
     """
     with path.open("rb") as file:
         _, footer = _footer(file)
-    found = _FOOTER_VALUE.search(footer)
+    match = _FOOTER_VALUE.search(footer)
     listed = _SEGMENTS.encode() + _TEXT in footer
-    if found is None and not listed:
+    if match is None and not listed:
         return False
-    if found is None or not listed or _footer_checksum(footer, found) != found[1].decode():
+    if match is None or not listed or _footer_checksum(footer, match) != match[1].decode():
         raise damaged(path, "the footer")
     return True
 
@@ -203,27 +203,27 @@ def damaged(path: Path, place: str) -> InputError:
 
 def unreadable(path: Path, error: BaseException, expected: str) -> InputError:
     """Return the error for a file that another library could not read."""
-    told = shortened(without_breaks(error), LONGEST_WORD)
-    return InputError(f"file {path}: expected {expected}, {told}")
+    reason = shortened(without_breaks(error), LONGEST_WORD)
+    return InputError(f"file {path}: expected {expected}, {reason}")
 
 
 def _sign(path: Path) -> None:
-    """Put the checksum of the footer in its place."""
+    """Write the checksum of the footer into the footer."""
     with path.open("r+b") as file:
         start, footer = _footer(file)
-        found = _FOOTER_VALUE.search(footer)
-        assert found is not None  # it was written a moment ago
-        file.seek(start + found.start(1))
-        file.write(_footer_checksum(footer, found).encode())
+        match = _FOOTER_VALUE.search(footer)
+        assert match is not None  # it was just written
+        file.seek(start + match.start(1))
+        file.write(_footer_checksum(footer, match).encode())
 
 
-def _footer_checksum(footer: bytes, found: re.Match[bytes]) -> str:
-    unsigned = footer[: found.start(1)] + _UNSIGNED.encode() + footer[found.end(1) :]
+def _footer_checksum(footer: bytes, match: re.Match[bytes]) -> str:
+    unsigned = footer[: match.start(1)] + _UNSIGNED.encode() + footer[match.end(1) :]
     return f"{zlib.crc32(unsigned):08x}"
 
 
 def _footer(file: BinaryIO) -> tuple[int, bytes]:
-    """Place and bytes of the footer, with its length and the magic behind it; no bytes if there is none."""
+    """Return position and bytes of the footer with its length and magic; no bytes if there is none."""
     size = file.seek(0, 2)
     file.seek(max(size - _FOOTER_END, 0))
     end = file.read()
@@ -235,7 +235,7 @@ def _footer(file: BinaryIO) -> tuple[int, bytes]:
 
 
 def _first_changed(path: Path, segments: Iterable[Segment]) -> int | None:
-    """Place of the first segment that is not what was written; None if all are."""
+    """Return the index of the first changed segment; None if there is none."""
     with path.open("rb") as file:
         for place, segment in enumerate(segments):
             if _read_segment(file, segment.size) != segment:
@@ -244,7 +244,7 @@ def _first_changed(path: Path, segments: Iterable[Segment]) -> int | None:
 
 
 def _read_segment(file: BinaryIO, size: int) -> Segment:
-    """The next bytes of a file, fewer at its end."""
+    """Read the next bytes of a file, fewer at its end."""
     done, crc32 = 0, 0
     while block := file.read(min(size - done, _BLOCK_BYTES)):
         done, crc32 = done + len(block), zlib.crc32(block, crc32)
@@ -252,12 +252,12 @@ def _read_segment(file: BinaryIO, size: int) -> Segment:
 
 
 def _group(file: pyarrow.parquet.ParquetFile, place: int) -> str:
-    """A row group by its number and rows, with the first column whose pages are not what was written."""
+    """Return number and rows of a row group, and the first column with a changed page."""
     import pyarrow as pa
 
     if not file.metadata.num_rows:
         return f"row group {place}"
-    counts = [file.metadata.row_group(each).num_rows for each in range(place + 1)]
+    counts = [file.metadata.row_group(group).num_rows for group in range(place + 1)]
     text = f"row group {place}, rows {sum(counts[:-1])} to {sum(counts) - 1}"
     for name in file.schema_arrow.names:
         try:
@@ -302,6 +302,6 @@ def values_checksum(values: Array, before: int = 0) -> int:
     values : array
         The numbers; a copy is made only if they are not contiguous.
     before : int
-        Checksum of numbers that stand before them; the result is that of all.
+        Checksum of the preceding numbers; the result is the checksum of all.
     """
     return zlib.crc32(np.ascontiguousarray(values).data, before)

@@ -1,4 +1,4 @@
-"""Time series from a CSV file of the user's: a column of times and named columns of numbers."""
+"""Time series from a CSV file of the user: a column of times and named columns of numbers."""
 
 from __future__ import annotations
 
@@ -10,57 +10,57 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError, shown, told_apart, without_breaks
+from spheretwin.models.base.errors import InputError, distinct_texts, shown, without_breaks
 
 TIME = "t_s"
 
-# Beyond it a number of seconds no longer tells ticks apart; below it, differences over it would overflow.
+# Beyond the first a number of seconds cannot distinguish ticks; below the second, quotients would overflow.
 LONGEST_s, CLOSEST_s = 1e9, 1e-9
 
-# Times of ticks are products and those of a file decimal fractions: what is meant as one time may differ by
-# some units in the last place, of which this is a few thousand.
+# Times of ticks are products, those of a file decimal fractions: equal times may differ by some units in the
+# last place. This is a few thousand of them.
 ROUNDING = 1e-12
 
 
-class Row(NamedTuple):
+class CsvRow(NamedTuple):
     """One row of a file."""
 
     line: int
-    """Number of its line, from 1 on."""
+    """Number of the line, from 1."""
     texts: list[str]
 
 
-class Series:
-    """Numbers by time.
+class TimeSeries:
+    """Time series of numbers.
 
     Parameters
     ----------
     t_s : (n,) array, s
         Rising times.
     values : (n, k) array
-        What is there at these times.
+        Values at these times.
     """
 
     def __init__(self, t_s: NDArray[np.float64], values: NDArray[np.float64]) -> None:
         self.t_s, self.values = t_s, values
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Series):
+        if not isinstance(other, TimeSeries):
             return NotImplemented
         return np.array_equal(self.t_s, other.t_s) and np.array_equal(self.values, other.values)
 
     def __hash__(self) -> int:
         return hash((self.t_s.tobytes(), self.values.tobytes()))
 
-    def held(self, t: NDArray[np.float64], before: Sequence[float]) -> NDArray[np.float64]:
-        """Values that hold from their times on, and `before` the first time others.
+    def zero_order_hold(self, t: NDArray[np.float64], before: Sequence[float]) -> NDArray[np.float64]:
+        """Interpolate with zero-order hold: each value applies from its time on.
 
         Parameters
         ----------
         t : (n,) array, s
             Times.
         before : sequence of k float
-            What holds before the first time.
+            Values before the first time.
 
         Returns
         -------
@@ -68,8 +68,8 @@ class Series:
         """
         return np.vstack([before, self.values])[np.searchsorted(reached(self.t_s), t, side="right")]
 
-    def linear(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values on straight lines between the times, the first before and the last after them.
+    def interpolate(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Interpolate linearly between the times; the first value applies before, the last after them.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class Series:
 
 
 def reached(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """From when on times count as reached: earlier by what rounding may take off a tick's time.
+    """Return the times less a rounding tolerance, so that the tick of a time counts as having reached it.
 
     Parameters
     ----------
@@ -103,85 +103,85 @@ def check_rising(times: Sequence[float]) -> None:
     Raises
     ------
     ValueError
-        One is not later than the one before, by a nanosecond at least.
+        A time is not later than the previous one by at least a nanosecond.
     """
     fault = _first_not_rising(np.array(times))
     if fault is not None:
-        before, after = told_apart(*times[fault - 1 : fault + 1])
+        before, after = distinct_texts(*times[fault - 1 : fault + 1])
         raise ValueError(f"expected rising times, received {before} then {after} s")
 
 
-def read(what: str, path: Path, columns: Sequence[str], largest: float) -> Series:
+def read(what: str, path: Path, columns: Sequence[str], largest: float) -> TimeSeries:
     """Read a series: a header, then a row for each time; lines that begin with ``#`` are comments.
 
     Parameters
     ----------
     what : str
-        What messages call the file.
+        Name of the file in messages.
     path : Path
-        The file. Columns that are not asked for are left alone.
+        The file. Other columns are ignored.
     columns : sequence of str
-        Columns beside that of the times, ``t_s``.
+        Columns in addition to the times, ``t_s``.
     largest : float
         Largest magnitude of their numbers.
 
     Returns
     -------
     Series
-        At least one row, times rising.
+        At least one row, with rising times.
 
     Raises
     ------
     InputError
-        The file cannot be read, lacks a column, or a row of it is no series.
+        The file cannot be read, lacks a column, or has an invalid row.
     """
     header, *rows = _rows(what, path)
-    wanted = (TIME, *columns)
+    names_read = (TIME, *columns)
     names = [name.strip() for name in header.texts]
-    if any(names.count(name) != 1 for name in wanted):
+    if any(names.count(name) != 1 for name in names_read):
         raise InputError(
-            f"{what} {path}: expected each of the columns {', '.join(wanted)} once,"
+            f"{what} {path}: expected each of the columns {', '.join(names_read)} once,"
             f" received {', '.join(names) or 'none'}"
         )
     if not rows:
         raise InputError(f"{what} {path}: expected at least one row below the header, received none")
     limits = dict.fromkeys(columns, largest) | {TIME: LONGEST_s}
-    table = np.empty((len(rows), len(wanted)))
+    table = np.empty((len(rows), len(names_read)))
     for target, row in zip(table, rows, strict=True):
         if len(row.texts) != len(names):
             raise InputError(
                 f"{what} {path}: expected {len(names)} numbers in line {row.line}, received {len(row.texts)}"
             )
-        for i, name in enumerate(wanted):
+        for i, name in enumerate(names_read):
             text = row.texts[names.index(name)]
             target[i] = _number(f"{what} {path}: line {row.line}", name, text, limits[name])
     fault = _first_not_rising(table[:, 0])
     if fault is not None:
-        before, after = told_apart(table[fault - 1, 0], table[fault, 0])
+        before, after = distinct_texts(table[fault - 1, 0], table[fault, 0])
         raise InputError(
             f"{what} {path}: line {rows[fault].line}: expected a {TIME} that rises,"
             f" received {before} then {after}"
         )
-    return Series(table[:, 0].copy(), table[:, 1:].copy())
+    return TimeSeries(table[:, 0].copy(), table[:, 1:].copy())
 
 
-def _rows(what: str, path: Path) -> list[Row]:
-    """Header and rows of a file; a header of nothing where there is none."""
+def _rows(what: str, path: Path) -> list[CsvRow]:
+    """Return header and rows of a file; an empty header for an empty file."""
     try:
         text = path.read_text(encoding="utf-8-sig")  # spreadsheets write a byte-order mark
     except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
         raise InputError(f"{what} {path}: expected a readable CSV file, {without_breaks(error)}") from None
     try:
-        return list(_split(text)) or [Row(1, [])]
+        return list(_split(text)) or [CsvRow(1, [])]
     except csv.Error as error:
         raise InputError(f"{what} {path}: expected values between commas, {error}") from None
 
 
-def _split(text: str) -> Iterator[Row]:
-    kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    reader = csv.reader((line for _, line in kept), skipinitialspace=True)
+def _split(text: str) -> Iterator[CsvRow]:
+    data_lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    reader = csv.reader((line for _, line in data_lines), skipinitialspace=True)
     for texts in reader:
-        yield Row(kept[reader.line_num - 1][0], texts)
+        yield CsvRow(data_lines[reader.line_num - 1][0], texts)
 
 
 def _number(where: str, name: str, text: str, largest: float) -> float:

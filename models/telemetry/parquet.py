@@ -1,7 +1,7 @@
-"""Telemetry streamed to a Parquet file while a run goes on, in memory that does not grow with it.
+"""Telemetry streamed to a Parquet file during a run, with constant memory.
 
-What has been flushed lies in a hidden folder beside the file, in parts that are Arrow streams: a killed
-process leaves them, any Arrow reader opens them, and `join` makes one file of them.
+Flushed rows are in Arrow streams (parts) in a hidden folder next to the file. A killed process leaves them.
+Any Arrow reader opens them, and `join` makes one file of them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 from spheretwin.models.base.files import OPEN_FILES, PartialFile, check_writable
 from spheretwin.models.telemetry.checksums import write_parquet
-from spheretwin.models.telemetry.partial_files import Parts, read_batches, read_schema
+from spheretwin.models.telemetry.partial_files import PartialStreams, read_batches, read_schema
 from spheretwin.models.telemetry.signals import Signal, width
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, Table
 
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 # Rows of a batch of a part: four seconds at 1 kHz, some 3 MB in memory.
 PART_ROWS = 4096
 
-# How long a process that ends at once waits for a chunk that is being written.
+# Time for which an ending process waits for a chunk that is being written.
 PATIENCE_s = 2.0
 
-# Batches of a row group of the file. The rows of one group are in memory at a time, and Arrow keeps 15 kB of
-# each until the file is whole: over two hours at 1 kHz, three or four batches need the least memory.
+# Batches of a row group of the file. The rows of one group are in memory at a time, and Arrow stores 15 kB of
+# each until the file is complete: over two hours at 1 kHz, three or four batches need the least memory.
 GROUP_BATCHES = 4
 
 
 class TelemetryFile:
-    """Follows a run into a Parquet file, which appears when it is closed.
+    """Sink of a run that writes a Parquet file, which appears when it is closed.
 
     Parameters
     ----------
@@ -45,12 +45,12 @@ class TelemetryFile:
     signals : tuple of Signal
         Columns, for a run that ends before its first row.
     facts : mapping
-        What is known of the run before it starts; kept with every part.
+        Metadata known before the run; stored in every part.
 
     Raises
     ------
     InputError
-        No file can be made there.
+        No file can be written there.
     """
 
     def __init__(self, path: Path, signals: tuple[Signal, ...], facts: Mapping[str, str]) -> None:
@@ -58,15 +58,15 @@ class TelemetryFile:
         self._path, self._facts = path, dict(facts)
         self._rows = Table(signals, np.empty((0, width(signals))))
         self._waiting: list[Table] = []
-        self._parts = Parts(path, facts)
+        self._parts = PartialStreams(path, facts)
         self._fault: SpheretwinError | None = None
         self._lock, self._closed = threading.Lock(), False
         OPEN_FILES.add(self)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, which must not change any more.
+        """Write the rows of one chunk, which must not change later.
 
-        What goes wrong is raised by `close`, so that the run itself goes on.
+        An error is raised by `close`, so that the run continues.
         """
         with self._lock:
             self._write(rows)
@@ -78,29 +78,29 @@ class TelemetryFile:
             self._flush()
             self._rows = rows.rows(0, 0)
         self._waiting.append(rows)
-        # Batches of one length, whatever the chunks: the same rows give the same bytes.
+        # Batches of one length for any chunks: the same rows give the same bytes.
         while not self._fault and sum(map(len, self._waiting)) >= PART_ROWS:
             self._flush(PART_ROWS)
 
     def note(self, t_s: float, text: str) -> None:
-        """Nothing: the command journal is among the facts that `close` is given."""
+        """Ignore a note: `close` receives the command journal."""
 
     def finish(self, status: str) -> None:
-        """Take note of how the run ended."""
+        """Store the final status of the run."""
         self._facts["status"] = status
 
     def close(self, facts: Mapping[str, str]) -> None:
-        """Make the file.
+        """Write the file.
 
         Parameters
         ----------
         facts : mapping
-            What is known of the run now that it has ended, as its command journal.
+            Metadata known after the run, such as its command journal.
 
         Raises
         ------
         SpheretwinError
-            It could not be written: what was there before is untouched, and the parts are kept.
+            Writing failed: an earlier file is unchanged, and the parts remain.
         """
         with self._lock:
             try:
@@ -110,8 +110,8 @@ class TelemetryFile:
                 OPEN_FILES.remove(self)
 
     def partial(self) -> PartialFile | None:
-        """Flush the rows that wait; return the parts, if there are rows. For a process that ends at once."""
-        if self._lock.acquire(timeout=PATIENCE_s):  # who holds it has flushed what there was, or is about to
+        """Flush the pending rows; return the parts, if there are rows. For a process that is ending."""
+        if self._lock.acquire(timeout=PATIENCE_s):  # its holder has flushed, or will flush
             try:
                 if not (self._fault or self._closed):
                     self._flush()
@@ -121,22 +121,22 @@ class TelemetryFile:
             return None
         return PartialFile(self._parts.folder, self._path, self._parts.rows)
 
-    def _close(self, known: Mapping[str, str]) -> None:
+    def _close(self, facts: Mapping[str, str]) -> None:
         if self._fault:
             raise self._fault
         if not self._parts.rows:
-            self._pending().write_parquet(self._path, known)
+            self._pending().write_parquet(self._path, facts)
             return
         self._flush()
         if self._fault:
             raise self._fault
         try:
             self._parts.close()
-            join(self._parts.paths, self._path, known)
+            join(self._parts.paths, self._path, facts)
         except OSError as error:
             raise self._unwritten(error) from None
         except SpheretwinError as error:
-            raise SpheretwinError(f"{error}{self._kept()}") from None
+            raise SpheretwinError(f"{error}{self._kept_rows_text()}") from None
         self._parts.remove()
 
     def _pending(self) -> Table:
@@ -144,7 +144,7 @@ class TelemetryFile:
         return Table(self._rows.signals, np.concatenate(values))
 
     def _flush(self, most: int | None = None) -> None:
-        """Append the rows that wait to the parts, or the first of them; the others wait on."""
+        """Append the pending rows, or the first `most` of them, to the parts."""
         rows = self._pending()
         last = len(rows) if most is None else most
         self._waiting = [rows.rows(last, len(rows))] if last < len(rows) else []
@@ -158,21 +158,21 @@ class TelemetryFile:
 
     def _unwritten(self, error: OSError) -> SpheretwinError:
         return SpheretwinError(
-            f"output: {self._path} could not be written, {without_breaks(error)}{self._kept()}"
+            f"output: {self._path} could not be written, {without_breaks(error)}{self._kept_rows_text()}"
         )
 
-    def _kept(self) -> str:
+    def _kept_rows_text(self) -> str:
         return f"; {self._parts.rows} rows are kept in {self._parts.folder}" if self._parts.rows else ""
 
 
 def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = None) -> int:
-    """Make one file of the parts that a run has flushed.
+    """Merge the parts that a run has flushed into one file.
 
     Parameters
     ----------
     parts : sequence of Path
-        In their order. Where one lacks a column that another has (the law was changed), it is NaN there. The
-        last may be torn, as a killed process leaves it: its whole batches are taken.
+        In order. A column that a part lacks (the law was changed) is NaN there. The last part may be torn by
+        a killed process: its complete batches are used.
     path : Path
         The file.
     facts : mapping, optional
@@ -186,10 +186,10 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
     Raises
     ------
     InputError
-        There is no part, one is no telemetry, one before the last is torn, none has a whole batch, or two
+        There is no part, one is not telemetry, one before the last is torn, none has a complete batch, or two
         have different columns of one name.
     SpheretwinError
-        Writing failed; what was there before is untouched.
+        Writing failed; an earlier file is unchanged.
     """
     if not parts:
         raise InputError("telemetry: expected at least one part, received none")
@@ -198,21 +198,21 @@ def join(parts: Sequence[Path], path: Path, facts: Mapping[str, str] | None = No
 
 
 def _groups(parts: Sequence[Path], schema: pa.Schema) -> Iterator[pa.Table]:
-    """Row groups of the file; at least one."""
+    """Yield the row groups of the file; at least one."""
     import pyarrow as pa  # slow to import, and most runs write no file
 
-    batches = (_widened(batch, schema) for batch in _batches(parts))
+    batches = (_with_all_columns(batch, schema) for batch in _batches(parts))
     rows = 0
     while len(group := pa.Table.from_batches(islice(batches, GROUP_BATCHES), schema)):
         rows += len(group)
         yield group
-        pa.default_memory_pool().release_unused()  # else Arrow keeps what a hundred groups have needed
+        pa.default_memory_pool().release_unused()  # otherwise Arrow retains the memory of a hundred groups
     if not rows:
         raise _empty(parts)
 
 
 def _batches(parts: Sequence[Path]) -> Iterator[pa.RecordBatch]:
-    """Whole batches of all parts."""
+    """Yield the complete batches of all parts."""
     for place, part in enumerate(parts, 1):
         torn = yield from read_batches(part)
         if torn and place < len(parts):  # rows are missing, and not at the end
@@ -220,10 +220,10 @@ def _batches(parts: Sequence[Path]) -> Iterator[pa.RecordBatch]:
 
 
 def _joint_schema(parts: Sequence[Path], facts: Mapping[str, str] | None) -> pa.Schema:
-    """Columns of all parts, each once, in the order in which they first appear."""
+    """Return the columns of all parts, each once, in order of first appearance."""
     import pyarrow as pa
 
-    found: dict[str, pa.Field] = {}
+    fields: dict[str, pa.Field] = {}
     metadata = facts
     for part in parts:
         schema = read_schema(part)
@@ -231,15 +231,15 @@ def _joint_schema(parts: Sequence[Path], facts: Mapping[str, str] | None) -> pa.
             continue
         metadata = schema.metadata if metadata is None else metadata
         for field in schema:
-            known = found.setdefault(field.name, field)
-            if not known.equals(field, check_metadata=True):
+            first = fields.setdefault(field.name, field)
+            if not first.equals(field, check_metadata=True):
                 raise InputError(
-                    f"telemetry {part}: expected {field.name} as {_size(known)} numbers {_words(known)},"
+                    f"telemetry {part}: expected {field.name} as {_size(first)} numbers {_words(first)},"
                     f" received {_size(field)} {_words(field)}"
                 )
-    if not found:
+    if not fields:
         raise _empty(parts)
-    return pa.schema(found.values(), metadata=metadata)
+    return pa.schema(fields.values(), metadata=metadata)
 
 
 def _empty(parts: Sequence[Path]) -> InputError:
@@ -255,19 +255,20 @@ def _size(field: pa.Field) -> int:
     return getattr(field.type, "list_size", 1)
 
 
-def _widened(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
-    """A batch with all columns of the file."""
+def _with_all_columns(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    """Return a batch with all columns of the file."""
     import pyarrow as pa
 
     present = set(batch.schema.names)
     columns = [
-        batch.column(field.name) if field.name in present else _nowhere(field, len(batch)) for field in schema
+        batch.column(field.name) if field.name in present else _column_of_nan(field, len(batch))
+        for field in schema
     ]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
-def _nowhere(field: pa.Field, rows: int) -> pa.Array:
-    """A column of NaN."""
+def _column_of_nan(field: pa.Field, rows: int) -> pa.Array:
+    """Return a column of NaN."""
     import pyarrow as pa
 
     flat = pa.array(np.full(rows * _size(field), np.nan))

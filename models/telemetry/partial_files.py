@@ -1,7 +1,7 @@
-"""Rows that a run has flushed: Arrow streams in a hidden folder beside its file, one for each set of columns.
+"""Partial files of a run: Arrow streams in a hidden folder next to its file, one for each set of columns.
 
-A stream grows by whole batches of rows, so that a killed process leaves all it had flushed: at worst the last
-batch of the last stream is torn, and is left out when they are read. A file next to each stream lists the
+A stream grows by complete batches of rows, so that a killed process leaves all flushed rows. At worst the
+last batch of the last stream is torn; readers skip it. A file next to each stream lists the
 checksums of its batches. Writing a stream takes little memory; that of a Parquet file grows with each row
 group.
 """
@@ -27,26 +27,26 @@ from spheretwin.models.telemetry.table import Table
 if TYPE_CHECKING:
     import pyarrow as pa
 
-# What each message of a stream begins with; the length of its description follows, in as many bytes.
+# First bytes of each message of a stream; the length of its description follows, in as many bytes.
 _MESSAGE = b"\xff\xff\xff\xff"
 
 _STREAM = "an Arrow stream of a run"
 
 
-class Parts:
-    """Follows a run into streams of Arrow; nothing is there before its first rows.
+class PartialStreams:
+    """Sink of a run that writes Arrow streams, created with the first rows.
 
     Parameters
     ----------
     path : Path
-        The file that will be made of them.
+        Path of the complete file.
     facts : mapping
         Metadata of each stream.
 
     Attributes
     ----------
     paths : list of Path
-        The streams, in order; each holds a whole batch or more.
+        Streams, in order; each holds at least one complete batch.
     rows : int
         Rows in all of them.
     """
@@ -56,23 +56,23 @@ class Parts:
         self.paths: list[Path] = []
         self.rows = 0
         self._signals: tuple[Signal, ...] = ()
-        # Of the last stream: its file, the list of its checksums, what writes to it.
+        # Of the last stream: its file, its list of checksums, its writer.
         self._sink: SegmentedFile | None = None
         self._list: SegmentList | None = None
         self._writer: Any = None
 
     @property
     def folder(self) -> Path:
-        """Where the streams are, once there is one."""
+        """Folder of the streams; there must be one."""
         return self.paths[0].parent
 
     def append(self, rows: Table) -> None:
-        """Hand some rows, at least one, to the operating system as one batch.
+        """Write rows, at least one, as one batch.
 
         Raises
         ------
         OSError
-            They could not be written. What was written before is kept, and nothing can be added to it.
+            Writing failed. Earlier batches remain, and nothing can be added.
         """
         try:
             if rows.signals == self._signals:
@@ -91,7 +91,7 @@ class Parts:
         Raises
         ------
         OSError
-            Its end could not be written; all its rows were.
+            The end could not be written; all rows were.
         """
         if self._writer is not None and self._sink is not None:
             self._writer.close()
@@ -99,11 +99,11 @@ class Parts:
             self._close_files()
 
     def remove(self) -> None:
-        """Delete all of them; they must be closed."""
+        """Delete all streams; they must be closed."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _begin(self, rows: Table) -> None:
-        """Open a stream for rows of new columns, which are there with its first batch or not at all."""
+        """Open a stream for rows with new columns; it exists with its first batch or not at all."""
         import pyarrow as pa  # slow to import, and most runs write no file
 
         folder = self.folder if self.paths else self._new_folder()
@@ -126,7 +126,7 @@ class Parts:
         self._end_batch()
 
     def _end_batch(self) -> None:
-        """Hand a batch to the operating system, then its checksum."""
+        """Flush a batch, then write its checksum."""
         if self._sink is not None and self._list is not None:
             self._sink.flush()
             self._list.append(self._sink.end_segment())
@@ -137,7 +137,7 @@ class Parts:
                 file.close()
 
     def _abandon(self) -> None:
-        """Let go of a stream that can take no more, without an end: it is read up to its last whole batch."""
+        """Close a stream that cannot be written, without an end: it is read up to its last complete batch."""
         with suppress(OSError):
             self._close_files()
         self._sink = self._list = self._writer = None
@@ -152,12 +152,12 @@ def _schema(signals: tuple[Signal, ...], facts: Mapping[str, str]) -> pa.Schema:
 
 
 def read_schema(part: Path) -> pa.Schema | None:
-    """Columns and metadata of a part; None where it was torn before it had any.
+    """Return columns and metadata of a part; None if it is torn before them.
 
     Raises
     ------
     InputError
-        It cannot be read, or is no telemetry of this package.
+        It cannot be read, or is not telemetry of this package.
     """
     import pyarrow as pa
 
@@ -181,19 +181,20 @@ def read_schema(part: Path) -> pa.Schema | None:
 
 
 def read_batches(part: Path) -> Generator[pa.RecordBatch, None, bool]:
-    """Whole batches of a part, one at a time, none of them copied; returns whether it was torn behind them.
+    """Yield the complete batches of a part, without copies; return True if it is torn after them.
 
     Raises
     ------
     InputError
-        It cannot be read, or a batch is not what was written.
+        It cannot be read, or a batch differs from what was written.
     """
     import pyarrow as pa
 
     segments = read_list(part)
     schema, checked, place = None, 0, 0
     for number in count():
-        # A mapping for each batch: what was read of a mapped file is the process's memory while it lasts.
+        # One mapping per batch: the read part of a mapped file counts as memory of the process while it is
+        # mapped.
         with _opened(part) as source:
             if segments is not None:
                 if number == len(segments):
@@ -216,7 +217,7 @@ def read_batches(part: Path) -> Generator[pa.RecordBatch, None, bool]:
 
 
 def _is_whole(part: Path, source: pa.MemoryMappedFile, start: int, segment: Segment, number: int) -> bool:
-    """Whether a segment is all there; `InputError` if it is not what was written."""
+    """Return True if a segment is complete; raise `InputError` if it differs from what was written."""
     source.seek(start)
     block = source.read_buffer(segment.size)
     if len(block) < segment.size:
@@ -260,17 +261,17 @@ def _is_signal(field: pa.Field) -> bool:
 
 # --- checksums
 
-# A line of a list: length and checksum of a segment, checksum of the line.
+# Line of a list: length and checksum of a segment, checksum of the line.
 _LINE_BYTES = len("000000000000 00000000 00000000\n")
 
 
 class SegmentList:
-    """Segments of a file that grows, in a file next to it: a line each, written behind the segment.
+    """List of the segments of a growing file, in a file next to it: one line each, written after the segment.
 
     Parameters
     ----------
     path : Path
-        The file that grows.
+        The growing file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -298,7 +299,7 @@ def read_list(path: Path) -> list[Segment] | None:
     Raises
     ------
     InputError
-        A line of the list is not what was written.
+        A line of the list differs from what was written.
     """
     listed = list_of(path)
     if not listed.is_file():
@@ -320,7 +321,7 @@ def _line(segment: Segment) -> bytes:
 
 
 def _segment(line: bytes) -> Segment | None:
-    """Segment of a line; None if the line is not what was written."""
+    """Return the segment of a line; None if the line differs from what was written."""
     try:
         size, crc32, _ = line.split()
         segment = Segment(int(size), int(crc32, 16))

@@ -1,4 +1,4 @@
-"""What a telemetry file says of its run beside the rows: enough to run it again."""
+"""Metadata of a telemetry file: everything needed to repeat the run."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ _RUN = "scenario, journal and ticks of a run"
 
 
 class Change(NamedTuple):
-    """One entry of the command journal."""
+    """Change of a field: an entry of the command journal."""
 
     tick: int
-    """First tick that it is in force."""
+    """First tick with the new value."""
     name: str
     value: Any
 
 
 @dataclass(frozen=True)
 class RunRecord:
-    """Typed form of a telemetry file's metadata; nothing in it differs between two equal runs.
+    """Typed metadata of a telemetry file; it is the same for two equal runs.
 
     Attributes
     ----------
     scenario : mapping
-        In force at tick 0, by section, as JSON has it.
+        Scenario at tick 0, by section, as JSON.
     journal : tuple of Change
-        What was changed on the way.
+        Changes during the run.
     ticks : int
-        Control ticks done.
+        Completed control ticks.
     files : mapping of str
         Digest of each model and curve by its path; None for one that could not be read.
     versions : mapping of str
-        Of Python and of every package that a figure may depend on.
+        Versions of Python and of every package that may affect a figure.
     first_tick : int
-        Control tick of the first row; those before were not kept.
+        Control tick of the first row; earlier ones were not stored.
     status : Status, optional
-        How the run ended; None while it goes on, and in what a killed run leaves.
+        Final status; None during the run, and in the files of a killed run.
     """
 
     scenario: Mapping[str, Any]
@@ -57,7 +57,7 @@ class RunRecord:
     first_tick: int = 0
 
     def metadata(self) -> dict[str, str]:
-        """The record as texts by name, as a file keeps them."""
+        """Return the record as texts by name, for a file."""
         texts = {
             "scenario": json.dumps(self.scenario),
             "journal": json.dumps(self.journal),
@@ -71,12 +71,12 @@ class RunRecord:
 
     @classmethod
     def from_metadata(cls, texts: Mapping[str, str]) -> RunRecord:
-        """Record of the texts that a file keeps; those of older versions lack files or versions.
+        """Read the record from the texts of a file; those of older versions lack files or versions.
 
         Raises
         ------
         InputError
-            Scenario, journal or ticks are missing, or a text is not what this package writes.
+            Scenario, journal or ticks are missing, or a text is invalid.
         """
         return cls(
             scenario=_read(texts, "scenario", _mapping),
@@ -92,7 +92,7 @@ class RunRecord:
 def _read(
     texts: Mapping[str, str], name: str, parse: Callable[[str], Any], default: str | None = None
 ) -> Any:
-    """The value of one text; `InputError` if it is missing and has no default, or cannot be read."""
+    """Read the value of a text; raise `InputError` if it is invalid, or missing without a default."""
     expected = f"metadata: expected {_RUN}"
     text = texts.get(name, default)
     if text is None:
@@ -116,14 +116,14 @@ def _journal(text: str) -> tuple[Change, ...]:
 
 @dataclass(frozen=True)
 class RunFacts:
-    """What is known of a run from its start, without a word of how a scenario is built.
+    """Facts of a run known from its start, independent of the structure of a scenario.
 
     Attributes
     ----------
     name, description : str
         Of the scenario.
     law : str
-        Name of the law that it begins under.
+        Name of the law at the start.
     duration_s : float
         Planned length, s.
     current_limit_A : float
@@ -131,11 +131,11 @@ class RunFacts:
     payload_kg : float
         Mass on the shaft's payload mount, kg.
     gravity_m_s2 : float or None
-        Gravity along -z of the stator, m/s²; None where the model's own acts, which is along another line.
+        Gravity along -z of the stator, m/s²; None if the model has gravity in another direction.
     mjcf : Path
         Model file.
     sections : mapping of mappings
-        Everything that the run depends on, for people: value by field by section, as JSON has values.
+        Everything that the run depends on, for display: JSON value by field by section.
     """
 
     name: str
@@ -154,11 +154,11 @@ PACKAGES = ("spheretwin", "mujoco", "numba", "numpy", "scipy", "pydantic", "pyar
 
 @cache
 def versions() -> dict[str, str]:
-    """Version of Python and of every package that a figure may depend on."""
-    found = {"python": platform.python_version()}
+    """Return the versions of Python and of every package that may affect a figure."""
+    versions_by_package = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            versions_by_package[package] = version(package)
         except PackageNotFoundError:
             continue
-    return found
+    return versions_by_package

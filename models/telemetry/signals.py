@@ -1,4 +1,4 @@
-"""What a run says, column by column: named signals with units."""
+"""Signals of a run: named telemetry columns with units."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ class Signal:
     unit : str
         Unit of every entry.
     size : int
-        Numbers a row, at least 1.
+        Numbers per row, at least 1.
     meaning : str
-        What it says, for tables and figures.
+        Description for tables and figures.
     labels : tuple of str
         A short name for each entry of a vector, without commas; or none.
     states : tuple of str
-        Where its values 0, 1, 2 and so on are states, their names, without commas; or none.
+        Names of the states if the values 0, 1, 2, ... are states, without commas; or none.
 
     Raises
     ------
     InputError
-        The name is no text or empty, the size no whole number above 0, the labels do not fit it, or a state
-        has no name.
+        The name is not a text or is empty, the size is not a whole number above 0, the labels do not fit it,
+        or a state has no name.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Signal:
                     f"signal {self.name}: expected {field} as printable text,"
                     f" received {shown(getattr(self, field))}"
                 )
-        # A size below 1 would let the loop write beside its rows.
+        # With a size below 1 the loop would write outside its rows.
         if not isinstance(self.size, int) or isinstance(self.size, bool) or self.size < 1:
             raise InputError(
                 f"signal {self.name}: expected size as a whole number above 0, received {shown(self.size)}"
@@ -77,7 +77,7 @@ class Signal:
         return [f"{self.name}[{label}]" for label in labels]
 
     def __hash__(self) -> int:
-        """Of the name, which Python keeps: what is known of some columns is looked up at every chunk."""
+        """Return the hash of the name, which Python caches: caches by signals are read at every chunk."""
         return hash(self.name)
 
 
@@ -86,7 +86,7 @@ def _is_text(value: object) -> bool:
 
 
 def _is_label(value: object) -> bool:
-    # A file keeps the labels in one text, parted by commas.
+    # A file stores the labels in one text, separated by commas.
     return isinstance(value, str) and value.isprintable() and value != "" and "," not in value
 
 
@@ -100,58 +100,58 @@ MOTION_SIGNALS = (
     Signal("q_ref_rad", "rad", 3, "desired hinge angles", ANGLES),
     Signal("qdot_ref_rad_s", "rad/s", 3, "desired hinge rates", ANGLES),
     Signal("error_rad", "rad", 3, "tracking error q - q_ref (28)", ANGLES),
-    Signal("torque_command_Nm", "N·m", 3, "generalised torque asked for by the law", ANGLES),
+    Signal("torque_command_Nm", "N·m", 3, "generalised torque commanded by the law", ANGLES),
     Signal("torque_Nm", "N·m", 3, "torque of the coils on the rotor, stator frame", AXES),
     Signal("disturbance_Nm", "N·m", 3, "generalised load and random torque, subtracted in (1)", ANGLES),
 )
-"""Logged by every run, first and in this order, whatever the actuator."""
+"""First signals of every run, in this order, for any actuator."""
 
 
 @cache
 def common_signals(groups: int) -> tuple[Signal, ...]:
-    """Signals of every run, in this order, for an actuator with a number of coil groups."""
-    each = tuple(f"group {j}" for j in range(groups))
+    """Return the signals of every run, in order, for an actuator with a number of coil groups."""
+    labels = tuple(f"group {j}" for j in range(groups))
     first_step = "group currents, mean over the first physics step of the tick"
     return (
         *MOTION_SIGNALS,
-        Signal("current_command_A", "A", groups, "group currents asked of the amplifiers", each),
-        Signal("current_A", "A", groups, first_step, each),
-        Signal("mean_current_A", "A", groups, "group currents, mean over the tick", each),
+        Signal("current_command_A", "A", groups, "group currents commanded to the amplifiers", labels),
+        Signal("current_A", "A", groups, first_step, labels),
+        Signal("mean_current_A", "A", groups, "group currents, mean over the tick", labels),
         Signal("allocation_scale", "1", 1, "share of the commanded torque within the current limit"),
     )
 
 
 COMMON_NAMES = frozenset(signal.name for signal in common_signals(1))
-"""Names of what every run logs."""
+"""Names of the signals of every run."""
 
 
 @cache
 def offsets(signals: tuple[Signal, ...]) -> dict[str, int]:
-    """First column of each signal in a flat row; not to be changed."""
+    """Return the first column of each signal in a flat row; read-only."""
     ends = accumulate((signal.size for signal in signals), initial=0)
     return dict(zip((signal.name for signal in signals), ends, strict=False))
 
 
 @cache
 def width(signals: tuple[Signal, ...]) -> int:
-    """Numbers in one flat row."""
+    """Return the numbers of one flat row."""
     return sum(signal.size for signal in signals)
 
 
-def with_more(known: Mapping[str, Signal], more: tuple[Signal, ...]) -> dict[str, Signal]:
-    """Signals by name, with more of them: a name means one thing throughout.
+def with_more(signals: Mapping[str, Signal], added: tuple[Signal, ...]) -> dict[str, Signal]:
+    """Return signals by name with added ones; a name has one meaning throughout.
 
     Raises
     ------
     InputError
-        One has the name of another.
+        An added signal has the name of another one.
     """
-    for signal in more:
-        before = known.get(signal.name, signal)
+    for signal in added:
+        before = signals.get(signal.name, signal)
         if before != signal:
             raise InputError(
                 f"session: expected the signal {signal.name} as it was before,"
                 f" {before.size} in {before.unit} ({before.meaning}),"
                 f" received {signal.size} in {signal.unit} ({signal.meaning})"
             )
-    return {**known, **{signal.name: signal for signal in more}}
+    return {**signals, **{signal.name: signal for signal in added}}

@@ -1,4 +1,4 @@
-"""How a run stands: one row for each status, with the code that compiled loops return and what a log says."""
+"""Status of a run: one row for each status, with the code of the compiled loop and the log text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 
 
 class Level(StrEnum):
-    """How much a line of a log matters."""
+    """Level of a log line."""
 
     INFO = "INFO"
     WARN = "WARN"
@@ -19,27 +19,27 @@ class Level(StrEnum):
 
 
 class Status(StrEnum):
-    """Where a run is, or how it ended; equal to its own name as text.
+    """Present or final status of a run; equal to its own name as text.
 
     Attributes
     ----------
     level : Level
-        How much it matters to whoever reads the log.
-    told : str
-        What the log says of it.
+        Level of the log line.
+    text : str
+        Text of the log line.
     code : int or None
-        What the loop returns for it; None where the loop cannot know of it.
+        Code that the loop returns; None if the loop cannot return it.
     """
 
     level: Level
-    told: str
+    text: str
     code: int | None
 
-    def __new__(cls, name: str, level: Level, told: str, code: int | None = None) -> Status:
-        """Text with its row."""
+    def __new__(cls, name: str, level: Level, text: str, code: int | None = None) -> Status:
+        """Create a name with its level, text and code."""
         status = str.__new__(cls, name)
         status._value_ = name
-        status.level, status.told, status.code = level, told, code
+        status.level, status.text, status.code = level, text, code
         return status
 
     RUNNING = "running", Level.INFO, "the run goes on", 0
@@ -61,16 +61,16 @@ class Status(StrEnum):
 
 
 BY_CODE = {status.code: status for status in Status if status.code is not None}
-"""Status for what the loop returns."""
+"""Status by the code of the loop."""
 
 
 def named(name: str) -> Status:
-    """Status of a name, as a file keeps it.
+    """Return the status of a name.
 
     Raises
     ------
     InputError
-        There is none of this name.
+        No status has this name.
     """
     for status in Status:
         if status == name:
@@ -83,21 +83,21 @@ def named(name: str) -> Status:
 Event = tuple[float, Level, str]
 """Simulated time in s, level, text."""
 
-# Chattering currents touch the limit for single ticks; pauses shorter than this are one event.
+# Chattering currents reach the limit for single ticks; pauses shorter than this are within one event.
 QUIET_S = 0.1
 
 RANK_LOST = "rank lost: the groups in use give no torque in one direction, and no currents are commanded"
 
 
 class Events:
-    """Finds the events of a run in its telemetry, chunk by chunk."""
+    """Detector of the events of a run in its telemetry, chunk by chunk."""
 
     def __init__(self) -> None:
         self._now_s = 0.0
         self._last_saturated_s = self._last_lost_s = -np.inf
 
     def of(self, rows: Table) -> list[Event]:
-        """Events of one chunk."""
+        """Return the events of one chunk."""
         t, scale = rows["t_s"], rows["allocation_scale"]
         events: list[Event] = []
         for i in np.flatnonzero(rank_lost(rows)):
@@ -106,12 +106,12 @@ class Events:
             self._last_lost_s = t[i]
         for i in np.flatnonzero(saturated(rows)):
             if t[i] - self._last_saturated_s > QUIET_S:
-                text = f"current limit reached: {100 * scale[i]:.0f} % of the commanded torque"
-                events.append((float(t[i]), Level.WARN, text))
+                message = f"current limit reached: {100 * scale[i]:.0f} % of the commanded torque"
+                events.append((float(t[i]), Level.WARN, message))
             self._last_saturated_s = t[i]
         self._now_s = float(t[-1])
         return sorted(events, key=lambda event: event[0])
 
     def end(self, status: Status) -> Event:
-        """Event of the run's end."""
-        return self._now_s, status.level, status.told
+        """Return the event of the end of the run."""
+        return self._now_s, status.level, status.text

@@ -1,4 +1,4 @@
-"""The telemetry of a run as a table: one row a control tick."""
+"""Telemetry of a run as a table: one row per control tick."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-# Numbers that change little from row to row: their bytes are split by significance, then compressed; that
+# The numbers change little from row to row: their bytes are split by significance, then compressed. That
 # takes less time and space than a dictionary of values, few of which occur twice.
 PARQUET_FORMAT: dict[str, Any] = {
     "compression": "zstd",
@@ -29,18 +29,18 @@ PARQUET_FORMAT: dict[str, Any] = {
 
 @cache
 def _places(signals: tuple[Signal, ...]) -> dict[str, tuple[int, int]]:
-    """First column and size of each signal."""
+    """Return first column and size of each signal."""
     first = offsets(signals)
     return {signal.name: (first[signal.name], signal.size) for signal in signals}
 
 
 def allocated(rows: int, columns: int) -> NDArray[np.float64]:
-    """Room for rows of telemetry.
+    """Allocate rows of telemetry.
 
     Raises
     ------
     InputError
-        There is not so much memory.
+        There is not enough memory.
     """
     try:
         return np.empty((rows, columns))
@@ -52,14 +52,14 @@ def allocated(rows: int, columns: int) -> NDArray[np.float64]:
 
 
 class Table:
-    """A run's telemetry: ``table["q_rad"]`` is an (n, 3) array, ``table["t_s"]`` an (n,) array.
+    """Telemetry of a run: ``table["q_rad"]`` is an (n, 3) array, ``table["t_s"]`` an (n,) array.
 
     Parameters
     ----------
     signals : tuple of Signal
         The columns, in order.
     values : (n, width) array
-        One flat row a tick; not copied.
+        One flat row per tick; not copied.
     """
 
     def __init__(self, signals: tuple[Signal, ...], values: NDArray[np.float64]) -> None:
@@ -84,24 +84,24 @@ class Table:
         return self.values[:, first] if size == 1 else self.values[:, first : first + size]
 
     def rows(self, first: int, last: int) -> Table:
-        """Table of the rows from `first` up to, not including, `last` (a view)."""
+        """Return the rows from `first` to `last`, exclusive (a view)."""
         return Table(self.signals, self.values[first:last])
 
     def write_parquet(self, path: Path, metadata: Mapping[str, str]) -> None:
-        """Write all columns, their units, `metadata` and checksums, whole or not at all.
+        """Write all columns, their units, `metadata` and checksums, completely or not at all.
 
         Raises
         ------
         InputError
-            No file can be made there.
+            No file can be written there.
         SpheretwinError
-            Writing failed; what was there before is untouched.
+            Writing failed; an earlier file is unchanged.
         """
         table = self.arrow(metadata)
         checksums.write_parquet(path, table.schema, [table], **PARQUET_FORMAT)
 
     def arrow(self, metadata: Mapping[str, str]) -> pa.Table:
-        """Arrow table of the same columns; units and words as metadata of the fields."""
+        """Return an Arrow table of the columns; units and descriptions are metadata of the fields."""
         import pyarrow as pa
 
         fields, columns = [], []
@@ -117,19 +117,19 @@ class Table:
 
 
 def read_parquet(path: Path, *, rows: bool = True) -> tuple[Table, dict[str, str]]:
-    """Read a table back, with the metadata of its file, and compare its checksums.
+    """Read a table and the metadata of its file, and compare its checksums.
 
     Parameters
     ----------
     path : Path
         The file; one of an earlier version has no checksums (`checksums.has_checksums`).
     rows : bool
-        Without them the table is empty, and only the file's end is read.
+        If False, the table is empty, and only the end of the file is read.
 
     Raises
     ------
     InputError
-        The file is missing, is no telemetry of this package, is damaged, or has two columns of one name.
+        The file is missing, is not telemetry of this package, is damaged, or has two columns of one name.
     """
     import pyarrow as pa
 
@@ -175,12 +175,12 @@ def _flat(column: pa.ChunkedArray, size: int) -> NDArray[np.float64]:
 
 
 def check_rows(log: NDArray[np.float64], columns: int) -> None:
-    """Find out whether compiled code may write into the rows of an array of a caller's.
+    """Check that compiled code may write into the rows of a caller's array.
 
     Raises
     ------
     InputError
-        They are of another kind or width: it would write beside them.
+        They have another type or width: compiled code would write outside them.
     """
     if isinstance(log, np.ndarray):
         fits = log.shape[1:] == (columns,) and log.dtype == np.float64
@@ -192,21 +192,21 @@ def check_rows(log: NDArray[np.float64], columns: int) -> None:
     )
 
 
-class KeptTelemetry:
-    """Follows a run and keeps its rows.
+class TelemetryBuffer:
+    """Sink of a run that stores its rows in memory.
 
     Parameters
     ----------
     signals : tuple of Signal
-        Columns at the start. Where a change on the way brings others, they are added; a column is NaN at
-        the ticks that had none.
+        Columns at the start. Columns that a change adds during the run are appended; a column is NaN at
+        ticks without it.
     ticks : int
-        Planned; no more rows are kept.
+        Planned ticks; the largest number of rows.
 
     Raises
     ------
     InputError
-        There is not so much memory.
+        There is not enough memory.
     """
 
     def __init__(self, signals: tuple[Signal, ...], ticks: int) -> None:
@@ -215,11 +215,11 @@ class KeptTelemetry:
 
     @property
     def table(self) -> Table:
-        """The rows so far (a view)."""
+        """Rows so far (a view)."""
         return self._table.rows(0, self._rows)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk."""
+        """Append the rows of one chunk."""
         if missing := tuple(signal for signal in rows.signals if signal not in self._table.signals):
             self._widen(missing)
         first, self._rows = self._rows, self._rows + len(rows)
@@ -232,27 +232,27 @@ class KeptTelemetry:
             here[signal.name][:] = rows[signal.name]
 
     def note(self, t_s: float, text: str) -> None:
-        """The journal is not among the rows."""
+        """Ignore a note: the journal is not part of the rows."""
 
     def finish(self, status: str) -> None:
-        """Nothing remains to be done."""
+        """Ignore the final status."""
 
-    def _widen(self, more: tuple[Signal, ...]) -> None:
-        before = self._table
-        signals = before.signals + more
-        self._table = Table(signals, allocated(len(before), width(signals)))
-        self._table.values[:, : before.values.shape[1]] = before.values
-        self._table.values[:, before.values.shape[1] :] = np.nan
+    def _widen(self, added: tuple[Signal, ...]) -> None:
+        previous = self._table
+        signals = previous.signals + added
+        self._table = Table(signals, allocated(len(previous), width(signals)))
+        self._table.values[:, : previous.values.shape[1]] = previous.values
+        self._table.values[:, previous.values.shape[1] :] = np.nan
 
 
 def saturated(rows: Table) -> NDArray[np.bool_]:
-    """True for each row in which the current limit left a part of the commanded torque."""
+    """Return True for each row in which the current limit reduces the commanded torque."""
     scale = rows["allocation_scale"]
     return (scale > 0) & (scale < 1)
 
 
 def rank_lost(rows: Table) -> NDArray[np.bool_]:
-    """True for each row in which the torque matrix of the groups in use has less than rank 3.
+    """Return True for each row in which the torque matrix of the groups in use has less than rank 3.
 
     Such a pose has a direction without torque. No currents are commanded then, whatever the limit.
     """

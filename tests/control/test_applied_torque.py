@@ -1,4 +1,4 @@
-"""What the controller believes of the torque that its commands led to, against the plant's own account."""
+"""Applied torque of the controller against the torque of the plant."""
 
 import numba
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import quad
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.applied_torque import belief, believe
+from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
 from spheretwin.control.law import Law
 from spheretwin.models.base.compiled import restore_state, save_state
 from spheretwin.models.kinematics import generalised_torque, rate_jacobian
@@ -25,7 +25,7 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
     """Against the convolution of the piecewise constant command with the lag, by quadrature."""
     generator = np.random.default_rng(3)
     commands = generator.normal(size=12)
-    mine = belief(True, 1, PERIOD_S, delay * PERIOD_S, lag_s)
+    mine = applied_torque(True, 1, PERIOD_S, delay * PERIOD_S, lag_s)
     G, pose = np.zeros((3, 1)), np.zeros(3)
 
     def command(t):
@@ -44,7 +44,7 @@ def test_mean_current_is_that_of_the_delayed_and_lagged_command(delay, lag_s):
         return total
 
     for tick in range(len(commands)):
-        believe(mine, pose, G, commands[tick : tick + 1])
+        estimate_applied_torque(mine, pose, G, commands[tick : tick + 1])
         begin, end = tick * PERIOD_S, (tick + 1) * PERIOD_S
         switch = begin + (delay % 1) * PERIOD_S
         parts = [(begin, switch), (switch, end)] if switch > begin else [(begin, end)]
@@ -63,16 +63,16 @@ def test_torque_on_the_hinges_is_the_transposed_jacobian_s():
         np.testing.assert_allclose(torque_q, rate_jacobian(q).T @ torque_S, rtol=0, atol=1e-15)
 
 
-def test_its_state_brings_it_back():
-    one, other = (belief(True, 4, PERIOD_S, 1.5e-3, 7e-4) for _ in range(2))
+def test_a_restored_state_gives_the_same_result():
+    one, other = (applied_torque(True, 4, PERIOD_S, 1.5e-3, 7e-4) for _ in range(2))
     generator = np.random.default_rng(1)
     G, pose = generator.normal(size=(3, 4)), np.array([0.1, 0.2, 0.3])
     for _ in range(5):
-        believe(one, pose, G, generator.normal(size=4))
+        estimate_applied_torque(one, pose, G, generator.normal(size=4))
     restore_state(other, save_state(one), "belief")
     command = generator.normal(size=4)
     for each in (one, other):
-        believe(each, pose, G, command)
+        estimate_applied_torque(each, pose, G, command)
     np.testing.assert_array_equal(save_state(one), save_state(other))
 
 
@@ -104,7 +104,7 @@ def test_where_the_model_is_true_it_is_the_torque_of_the_coils(engine):
         np.testing.assert_allclose(table["believed_Nm"][row + 1], torque_q, rtol=0, atol=1e-15)
 
 
-def test_what_is_not_asked_for_is_no_number_and_moves_no_bit():
+def test_an_unused_applied_torque_is_nan_and_changes_no_bit():
     scenario = scenarios.load("hold", {"duration": 0.1})
     silent, told = simulate(scenario, law=asking(asks=False)), simulate(scenario, law=asking())
     np.testing.assert_array_equal(silent.telemetry["q_rad"], told.telemetry["q_rad"])
@@ -114,7 +114,7 @@ def test_what_is_not_asked_for_is_no_number_and_moves_no_bit():
 
 
 @pytest.mark.parametrize("nominal", [{"nominal.delay_s": 2.5e-3}, {"nominal.time_constant_s": 0.0}])
-def test_a_session_goes_on_with_what_it_believed(nominal):
+def test_a_restored_session_continues_with_the_applied_torque(nominal):
     scenario = scenarios.load("hold", nominal)
     with Session(scenario, asking()) as session, Session(scenario, asking()) as other:
         session.advance(37)
@@ -122,7 +122,7 @@ def test_a_session_goes_on_with_what_it_believed(nominal):
         assert other.advance(50).values.tobytes() == session.advance(50).values.tobytes()
 
 
-def test_a_change_beside_the_law_leaves_the_belief(tmp_path):
+def test_a_change_outside_the_law_keeps_the_applied_torque(tmp_path):
     scenario = scenarios.load("hold")
     with Session(scenario, asking()) as kept, Session(scenario, asking()) as changed:
         changed.advance(20)

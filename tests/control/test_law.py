@@ -92,7 +92,7 @@ def test_other_numbers_are_refused_by_field(field, numbers, part):
         ({"signals": [Signal("b", "1", 1, ""), Signal("b", "1", 1, "")]}, "received b"),
     ],
 )
-def test_what_is_no_law_is_refused(changes, part):
+def test_an_invalid_law_is_refused(changes, part):
     assert part in refusal(law, **changes)
 
 
@@ -119,7 +119,7 @@ def signal(**changes):
         ({"labels": "ab"}, "labels as texts without commas, received 'ab'"),
     ],
 )
-def test_what_is_no_signal_is_refused(changes, part):
+def test_an_invalid_signal_is_refused(changes, part):
     message = refusal(signal, **changes)
     assert part in message
     assert message.startswith("signal")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from spheretwin.control.controller import law_at
-from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.control.law import SIGNATURE, NominalModel
 from spheretwin.control.laws.adaptive_fuzzy import AdaptiveFuzzy
 from spheretwin.control.laws.afsm import AFSM
 from spheretwin.control.laws.pd import PD
@@ -22,7 +22,7 @@ def by_address(address, t, reference, measurement, parameters, state, torque):
 
 
 def known(actuator):
-    return Known(PERIOD, 0.0, actuator.inertia)
+    return NominalModel(PERIOD, 0.0, actuator.inertia)
 
 
 def each_axis(kind):

@@ -238,7 +238,7 @@ def like(**changes):
         ),
     ],
 )
-def test_what_is_no_controller_is_refused_in_one_line(system, part):
+def test_an_invalid_system_is_refused_in_one_line(system, part):
     assert part in refusal(system)
 
 

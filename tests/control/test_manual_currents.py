@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.manual_currents import Manual, ask_by_hand
+from spheretwin.control.manual_currents import Manual, command_manual_currents
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
@@ -19,7 +19,7 @@ def by_hand(**changes):
     )
 
 
-def test_each_group_is_asked_for_its_current_and_the_law_for_nothing():
+def test_each_group_is_commanded_its_current_and_the_law_is_not_called():
     rows = by_hand().telemetry
     np.testing.assert_array_equal(rows["current_command_A"], np.tile(CURRENTS, (50, 1)))
     np.testing.assert_array_equal(rows["torque_command_Nm"], 0.0)
@@ -27,9 +27,9 @@ def test_each_group_is_asked_for_its_current_and_the_law_for_nothing():
     assert np.abs(rows["torque_Nm"]).max() > 0.0
 
 
-def test_no_group_is_asked_for_more_than_the_limit():
+def test_no_group_is_commanded_more_than_the_limit():
     command = np.empty(3)
-    share = ask_by_hand(Manual(True, np.array([0.5, -4.0, 10.0])), 2.0, command)
+    share = command_manual_currents(Manual(True, np.array([0.5, -4.0, 10.0])), 2.0, command)
     np.testing.assert_array_equal(command, [0.5, -2.0, 2.0])
     assert share == 0.2
     rows = by_hand(**{"nominal.current_limit_A": 0.4}).telemetry

@@ -93,7 +93,7 @@ def test_shipped_actuator_is_read_once():
         ('<frame euler="0 28 0">', '<frame euler="0 29 0">', "one coil opposite coil_upper00"),
     ],
 )  # fmt: skip
-def test_a_model_that_is_no_such_actuator_is_told_in_one_line(tmp_path, old, new, part):
+def test_an_invalid_actuator_is_reported_in_one_line(tmp_path, old, new, part):
     assert old in TEXT
     meshes = f'meshdir="{actuators.FOLDER / "assets"}"'
     (path := tmp_path / "mine.xml").write_text(TEXT.replace(old, new).replace('meshdir="assets"', meshes))
@@ -207,7 +207,7 @@ def test_a_run_takes_every_drive_that_a_model_may_have(tmp_path, limit, resistan
     assert simulate(scenario).status == "completed"
 
 
-def test_a_path_that_no_file_can_have_is_told_in_one_line():
+def test_an_invalid_path_is_reported_in_one_line():
     with pytest.raises(InputError, match="expected an MJCF file") as caught:
         actuators.load(Path("x" * 20_000))
     assert len(str(caught.value)) < 1000

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import pytest
 
 from spheretwin.models import actuator as actuators
-from spheretwin.models.actuator import Coil, Magnet
+from spheretwin.models.actuator import CoilGeometry, Magnet
 from spheretwin.models.magnetics import computed_from, disagreements
 
 TEXT = actuators.MJCF_PATH.read_text()
@@ -41,7 +41,11 @@ def test_a_changed_model_file_is_named(tmp_path, old, new, line):
 
 @pytest.mark.parametrize(
     ("part", "name"),
-    [(part, field.name) for part, kind in (("magnet", Magnet), ("coil", Coil)) for field in fields(kind)],
+    [
+        (part, field.name)
+        for part, kind in (("magnet", Magnet), ("coil", CoilGeometry))
+        for field in fields(kind)
+    ],
 )
 def test_every_number_of_magnet_and_coil_is_compared(actuator, part, name):
     data = getattr(actuator, part)
@@ -81,4 +85,4 @@ def test_a_file_s_name_cannot_break_the_line(actuator):
 def test_numbers_are_told_by_part_and_name(actuator):
     named = computed_from(actuator.magnet, actuator.coil)
     assert named["coil turns"] == 320
-    assert len(named) == len(fields(Magnet)) + len(fields(Coil))
+    assert len(named) == len(fields(Magnet)) + len(fields(CoilGeometry))

@@ -53,7 +53,7 @@ def test_an_edit_of_the_same_size_and_time_is_read(tmp_path):
 
 
 def test_only_so_many_files_are_kept(tmp_path):
-    paths = [tmp_path / f"{number}.xml" for number in range(mjcf.MOST_KEPT + 1)]
+    paths = [tmp_path / f"{number}.xml" for number in range(mjcf.MOST_MODELS + 1)]
     for path in paths:
         path.write_text(TEXT)
     first = mjcf.read(paths[0])
@@ -63,7 +63,7 @@ def test_only_so_many_files_are_kept(tmp_path):
     assert mjcf.read(paths[0]) is not first
 
 
-def test_a_file_that_was_broken_is_read_when_it_is_mended(tmp_path):
+def test_a_broken_file_is_read_after_its_correction(tmp_path):
     (path := tmp_path / "mine.xml").write_text(TEXT.replace("</mujoco>", ""))
     for _ in range(2):
         with pytest.raises(InputError, match="expected valid MJCF"):

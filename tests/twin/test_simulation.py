@@ -8,7 +8,7 @@ from spheretwin import loop as loops
 from spheretwin import runtime as machines
 from spheretwin import scenario as scenarios
 from spheretwin import simulation as simulations
-from spheretwin.control.law import Known, Law
+from spheretwin.control.law import Law, NominalModel
 from spheretwin.loop import Functions
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
@@ -157,7 +157,7 @@ def test_a_plain_python_law_runs_as_a_compiled_one_does():
 
 def test_the_law_s_state_is_not_shared_between_runs(actuator):
     scenario = scenarios.load("hold", {"duration": 0.1})
-    law = scenario.controller.build(Known(1e-3, 0.0, actuator.inertia))
+    law = scenario.controller.build(NominalModel(1e-3, 0.0, actuator.inertia))
     first, again = simulate(scenario, law=law), simulate(scenario, law=law)
     np.testing.assert_array_equal(first.telemetry.values, again.telemetry.values)
     np.testing.assert_array_equal(law.state, 0)

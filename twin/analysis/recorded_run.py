@@ -212,7 +212,7 @@ def _of_recording(path: Path) -> Reviewed:
 
     facts, table, log, whole, checked = reader.read(path)
     _check_times(path, table)
-    statuses = {status.told: status for status in Status}
+    statuses = {status.text: status for status in Status}
     scenario, status = _scenario(facts), statuses.get(log[-1][2] if log else "")
     period_s = float(scenario["controller"]["period_s"])
     ticks = int(ticks_of(table, period_s)[-1]) + 1 if len(table) else 0

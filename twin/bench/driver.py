@@ -131,8 +131,8 @@ class Desk:
         if self.session.law_error:
             self.reason = f"{self.session.law_error}"
         elif self.session.ended:
-            why = f", {self.session.reason.told}" if self.session.reason else ""
-            self.reason = f"{self.session.status}: {self.session.status.told}{why}"
+            why = f", {self.session.reason.text}" if self.session.reason else ""
+            self.reason = f"{self.session.status}: {self.session.status.text}{why}"
         if len(rows):
             self.row = rows.rows(len(rows) - 1, len(rows))
         return rows

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError, told_apart
+from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.session import Session
 from spheretwin.trajectories.rounding import LARGEST, Approach, faded
@@ -62,7 +62,7 @@ def pointed(pose_rad: tuple[float, float, float], hinge_range_rad: Array) -> Sha
     """
     for name, angle, low, high in zip(ANGLES, pose_rad, *_inner(hinge_range_rad), strict=True):
         if not low <= angle <= high:
-            least, most, received = told_apart(low, high, angle)
+            least, most, received = distinct_texts(low, high, angle)
             raise InputError(f"bench: expected {name} from {least} to {most} rad, received {received}")
     return Hold(angle_rad=pose_rad)
 

@@ -19,7 +19,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable, make_folder
 from spheretwin.models.design import curve_check, field_check, torque_map
 from spheretwin.models.design.curve_check import ComputedCurve
-from spheretwin.models.design.torque_map import Survey
+from spheretwin.models.design.torque_map import TorqueSurvey
 from spheretwin.models.design.workspace import LARGEST_TILT_DEG
 from spheretwin.viz.terminal import magnetics, runs
 from spheretwin.viz.terminal.progress import tracked
@@ -300,7 +300,7 @@ def _plots() -> ModuleType:
         ) from None
 
 
-def _draw(plots: ModuleType, folder: Path, surveyed: Survey) -> list[Path]:
+def _draw(plots: ModuleType, folder: Path, surveyed: TorqueSurvey) -> list[Path]:
     from spheretwin.viz.figures.crosscheck import save  # Matplotlib is optional
 
     workspace, on_grid, worst = surveyed.workspace, surveyed.on_grid, surveyed.worst

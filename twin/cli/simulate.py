@@ -22,7 +22,7 @@ from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import KeptTelemetry
+from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.outputs import Outputs
 from spheretwin.replay import Plan
 from spheretwin.run import Figures, OwnMetric, Run, check_names, own_value, summary
@@ -56,7 +56,7 @@ class OwnMetrics:
 
     def __init__(self, specs: Sequence[str]) -> None:
         self._functions: dict[str, OwnMetric] = {}
-        self._kept: KeptTelemetry | None = None
+        self._kept: TelemetryBuffer | None = None
         self.faults: list[str] = []
         for spec in specs:
             name = spec.rpartition(":")[2]
@@ -65,7 +65,7 @@ class OwnMetrics:
             self._functions[name] = load_function(spec, f"metric {name}")
         check_names(self._functions)
 
-    def sinks(self, session: Session, ticks: int) -> list[KeptTelemetry]:
+    def sinks(self, session: Session, ticks: int) -> list[TelemetryBuffer]:
         """What is to follow a run of so many ticks: nothing where there is no function.
 
         Raises
@@ -73,7 +73,7 @@ class OwnMetrics:
         InputError
             The telemetry does not fit in memory.
         """
-        self._kept = KeptTelemetry(session.signals, ticks) if self._functions else None
+        self._kept = TelemetryBuffer(session.signals, ticks) if self._functions else None
         return [self._kept] if self._kept else []
 
     def values(self, session: Session, status: Status) -> dict[str, Any]:
@@ -261,5 +261,5 @@ def _ending(session: Session, status: str, planned_s: float) -> str:
         return f"the run ended before its first tick was complete: {status}"
     angles = np.degrees(session.q_rad)
     pose = ", ".join(f"{name} {angle:.1f}°" for name, angle in zip("αβγ", angles, strict=True))
-    why = f", {session.reason.told}" if session.reason else ""
+    why = f", {session.reason.text}" if session.reason else ""
     return f"the run ended at {session.t_s:.3f} s of {planned_s:g} s: {status}{why} ({pose})"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.control.supervision.enabled_groups import STATES, TOLD, Groups, tell
+from spheretwin.control.supervision.enabled_groups import REPORTED, STATES, EnabledGroups, mark_faulty_groups
 from spheretwin.control.supervision.watchdog import REASONS
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.schedule import NEVER, FaultPlan
@@ -33,7 +33,7 @@ class FaultInjector:
         self,
         plan: FaultPlan,
         effects: Effects | None,
-        groups: Groups,
+        groups: EnabledGroups,
         marks: NDArray[np.float64],
         began_s: NDArray[np.float64],
     ) -> None:
@@ -51,7 +51,7 @@ class FaultInjector:
         if (active, began_s.tobytes()) != self._as_of:
             self._as_of = active, began_s.tobytes()
             self._began_s[:], self._marks[:] = began_s, self._plan.marks(active)
-            tell(self._groups, self._plan.told(active), tick * self._plan.period_s)
+            mark_faulty_groups(self._groups, self._plan.told(active), tick * self._plan.period_s)
             if self._effects:
                 self._clear()
                 self._plan.apply(active, self._effects)
@@ -85,11 +85,11 @@ class FaultLines:
             delays = rows["time_to_detection_s"]
             for t_s, group, out in self._changes(rows, "group_out"):
                 after_s = delays[np.searchsorted(rows["t_s"], t_s), group]
-                after = f", {1e3 * after_s:.0f} ms after it failed" if out > TOLD and after_s >= 0 else ""
+                after = f", {1e3 * after_s:.0f} ms after it failed" if out > REPORTED and after_s >= 0 else ""
                 found.append((t_s, f"group {group} {STATES[out]}{after}"))
         if len(rows) and "failsafe_reason" in names:
             for t_s, _, reason in self._changes(rows, "failsafe_reason"):
-                found.append((t_s, f"watchdog: {REASONS[reason].told}"))
+                found.append((t_s, f"watchdog: {REASONS[reason].text}"))
         return sorted(found, key=lambda line: line[0])
 
     def _changes(self, rows: Table, name: str) -> list[tuple[float, int, int]]:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from spheretwin import scenario as scenarios
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
-from spheretwin.models.base.cache import keep, kept
+from spheretwin.models.base.cache import load_entry, store_entry
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.models.telemetry.status import Status
@@ -51,7 +51,7 @@ class Memory:
     def __init__(self, name: str, keys: Mapping[str, str]) -> None:
         self._keys = keys
         self._entry = f"reproduce_{name}.pickle"
-        content = kept(self._entry)
+        content = load_entry(self._entry)
         # What lies there beside it is machine code: the folder is trusted.
         self._outcomes: dict[str, Outcome] = pickle.loads(content) if content else {}
         self._saved_s, self._new = time.monotonic(), 0
@@ -70,7 +70,7 @@ class Memory:
     def save(self) -> None:
         """Save what is new, unless the cache cannot take it."""
         if self._new:
-            keep(self._entry, pickle.dumps(self._outcomes))
+            store_entry(self._entry, pickle.dumps(self._outcomes))
             self._saved_s, self._new = time.monotonic(), 0
 
     def _key(self, case: str, plant: str | None, seed: int) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, allocate_bounded
 from spheretwin.control.allocation.least_norm import allocate
-from spheretwin.control.supervision.enabled_groups import TOLD
+from spheretwin.control.supervision.enabled_groups import REPORTED
 from spheretwin.control.supervision.fault_detector import LEAST_SHARE, DetectorSection
 from spheretwin.control.supervision.watchdog import REASONS, Reason, WatchdogSection
 from spheretwin.models.actuator import Actuator
@@ -223,7 +223,7 @@ def reason(outcome: Outcome) -> str | None:
     """Why a run does not track, or was stopped; None where it tracks, or nothing can be said."""
     kept: Found = outcome.kept
     if kept.stopped is not Reason.NONE:
-        return kept.stopped.told
+        return kept.stopped.text
     if tracks(outcome) or kept.left is None:
         return None
     if kept.left.rank < 3:
@@ -265,7 +265,7 @@ def _detected_s(table: Table) -> dict[int, float]:
     """For each group that was found not to follow, time from its fault, s; for one that works, none."""
     if not len(table) or "group_out" not in {signal.name for signal in table.signals}:
         return {}
-    groups = np.flatnonzero(table["group_out"][-1] > TOLD)
+    groups = np.flatnonzero(table["group_out"][-1] > REPORTED)
     return {int(group): float(table["time_to_detection_s"][-1, group]) for group in groups}
 
 

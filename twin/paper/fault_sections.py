@@ -77,7 +77,7 @@ def _stopped(runs: Sequence[Outcome]) -> tuple[str, str]:
     kept = [run.kept for run in runs if run.kept.stopped is not Reason.NONE]
     if not kept:
         return "–", "–"
-    reasons = dict.fromkeys(each.stopped.told for each in kept)
+    reasons = dict.fromkeys(each.stopped.text for each in kept)
     return "; ".join(reasons), f"{np.median([1e3 * (each.stopped_s - each.start_s) for each in kept]):.0f}"
 
 

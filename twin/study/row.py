@@ -22,7 +22,7 @@ from spheretwin.models.base.errors import (
 from spheretwin.models.base.user_code import is_reference, load_function
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import KeptTelemetry
+from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.provenance import record_of
 from spheretwin.run import OwnMetric, Run, check_names, own_value
 from spheretwin.scenario import reading
@@ -202,7 +202,7 @@ class Rows:
             for name in self.metrics
         }
         sinks: list[Sink] = [follower(metrics)]
-        kept = KeptTelemetry(session.signals, scenario.ticks) if self._own else None
+        kept = TelemetryBuffer(session.signals, scenario.ticks) if self._own else None
         file = self._file(row, session)
         sinks += [sink for sink in (kept, file) if sink]
         try:
@@ -217,7 +217,7 @@ class Rows:
         if kept:
             run = Run(session.begun_as, status, kept.table, session.loop_s, session.actuator)
             figures |= {name: _own_value(name, metric, run, complaints) for name, metric in self._own.items()}
-        reason = session.reason.told if session.reason else None
+        reason = session.reason.text if session.reason else None
         return Result(str(status), reason, "; ".join(complaints) or None, figures)
 
     def _file(self, row: Row, session: Session) -> TelemetryFile | None:

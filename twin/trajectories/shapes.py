@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from spheretwin.models.telemetry.csv_series import Series, check_rising, reached
+from spheretwin.models.telemetry.csv_series import TimeSeries, check_rising, reached
 from spheretwin.trajectories.rounding import CONFIG, LARGEST, ZERO, Bounded, Corners, Time, Triple
 from spheretwin.trajectories.trajectory import Samples, Shape
 
@@ -178,7 +178,9 @@ class Steps(Shape):
 
     def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
         samples = np.zeros((len(t), 3, 3))
-        samples[:, 0] = Series(np.array(self.times_s), np.array(self.angles_rad)).held(t, self.start_rad)
+        samples[:, 0] = TimeSeries(np.array(self.times_s), np.array(self.angles_rad)).zero_order_hold(
+            t, self.start_rad
+        )
         return samples
 
     def corners(self) -> Corners:  # noqa: D102

@@ -10,8 +10,8 @@ from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr
 
-from spheretwin.models.base.errors import InputError, told_apart
-from spheretwin.models.telemetry.csv_series import TIME, Series, read
+from spheretwin.models.base.errors import InputError, distinct_texts
+from spheretwin.models.telemetry.csv_series import TIME, TimeSeries, read
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.trajectories.rounding import LARGEST
 from spheretwin.trajectories.trajectory import Samples, Shape
@@ -45,7 +45,7 @@ class Path:
         both ends.
     """
 
-    def __init__(self, poses: Series, between: Between) -> None:
+    def __init__(self, poses: TimeSeries, between: Between) -> None:
         self._known_by = poses, between
         self._times, self._poses = poses.t_s, poses.values
         self._lasts = np.diff(poses.t_s)
@@ -149,21 +149,21 @@ class Waypoints(Shape):
 
     def _check_limit(self, what: str, unit: str, peak: Peak, limit: float | None) -> None:
         if limit is not None and peak.value > limit:
-            most, received = told_apart(limit, peak.value)
+            most, received = distinct_texts(limit, peak.value)
             raise InputError(
                 f"waypoints {self.file}: expected a largest {what} of {most} {unit},"
                 f" received {received} {unit} on {peak.axis} at {peak.t_s:g} s"
             )
 
 
-def _minimum_jerk(poses: Series) -> Array:
+def _minimum_jerk(poses: TimeSeries) -> Array:
     """``10 u³ - 15 u⁴ + 6 u⁵`` of the way: no rate and no acceleration at either end."""
     way = np.diff(poses.values, axis=0)
     none = np.zeros_like(way)
     return np.stack([poses.values[:-1], none, none, 10 * way, -15 * way, 6 * way])
 
 
-def _cubic(poses: Series) -> Array:
+def _cubic(poses: TimeSeries) -> Array:
     from scipy.interpolate import CubicSpline  # slow to import, and few need it
 
     by_power = CubicSpline(poses.t_s, poses.values, bc_type="clamped").c[::-1]  # (4, segments, 3), of seconds

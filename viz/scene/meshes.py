@@ -14,7 +14,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from spheretwin.models.actuator import Coil, read_magnet_and_coil
+from spheretwin.models.actuator import CoilGeometry, read_magnet_and_coil
 from spheretwin.models.base.errors import InputError, without_breaks
 from spheretwin.models.base.mujoco_library import compiler_warnings
 from spheretwin.models.mjcf import fingerprint
@@ -83,7 +83,7 @@ FLANGE_SHARE = 0.07  # of the length
 RECESS_SHARE = 0.12  # of the winding's depth
 
 
-def coil_mesh(coil: Coil, centres: Array, axes: Array, places: list[int], count: int) -> rr.Mesh3D:
+def coil_mesh(coil: CoilGeometry, centres: Array, axes: Array, places: list[int], count: int) -> rr.Mesh3D:
     """All coils as one mesh; each looks up its own pixel of a texture, whose bytes then change over time.
 
     Of the ways to colour dozens of coils at 60 Hz this is the cheapest that keeps their shape: a mesh entity
@@ -117,7 +117,7 @@ def coil_mesh(coil: Coil, centres: Array, axes: Array, places: list[int], count:
     )
 
 
-def _outline(coil: Coil) -> list[tuple[float, float]]:
+def _outline(coil: CoilGeometry) -> list[tuple[float, float]]:
     """Corners of a coil's outline, each distance from the axis and height along it, m."""
     bore, radius, half = coil.inner_radius_m, coil.outer_radius_m, coil.length_m / 2
     flange = FLANGE_SHARE * coil.length_m

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from spheretwin.models.design.curve_check import ComputedCurve, JudgedCurve, Misfit, Peak
+from spheretwin.models.design.curve_check import ComputedCurve, CurvePeak, JudgedCurve, Misfit
 from spheretwin.models.design.field_check import FieldVerdict
 from spheretwin.models.design.torque_map import WorkspaceVerdict, direction_text
 from spheretwin.viz.terminal import tables
@@ -111,7 +111,7 @@ def _print_curve(title: str, rows: Sequence[tuple[str, str]]) -> None:
     tables.terminal_console().print(table)
 
 
-def _peak(peak: Peak) -> str:
+def _peak(peak: CurvePeak) -> str:
     return f"{peak.peak_Nm_per_A:.5f} N·m/A at {peak.peak_deg:.2f}°"
 
 

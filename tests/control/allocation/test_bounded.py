@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS, STEPS_PER_GROUP, follow_path
-from spheretwin.control.allocation.simplex import climb
+from spheretwin.control.allocation.simplex import increase_share
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
 
@@ -202,12 +202,12 @@ def test_path_ends_well_within_its_steps_and_may_be_left_at_any(actuator, matrix
 
 
 @pytest.mark.parametrize("matrix", cases.MATRICES)
-def test_the_way_out_of_a_lost_path_reaches_the_largest_torque_alone(actuator, matrix):
+def test_the_simplex_fallback_reaches_the_largest_torque(actuator, matrix):
     rng = np.random.default_rng(6)
     for _ in range(40):
         G, start, largest = beyond_reach(rng, matrix, actuator)
         demand = np.zeros(G.shape[1])
-        share, steps = climb(G, start, 1e9, 0.0, 1000, demand)
+        share, steps = increase_share(G, start, 1e9, 0.0, 1000, demand)
         assert share == pytest.approx(largest, rel=1e-9)
         assert steps <= STEPS_PER_GROUP * G.shape[1]
         assert np.abs(demand).max() <= 1 + 1e-9
@@ -215,7 +215,7 @@ def test_the_way_out_of_a_lost_path_reaches_the_largest_torque_alone(actuator, m
             G @ demand, np.multiply(share, start), rtol=0, atol=1e-9 * share * np.linalg.norm(start)
         )
         demand[:] = 0.0
-        assert climb(G, start, 0.7 * largest, 0.0, 1000, demand)[0] == 0.7 * largest
+        assert increase_share(G, start, 0.7 * largest, 0.0, 1000, demand)[0] == 0.7 * largest
         np.testing.assert_allclose(
             G @ demand, np.multiply(0.7 * largest, start), rtol=0, atol=1e-9 * share * np.linalg.norm(start)
         )

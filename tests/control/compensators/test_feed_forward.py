@@ -10,8 +10,8 @@ from spheretwin import scenario as scenarios
 from spheretwin.control.compensators.feed_forward import (
     FeedForwardSection,
     NominalRotor,
+    compute_feed_forward,
     feed_forward,
-    reckon,
 )
 from spheretwin.control.law import Law
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
@@ -29,7 +29,7 @@ numbers = st.lists(st.floats(-3, 3), min_size=3, max_size=3).map(np.array)
 
 def fed(reference, **shares):
     feed = feed_forward(FeedForwardSection(**shares), ROTOR, 1e-3, 0.0)
-    reckon(feed, np.array(reference))
+    compute_feed_forward(feed, np.array(reference))
     return feed.torque_q
 
 
@@ -127,7 +127,7 @@ def test_inertia_alone_follows_a_motion_as_the_period_goes_to_zero():
 
 @pytest.mark.parametrize("delay_s", [0.0, 5e-4, 1e-3, 2.5e-3])
 @pytest.mark.parametrize("predicted", [False, True])
-def test_a_law_s_account_of_its_own_torque_closes(delay_s, predicted):
+def test_the_applied_torque_of_a_law_excludes_the_feed_forward(delay_s, predicted):
     """One that asks for nothing is told of nothing, while what is fed forward turns the rotor."""
     scenario = alone(
         "sinusoid", plant__initial_rad_s=[0.2 * np.pi] * 3, duration=0.3, drive__delay_s=delay_s,

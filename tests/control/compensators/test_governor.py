@@ -104,7 +104,7 @@ def test_what_is_within_its_acceleration_is_followed():
     assert np.abs(behind[:, 1]).max() == pytest.approx(1 / 12 * jerk * PERIOD_S**2, rel=0.01)
 
 
-def test_a_jump_of_rate_is_caught_up_with_in_the_time_that_the_exact_move_takes():
+def test_a_jump_of_rate_takes_the_time_of_the_exact_move():
     """From rest behind what moves away at w: (1 + √2) w / R, by the parabolas of the continuous optimum."""
     rate, largest = np.pi / 30, 5.0
     t = PERIOD_S * np.arange(200)
@@ -119,7 +119,7 @@ def test_a_jump_of_rate_is_caught_up_with_in_the_time_that_the_exact_move_takes(
     assert behind == pytest.approx(rate**2 / (2 * largest), rel=0.05)
 
 
-def test_what_is_beyond_numbers_is_told_and_forgotten():
+def test_non_finite_input_is_reported_and_resets_the_governor():
     for bad in (np.inf, np.nan):
         mine = made()
         assert not govern(mine, np.full((3, 3), bad), np.zeros((3, 3)))

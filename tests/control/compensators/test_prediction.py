@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.applied_torque import belief, believe
-from spheretwin.control.compensators.prediction import Delayed, PredictionSection, predict, prediction
+from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
+from spheretwin.control.compensators.prediction import DelayModel, PredictionSection, predict, prediction
 from spheretwin.control.law import Law
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import acceleration
@@ -36,19 +36,19 @@ class Way:
         self.model = torque_model(actuator)
         self.ticks = round(delay) + 20
         self.commands = [commands_at(-period_s * (self.ticks - k)) for k in range(self.ticks)]
-        delayed = Delayed(period_s, delay * period_s, LAG_S, self.inertia)
+        delayed = DelayModel(period_s, delay * period_s, LAG_S, self.inertia)
         self.mine = prediction(PredictionSection(on=True), delayed, self.model)
-        self.belief = belief(True, 18, period_s, delay * period_s, LAG_S)
+        self.applied_torque = applied_torque(True, 18, period_s, delay * period_s, LAG_S)
         self.measurement = np.zeros((6, 3))
         G = torque_matrix(Q, actuator)
         for k in range(self.ticks):
             self.predict()
-            believe(self.belief, Q, G, self.commands[k])
+            estimate_applied_torque(self.applied_torque, Q, G, self.commands[k])
         self.predict()
 
     def predict(self):
-        self.measurement[:3] = Q, V, self.belief.torque_q
-        assert predict(self.mine, self.belief, self.model, self.measurement)
+        self.measurement[:3] = Q, V, self.applied_torque.torque_q
+        assert predict(self.mine, self.applied_torque, self.model, self.measurement)
 
     def current(self, t):
         """Exact response to the delayed commands, switch by switch; at rest before the first."""
@@ -104,7 +104,7 @@ def test_the_torque_is_that_of_the_period_before_the_instant_predicted(delay, ac
     tolerance = np.abs(E_G).max() * 18 * 8 * np.abs(V).max() * end + 1e-9
     np.testing.assert_allclose(way.measurement[2], torque / period_s, rtol=0, atol=tolerance)
     np.testing.assert_array_equal(way.measurement[3:5], [Q, V])
-    np.testing.assert_array_equal(way.measurement[5], way.belief.torque_q)
+    np.testing.assert_array_equal(way.measurement[5], way.applied_torque.torque_q)
 
 
 HANDED = tuple(
@@ -139,7 +139,7 @@ def still_air(**changes):
 
 
 @pytest.mark.parametrize("periods", [1, 3])
-def test_where_the_model_is_true_it_is_where_the_rotor_will_be(periods):
+def test_with_the_true_model_it_is_the_future_motion_of_the_rotor(periods):
     table = simulate(still_air(drive__delay_s=periods * 1e-3), law=TELLING).telemetry
     for predicted, true in (("q_predicted_rad", "q_rad"), ("qdot_predicted_rad_s", "qdot_rad_s")):
         # From 10 ms on: the first command is a jump of the currents, the others are not.
@@ -161,7 +161,7 @@ def test_where_the_model_is_true_it_is_where_the_rotor_will_be(periods):
     np.testing.assert_allclose(table["at"], np.repeat(sine, 3, axis=1), rtol=0, atol=1.01 * cubic)
 
 
-def test_without_a_delay_it_moves_no_bit():
+def test_without_a_delay_it_changes_no_bit():
     for law in ("pid", "afsm"):
         still = still_air(controller__law=law, duration=0.1)
         plain = still_air(controller__law=law, duration=0.1, controller__prediction__on=False)
@@ -170,7 +170,7 @@ def test_without_a_delay_it_moves_no_bit():
             np.testing.assert_array_equal(predicted[signal.name], other[signal.name])
 
 
-def test_a_known_delay_no_longer_unsettles_a_loop():
+def test_a_known_delay_no_longer_destabilises_a_loop():
     """Eight periods under a PID whose poles are at 60 1/s: without prediction it swings for ever."""
     fields = {"drive__delay_s": 8e-3, "controller__law": "pid", "controller__stiffness": 3 * 60.0**2,
               "controller__damping": 180.0, "controller__integral": 60.0**3, "duration": 1.0}  # fmt: skip
@@ -181,7 +181,7 @@ def test_a_known_delay_no_longer_unsettles_a_loop():
     assert np.abs(settled["error_rad"][-200:]).max() < 1e-4
 
 
-def test_a_law_is_told_that_no_delay_is_left():
+def test_a_law_receives_a_delay_of_zero_with_prediction():
     with Session(still_air(drive__delay_s=2e-3, controller__law="pid")) as session:
         session.advance(10)
         predicted = len(session.law.state)

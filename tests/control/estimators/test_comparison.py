@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.control.estimators.noise_and_lag import Motion, compare
+from spheretwin.control.estimators.noise_and_lag import SampledSine, compare
 from spheretwin.models.base.errors import InputError
 
 BANDWIDTHS = [60.0, 150.0, 400.0]
@@ -42,11 +42,11 @@ def test_differentiator_loses_a_motion_of_more_jerk_than_its_bound():
 
 
 def test_same_seed_gives_the_same_figures():
-    motion = Motion(duration_s=6.0, seed=3)
+    motion = SampledSine(duration_s=6.0, seed=3)
     for one, other in zip(compare([100.0], motion).values(), compare([100.0], motion).values(), strict=True):
         np.testing.assert_array_equal(np.hstack(one), np.hstack(other))
 
 
 def test_record_of_no_two_periods_is_refused():
     with pytest.raises(InputError, match=r"expected a duration of at least 5\.33333 s, received 4"):
-        compare([100.0], Motion(duration_s=4.0))
+        compare([100.0], SampledSine(duration_s=4.0))

@@ -35,7 +35,7 @@ def test_ideal_is_no_estimator_and_the_first():
 
 
 @pytest.mark.parametrize("kind", ESTIMATORS)
-def test_kind_tells_the_union_apart(kind):
+def test_kind_discriminates_the_union(kind):
     class Holder(BaseModel):
         estimator: AnyEstimator
 
@@ -112,7 +112,7 @@ def test_step_is_answered_by_a_pulse_that_ends(kind):
 
 
 @EACH
-def test_axes_know_nothing_of_each_other(kind):
+def test_axes_are_independent(kind):
     generator = np.random.default_rng(0)
     angle = np.cumsum(generator.normal(scale=1e-3, size=(300, 3)), axis=0)
     bandwidths = (60.0, 150.0, 400.0)
@@ -132,7 +132,7 @@ def test_same_angles_give_the_same_bytes(kind):
 
 
 @EACH
-def test_no_number_gives_no_number_and_starts_the_axis_anew(kind):
+def test_a_non_finite_angle_gives_nan_and_restarts_the_axis(kind):
     angle = 5.0 + on_all_axes(2.0 * PERIOD * np.arange(200))
     broken = angle.copy()
     broken[100, 1], broken[120, 2] = np.nan, np.inf

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spheretwin.control.law_components.extended_state_observer import Observed, observe, observer_gains
-from spheretwin.control.law_components.nominal_motion import Motion, Nominal, moved_on
+from spheretwin.control.law_components.extended_state_observer import ObserverState, observe, observer_gains
+from spheretwin.control.law_components.nominal_motion import RotorModel, RotorMotion, advance_motion
 
 PERIOD = 1e-3
 TUNINGS = [(800.0, 20.0), (800.0, 400.0), (700.0, 100.0), (180.0, 90.0)]
-ONE = Nominal((1.0, 1.0, 1.0), False)  # a disturbance is an acceleration
+ONE = RotorModel((1.0, 1.0, 1.0), False)  # a disturbance is an acceleration
 REST = (0.0, 0.0, 0.0)
 
 
@@ -21,7 +21,7 @@ def error_map(bandwidths):
     """F, column by column: errors of the first axis after one period at rest."""
     columns = []
     for angle, rate, disturbance in np.eye(3):
-        wrong = Observed(Motion((angle, 0.0, 0.0), (rate, 0.0, 0.0)), (disturbance, 0.0, 0.0))
+        wrong = ObserverState(RotorMotion((angle, 0.0, 0.0), (rate, 0.0, 0.0)), (disturbance, 0.0, 0.0))
         motion, learnt = seen(wrong, REST, REST, bandwidths)
         columns.append([motion.angle[0], motion.rate[0], learnt[0]])
     return np.array(columns).T
@@ -40,13 +40,13 @@ def test_poles_are_where_they_are_placed(bandwidths):
 
 def test_the_error_on_the_exact_model_decays_to_nothing(actuator):
     """All axes coupled, large motion, random torques, under a constant load."""
-    nominal, load = Nominal(tuple(actuator.inertia), True), np.array([0.05, -0.03, 0.04])
+    nominal, load = RotorModel(tuple(actuator.inertia), True), np.array([0.05, -0.03, 0.04])
     generator = np.random.default_rng(0)
-    true = Motion((0.2, -0.3, 0.4), (1.0, -2.0, 3.0))
-    known, errors = Observed(Motion(true.angle, REST), REST), []
+    true = RotorMotion((0.2, -0.3, 0.4), (1.0, -2.0, 3.0))
+    known, errors = ObserverState(RotorMotion(true.angle, REST), REST), []
     for _ in range(600):
         torque = 0.05 * generator.normal(size=3) - 0.2 * np.array(true.rate) * actuator.inertia - load
-        true = moved_on(true, tuple(torque + load), nominal, PERIOD)
+        true = advance_motion(true, tuple(torque + load), nominal, PERIOD)
         known = seen(known, true.angle, torque, (180.0, 90.0), nominal)
         errors.append(np.abs(np.subtract(known.motion.rate, true.rate)).max())
     # The slowest pole, 90 1/s, over 0.1 s. It is moved by some of the rotor's own rates, 4 rad/s in all: M
@@ -202,5 +202,5 @@ def test_a_schedule_leaves_the_fast_poles_their_directions():
 
 
 def test_without_a_bandwidth_no_disturbance_is_learnt():
-    found = seen(Observed(Motion(REST, REST), (0.3, 0.3, 0.3)), (0.1, 0.2, 0.3), REST, (500.0, 0.0))
+    found = seen(ObserverState(RotorMotion(REST, REST), (0.3, 0.3, 0.3)), (0.1, 0.2, 0.3), REST, (500.0, 0.0))
     assert found.disturbance == (0.3, 0.3, 0.3)

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 
 from spheretwin.control.controller import law_at
-from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.control.law import SIGNATURE, NominalModel
 from spheretwin.models.base.compiled import compiled_callback
 
 PERIOD = 1e-3
@@ -18,7 +18,7 @@ def by_address(address, t, reference, measurement, parameters, state, torque):
 
 
 def known(actuator, delay_s=0.0, period_s=PERIOD):
-    return Known(period_s, delay_s, actuator.inertia)
+    return NominalModel(period_s, delay_s, actuator.inertia)
 
 
 def follows(law, slow):

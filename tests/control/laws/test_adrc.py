@@ -37,7 +37,7 @@ def test_law_follows_its_equations(actuator):
 
 @pytest.mark.parametrize("period_s", [1e-4, 1e-3, 1e-2])
 @pytest.mark.parametrize("bandwidth", [30.0, 400.0])
-def test_observer_has_its_three_poles_where_they_are_said_to_be(bandwidth, period_s):
+def test_observer_has_the_documented_poles(bandwidth, period_s):
     T, gains = period_s, np.array([gain[0] for gain in observer_gains(np.array([bandwidth]), period_s)])
     A = np.array([[1, T, T * T / 2], [0, 1, T], [0, 0, 1]])
     error = A - np.outer(gains, A[0])  # predicted, then corrected by what the angle misses by
@@ -64,7 +64,7 @@ def observed(actuator, gains, load_Nm, ticks):
     return np.array(missed)
 
 
-def test_the_observer_converges_as_its_poles_say(actuator):
+def test_the_observer_converges_at_the_rate_of_its_poles(actuator):
     """From an unknown load its error is that of the matrix whose poles were checked, tick by tick, to 0."""
     load_Nm, ticks = 0.05, 400
     gains = ADRC(observer_bandwidth=100.0)

@@ -6,7 +6,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.controller import law_at
-from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.control.law import SIGNATURE, NominalModel
 from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver, boosted
 from spheretwin.models.base.compiled import compiled_callback
 from spheretwin.models.base.errors import InputError
@@ -111,7 +111,7 @@ class SlowLaw:
 )
 def test_law_follows_its_equations(actuator, gains, delay_s):
     gains = AFSMWithObserver(**gains)
-    law = gains.build(Known(PERIOD, delay_s, actuator.inertia))
+    law = gains.build(NominalModel(PERIOD, delay_s, actuator.inertia))
     slow = SlowLaw(gains, actuator.inertia, delay_s)
     compiled = compiled_callback(SIGNATURE, law.step)
     generator = np.random.default_rng(0)
@@ -129,7 +129,7 @@ def test_law_follows_its_equations(actuator, gains, delay_s):
         np.testing.assert_array_equal(state[9:12] == law.parameters[24:27], slow.wd == law.parameters[24:27])
 
 
-def test_the_boost_is_nothing_within_the_layer_and_pushes_back_beyond_it():
+def test_the_boost_is_zero_within_the_layer_and_opposes_s_beyond_it():
     inside = np.linspace(-0.15, 0.15, 31)
     assert not any(boosted(s, 70.0, 0.15, 100.0) for s in inside)
     for s in (0.151, 0.3, 5.0):
@@ -154,7 +154,7 @@ def one_of(fields, dotted):
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_a_preset_gives_what_is_not_given(preset):
+def test_a_preset_sets_the_fields_that_are_not_given(preset):
     law = {"controller.law": "afsm_eso", "controller.preset": preset}
     gains = scenarios.load("hold", law).controller.model_dump()
     for name, value in in_one(PRESETS[preset]):
@@ -183,7 +183,7 @@ def test_another_law_in_its_place_starts_with_its_own_gains():
 
 
 @pytest.mark.parametrize("bad", ["slow", 3, ["fast"], None])
-def test_a_preset_that_is_none_is_refused(bad):
+def test_an_unknown_preset_is_refused(bad):
     with pytest.raises(
         InputError, match=r"controller\.preset: expected 'ideal', 'fast', 'prototype' or 'robust'"
     ):
@@ -192,7 +192,7 @@ def test_a_preset_that_is_none_is_refused(bad):
 
 def closed_loop(preset, modelling_error, inertia):
     """Matrix of one period of (angle, rate, ẑ₁, ẑ₂, d̂) of β: the law on (1 + m) of its double integrator."""
-    law = AFSMWithObserver(preset=preset, coupled=False).build(Known(PERIOD, 0.0, inertia))
+    law = AFSMWithObserver(preset=preset, coupled=False).build(NominalModel(PERIOD, 0.0, inertia))
     columns, small = [], 1e-4  # well within the layer
     state, torque = law.state.copy(), np.empty(3)
     law.step(0.0, np.zeros((3, 3)), np.zeros((3, 3)), law.parameters, state, torque)
@@ -227,7 +227,9 @@ def torque_of(law, state):
         ("robust", (-0.76, 4.8), (-0.78, 4.95)),
     ],
 )
-def test_with_another_inertia_the_poles_are_stable_as_far_as_is_said(actuator, preset, stable, unstable):
+def test_with_another_inertia_the_poles_are_stable_in_the_documented_range(
+    actuator, preset, stable, unstable
+):
     for m in np.linspace(*stable, 30):
         assert np.abs(np.linalg.eigvals(closed_loop(preset, m, actuator.inertia))).max() < 1
     for m in unstable:

@@ -68,12 +68,12 @@ def test_fast_is_twice_as_exact(afsm, m, load, seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_load_does_not_show_in_what_is_left(seed):
+def test_the_remaining_error_does_not_depend_on_the_load(seed):
     light, heavy = (flown(0.5, load, seed)["tail_rms_error_rad"] for load in (0.0, 5.0))
     assert max(heavy) <= 1.1 * max(light)
 
 
-def test_what_each_part_earns():
+def test_benefit_of_each_part():
     """Without the schedule, the boost, the observer: worse, and worst without the observer."""
     whole = largest(flown(0.5, 5.0, 0))
     no_boost = largest(flown(0.5, 5.0, 0, **{"controller.boost_slope_1_s": 0.0}))
@@ -82,7 +82,7 @@ def test_what_each_part_earns():
     assert whole < 0.8 * no_boost < 0.8 * no_schedule < 0.64 * no_observer
 
 
-def test_the_coupled_model_earns_the_nutation():
+def test_benefit_of_the_coupled_model_in_the_nutation():
     moving = {"plant.engine": "lagrangian", "controller.law": "afsm_eso"}
     coupled, single = (
         figures_of(simulate(scenarios.load("nutation", {**moving, "controller.coupled": coupled})))

@@ -9,7 +9,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control import laws
-from spheretwin.control.law import Known
+from spheretwin.control.law import NominalModel
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
 from spheretwin.simulation import simulate
@@ -20,7 +20,7 @@ def test_every_law_runs_to_a_status(name):
     run = simulate(scenarios.load("hold", {"controller.law": name, "duration": 0.05}))
     assert run.status in set(Status)
     assert len(run.telemetry) == 50 or run.status != Status.COMPLETED
-    known = Known(run.scenario.controller.period_s, 0.0, run.actuator.inertia)
+    known = NominalModel(run.scenario.controller.period_s, 0.0, run.actuator.inertia)
     for signal in run.scenario.controller.build(known).signals:
         assert np.isfinite(run.telemetry[signal.name]).all()
         assert signal.unit
@@ -53,7 +53,7 @@ def imported_by(path):
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_every_law_is_written_with_what_is_open_to_a_user_s_own(name):
+def test_every_law_imports_only_modules_open_to_user_laws(name):
     path = Path(importlib.import_module(LAWS[name].__module__).__file__)
     ours = [module for module in imported_by(path) if module.startswith("spheretwin")]
     assert "spheretwin.control.law" in ours

@@ -20,7 +20,7 @@ def sampled(period_s):
 
 
 @pytest.mark.parametrize("weights", WEIGHTS)
-def test_gains_are_the_best_that_there_are(weights):
+def test_gains_have_the_least_cost(weights):
     """The cost of these gains is P; the gains that are best where P is to come are these gains."""
     (A, B), K = sampled(PERIOD), np.array([regulator(*weights, PERIOD)])
     closed = A - B @ K

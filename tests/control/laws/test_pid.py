@@ -8,7 +8,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.controller import law_at
-from spheretwin.control.law import SIGNATURE, Known
+from spheretwin.control.law import SIGNATURE, NominalModel
 from spheretwin.control.law_components.feedback import triple_pole
 from spheretwin.control.laws.pid import PID
 from spheretwin.models.base.compiled import compiled_callback
@@ -51,7 +51,7 @@ class SlowPID:
 @pytest.mark.parametrize("delay_s", [0.0, 1e-3, 2.25e-3])
 def test_law_follows_its_equations(actuator, delay_s):
     gains = PID(stiffness=[4e3, 5e3, 1e3], damping=[100.0, 150.0, 80.0], integral=[6e4, 0.0, 9e3])
-    law = gains.build(Known(PERIOD, delay_s, actuator.inertia))
+    law = gains.build(NominalModel(PERIOD, delay_s, actuator.inertia))
     slow = SlowPID(gains, actuator.inertia, delay_s)
     compiled = compiled_callback(SIGNATURE, law.step)
     generator = np.random.default_rng(0)
@@ -66,7 +66,7 @@ def test_law_follows_its_equations(actuator, delay_s):
 
 def closed_loop(gains, period_s, inertia):
     """Matrix of one control period of (angle, rate, integral) of β: the law on a double integrator."""
-    law = gains.build(Known(period_s, 0.0, inertia))
+    law = gains.build(NominalModel(period_s, 0.0, inertia))
     columns = []
     for unit in np.eye(3):
         state, torque = law.state.copy(), np.empty(3)
@@ -91,7 +91,7 @@ def test_closed_loop_poles_are_those_of_the_sampled_loop(actuator):
 
 
 @pytest.mark.parametrize("bandwidth", [10.0, 40.0])
-def test_a_triple_pole_is_where_it_is_said_to_be(actuator, bandwidth):
+def test_a_triple_pole_is_at_minus_the_bandwidth(actuator, bandwidth):
     stiffness, damping, integral = triple_pole(bandwidth)
     period_s = 1e-6
     matrix = closed_loop(

@@ -5,14 +5,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spheretwin.control.supervision.enabled_groups import FOUND_OPEN, FOUND_SHORTED, IN_USE, TOLD, groups
+from spheretwin.control.supervision.enabled_groups import (
+    DETECTED_OPEN,
+    DETECTED_SHORTED,
+    IN_USE,
+    REPORTED,
+    groups,
+)
 from spheretwin.control.supervision.fault_detector import (
     DetectorSection,
-    Followed,
+    NominalCurrents,
     derived_threshold_A,
     derived_ticks,
+    detect_faults,
     detector,
-    find,
 )
 from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, flow
 from spheretwin.electronics.coil import CoilSection, coil
@@ -25,7 +31,7 @@ from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 
 COUNT, R_OHM, L_H, PERIOD_S = 18, 1.3, 0.9e-3, 1e-3
-PROTOTYPE = Followed(
+PROTOTYPE = NominalCurrents(
     period_s=PERIOD_S,
     current_limit_A=8.0,
     static_error_A=0.8 * (1e-3 + 2e-3 + 4.5 * 20 / 2**16 + 1e-3 * 10),
@@ -38,8 +44,8 @@ PROTOTYPE = Followed(
 POSE, STILL = np.array([0.3, -0.2, 0.5]), np.zeros(3)
 
 
-def made(followed=PROTOTYPE, **section):
-    return detector(DetectorSection(**section), True, COUNT, followed)
+def made(nominal=PROTOTYPE, **section):
+    return detector(DetectorSection(**section), True, COUNT, nominal)
 
 
 def test_the_prototype_s_threshold_and_ticks():
@@ -95,11 +101,11 @@ def test_a_healthy_current_looks_like_none_for_fewer_ticks(
     swing_V, inductance_H, resistance_ohm, bandwidth_rad_s, period_s
 ):
     """From one limit to the other, through an amplifier with that swing: the samples below the threshold."""
-    followed = PROTOTYPE._replace(
+    nominal = PROTOTYPE._replace(
         period_s=period_s, swing_V=swing_V, inductance_H=inductance_H, resistance_ohm=resistance_ohm,
         time_constant_s=1 / bandwidth_rad_s,
     )  # fmt: skip
-    watcher = made(followed)
+    watcher = made(nominal)
     stage = amplifier(
         AmplifierSection(supply_V=swing_V, bandwidth_rad_s=bandwidth_rad_s), 8.0, period_s, 1, 0
     )  # fmt: skip
@@ -117,32 +123,32 @@ def hold(watcher, state, measured, believed=2.0, q=POSE, qdot=STILL, t=0.0, actu
     """Ticks at which all groups are measured and believed alike."""
     watcher.measured_A[:] = measured
     G = torque_matrix(q, actuator) if actuator else np.full((3, COUNT), 0.02)
-    find(watcher, state, np.broadcast_to(believed, COUNT).astype(float), G, q, qdot, t)
+    detect_faults(watcher, state, np.broadcast_to(believed, COUNT).astype(float), G, q, qdot, t)
 
 
-def test_so_many_ticks_that_speak_for_a_fault_and_not_one_less():
+def test_a_fault_needs_the_exact_number_of_ticks():
     watcher, state = made(ticks=5), groups(COUNT)
     for tick in range(5):
         assert not state.some_out[0]
         hold(watcher, state, 0.01, t=0.1 * tick)
-    assert state.out.tolist() == [FOUND_OPEN] * COUNT
+    assert state.out.tolist() == [DETECTED_OPEN] * COUNT
     assert state.out_s.tolist() == [0.4] * COUNT
     assert state.some_out[0]
 
 
-def test_a_tick_of_health_is_the_end_of_what_was_counted_and_silence_is_not():
+def test_a_healthy_tick_resets_the_count_and_a_neutral_one_does_not():
     watcher, state = made(ticks=3), groups(COUNT)
     for measured, believed, counted in [
         (0.0, 2.0, 1), (0.0, 2.0, 2), (2.0, 2.0, 0), (0.0, 2.0, 1), (0.0, 0.05, 1), (0.05, -0.05, 1),
         (0.0, -2.0, 2), (-1.0, -2.0, 0),
     ]:  # fmt: skip
         hold(watcher, state, measured, believed)
-        assert watcher.counted.tolist() == [counted] * COUNT
+        assert watcher.indications.tolist() == [counted] * COUNT
     assert not state.some_out[0]
 
 
 @pytest.mark.parametrize("shorted", [False, True])
-def test_a_turning_rotor_tells_an_open_group_from_a_shorted_one(actuator, shorted):
+def test_a_turning_rotor_distinguishes_open_and_shorted_groups(actuator, shorted):
     """A shorted coil's current by its differential equation, with the EMF of a turning rotor."""
     watcher, state, qdot = made(ticks=6), groups(COUNT), np.array([3.0, -4.0, 6.0])
     emf = torque_matrix(POSE, actuator).T @ rate_jacobian(POSE) @ qdot
@@ -154,24 +160,24 @@ def test_a_turning_rotor_tells_an_open_group_from_a_shorted_one(actuator, shorte
         hold(watcher, state, measured, 3.0, qdot=qdot, actuator=actuator)
     told_apart = np.abs(emf / R_OHM) > 0.01
     assert np.count_nonzero(told_apart) > 12
-    assert set(state.out[told_apart].tolist()) == {FOUND_SHORTED if shorted else FOUND_OPEN}
+    assert set(state.out[told_apart].tolist()) == {DETECTED_SHORTED if shorted else DETECTED_OPEN}
 
 
-def test_a_name_that_was_a_guess_is_mended_once_the_rotor_turns(actuator):
+def test_a_guessed_classification_is_corrected_when_the_rotor_turns(actuator):
     watcher, state = made(ticks=3), groups(COUNT)
     for _ in range(5):
         hold(watcher, state, 0.0, 3.0, actuator=actuator)
-    assert state.out.tolist() == [FOUND_OPEN] * COUNT  # still, nothing tells them apart
+    assert state.out.tolist() == [DETECTED_OPEN] * COUNT  # still, nothing tells them apart
     qdot = np.array([3.0, -4.0, 6.0])
     emf = torque_matrix(POSE, actuator).T @ rate_jacobian(POSE) @ qdot
     for tick in range(60):
         current = -emf / R_OHM * (1 - np.exp(-(tick + 1) * PERIOD_S * R_OHM / L_H))
         hold(watcher, state, current, 0.0, qdot=qdot, actuator=actuator)
     clear = np.abs(emf / R_OHM) > 0.03
-    assert set(state.out[clear].tolist()) == {FOUND_SHORTED}
+    assert set(state.out[clear].tolist()) == {DETECTED_SHORTED}
 
 
-def test_noise_changes_no_true_name(actuator):
+def test_noise_changes_no_correct_classification(actuator):
     """A minute of the prototype's noise on open groups of a rotor that just about turns."""
     generator = np.random.default_rng(1)
     watcher, state = made(), groups(COUNT)
@@ -183,14 +189,14 @@ def test_noise_changes_no_true_name(actuator):
             changes += np.count_nonzero(state.out != last)
         last = state.out.copy() if state.some_out[0] else None
     assert changes <= COUNT  # at most once, where the first name was a guess
-    assert set(state.out.tolist()) == {FOUND_OPEN}
+    assert set(state.out.tolist()) == {DETECTED_OPEN}
 
 
-def test_a_group_that_is_told_of_is_forgotten_and_begins_anew():
+def test_a_reported_group_resets_the_detector():
     watcher, state = made(ticks=3), groups(COUNT)
     for _ in range(2):
         hold(watcher, state, 0.0)
-    state.out[:] = TOLD
+    state.out[:] = REPORTED
     hold(watcher, state, 0.0)
     state.out[:] = IN_USE
     for _ in range(2):
@@ -204,7 +210,7 @@ def test_a_group_that_is_told_of_is_forgotten_and_begins_anew():
     st.sampled_from([0.0, 3.0, 1e300, np.inf, np.nan]),
     st.sampled_from([0.0, 1.0, 1e200, np.nan]),
 )
-def test_what_is_no_number_is_no_fault_and_stays_in_its_group(measured, believed, rate):
+def test_a_non_finite_current_is_no_fault_and_affects_only_its_group(measured, believed, rate):
     watcher, state = made(ticks=2), groups(COUNT)
     for value in measured:
         everyone = np.full(COUNT, 2.0)
@@ -213,14 +219,14 @@ def test_what_is_no_number_is_no_fault_and_stays_in_its_group(measured, believed
         wanted[3] = believed
         hold(watcher, state, everyone, wanted, qdot=np.full(3, rate))
         if np.isnan(measured).any() or np.isnan(rate):
-            assert state.out[3] in (IN_USE, FOUND_OPEN, FOUND_SHORTED)
+            assert state.out[3] in (IN_USE, DETECTED_OPEN, DETECTED_SHORTED)
     if not np.isnan(rate):
         assert not np.delete(state.out, 3).any()
     if np.isnan(measured).all():
         assert state.out[3] == IN_USE
 
 
-def test_a_state_is_all_it_goes_on_from(actuator):
+def test_the_state_is_complete(actuator):
     generator = np.random.default_rng(0)
     one, other = made(), made()
     first, second = groups(COUNT), groups(COUNT)

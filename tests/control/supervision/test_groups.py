@@ -1,4 +1,4 @@
-"""Groups that are left out: no current in them, and the whole torque from the others."""
+"""Disabled groups: no current in them, and the whole torque from the others."""
 
 import numpy as np
 import pytest
@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.allocation.bounded import SCRATCH_ROWS
 from spheretwin.control.supervision.enabled_groups import (
-    FOUND_OPEN,
-    FOUND_SHORTED,
+    DETECTED_OPEN,
+    DETECTED_SHORTED,
     IN_USE,
-    TOLD,
+    REPORTED,
     groups,
-    leave_out,
-    tell,
+    mark_faulty_groups,
+    mask_disabled_groups,
 )
 from spheretwin.models.base.compiled import restore_state, save_state
 from spheretwin.models.magnetics import torque_matrix
@@ -28,7 +28,7 @@ def told(*places):
 
 def without(places):
     made = groups(COUNT)
-    tell(made, told(*places), 0.5)
+    mark_faulty_groups(made, told(*places), 0.5)
     return made
 
 
@@ -48,7 +48,7 @@ def test_the_others_give_the_whole_torque(actuator, name, out, pose, torque):
     """Of the columns of the others, G I is the share of what is wanted, and I the smallest that gives it."""
     G, wanted = torque_matrix(np.array(pose), actuator), 0.2 * np.array(torque)
     made = without(out)
-    leave_out(made, G)
+    mask_disabled_groups(made, G)
     current, share = allocated(name, made.G, wanted)
     used = ~told(*out)
     assert not current[~used].any()
@@ -72,34 +72,34 @@ def test_with_too_few_left_there_is_no_torque_and_no_current(actuator, name):
     G = torque_matrix(np.array([0.2, -0.1, 0.3]), actuator)
     for left in (0, 1, 2):
         made = without(range(left, COUNT))
-        leave_out(made, G)
+        mask_disabled_groups(made, G)
         current, share = allocated(name, made.G, np.array([0.1, 0.2, 0.3]))
         assert share == 0.0
         assert not current.any()
 
 
-def test_what_was_told_is_taken_back_and_what_was_found_is_not():
+def test_reported_groups_are_enabled_again_and_detected_ones_are_not():
     made = groups(COUNT)
-    made.out[5], made.out[6], made.some_out[0] = FOUND_OPEN, FOUND_SHORTED, True
-    tell(made, told(2, 5), 1.0)
-    assert made.out[[2, 5, 6]].tolist() == [TOLD, FOUND_OPEN, FOUND_SHORTED]
+    made.out[5], made.out[6], made.some_out[0] = DETECTED_OPEN, DETECTED_SHORTED, True
+    mark_faulty_groups(made, told(2, 5), 1.0)
+    assert made.out[[2, 5, 6]].tolist() == [REPORTED, DETECTED_OPEN, DETECTED_SHORTED]
     assert made.out_s[2] == 1.0
-    tell(made, told(2, 5), 2.0)
+    mark_faulty_groups(made, told(2, 5), 2.0)
     assert made.out_s[2] == 1.0  # since when, not until when
-    tell(made, told(), 3.0)
-    assert made.out[[2, 5, 6]].tolist() == [IN_USE, FOUND_OPEN, FOUND_SHORTED]
+    mark_faulty_groups(made, told(), 3.0)
+    assert made.out[[2, 5, 6]].tolist() == [IN_USE, DETECTED_OPEN, DETECTED_SHORTED]
     assert made.some_out[0]
 
 
 def test_with_all_in_use_no_bit_of_the_matrix_is_another(actuator):
     G, made = torque_matrix(np.array([0.5, 0.3, -0.2]), actuator), groups(COUNT)
-    leave_out(made, G)
+    mask_disabled_groups(made, G)
     assert made.G.tobytes() == np.ascontiguousarray(G).tobytes()
     assert not made.some_out[0]
 
 
 @given(st.lists(st.integers(0, 3), min_size=COUNT, max_size=COUNT), st.floats(0, 1e9))
-def test_a_state_is_all_there_is(out, t_s):
+def test_the_state_is_complete(out, t_s):
     made, other = groups(COUNT), groups(COUNT)
     made.out[:], made.out_s[:], made.some_out[:] = out, t_s, any(out)
     restore_state(other, save_state(made), "groups")

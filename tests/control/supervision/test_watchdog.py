@@ -10,12 +10,12 @@ from spheretwin.control.supervision.watchdog import (
     REASONS,
     RELEASE,
     SHORT,
+    MeasurementLimits,
     Reason,
     WatchdogSection,
-    Watched,
-    carried_on,
-    mend,
-    over,
+    count_rundown,
+    replace_invalid,
+    transfer_watchdog,
     trip,
     watch,
     watchdog,
@@ -24,7 +24,7 @@ from spheretwin.models.base.compiled import restore_state, save_state
 
 PERIOD_S, NOISE_RAD, QUANTUM_RAD = 1e-3, np.array([3e-4, 3e-4, 0.0]), np.array([8e-5, 8e-5, 3e-3])
 RANGE_RAD = np.array([[-1.4, 1.4], [-1.4, 1.4], [-np.inf, np.inf]])
-WATCHED = Watched(PERIOD_S, NOISE_RAD, QUANTUM_RAD, RANGE_RAD)
+WATCHED = MeasurementLimits(PERIOD_S, NOISE_RAD, QUANTUM_RAD, RANGE_RAD)
 STILL = np.zeros(3)
 
 
@@ -88,21 +88,21 @@ def test_speed_and_edge(axis):
 
 
 @given(st.tuples(*[st.sampled_from([0.1, np.nan, np.inf, -np.inf])] * 6))
-def test_what_is_no_number_is_mended_and_trips(numbers):
+def test_a_non_finite_measurement_is_replaced_and_trips(numbers):
     watcher = made()
     looked(watcher, [0.2, 0.3, 0.4])
     measurement = np.array([numbers[:3], numbers[3:], [7.0] * 3])
     lost = ~np.isfinite(measurement[:2]).all(axis=0)
-    assert mend(watcher, measurement)
+    assert replace_invalid(watcher, measurement)
     assert np.isfinite(measurement).all()
     np.testing.assert_array_equal(measurement[0], np.where(lost, [0.2, 0.3, 0.4], 0.1))
     np.testing.assert_array_equal(measurement[1], np.where(lost, 0.0, 0.1))
     assert watcher.reason[0] == (Reason.MEASUREMENT if lost.any() else Reason.NONE)
     off = watchdog(WatchdogSection(), WATCHED, np.ones(3), np.zeros(1, dtype=np.int64))
-    assert not mend(off, np.full((3, 3), np.nan))
+    assert not replace_invalid(off, np.full((3, 3), np.nan))
 
 
-def test_a_rate_that_is_no_number_trips_and_is_none():
+def test_a_non_finite_rate_trips_and_becomes_zero():
     watcher, rates = made(), np.array([0.0, np.inf, np.nan])
     watch(watcher, np.zeros(3), rates)
     assert watcher.reason[0] == Reason.MEASUREMENT
@@ -112,19 +112,19 @@ def test_a_rate_that_is_no_number_trips_and_is_none():
 @pytest.mark.parametrize("action", ["release", "short"])
 def test_the_first_reason_stays_and_the_run_goes_on_for_its_time(action):
     watcher = made(action=action, rundown_s=0.004)
-    assert not over(watcher)
+    assert not count_rundown(watcher)
     trip(watcher, int(Reason.SPEED))
     trip(watcher, int(Reason.EDGE))
     assert REASONS[int(watcher.reason[0])] == Reason.SPEED
     assert watcher.halt[0] == (SHORT if action == "short" else RELEASE) != GO
-    assert [over(watcher) for _ in range(6)] == [False] * 4 + [True] * 2
+    assert [count_rundown(watcher) for _ in range(6)] == [False] * 4 + [True] * 2
     at_once = made(rundown_s=0.0)
     trip(at_once, int(Reason.SPEED))
-    assert over(at_once)
+    assert count_rundown(at_once)
 
 
 @given(st.lists(st.tuples(st.floats(-1.3, 1.3), st.floats(-50, 50), st.integers(0, 1)), max_size=20))
-def test_a_state_is_all_it_goes_on_from(samples):
+def test_the_state_is_complete(samples):
     one, other = made(), made()
     for place, (angle, rate, fresh) in enumerate(samples):
         if place == len(samples) // 2:
@@ -132,16 +132,16 @@ def test_a_state_is_all_it_goes_on_from(samples):
         one.fresh[0] = other.fresh[0] = fresh
         for each in (one, other) if place >= len(samples) // 2 else (one,):
             looked(each, [angle, 0, 0], [rate, 0, 0])
-            over(each)
+            count_rundown(each)
     if samples:
         assert save_state(other).tobytes() == save_state(one).tobytes()
 
 
-def test_one_that_was_off_begins_anew():
+def test_a_watchdog_that_was_off_starts_again():
     before, after = made(), made(largest_rate_rad_s=10.0)
     looked(before, [0.3, 0, 0])
-    carried_on(before, after)
+    transfer_watchdog(before, after)
     assert looked(after, STILL) == Reason.JUMP
     after = made()
-    carried_on(before._replace(on=False), after)
+    transfer_watchdog(before._replace(on=False), after)
     assert looked(after, [-0.9, 0, 0]) == Reason.NONE

@@ -253,7 +253,7 @@ def test_read_only_home_still_compiles():
     assert float(python(code, **{**environment, "HOME": "/proc"})) == 1.0
 
 
-def test_kept_array_is_computed_once(tmp_path, monkeypatch):
+def test_cached_array_is_computed_once(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "_root", lambda: tmp_path)
     made = []
 
@@ -262,11 +262,11 @@ def test_kept_array_is_computed_once(tmp_path, monkeypatch):
         return np.arange(3.0)
 
     for _ in range(2):
-        np.testing.assert_array_equal(cache.kept_array(b"key", compute), [0, 1, 2])
+        np.testing.assert_array_equal(cache.cached_array(b"key", compute), [0, 1, 2])
     assert len(made) == 1
-    cache.kept_array(b"other key", compute)
+    cache.cached_array(b"other key", compute)
     assert len(made) == 2
     next(tmp_path.rglob("*.npy")).write_bytes(b"damaged")
-    cache.kept_array(b"key", compute)
-    cache.kept_array(b"other key", compute)
+    cache.cached_array(b"key", compute)
+    cache.cached_array(b"other key", compute)
     assert len(made) == 3

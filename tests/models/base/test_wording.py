@@ -14,10 +14,10 @@ from spheretwin.models.base.errors import (
     InputError,
     SpheretwinError,
     did_you_mean,
+    distinct_texts,
     is_plain,
     one_line,
     shown,
-    told_apart,
 )
 
 
@@ -87,15 +87,15 @@ def test_every_error_of_the_package_is_one_line_in_python_too():
         ((0.0, np.nan, np.inf), ["0", "nan", "inf"]),
     ],
 )
-def test_numbers_that_differ_are_told_apart_in_few_digits(numbers, texts):
-    assert told_apart(*numbers) == texts
+def test_different_numbers_have_different_texts_of_few_digits(numbers, texts):
+    assert distinct_texts(*numbers) == texts
 
 
 @given(st.lists(st.floats(allow_nan=False), max_size=5))
 def test_texts_differ_as_the_numbers_do(numbers):
     # Zeros of both signs are one number in two texts.
     numbers = [number + 0.0 for number in numbers]
-    assert len(set(told_apart(*numbers))) == len(set(numbers))
+    assert len(set(distinct_texts(*numbers))) == len(set(numbers))
 
 
 def test_a_near_name_is_suggested_and_a_far_one_is_not():

@@ -36,7 +36,7 @@ def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
 
 
 @pytest.mark.usefixtures("coarse")
-def test_a_wrong_matrix_is_not_laid_to_the_curve(actuator, monkeypatch):
+def test_a_wrong_matrix_is_not_attributed_to_the_curve(actuator, monkeypatch):
     right = direct_summation.torque_matrix
     monkeypatch.setattr(direct_summation, "torque_matrix", lambda q, actuator: -right(q, actuator))
     verdict = field_verdict.judge(actuator, poses=1)

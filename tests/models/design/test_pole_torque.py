@@ -12,10 +12,10 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from spheretwin.models import torque_curve
-from spheretwin.models.actuator import TORQUE_CURVE_PATH, Coil, Magnet
+from spheretwin.models.actuator import TORQUE_CURVE_PATH, CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design import pole_torque
-from spheretwin.models.design.pole_torque import Convergence, Mesh, compute_curve
+from spheretwin.models.design.pole_torque import Mesh, MeshConvergence, compute_curve
 from spheretwin.models.torque_curve import TorqueCurve
 
 COARSE = Mesh(along=16, around=96, across=8)
@@ -36,7 +36,7 @@ def flat(magnet) -> Magnet:
 
 
 @pytest.fixture(scope="module")
-def coil(actuator) -> Coil:
+def coil(actuator) -> CoilGeometry:
     return actuator.coil
 
 
@@ -45,7 +45,7 @@ def shipped() -> TorqueCurve:
     return torque_curve.read(TORQUE_CURVE_PATH)
 
 
-def torque_at(magnet: Magnet, coil: Coil, degrees, mesh: Mesh | None = None) -> np.ndarray:
+def torque_at(magnet: Magnet, coil: CoilGeometry, degrees, mesh: Mesh | None = None) -> np.ndarray:
     return compute_curve(magnet, coil, np.radians(degrees), mesh).torque_Nm_per_A
 
 
@@ -143,7 +143,7 @@ def magpylib_magnet(magnet: Magnet, degrees: float) -> magpylib.magnet.Cylinder:
     )
 
 
-def magpylib_loops(coil: Coil, across: int, along: int) -> list[magpylib.current.Circle]:
+def magpylib_loops(coil: CoilGeometry, across: int, along: int) -> list[magpylib.current.Circle]:
     """The winding as loops at the Gauss points of its section, one ampere times their share of the turns."""
     u, share_u = np.polynomial.legendre.leggauss(across)
     v, share_v = np.polynomial.legendre.leggauss(along)
@@ -209,7 +209,7 @@ def test_a_ground_magnet_s_own_field_pushes_back_on_the_winding(magnet, coil, sh
     assert limit == pytest.approx(expected, abs=1e-4 * shipped.peak_Nm_per_A)
 
 
-def dipole_torque(magnet: Magnet, coil: Coil, degrees) -> np.ndarray:
+def dipole_torque(magnet: Magnet, coil: CoilGeometry, degrees) -> np.ndarray:
     """Torque about the joint between two dipoles at the centres: derivative of their energy by the angle."""
     volume = np.pi * magnet.radius_m**2 * magnet.length_m
     inner, outer = coil.inner_radius_m, coil.outer_radius_m
@@ -245,7 +245,7 @@ def test_tends_to_two_dipoles(flat, coil):
 # Iron behind the pole
 
 
-def sphere_torque(magnet: Magnet, coil: Coil, degrees) -> np.ndarray:
+def sphere_torque(magnet: Magnet, coil: CoilGeometry, degrees) -> np.ndarray:
     """Torque on a homogeneously magnetised sphere about the back's middle: that of a dipole, exactly."""
     moment = magnet.remanence_T / mu_0 * 4 / 3 * np.pi * magnet.radius_m**3
     winding = magpylib.Collection(magpylib_loops(coil, 16, 16))
@@ -330,7 +330,7 @@ def test_shipped_curve_has_the_expected_peak(shipped):
 
 def test_shipped_provenance_matches_the_geometry(magnet, coil):
     head = [line[2:] for line in TORQUE_CURVE_PATH.read_text().splitlines() if line.startswith("# ")]
-    written = pole_torque.provenance(magnet, coil, Convergence(peak=1e-6, worst=1e-6))
+    written = pole_torque.provenance(magnet, coil, MeshConvergence(peak=1e-6, worst=1e-6))
     assert [line for line in head if "magpylib" not in line] == [
         line for line in written if "magpylib" not in line
     ]
@@ -344,7 +344,7 @@ def test_shipped_head_is_what_the_curve_was_computed_for(magnet, coil, shipped):
 
 def test_provenance_tells_a_flat_front_from_a_ground_one(magnet, flat, coil):
     ground_lines, flat_lines = (
-        "\n".join(pole_torque.provenance(pole, coil, Convergence(peak=1e-6, worst=1e-6)))
+        "\n".join(pole_torque.provenance(pole, coil, MeshConvergence(peak=1e-6, worst=1e-6)))
         for pole in (magnet, flat)
     )
     assert "centre at 45 mm, front ground to radius 50 mm." in ground_lines

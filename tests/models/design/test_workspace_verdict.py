@@ -37,7 +37,7 @@ def test_weakest_pose_is_the_worst_of_all_tilts(surveyed):
     assert weakest.least_norm_Nm == pytest.approx(min(row.least_norm_Nm for row in verdict.by_tilt))
     assert np.linalg.norm(weakest.direction) == pytest.approx(1)
     assert [pose.figure for pose in verdict.weakest] == sorted(
-        (pose.figure for pose in verdict.weakest), key=list(torque_map.TOLD).index
+        (pose.figure for pose in verdict.weakest), key=list(torque_map.REPORTED_POSES).index
     )
 
 

@@ -115,7 +115,7 @@ def test_columns_that_come_and_go_are_nan_where_they_are_not(tmp_path):
                 assert np.all(np.isnan(found))
 
 
-def test_two_meanings_of_one_column_are_told_apart_and_the_parts_kept(tmp_path):
+def test_two_meanings_of_one_column_are_refused_and_the_parts_remain(tmp_path):
     other = Signal("gain", "N", 1, "something else")
     file = TelemetryFile(path := tmp_path / "run.parquet", (*SIGNALS, GAIN), FACTS)
     file.write(table(20, (*SIGNALS, GAIN)))

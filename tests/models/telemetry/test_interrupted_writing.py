@@ -34,7 +34,7 @@ STREAM = """
 import sys
 import numpy as np
 from pathlib import Path
-from spheretwin.models.telemetry import file as telemetry_file
+from spheretwin.models.telemetry import parquet as telemetry_file
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 SIGNALS = common_signals(18)

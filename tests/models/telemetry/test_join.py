@@ -65,7 +65,7 @@ FOREIGN = {
 
 @pytest.mark.parametrize("kind", FOREIGN)
 @pytest.mark.parametrize("after_a_good_one", [False, True])
-def test_what_is_no_part_is_refused(kind, after_a_good_one, tmp_path):
+def test_an_invalid_part_is_refused(kind, after_a_good_one, tmp_path):
     foreign, good = tmp_path / "000001.arrows", tmp_path / "000000.arrows"
     FOREIGN[kind](foreign)
     arrow_stream(good, table(10).arrow(FACTS))
@@ -90,7 +90,7 @@ def test_no_part_at_all_is_refused(tmp_path):
 def stream(tmp_path_factory):
     """A table, the part that has it in three batches, and where each message of the part ends."""
     whole, ends = table(15, (*SIGNALS[:2], GAIN)), []
-    parts = telemetry_parts.Parts(tmp_path_factory.mktemp("stream") / "run.parquet", FACTS)
+    parts = telemetry_parts.PartialStreams(tmp_path_factory.mktemp("stream") / "run.parquet", FACTS)
     for first in (0, 5, 10):
         parts.append(whole.rows(first, first + 5))
         ends.append(parts.paths[0].stat().st_size)  # it has reached the operating system

@@ -3,7 +3,7 @@
 import numpy as np
 
 from spheretwin.models.telemetry.signals import Signal, width
-from spheretwin.models.telemetry.table import KeptTelemetry, Table
+from spheretwin.models.telemetry.table import Table, TelemetryBuffer
 
 TIME, RATE, GAIN = Signal("t_s", "s", 1, "time"), Signal("w", "rad/s", 3, "rate"), Signal("g", "1", 1, "gain")
 
@@ -14,7 +14,7 @@ def rows(signals, first, count):
 
 
 def test_all_rows_are_there_in_their_order():
-    kept = KeptTelemetry((TIME, RATE), 10)
+    kept = TelemetryBuffer((TIME, RATE), 10)
     chunks = [rows((TIME, RATE), 100 * i, count) for i, count in enumerate((3, 0, 5))]
     for chunk in chunks:
         kept.write(chunk)
@@ -23,7 +23,7 @@ def test_all_rows_are_there_in_their_order():
 
 
 def test_a_column_that_comes_or_goes_is_nan_where_it_was_not():
-    kept = KeptTelemetry((TIME, RATE), 6)
+    kept = TelemetryBuffer((TIME, RATE), 6)
     first, second = rows((TIME, RATE), 0, 2), rows((TIME, GAIN), 50, 3)
     kept.write(first)
     kept.write(second)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.csv_series import Series, check_rising, read
+from spheretwin.models.telemetry.csv_series import TimeSeries, check_rising, read
 
 GOOD = "t_s,a,b\n0,1,-2\n0.5,3,4\n2,5,6e-1\n"
 VALUES = [[1.0, -2.0], [3.0, 4.0], [5.0, 0.6]]
@@ -59,7 +59,7 @@ def test_it_is_read_as_it_is_written(tmp_path, content):
         ("t_s,a,b\n0,1," + "9" * 200_000 + "\n", "expected values between commas, field larger than"),
     ],
 )
-def test_what_is_no_series_is_refused_by_line(tmp_path, content, complaint):
+def test_an_invalid_series_is_refused_by_line(tmp_path, content, complaint):
     with pytest.raises(InputError) as refusal:
         reading(tmp_path, content)
     message = str(refusal.value)
@@ -69,18 +69,18 @@ def test_what_is_no_series_is_refused_by_line(tmp_path, content, complaint):
 
 
 @pytest.mark.parametrize("name", ["absent.csv", ".", "a\0b"])
-def test_what_is_no_file_is_refused(tmp_path, name):
+def test_an_unreadable_file_is_refused(tmp_path, name):
     with pytest.raises(InputError, match="expected a readable CSV file"):
         read("bench", tmp_path / name, ("a", "b"), 1.0)
 
 
 def test_values_hold_or_are_joined_by_lines():
-    series = Series(np.array([1.0, 2.0, 4.0]), np.array([[1.0, 10.0], [3.0, 20.0], [7.0, 0.0]]))
+    series = TimeSeries(np.array([1.0, 2.0, 4.0]), np.array([[1.0, 10.0], [3.0, 20.0], [7.0, 0.0]]))
     t = np.array([0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 9.0])
-    held = series.held(t, (-1.0, -2.0))
+    held = series.zero_order_hold(t, (-1.0, -2.0))
     np.testing.assert_array_equal(held[:, 0], [-1, 1, 1, 3, 3, 7, 7])
     np.testing.assert_array_equal(held[:, 1], [-2, 10, 10, 20, 20, 0, 0])
-    linear = series.linear(t)
+    linear = series.interpolate(t)
     np.testing.assert_array_equal(linear[:, 0], [1, 1, 2, 3, 5, 7, 7])
     np.testing.assert_array_equal(linear[:, 1], [10, 10, 15, 20, 10, 0, 0])
 

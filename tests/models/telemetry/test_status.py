@@ -13,8 +13,8 @@ from spheretwin.plant.step import DIVERGED, GOING, LEFT_WORKSPACE
 @pytest.mark.parametrize("status", Status)
 def test_every_status_has_a_level_and_a_sentence_and_is_its_own_name(status):
     assert isinstance(status.level, Level)
-    assert status.told.isprintable()
-    assert len(status.told.split()) > 2
+    assert status.text.isprintable()
+    assert len(status.text.split()) > 2
     assert status == named(str(status))
     assert f"{status}" == status.value == status.name.lower()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.control.supervision.enabled_groups import FOUND_OPEN, FOUND_SHORTED, TOLD
+from spheretwin.control.supervision.enabled_groups import DETECTED_OPEN, DETECTED_SHORTED, REPORTED
 from spheretwin.faults.fault_injector import FaultLines
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.table import Table
@@ -20,7 +20,7 @@ def scenario(name="nutation", hardware="prototype", **changes):
     return scenarios.load(name, {**detecting, **changes})
 
 
-@pytest.mark.parametrize(("mode", "name"), [("open", FOUND_OPEN), ("short", FOUND_SHORTED)])
+@pytest.mark.parametrize(("mode", "name"), [("open", DETECTED_OPEN), ("short", DETECTED_SHORTED)])
 @pytest.mark.parametrize("hardware", ["prototype", "ideal"])
 def test_every_group_that_fails_is_found_and_named_and_no_other(hardware, mode, name):
     """In nutation, which asks every group for more than twice the threshold within a tenth of a second."""
@@ -123,7 +123,7 @@ def test_what_is_known_is_left_out_from_its_tick_on_and_taken_back():
         table, out = run.telemetry, run.telemetry["group_out"]
         assert set(np.flatnonzero(out.any(axis=0)).tolist()) == {2, 9}
         assert np.flatnonzero(out[:, 2]).tolist() == list(range(100, 200))
-        assert set(out[100:200, 2].tolist()) == {TOLD}
+        assert set(out[100:200, 2].tolist()) == {REPORTED}
         assert not table["current_command_A"][100:200][:, [2, 9]].any()
         assert table["current_command_A"][:100, 2].any()
         assert table["current_command_A"][200:, 2].any()
@@ -162,7 +162,7 @@ def test_detect_of_a_fault_is_the_detector():
     general = scenario(fault=[fault], duration=1.0)
     one, other = simulate(asked).telemetry, simulate(general).telemetry
     assert one.values.tobytes() == other.values.tobytes()
-    assert one["group_out"][-1, 7] == FOUND_OPEN
+    assert one["group_out"][-1, 7] == DETECTED_OPEN
 
 
 def test_a_detector_that_finds_nothing_moves_no_bit():

@@ -217,8 +217,8 @@ def test_the_command_says_why_and_keeps_it_all(tmp_path, capsys):
     told = capsys.readouterr()
     summary = json.loads(told.out)
     assert summary["status"] == "failsafe"
-    assert summary["reason"] == Reason.EDGE.told
-    assert f"failsafe, {Reason.EDGE.told}" in told.err
+    assert summary["reason"] == Reason.EDGE.text
+    assert f"failsafe, {Reason.EDGE.text}" in told.err
     table = read_parquet(path)[0]
     assert np.isfinite(table.values).all()
     assert table["failsafe_reason"][-1] == Reason.EDGE
@@ -283,7 +283,7 @@ def test_a_trip_in_the_last_tick_counts_and_is_told(capsys):
     for ticks, code, status in ((tripped, 0, "completed"), (tripped + 1, 1, "failsafe")):
         assert cli.main([*arguments, "--duration", f"{ticks * 1e-3:g}"]) == code
         assert f"nutation under afsm: {status}" in (printed := capsys.readouterr()).out
-        assert (Reason.JUMP.told in printed.out) == (Reason.JUMP.told in printed.err) == bool(code)
+        assert (Reason.JUMP.text in printed.out) == (Reason.JUMP.text in printed.err) == bool(code)
 
 
 def test_a_stop_during_the_rundown_is_failsafe_too():
@@ -308,7 +308,7 @@ def test_a_study_tells_of_its_failsafe_rows_and_exits_1(tmp_path, capsys):
     assert (found["rows"], found["failed"]) == (2, 1)
     assert found["summary"]["afsm"]["statuses"] == {"completed": 1, "failsafe": 1}
     assert printed.err.startswith("spheretwin: sweep: 1 of 2 rows failed, the first with key ")
-    assert printed.err.endswith(f": failsafe, {Reason.JUMP.told}\n")
+    assert printed.err.endswith(f": failsafe, {Reason.JUMP.text}\n")
     assert printed.err.count("\n") == 1
     # Finished rows stay in the table, whatever the limit.
     assert cli.main([*command, "--json", "--limit", "1"]) == 1

@@ -114,7 +114,7 @@ INPUTS = {
     "group gain": lambda machine: machine._plant.group_gain,
     "estimate": lambda machine: machine._controller.estimates.memory,
     "law": lambda machine: machine._controller.memory,
-    "belief": lambda machine: machine._controller.belief.current,
+    "belief": lambda machine: machine._controller.applied_torque.current,
     "detector": lambda machine: machine._controller.supervision.detector.shorted_A,
     "wiper": lambda machine: machine._sensors.stage("potentiometer").line.table[:, LAST],
     "converted": lambda machine: machine._sensors.stage("adc").on_the_way_rad.ravel(),

@@ -16,8 +16,8 @@ MINE = IDEAL._replace(name="mine")
 def cache(monkeypatch):
     """A cache of its own, in memory."""
     entries = {}
-    monkeypatch.setattr(memories, "kept", entries.get)
-    monkeypatch.setattr(memories, "keep", entries.__setitem__)
+    monkeypatch.setattr(memories, "load_entry", entries.get)
+    monkeypatch.setattr(memories, "store_entry", entries.__setitem__)
     return entries
 
 

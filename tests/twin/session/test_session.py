@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spheretwin.control.law import Known, Law
+from spheretwin.control.law import Law, NominalModel
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table, read_parquet
@@ -166,7 +166,9 @@ def test_a_memory_without_end_ends_a_run_only_where_it_is_logged(logged):
 
 def test_a_shipped_law_handed_over_is_the_same_law():
     section = scenario().controller
-    handed = session(section.build(Known(1e-3, 0.0, np.array(session().scenario.nominal.inertia_kg_m2))))
+    handed = session(
+        section.build(NominalModel(1e-3, 0.0, np.array(session().scenario.nominal.inertia_kg_m2)))
+    )
     assert rows(handed.advance(200)) == rows(session().advance(200))
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from spheretwin import cli
 from spheretwin.models.base.errors import InputError
-from spheretwin.models.telemetry.csv_series import Series
+from spheretwin.models.telemetry.csv_series import TimeSeries
 from spheretwin.trajectories.waypoints import Path, Waypoints
 
 HEADER = "t_s,alpha_rad,beta_rad,gamma_rad"
@@ -37,7 +37,7 @@ def some_poses(draw):
     gaps = draw(st.lists(st.floats(0.01, 3), min_size=1, max_size=6))
     angle = st.floats(-2, 2)
     poses = draw(st.lists(st.tuples(angle, angle, angle), min_size=len(gaps) + 1, max_size=len(gaps) + 1))
-    return Series(np.cumsum([draw(st.floats(-1, 1)), *gaps]), np.array(poses))
+    return TimeSeries(np.cumsum([draw(st.floats(-1, 1)), *gaps]), np.array(poses))
 
 
 @pytest.mark.parametrize("between", KINDS)
@@ -81,7 +81,7 @@ def test_minimum_jerk_solves_the_conditions_of_rest_at_both_ends(poses):
 
 
 def test_cubic_is_the_clamped_spline():
-    path = Path(Series(T, POSES), "cubic")
+    path = Path(TimeSeries(T, POSES), "cubic")
     # A piecewise cubic of two continuous derivatives with given poses and end rates is the only one: fourth
     # differences within a segment vanish, the rest is checked above.
     for start, end in pairwise(T):
@@ -89,13 +89,13 @@ def test_cubic_is_the_clamped_spline():
         np.testing.assert_allclose(np.diff(angle, 4, axis=0), 0.0, atol=1e-14)
     # Through two poses alone it is Hermite's 3 u² - 2 u³.
     share = np.linspace(0, 0.999, 11)
-    two = Path(Series(T[:2], POSES[:2]), "cubic").sample(T[0] + 0.75 * share)[:, 0, 2]
+    two = Path(TimeSeries(T[:2], POSES[:2]), "cubic").sample(T[0] + 0.75 * share)[:, 0, 2]
     np.testing.assert_allclose(two, 3 * share**2 - 2 * share**3, atol=1e-15)
 
 
 @pytest.mark.parametrize("between", KINDS)
 @given(poses=some_poses())
-@example(poses=Series(T, np.zeros((4, 3))))
+@example(poses=TimeSeries(T, np.zeros((4, 3))))
 def test_peaks_are_the_largest_there_are(between, poses):
     path = Path(poses, between)
     t = np.concatenate([np.linspace(start, end, 400, endpoint=False) for start, end in pairwise(poses.t_s)])

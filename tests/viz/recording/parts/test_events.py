@@ -23,7 +23,7 @@ def rows(t_s, scale):
 def test_every_status_ends_a_log(status):
     events = Events()
     events.of(rows([0.0, 0.5], [1.0, 1.0]))
-    assert events.end(status) == (0.5, status.level, status.told)
+    assert events.end(status) == (0.5, status.level, status.text)
 
 
 def test_a_lost_rank_is_an_event_of_its_own():
