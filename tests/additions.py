@@ -355,10 +355,10 @@ class Filter(NamedTuple):
 
 
 @part_of_its_caller
-def attenuate(stage, asked, draws):
-    for j in range(asked.shape[0]):
-        asked[j] *= stage.gain
-    pass_line(stage, asked, draws)
+def attenuate(stage, setpoint, draws):
+    for j in range(setpoint.shape[0]):
+        setpoint[j] *= stage.gain
+    pass_line(stage, setpoint, draws)
 ''',
         "twin/electronics/drive_chain.py",
         (
@@ -381,8 +381,8 @@ FUSE = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
     "sensor stage's fault": Addition(
         "",
         """
-GEAR_SIGNAL = Signal(lambda effects: effects.sensors.stage("gear").line, "rad")
-GEAR = Target("gear", line_modes.modes(GEAR_SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
+GEAR_SIGNAL = FaultSignal(lambda effects: effects.sensors.stage("gear").line, "rad")
+GEAR = Target("gear", signal_modes(GEAR_SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
 """,
         "twin/faults/targets.py",
         ("        DAC,\n", "        DAC,\n        GEAR,\n"),
@@ -390,8 +390,8 @@ GEAR = Target("gear", line_modes.modes(GEAR_SIGNAL), places=("alpha", "beta", "g
     "drive stage's fault": Addition(
         "",
         """
-FILTER_SIGNAL = Signal(lambda effects: effects.drive.stage("filter").line, "A")
-FILTER_MODES = {**line_modes.modes(FILTER_SIGNAL), **line_modes.silent_modes(FILTER_SIGNAL)}
+FILTER_SIGNAL = FaultSignal(lambda effects: effects.drive.stage("filter").line, "A")
+FILTER_MODES = {**signal_modes(FILTER_SIGNAL), **silent_modes(FILTER_SIGNAL)}
 FILTER = Target("filter", FILTER_MODES, each_group=True)
 """,
         "twin/faults/targets.py",

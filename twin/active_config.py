@@ -29,19 +29,19 @@ from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.plant.mujoco_rotor import integrator_name
 from spheretwin.scenario.changes import changed, first_tick, planned
-from spheretwin.scenario.files import Files, files_again, files_of, nominal_curve
+from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
+from spheretwin.scenario.sections import Plant as PlantSection
 from spheretwin.scenario.sections import (
-    OwnController,
-    OwnPath,
     ResolvedNominal,
     ResolvedPlant,
     ResolvedScenario,
     Scenario,
+    UserController,
+    UserPath,
 )
-from spheretwin.scenario.sections import Plant as PlantSection
 from spheretwin.trajectories import SHAPES
 from spheretwin.trajectories.rounding import Triple
-from spheretwin.trajectories.trajectory import OwnTrajectory, Sampled, checked
+from spheretwin.trajectories.trajectory import Sampled, UserTrajectory, checked
 
 # What the engine's compiler takes where a file says nothing.
 UNWRITTEN_STEP_s = 0.002
@@ -50,7 +50,7 @@ UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
 
 
 def resolved(
-    scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None
+    scenario: Scenario, files: Files, law: Law | None, trajectory: UserTrajectory | None
 ) -> ResolvedScenario:
     """Return a scenario with every default filled in, from its files, its trajectory and its hardware.
 
@@ -75,7 +75,7 @@ def resolved(
     )
     if law:
         law.check_period(scenario.controller.period_s)
-        controller = OwnController(
+        controller = UserController(
             law=name_of_own(law.name),
             period_s=scenario.controller.period_s,
             parameters=tuple(law.parameters.tolist()),
@@ -83,7 +83,7 @@ def resolved(
         )
         made = made.model_copy(update={"controller": controller})
     if trajectory:
-        made = made.model_copy(update={"trajectory": OwnPath(shape=name_of_own(trajectory.name))})
+        made = made.model_copy(update={"trajectory": UserPath(shape=name_of_own(trajectory.name))})
     _check_pose(plant.initial_rad, actuator)
     _check_faults(made.fault, actuator)
     return made
@@ -236,25 +236,25 @@ def _check_faults(faults: tuple[Fault, ...], actuator: Actuator) -> None:
             )
 
 
-class InForce(NamedTuple):
+class ActiveConfig(NamedTuple):
     """All that a machine is built from; a change gives another."""
 
     scenario: ResolvedScenario
     files: Files
-    own_law: Law | None
-    own_trajectory: OwnTrajectory | None
+    user_law: Law | None
+    user_trajectory: UserTrajectory | None
 
     @property
     def law(self) -> Law:
         """Law that is asked for; one that a scenario names is made anew at each call."""
-        return self.own_law or assembly.law_of(self.scenario)
+        return self.user_law or assembly.law_of(self.scenario)
 
     @property
     def signals(self) -> tuple[Signal, ...]:
         """Columns that a run has."""
         return assembly.signals_of(self.scenario, self.files.actuator, self.law)
 
-    def after(self, name: str, value: Any) -> InForce:
+    def after(self, name: str, value: Any) -> ActiveConfig:
         """With another value of one field, or another law.
 
         Raises
@@ -263,21 +263,21 @@ class InForce(NamedTuple):
             A field that is unknown, of the wrong type or out of range, or one of what the user replaced.
         """
         if isinstance(value, Law):
-            return _resolved(self.scenario, self.files, value, self.own_trajectory)
-        if self.own_trajectory and name.split(".")[0] == "trajectory":
+            return _resolved(self.scenario, self.files, value, self.user_trajectory)
+        if self.user_trajectory and name.split(".")[0] == "trajectory":
             raise InputError(
                 "session: expected no field of a scenario's trajectory, as"
-                f" {self.own_trajectory.name} is followed instead"
+                f" {self.user_trajectory.name} is followed instead"
             )
-        own_law = None if name == "controller.law" else self.own_law
+        user_law = None if name == "controller.law" else self.user_law
         of_the_law = name.startswith("controller.") and name.split(".")[1] not in AROUND
-        if own_law and of_the_law:
-            raise InputError(f"session: expected no field of a shipped law, as {own_law.name} is not one")
+        if user_law and of_the_law:
+            raise InputError(f"session: expected no field of a shipped law, as {user_law.name} is not one")
         scenario = changed(self.scenario, name, value)
-        files = files_again(self.files, self.scenario, scenario)
-        return _resolved(scenario, files, own_law, self.own_trajectory)
+        files = reload_files(self.files, self.scenario, scenario)
+        return _resolved(scenario, files, user_law, self.user_trajectory)
 
-    def after_each(self, plan: tuple[Change, ...]) -> Iterator[InForce]:
+    def after_each(self, plan: tuple[Change, ...]) -> Iterator[ActiveConfig]:
         """After each of some changes in turn.
 
         Raises
@@ -291,9 +291,9 @@ class InForce(NamedTuple):
             yield now
 
 
-def at_start(
+def initial_config(
     scenario: Scenario, law: Law | None, trajectory: Sampled | None, files: Files | None = None
-) -> InForce:
+) -> ActiveConfig:
     """What a session begins with; its files are read unless given.
 
     Raises
@@ -305,5 +305,7 @@ def at_start(
     return _resolved(scenario, files or files_of(scenario), law, own)
 
 
-def _resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None) -> InForce:
-    return InForce(resolved(scenario, files, law, trajectory), files, law, trajectory)
+def _resolved(
+    scenario: Scenario, files: Files, law: Law | None, trajectory: UserTrajectory | None
+) -> ActiveConfig:
+    return ActiveConfig(resolved(scenario, files, law, trajectory), files, law, trajectory)

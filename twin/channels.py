@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.control.supervision.enabled_groups import IN_USE, STATES
 from spheretwin.control.supervision.watchdog import REASONS
-from spheretwin.electronics.drive import tell
+from spheretwin.electronics.drive import write_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.base.compiled import part_of_its_caller
@@ -65,7 +65,7 @@ def drive_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_drive(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    tell(plant.driving, row)
+    write_telemetry(plant.drive, row)
 
 
 DRIVE = Channel(drive_signals, lambda scenario: scenario.drive.supply_V is not None, write_drive)
@@ -95,15 +95,15 @@ def fault_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_faults(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    groups, parts = controller.supervision.groups, plant.marks.shape[0]
+    groups, parts = controller.supervision.groups, plant.fault_modes.shape[0]
     count = groups.out.shape[0]
     for part in range(parts):
-        row[part] = plant.marks[part]
+        row[part] = plant.fault_modes[part]
     for j in range(count):
         out = groups.out[j]
         row[parts + j] = out
-        known = out != IN_USE and plant.began_s[j] >= 0.0
-        row[parts + count + j] = max(groups.out_s[j] - plant.began_s[j], 0.0) if known else NOT_YET
+        known = out != IN_USE and plant.fault_start_s[j] >= 0.0
+        row[parts + count + j] = max(groups.out_s[j] - plant.fault_start_s[j], 0.0) if known else NOT_YET
 
 
 def _logs_faults(scenario: Scenario) -> bool:

@@ -43,7 +43,7 @@ class _Known(NamedTuple):
     finite: NDArray[np.bool_]  # (n,) whether both are numbers
 
 
-class Exogenous:
+class InputGenerator:
     """Reference and disturbance of a scenario.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin import assembly
-from spheretwin.active_config import at_start
+from spheretwin.active_config import initial_config
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, shown, told_apart
 from spheretwin.models.kinematics import rate_jacobian, rotation
@@ -264,7 +264,7 @@ def linearise(
     _check_choice("kind", kind, ("scipy", "control"))
     # Before the work, so that a library that is missing is told at once.
     library = _python_control() if kind == "control" else importlib.import_module("scipy.signal")
-    in_force = at_start(scenario, None, None)
+    in_force = initial_config(scenario, None, None)
     actuator = in_force.files.actuator
     pose = _pose(in_force.scenario.plant.initial_rad if pose_rad is None else pose_rad, actuator)
     known = knowledge(in_force.scenario, in_force.files, nominal=nominal)

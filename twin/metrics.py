@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.drive_chain import drive
+from spheretwin.electronics.drive_chain import current_lag
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
@@ -161,7 +161,7 @@ class CopperLoss(Metric):
         # Shares of the distance to the command that are left on average: over the first step, over the tick,
         # and of its square over the tick, which decays twice as fast.
         self._first_step, self._tick, self._tick_squared = (
-            drive(each_lag_s, span_s, self._limit_A).mean_share
+            current_lag(each_lag_s, span_s, self._limit_A).mean_share
             for each_lag_s, span_s in (
                 (lag_s, planned.scenario.plant.step_s),
                 (lag_s, planned.period_s),

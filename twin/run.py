@@ -289,7 +289,7 @@ class Figures:
         return [line for metric in self._metrics.values() for line in metric.warnings()]
 
 
-def figures_of(run: Run, extra: Mapping[str, OwnMetric] | None = None) -> dict[str, Any]:
+def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[str, Any]:
     """Figures of a run whose telemetry is in memory.
 
     Parameters
@@ -311,7 +311,7 @@ def figures_of(run: Run, extra: Mapping[str, OwnMetric] | None = None) -> dict[s
     return {**figures.values(), **{name: own_value(name, metric, run) for name, metric in own.items()}}
 
 
-def check_names(own: Mapping[str, OwnMetric]) -> None:
+def check_names(own: Mapping[str, UserMetric]) -> None:
     """Find out whether functions of the user's have names of their own.
 
     Raises
@@ -325,7 +325,7 @@ def check_names(own: Mapping[str, OwnMetric]) -> None:
             raise InputError(f"metric: expected another name than {taken}, received {name}")
 
 
-def own_value(name: str, metric: OwnMetric, run: Run) -> Any:
+def own_value(name: str, metric: UserMetric, run: Run) -> Any:
     """What a function of the user's says of a run, as JSON holds it.
 
     Raises

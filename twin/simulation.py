@@ -145,7 +145,7 @@ def follow(
     session.check_horizon(_known_to(ticks, waiting))
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
-    noted, told = _note_events(session, 0, sinks), FaultLines()
+    noted, told = _note_events(session, 0, sinks), FaultMessages()
     while session.tick < ticks and not session.ended and not stop_requested():
         _make(session, ticks, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))

@@ -197,9 +197,9 @@ def process_seconds(*command: str) -> Callable[[], float]:
     )
 
 
-def _rotor() -> Rotor:
+def _rotor() -> MujocoRotor:
     plant = scenarios.load(SCENARIO).plant
-    rotor = Rotor(
+    rotor = MujocoRotor(
         mjcf.read(actuators.MJCF_PATH),
         plant.step_s,
         plant.integrator,

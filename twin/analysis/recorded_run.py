@@ -17,7 +17,7 @@ import numpy as np
 from spheretwin.active_config import InForce, at_start
 from spheretwin.analysis import recovery
 from spheretwin.analysis.recovery import held, ticks_of
-from spheretwin.faults.fault_injector import FaultLines
+from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.checksums import has_checksums

@@ -12,7 +12,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of
 from spheretwin.scenario.changes import FAULT, changed, is_fixed
 from spheretwin.scenario.reading import override, validated
-from spheretwin.scenario.sections import Scenario, fields_of_set
+from spheretwin.scenario.sections import Scenario, hardware_fields
 from spheretwin.session import Session
 from spheretwin.snapshot import Snapshot
 from spheretwin.trajectories.trajectory import Shape
@@ -45,8 +45,8 @@ def _with_hardware(settings: Scenario, hardware: str) -> Scenario:
     fields["hardware"] = hardware
     untouched = Scenario(trajectory=settings.trajectory).model_dump(mode="json")
     knows_truth = settings.nominal.equals_truth
-    plain = {dotted: _value(untouched, dotted) for dotted in fields_of_set(settings.hardware, knows_truth)}
-    for dotted, value in (plain | fields_of_set(hardware, knows_truth)).items():
+    plain = {dotted: _value(untouched, dotted) for dotted in hardware_fields(settings.hardware, knows_truth)}
+    for dotted, value in (plain | hardware_fields(hardware, knows_truth)).items():
         if dotted == "estimator.kind":  # another member of a family has other fields
             fields["estimator"] = {}
         override(fields, dotted, value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from spheretwin.bench.driver import Desk
-from spheretwin.faults.fault_injector import FaultLines
+from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.telemetry.table import Table
 from spheretwin.outputs import Files, Keeping
 from spheretwin.provenance import change_text
@@ -45,7 +45,7 @@ class Recording:
 
     def begin_anew(self) -> None:
         """A run begins: nothing has happened in it."""
-        self._faults, self._noted = FaultLines(), (0, 0)
+        self._faults, self._noted = FaultMessages(), (0, 0)
 
     def go_on_from(self, session: Session) -> None:
         """What was changed until now has been told."""

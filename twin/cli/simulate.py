@@ -15,7 +15,7 @@ import numpy as np
 from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, warn
-from spheretwin.loop import is_own
+from spheretwin.loop import is_user_law
 from spheretwin.metrics import Planned
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
@@ -35,7 +35,7 @@ from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import Progress
 
 
-class OwnMetrics:
+class UserMetrics:
     """Keeps what functions of the user's are to be handed, and asks them when the run is over.
 
     Parameters
@@ -55,7 +55,7 @@ class OwnMetrics:
     """
 
     def __init__(self, specs: Sequence[str]) -> None:
-        self._functions: dict[str, OwnMetric] = {}
+        self._functions: dict[str, UserMetric] = {}
         self._kept: KeptTelemetry | None = None
         self.faults: list[str] = []
         for spec in specs:
@@ -83,7 +83,7 @@ class OwnMetrics:
         run = Run(session.begun_as, status, self._kept.table, session.loop_s, session.actuator)
         return {name: self._value(name, metric, run) for name, metric in self._functions.items()}
 
-    def _value(self, name: str, metric: OwnMetric, run: Run) -> Any:
+    def _value(self, name: str, metric: UserMetric, run: Run) -> Any:
         try:
             with contextlib.redirect_stdout(sys.stderr):  # stdout is for the figures alone
                 return own_value(name, metric, run)
@@ -154,7 +154,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         raise InputError(
             f"command line: expected --view with --record or --live, received {options.view} alone"
         )
-    own = OwnMetrics(options.metric)
+    own = UserMetrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
@@ -249,7 +249,7 @@ def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
     except SpheretwinError:
         raise
     except Exception as error:  # the user's code may raise anything
-        if not is_own(session.law):
+        if not is_user_law(session.law):
             raise
         raise LawError.of(session.law.name, session.t_s, error) from error
     if session.law_error:

@@ -27,7 +27,7 @@ from spheretwin.models.mjcf import read
 from spheretwin.models.telemetry.table import Table
 from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.scenario.changes import changed
 from spheretwin.simulation import simulate
 from spheretwin.trajectories.shapes import Nutation
@@ -139,7 +139,7 @@ def integrate(pieces: Pieces, inertia: Array) -> Array:
 
 def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Array:
     """States at the ends of the pieces by MuJoCo."""
-    rotor = Rotor(read(mjcf), step_s, integrator, 0.0, 0.0)
+    rotor = MujocoRotor(read(mjcf), step_s, integrator, 0.0, 0.0)
     plant = rotor.start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]
     for torque in pieces.torque:

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from spheretwin.electronics.coil import OPEN, Coil, Relaxation, relaxation
+from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
 from spheretwin.electronics.drive_stage import DriveSetup, DriveStage
 from spheretwin.electronics.random_streams import errors
 from spheretwin.electronics.stages import FaultLine, fault_line
@@ -146,13 +146,13 @@ def amplifier(
     )
 
 
-def flow(groups: int) -> Flow:
+def zero_flow(groups: int) -> Flow:
     """Nothing has passed yet."""
     return Flow(*np.zeros((len(Flow._fields), groups)))
 
 
 @part_of_its_caller
-def clear(flow: Flow) -> None:
+def reset_sums(flow: Flow) -> None:
     """Begin the sums anew, as at the start of a control period."""
     for j in range(flow.copper_J.shape[0]):
         flow.copper_J[j] = flow.work_J[j] = 0.0
@@ -171,8 +171,8 @@ class Phase(NamedTuple):
 @part_of_its_caller
 def drive_coils(
     amplifier: Amplifier,
-    coil: Coil,
-    asked: NDArray[np.float64],
+    coil: GroupCoils,
+    setpoint: NDArray[np.float64],
     emf: NDArray[np.float64],
     current: NDArray[np.float64],
     flow: Flow,
@@ -182,7 +182,7 @@ def drive_coils(
     Parameters
     ----------
     amplifier : Amplifier
-    coil : Coil
+    coil : GroupCoils
         Of which the temperatures are left as they are: `coil.warm` carries them on.
     asked : (n,) array, A
         Held over the step. With the amplifier's offset, and within the current limit, it is the target.
@@ -202,8 +202,8 @@ def drive_coils(
     )
     stiffness = coil.inductance_H * amplifier.bandwidth_rad_s
     for j in range(current.shape[0]):
-        wanted = asked[j] + amplifier.offset_A[j]
-        target = min(max(wanted, -limit), limit)
+        unlimited = setpoint[j] + amplifier.offset_A[j]
+        target = min(max(unlimited, -limit), limit)
         e = min(max(emf[j], -LARGEST_EMF_V), LARGEST_EMF_V)
         start, R = current[j], coil.resistance_ohm[j]
         volts = R * start + stiffness * (target - start) + e
@@ -217,7 +217,7 @@ def drive_coils(
         flow.mean_current_A[j] = whole.charge_As / h
         flow.copper_J[j] += R * whole.square_A2s
         flow.work_J[j] += whole.work_J
-        if abs(wanted) > limit:
+        if abs(unlimited) > limit:
             flow.current_limited_s[j] += h
 
 
@@ -319,8 +319,15 @@ Array = NDArray[np.float64]
 
 
 @allocation_free
-def undriven(
-    contact: int, coil: Coil, group: int, step_s: float, emf_V: float, current: Array, mean: Array, flow: Flow
+def advance_open_short(
+    contact: int,
+    coil: GroupCoils,
+    group: int,
+    step_s: float,
+    emf_V: float,
+    current: Array,
+    mean: Array,
+    flow: Flow,
 ) -> None:
     """Advance the current of one undriven group by a physics step.
 
@@ -328,7 +335,7 @@ def undriven(
     ----------
     contact : int
         `OPEN` or `SHORTED`.
-    coil : Coil
+    coil : GroupCoils
         Its temperature is left as it is.
     group : int
     step_s : float, s

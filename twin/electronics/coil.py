@@ -110,7 +110,7 @@ class CoilSection(BaseModel):
     )
 
 
-class Coil(NamedTuple):
+class GroupCoils(NamedTuple):
     """Coils of all groups as compiled code sees them."""
 
     inductance_H: float
@@ -134,9 +134,9 @@ class Coil(NamedTuple):
         return (self.contact,)
 
 
-def coil(
+def group_coils(
     section: CoilSection, resistance_ohm: float, inductance_H: float, period_s: float, groups: int
-) -> Coil:
+) -> GroupCoils:
     """Coils at the temperature around them.
 
     Parameters
@@ -150,7 +150,7 @@ def coil(
     """
     cold = resistance_ohm if section.resistance_ohm is None else section.resistance_ohm
     time_constant_s = section.thermal_resistance_K_W * section.heat_capacity_J_K
-    made = Coil(
+    coils = GroupCoils(
         inductance_H=inductance_H if section.inductance_H is None else section.inductance_H,
         cold_resistance_ohm=cold,
         resistance_per_K=section.resistance_per_K,
@@ -163,12 +163,12 @@ def coil(
         resistance_ohm=np.empty(groups),
         contact=np.full(groups, DRIVEN, dtype=np.int64),
     )
-    settle_resistance(made)
-    return made
+    update_resistance(coils)
+    return coils
 
 
 @part_of_its_caller
-def settle_resistance(coil: Coil) -> None:
+def update_resistance(coil: GroupCoils) -> None:
     """``R = R20 (1 + a (T - 20 °C))`` at the present temperatures."""
     for j in range(coil.resistance_ohm.shape[0]):
         rise = coil.temperature_degC[j] - REFERENCE_degC
@@ -176,12 +176,12 @@ def settle_resistance(coil: Coil) -> None:
 
 
 @part_of_its_caller
-def warm(coil: Coil, copper_J: NDArray[np.float64]) -> None:
+def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None:
     """Carry temperature and resistance over one control period, exactly for the mean power in it.
 
     Parameters
     ----------
-    coil : Coil
+    coil : GroupCoils
         Changed in place.
     copper_J : (n,) array, J
         Copper loss of each group in the period.
@@ -190,11 +190,11 @@ def warm(coil: Coil, copper_J: NDArray[np.float64]) -> None:
         power = copper_J[j] / coil.period_s
         last = coil.ambient_degC + coil.thermal_resistance_K_W * power
         coil.temperature_degC[j] += (last - coil.temperature_degC[j]) * coil.settled
-    settle_resistance(coil)
+    update_resistance(coil)
 
 
 @part_of_its_caller
-def overheated(coil: Coil) -> bool:
+def is_overheated(coil: GroupCoils) -> bool:
     """Whether a group is as hot as its amplifier lets it be, or its temperature is not a number."""
     for j in range(coil.temperature_degC.shape[0]):
         if not coil.temperature_degC[j] < coil.shutdown_degC:

@@ -85,9 +85,9 @@ class DacStage(NamedTuple):
 
 
 @part_of_its_caller
-def convert_command(stage: DacStage, asked: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+def convert_command(stage: DacStage, setpoint: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
     """Convert a command (n,), A, in its place."""
-    convert(stage.dac, asked, asked)
+    convert(stage.dac, setpoint, setpoint)
 
 
 class Dac(NamedTuple):
@@ -129,7 +129,7 @@ def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int
 
 
 @allocation_free
-def convert(dac: Dac, command: NDArray[np.float64], asked: NDArray[np.float64]) -> None:
+def convert(dac: Dac, command: NDArray[np.float64], setpoint: NDArray[np.float64]) -> None:
     """Convert a command.
 
     It depends on nothing but the command: it may be called when a command comes into force, or once when it
@@ -145,7 +145,7 @@ def convert(dac: Dac, command: NDArray[np.float64], asked: NDArray[np.float64]) 
     """
     if not dac.converts:
         for j in range(command.shape[0]):
-            asked[j] = command[j]
+            setpoint[j] = command[j]
         return
     for j in range(command.shape[0]):
         held = min(max(command[j], -dac.span_A), dac.span_A)  # its quotients stay numbers
@@ -153,7 +153,7 @@ def convert(dac: Dac, command: NDArray[np.float64], asked: NDArray[np.float64]) 
         code = min(max(code, dac.lowest), dac.highest)
         inl = _inl(dac.inl_lsb[j], (2.0 * code + 1.0) / (dac.highest - dac.lowest))
         volts = dac.lsb_V * (code * dac.gain[j] + inl) + dac.offset_V[j]
-        asked[j] = dac.transconductance_A_V * volts
+        setpoint[j] = dac.transconductance_A_V * volts
 
 
 @allocation_free

@@ -21,23 +21,23 @@ from spheretwin.electronics.amplifier import (
     Amplifier,
     AmplifierSection,
     Flow,
+    advance_open_short,
     amplifier,
-    clear,
     drive_coils,
-    flow,
-    undriven,
+    reset_sums,
+    zero_flow,
 )
 from spheretwin.electronics.coil import (
     DRIVEN,
     OPEN,
     SHORTED,
-    Coil,
     CoilSection,
+    GroupCoils,
+    advance_temperature,
     back_emf,
-    coil,
-    overheated,
-    settle_resistance,
-    warm,
+    group_coils,
+    is_overheated,
+    update_resistance,
 )
 from spheretwin.electronics.converters import DacSection
 from spheretwin.electronics.delay import Delay, DelaySection, delay, due, latch, transfer_delay
@@ -92,7 +92,7 @@ class ResolvedDrive(DriveSection):
         return cast("float", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s
 
 
-class Drive(NamedTuple):
+class CurrentLag(NamedTuple):
     """First-order lag, solved exactly over one physics step with the command held."""
 
     decay: float
@@ -103,17 +103,17 @@ class Drive(NamedTuple):
     """Of the amplifiers, whatever is asked of them."""
 
 
-def drive(time_constant_s: float, step_s: float, current_limit_A: float) -> Drive:
+def current_lag(time_constant_s: float, step_s: float, current_limit_A: float) -> CurrentLag:
     """Drive for a time constant L/R (s; 0 for ideal amplifiers), a physics step (s) and a limit (A)."""
     if time_constant_s == 0:
-        return Drive(0.0, 0.0, current_limit_A)
+        return CurrentLag(0.0, 0.0, current_limit_A)
     steps = step_s / time_constant_s
-    return Drive(exp(-steps), -expm1(-steps) / steps, current_limit_A)
+    return CurrentLag(exp(-steps), -expm1(-steps) / steps, current_limit_A)
 
 
 @allocation_free
 def advance_lag(
-    drive: Drive,
+    lag: CurrentLag,
     command: NDArray[np.float64],
     current: NDArray[np.float64],
     mean: NDArray[np.float64],
@@ -122,7 +122,7 @@ def advance_lag(
 
     Parameters
     ----------
-    drive : Drive
+    lag : CurrentLag
         Lag of the groups.
     command : (n,) array, A
         Held over the step; the amplifiers follow it as far as their limit.
@@ -131,17 +131,17 @@ def advance_lag(
     mean : (n,) array, A
         Mean over the step, which is what acts on the rotor.
     """
-    limit = drive.current_limit_A
+    limit = lag.current_limit_A
     for j in range(command.shape[0]):
         target = min(max(command[j], -limit), limit)
         distance = current[j] - target
-        mean[j] = target + drive.mean_share * distance
-        current[j] = target + drive.decay * distance
+        mean[j] = target + lag.mean_share * distance
+        current[j] = target + lag.decay * distance
 
 
 Array = NDArray[np.float64]
 
-GOING, HANGING, SILENT = 0, 1, 2
+NORMAL, STUCK, SILENT = 0, 1, 2
 """What leaves the controller: its commands, its last one for ever, or nothing."""
 
 RELEASED, BRAKED = 1, 2
@@ -152,16 +152,16 @@ _convert = chained([kind.convert() for kind in STAGES.values()])
 _advance = chained([kind.advance() for kind in STAGES.values()])
 
 
-class Output(NamedTuple):
+class ControllerOutput(NamedTuple):
     """Output of the controller, which faults and a watchdog act on."""
 
-    leaves: NDArray[np.int64]  # (1,) `GOING`, `HANGING` or `SILENT`
-    late_steps: NDArray[np.int64]  # (1,) physics steps more of delay
+    state: NDArray[np.int64]  # (1,) `NORMAL`, `STUCK` or `SILENT`
+    delay_steps: NDArray[np.int64]  # (1,) physics steps more of delay
     halt: NDArray[np.int64]  # (1,) a watchdog's
 
     def fault_arrays(self) -> tuple[NDArray[Any], ...]:
         """Arrays that faults write."""
-        return self.leaves, self.late_steps
+        return self.state, self.delay_steps
 
 
 class DriveChain(NamedTuple):
@@ -170,16 +170,16 @@ class DriveChain(NamedTuple):
     converts: bool  # whether what is asked of the amplifiers is other than the command
     supplied: bool  # whether the amplifiers have a supply, and the coils a voltage
     supply_V: float
-    lag: Drive
-    output: Output
+    lag: CurrentLag
+    output: ControllerOutput
     stages: tuple[Any, ...]  # in the order of `STAGES`
     delay: Delay
     supply: FaultLine  # of its voltage
     amplifier: Amplifier
-    coil: Coil
+    coil: GroupCoils
     flow: Flow
     draws: Array  # standard normal numbers of this tick, of faults
-    asked: Array  # (n,) A of the amplifiers
+    setpoint: Array  # (n,) A of the amplifiers
     emf: Array  # (n,) V
     rate_S: Array  # (3,) rad/s of the rotor, stator frame
     period: Array  # (3,) of this control period: charge drawn in As, supply in V, 1 if a group is not driven
@@ -190,7 +190,7 @@ class DriveChain(NamedTuple):
         return self.stages[_NAMES.index(name)]
 
 
-DRAWN_As, SUPPLY_V, UNDRIVEN = 0, 1, 2
+DRAWN_As, SUPPLY_V, OPEN_SHORT = 0, 1, 2
 """Places in `DriveChain.period`."""
 
 
@@ -240,52 +240,52 @@ def drive_chain(
     if faults:
         more = -(-faults.most_late_steps // substeps)
         late = late._replace(ring=np.zeros((len(late.ring) + more, groups)))
-    made = DriveChain(
+    chain = DriveChain(
         converts=section.converts or faults is not None,
         supplied=section.supply_V is not None,
         supply_V=0.0 if section.supply_V is None else section.supply_V,
-        lag=drive(section.lag_s, step_s, section.current_limit_A),
-        output=Output(
-            np.full(1, GOING), np.zeros(1, dtype=np.int64), faults.halt if faults else np.full(1, GOING)
+        lag=current_lag(section.lag_s, step_s, section.current_limit_A),
+        output=ControllerOutput(
+            np.full(1, NORMAL), np.zeros(1, dtype=np.int64), faults.halt if faults else np.full(1, NORMAL)
         ),
         stages=tuple(kind.build(section, setup) for kind in STAGES.values()),
         delay=late,
         supply=fault_line(1),
         amplifier=amplifier(section, section.current_limit_A, step_s, groups, seed),
-        coil=coil(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
-        flow=flow(groups),
+        coil=group_coils(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
+        flow=zero_flow(groups),
         draws=faults.draws if faults else np.empty(0),
-        asked=np.zeros(groups),
+        setpoint=np.zeros(groups),
         emf=np.zeros(groups),
         rate_S=np.zeros(3),
         period=np.zeros(3),
         before=np.zeros((5, groups)),
     )
-    made.period[SUPPLY_V] = made.supply_V
-    return made
+    chain.period[SUPPLY_V] = chain.supply_V
+    return chain
 
 
 @part_of_its_caller
 def begin(chain: DriveChain, command: Array) -> None:
     """Take the commands of a control period, as far as they leave the controller, and begin its sums."""
-    asked, output, period = chain.asked, chain.output, chain.period
+    setpoint, output, period = chain.setpoint, chain.output, chain.period
     if chain.converts:
-        if output.leaves[0] == HANGING:
-            for j in range(asked.shape[0]):
-                asked[j] = chain.delay.ring[chain.delay.newest[0], j]
+        if output.state[0] == STUCK:
+            for j in range(setpoint.shape[0]):
+                setpoint[j] = chain.delay.ring[chain.delay.newest[0], j]
         else:
-            for j in range(asked.shape[0]):
-                asked[j] = 0.0 if output.leaves[0] == SILENT else command[j]
-            _convert(chain.stages, asked, chain.draws)
-        latch(chain.delay, asked)
-    clear(chain.flow)
+            for j in range(setpoint.shape[0]):
+                setpoint[j] = 0.0 if output.state[0] == SILENT else command[j]
+            _convert(chain.stages, setpoint, chain.draws)
+        latch(chain.delay, setpoint)
+    reset_sums(chain.flow)
     period[DRAWN_As] = 0.0
     if chain.supplied:
         period[SUPPLY_V] = max(through(chain.supply, 0, chain.supply_V, chain.draws), 0.0)
-    period[UNDRIVEN] = 0.0
-    for j in range(asked.shape[0]):
+    period[OPEN_SHORT] = 0.0
+    for j in range(setpoint.shape[0]):
         if _contact(chain, j) != DRIVEN:
-            period[UNDRIVEN] = 1.0
+            period[OPEN_SHORT] = 1.0
 
 
 @part_of_its_caller
@@ -320,39 +320,39 @@ def advance(
     mean : (n,) array, A
         Result: over the step.
     """
-    asked, undriven_groups = chain.asked if chain.converts else command, chain.period[UNDRIVEN] != 0.0
+    setpoint, any_open_short = chain.setpoint if chain.converts else command, chain.period[OPEN_SHORT] != 0.0
     if chain.converts:
-        ask(chain, substep)
-    if chain.supplied or undriven_groups:
+        update_setpoint(chain, substep)
+    if chain.supplied or any_open_short:
         angular_velocity(q, qdot, chain.rate_S)
         back_emf(G, gain, chain.rate_S, chain.emf)
-    if undriven_groups:
-        _keep(chain, current)
+    if any_open_short:
+        _save_open_short_groups(chain, current)
     if chain.supplied:
-        drive_coils(_supplied(chain), chain.coil, asked, chain.emf, current, chain.flow)
+        drive_coils(_amplifier_on_supply(chain), chain.coil, setpoint, chain.emf, current, chain.flow)
         for j in range(mean.shape[0]):
             mean[j] = chain.flow.mean_current_A[j]
     else:
-        advance_lag(chain.lag, asked, current, mean)
-    if undriven_groups:
-        _advance_undriven(chain, current, mean)
+        advance_lag(chain.lag, setpoint, current, mean)
+    if any_open_short:
+        _advance_open_short_groups(chain, current, mean)
     if chain.supplied:
-        _draw(chain, asked, mean)
+        _add_supply_charge(chain, setpoint, mean)
 
 
 @part_of_its_caller
-def ask(chain: DriveChain, substep: int) -> None:
+def update_setpoint(chain: DriveChain, substep: int) -> None:
     """Write what the amplifiers are asked for in a physics step."""
-    asked, late, output = chain.asked, chain.delay, chain.output
-    due(Delay(late.ring, late.newest, late.steps + output.late_steps[0], late.substeps), substep, asked)
-    if output.halt[0] != GOING:
-        for j in range(asked.shape[0]):
-            asked[j] = 0.0
-    _advance(chain.stages, asked, chain.draws)
+    setpoint, late, output = chain.setpoint, chain.delay, chain.output
+    due(Delay(late.ring, late.newest, late.steps + output.delay_steps[0], late.substeps), substep, setpoint)
+    if output.halt[0] != NORMAL:
+        for j in range(setpoint.shape[0]):
+            setpoint[j] = 0.0
+    _advance(chain.stages, setpoint, chain.draws)
 
 
 @part_of_its_caller
-def _supplied(chain: DriveChain) -> Amplifier:
+def _amplifier_on_supply(chain: DriveChain) -> Amplifier:
     """Amplifiers on the supply of this period, whose swing is 0 if the drops take all of it."""
     amplifier, more_V = chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V
     if more_V == 0.0:
@@ -370,20 +370,20 @@ def _supplied(chain: DriveChain) -> Amplifier:
 
 
 @part_of_its_caller
-def _draw(chain: DriveChain, asked: Array, mean: Array) -> None:
+def _add_supply_charge(chain: DriveChain, setpoint: Array, mean: Array) -> None:
     """Add what the amplifiers draw from the supply in a physics step."""
     amplifier, period = chain.amplifier, chain.period
     for j in range(mean.shape[0]):
         drawn = mean[j]
-        if period[UNDRIVEN] != 0.0 and _contact(chain, j) == SHORTED:
+        if period[OPEN_SHORT] != 0.0 and _contact(chain, j) == SHORTED:
             # What turns in the coil is not the supply's; past it, the amplifier drives what it is asked.
             limit = amplifier.current_limit_A
-            drawn = min(max(asked[j] + amplifier.offset_A[j], -limit), limit)
+            drawn = min(max(setpoint[j] + amplifier.offset_A[j], -limit), limit)
         period[DRAWN_As] += abs(drawn) * amplifier.step_s
 
 
 @part_of_its_caller
-def _keep(chain: DriveChain, current: Array) -> None:
+def _save_open_short_groups(chain: DriveChain, current: Array) -> None:
     """Keep currents and sums of the groups that no amplifier drives, before all are driven."""
     flow, before = chain.flow, chain.before
     for j in range(current.shape[0]):
@@ -393,7 +393,7 @@ def _keep(chain: DriveChain, current: Array) -> None:
 
 
 @part_of_its_caller
-def _advance_undriven(chain: DriveChain, current: Array, mean: Array) -> None:
+def _advance_open_short_groups(chain: DriveChain, current: Array, mean: Array) -> None:
     """Undo what driving has done to the groups that no amplifier drives, and advance them by themselves."""
     flow, before = chain.flow, chain.before
     for j in range(current.shape[0]):
@@ -401,7 +401,9 @@ def _advance_undriven(chain: DriveChain, current: Array, mean: Array) -> None:
         if contact != DRIVEN:
             current[j], flow.copper_J[j], flow.work_J[j] = before[0, j], before[1, j], before[2, j]
             flow.voltage_limited_s[j], flow.current_limited_s[j] = before[3, j], before[4, j]
-            undriven(contact, chain.coil, j, chain.amplifier.step_s, chain.emf[j], current, mean, flow)
+            advance_open_short(
+                contact, chain.coil, j, chain.amplifier.step_s, chain.emf[j], current, mean, flow
+            )
 
 
 @part_of_its_caller
@@ -415,13 +417,13 @@ def _contact(chain: DriveChain, group: int) -> int:
 def end(chain: DriveChain) -> bool:
     """End a control period: the coils have warmed by what they lost; returns whether none is too hot."""
     if chain.supplied:
-        warm(chain.coil, chain.flow.copper_J)
-        return not overheated(chain.coil)
+        advance_temperature(chain.coil, chain.flow.copper_J)
+        return not is_overheated(chain.coil)
     return True
 
 
 @part_of_its_caller
-def tell(chain: DriveChain, row: Array) -> None:
+def write_telemetry(chain: DriveChain, row: Array) -> None:
     """Write power, losses, temperatures and limits of the control period into the beginning of `row`."""
     flow, period_s, groups = chain.flow, chain.coil.period_s, chain.emf.shape[0]
     row[0] = chain.period[SUPPLY_V] * chain.period[DRAWN_As] / period_s
@@ -450,9 +452,9 @@ def transfer(before: DriveChain | None, after: DriveChain, command: Array) -> No
     else:
         transfer_delay(before.delay, after.delay)
         after.coil.temperature_degC[:] = before.coil.temperature_degC
-        settle_resistance(after.coil)
+        update_resistance(after.coil)
     if after.converts:  # what is held from now on is what it would have been
-        ask(after, after.delay.substeps - 1)
+        update_setpoint(after, after.delay.substeps - 1)
     for was, now in zip(before.stages if before else after.stages, after.stages, strict=True):
         if was.on and now.on:
             transfer_state(was, now)

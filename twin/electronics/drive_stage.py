@@ -61,7 +61,7 @@ class DriveStage(BaseModel):
 
 
 @part_of_its_caller
-def pass_line(stage: Any, asked: NDArray, draws: NDArray) -> None:
+def pass_line(stage: Any, setpoint: NDArray, draws: NDArray) -> None:
     """Pass what is asked of each group, A, through the fault line of a stage."""
     for j in range(stage.line.table.shape[0]):
-        asked[j] = through(stage.line, j, asked[j], draws)
+        setpoint[j] = through(stage.line, j, setpoint[j], draws)

@@ -25,14 +25,14 @@ from spheretwin.electronics.sensor_chain import (
 from spheretwin.models.base.compiled import part_of_its_caller
 
 
-class Exact(NamedTuple):
+class IdealSensors(NamedTuple):
     """Sensors that hand over the truth."""
 
     rows: int  # that they write of a measurement
 
 
 @part_of_its_caller
-def _exactly(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> bool:
+def _sense_ideal(sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> bool:
     finite = True
     for i in range(3):
         measurement[0, i], measurement[1, i] = q[i], qdot[i]
@@ -40,17 +40,19 @@ def _exactly(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> b
     return finite
 
 
-Sensors = Exact | SensorChain
+Sensors = IdealSensors | SensorChain
 
-_SENSE: dict[type, Any] = {Exact: _exactly, SensorChain: chain.sense}
+_SENSE: dict[type, Any] = {IdealSensors: _sense_ideal, SensorChain: chain.sense}
 
 
-def made(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> Sensors:
+def build_sensors(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> Sensors:
     """Sensors of a section, with the errors that the seed gives them, and the faults that may come."""
-    return Exact(2) if section.ideal and faults is None else sensor_chain(section, seed, faults)
+    return IdealSensors(2) if section.ideal and faults is None else sensor_chain(section, seed, faults)
 
 
-def carried_on(before: Sensors, after: Sensors, section: SensorsSection, q: NDArray, noise: NDArray) -> None:
+def transfer_sensors(
+    before: Sensors, after: Sensors, section: SensorsSection, q: NDArray, noise: NDArray
+) -> None:
     """Go on as before with other figures.
 
     Parameters
@@ -74,18 +76,18 @@ def carried_on(before: Sensors, after: Sensors, section: SensorsSection, q: NDAr
             chain.transfer(before, after)
 
 
-def sense(sensing: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:
+def sense(sensors: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:
     """Write measured angles and true rates into a measurement (3, 3), as `chain.sense` does."""
-    return bool(_SENSE[type(sensing)](sensing, q, qdot, noise, measurement))
+    return bool(_SENSE[type(sensors)](sensors, q, qdot, noise, measurement))
 
 
 @overload(sense, inline="always")
 def _compiled_sense(
-    sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any
+    sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any
 ) -> Callable[..., Any] | None:
-    chosen: Any = _SENSE.get(getattr(sensing, "instance_class", object))
+    chosen: Any = _SENSE.get(getattr(sensors, "instance_class", object))
 
-    def call(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> Any:
-        return chosen(sensing, q, qdot, noise, measurement)
+    def call(sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> Any:
+        return chosen(sensors, q, qdot, noise, measurement)
 
     return call if chosen else None

@@ -22,10 +22,10 @@ from spheretwin.models.lagrangian import (
     triple,
     turns,
 )
-from spheretwin.plant.rotor import EngineKind, Setting
+from spheretwin.plant.rotor import EngineKind, RotorSettings
 
 
-class Equations(NamedTuple):
+class LagrangianData(NamedTuple):
     """The equations of motion as compiled code sees them; the last three are what the loop reads and sets."""
 
     step_s: float
@@ -82,7 +82,7 @@ class LagrangianRotor:
         self.inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
         self.weight_moment = payload_kg * gravity_m_s2 * height
 
-    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Equations:
+    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> LagrangianData:
         """Set pose and rates at time 0; return what compiled code steps.
 
         Parameters
@@ -94,7 +94,7 @@ class LagrangianRotor:
         """
         pose, rates = np.array(q, dtype=np.float64), np.array(qdot, dtype=np.float64)
         self._state = pose, rates
-        return Equations(
+        return LagrangianData(
             step_s=self._step_s,
             inertia=self.inertia,
             weight_moment=self.weight_moment,
@@ -114,7 +114,7 @@ class LagrangianRotor:
 
 
 @allocation_free
-def step(plant: Equations) -> None:
+def step(plant: LagrangianData) -> None:
     """One physics step of the classical Runge-Kutta method of order four.
 
     The torque on the hinges is held over the step, as MuJoCo does. The state goes through the stages as
@@ -135,7 +135,7 @@ def step(plant: Equations) -> None:
 
 
 @allocation_free
-def _acceleration(plant: Equations, q: Triple, qdot: Triple) -> Triple:
+def _acceleration(plant: LagrangianData, q: Triple, qdot: Triple) -> Triple:
     torque, inertia = triple(plant.torque_q), triple(plant.inertia)
     return acceleration_entries(turns(q), qdot, torque, inertia, plant.weight_moment)
 
@@ -145,23 +145,23 @@ def _moved(start: Triple, time: float, rate: Triple) -> Triple:
     return start[0] + time * rate[0], start[1] + time * rate[1], start[2] + time * rate[2]
 
 
-def _set_up(setting: Setting) -> LagrangianRotor:
-    gravity_m_s2 = setting.gravity_m_s2
+def _set_up(settings: RotorSettings) -> LagrangianRotor:
+    gravity_m_s2 = settings.gravity_m_s2
     known = () if gravity_m_s2 is None else (mjcf.OTHER_GRAVITY,)
-    unknown = [name for name in setting.model.unknown_to_the_lagrangian if name not in known]
+    unknown = [name for name in settings.model.unknown_to_the_lagrangian if name not in known]
     if unknown:
         raise InputError(
             "Lagrangian plant: expected a rigid rotor on three ideal hinges, received a model with"
             f" {', '.join(unknown)}; plant.engine mujoco computes it"
         )
     return LagrangianRotor(
-        setting.actuator,
-        setting.step_s,
-        setting.integrator,
-        setting.modelling_error,
-        setting.payload_kg,
+        settings.actuator,
+        settings.step_s,
+        settings.integrator,
+        settings.modelling_error,
+        settings.payload_kg,
         gravity_m_s2=0.0 if gravity_m_s2 is None else gravity_m_s2,
     )
 
 
-LAGRANGIAN = EngineKind("lagrangian", _set_up, Equations, step)
+LAGRANGIAN = EngineKind("lagrangian", _set_up, LagrangianData, step)

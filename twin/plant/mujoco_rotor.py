@@ -30,7 +30,7 @@ def integrator_name(number: int) -> str:
     return names.get(number, mujoco.mjtIntegrator(number).name.removeprefix("mjINT_").lower())
 
 
-class Engine(NamedTuple):
+class MujocoData(NamedTuple):
     """The engine as compiled code sees it: two addresses, and views of MuJoCo's own arrays."""
 
     model_address: int
@@ -41,7 +41,7 @@ class Engine(NamedTuple):
     warnings: NDArray[np.int32]  # how often the engine has warned, of each kind
 
 
-class Rotor:
+class MujocoRotor:
     """The rotor in MuJoCo, set up for one run.
 
     Parameters
@@ -86,7 +86,7 @@ class Rotor:
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
 
-    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Engine:
+    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> MujocoData:
         """Set pose and rates at time 0; return what compiled code steps.
 
         Parameters
@@ -98,7 +98,7 @@ class Rotor:
         """
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = q, qdot
-        return Engine(
+        return MujocoData(
             self.model._address,
             self.data._address,
             self.data.qpos,
@@ -132,21 +132,21 @@ else:
 
 
 @compiled
-def step(engine: Engine) -> None:
+def step(engine: MujocoData) -> None:
     """One physics step of MuJoCo, from compiled code or from Python."""
     _mj_step(engine.model_address, engine.data_address)
 
 
 MUJOCO = EngineKind(
     "mujoco",
-    lambda setting: Rotor(
-        setting.model,
-        setting.step_s,
-        setting.integrator,
-        setting.modelling_error,
-        setting.payload_kg,
-        setting.gravity_m_s2,
+    lambda settings: MujocoRotor(
+        settings.model,
+        settings.step_s,
+        settings.integrator,
+        settings.modelling_error,
+        settings.payload_kg,
+        settings.gravity_m_s2,
     ),
-    Engine,
+    MujocoData,
     step,
 )

@@ -12,7 +12,7 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.mjcf import Mjcf
 
 
-class Setting(NamedTuple):
+class RotorSettings(NamedTuple):
     """What a rotor is set up from."""
 
     model: Mjcf
@@ -61,9 +61,9 @@ class EngineKind(NamedTuple):
 
     name: str
     """As `plant.engine` has it."""
-    set_up: Callable[[Setting], Rotor]
+    set_up: Callable[[RotorSettings], Rotor]
     """May refuse, with an InputError, a model that holds what it does not know."""
-    stepped: type
+    data: type
     """Class of what `Rotor.start` returns."""
     step: Callable[[Any], None]
     """Takes one physics step of that; compiled."""

@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from spheretwin.electronics.drive import Stages, advance_currents, begin, end
+from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.models.base.compiled import copy_into, part_of_its_caller
 from spheretwin.models.kinematics import generalised_torque
@@ -27,7 +27,7 @@ ENGINES: dict[str, EngineKind] = {
 }
 
 
-_STEPS: dict[type, Callable[[Any], None]] = {row.stepped: row.step for row in ENGINES.values()}
+_STEPS: dict[type, Callable[[Any], None]] = {row.data: row.step for row in ENGINES.values()}
 
 
 def step(rotor: Any) -> None:
@@ -63,7 +63,7 @@ class Plant(NamedTuple):
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
-    driving: Stages
+    drive: DriveModel
     friction: Friction
     group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
@@ -75,17 +75,19 @@ class Plant(NamedTuple):
     last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
     current: NDArray[np.float64]  # (n,) A, now
     mean_current: NDArray[np.float64]  # (n,) A, over the physics step
-    pulling: NDArray[np.float64]  # (n,) A, the same times the gain
+    effective_current: NDArray[np.float64]  # (n,) A, the same times the gain
     torque_S: NDArray[np.float64]  # (3,) N·m of the coils, stator frame, in the physics step
     friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, mean over the physics step
     first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
     draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and of sensors of currents
     current_sensors: CurrentSensors
-    marks: NDArray[np.float64]  # of every part that may fail: the number of its mode, or 0
-    began_s: NDArray[np.float64]  # (n,) when the last fault of each group began, s; below 0 where none has
+    fault_modes: NDArray[np.float64]  # of every part that may fail: the number of its mode, or 0
+    fault_start_s: NDArray[
+        np.float64
+    ]  # (n,) when the last fault of each group began, s; below 0 where none has
 
 
-class Delivered(NamedTuple):
+class PlantOutput(NamedTuple):
     """Currents and torque in a control period: the plant's part of a telemetry row."""
 
     current: NDArray[np.float64]  # (n,) A, mean over the first physics step
@@ -95,7 +97,7 @@ class Delivered(NamedTuple):
 
 @part_of_its_caller
 def plant_tick(
-    plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: Delivered
+    plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: PlantOutput
 ) -> int:
     """Advance the plant by one control period.
 
@@ -124,15 +126,15 @@ def plant_tick(
     q, qdot, torque_q, torque_S = rotor.q, rotor.qdot, rotor.torque_q, plant.torque_S
     middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
     hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
-    current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
+    current, mean_current, effective_current = plant.current, plant.mean_current, plant.effective_current
     gain, unmodelled, friction, friction_q = (
         plant.group_gain,
         plant.unmodelled_torque,
         plant.friction,
         plant.friction_q,
     )
-    driving = plant.driving
-    begin(driving, command)
+    drive = plant.drive
+    begin(drive, command)
     for substep in range(plant.substeps):
         for i in range(3):
             middle_q[i] = q[i] + half_step_s * qdot[i]
@@ -142,11 +144,11 @@ def plant_tick(
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
         fill_torque_matrix(middle_q, magnetics, G, scratch)
-        advance_currents(driving, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
+        advance_currents(drive, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
         log_mean_current(mean_current, substep, delivered.mean_current)
-        for j in range(pulling.shape[0]):
-            pulling[j] = gain[j] * mean_current[j]
-        rotor_torque(G, pulling, torque_S)
+        for j in range(effective_current.shape[0]):
+            effective_current[j] = gain[j] * mean_current[j]
+        rotor_torque(G, effective_current, torque_S)
         generalised_torque(middle_q, torque_S, torque_q)
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
@@ -163,7 +165,7 @@ def plant_tick(
         for i in range(3):  # at every step: beyond its range a hinge would meet a stop that is not computed
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
-    if not end(driving):
+    if not end(drive):
         return FAILSAFE
     for kind in range(rotor.warnings.shape[0]):
         if rotor.warnings[kind] > 0:

@@ -10,7 +10,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.scenario.changes import check_events, fields_with
 from spheretwin.scenario.reading import beside, override, validated
-from spheretwin.scenario.sections import Scenario, left_open
+from spheretwin.scenario.sections import Scenario, hardware_defaults
 from spheretwin.trajectories import SHAPES
 
 
@@ -32,7 +32,7 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     """
     fields = fields_with(source, overrides or {})
     hardware = fields.get("hardware")
-    for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
+    for dotted, value in hardware_defaults(fields, hardware if isinstance(hardware, str) else None).items():
         override(fields, dotted, value)
     try:
         taken = beside("", fields)

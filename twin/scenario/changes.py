@@ -16,7 +16,7 @@ from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.scenario.fields import Kind, every_field, kind_of, section_kind
 from spheretwin.scenario.reading import beside, is_dotted, override, read, shipped, validated
-from spheretwin.scenario.sections import OwnController, Scenario, kind_of_scenario, scenario_with
+from spheretwin.scenario.sections import Scenario, UserController, kind_of_scenario, scenario_with
 
 # What a run is begun with cannot be changed on its way.
 FIXED = (
@@ -39,9 +39,9 @@ FIXED = (
 FAULT = "fault"
 
 TAGS = frozenset(
-    kind.told_apart_by
+    kind.discriminator
     for _, field in every_field(Scenario)
-    if (kind := kind_of(field)) and kind.told_apart_by
+    if (kind := kind_of(field)) and kind.discriminator
 )
 """Names of the fields that choose a member of a family, as ``shape`` and ``law``."""
 
@@ -120,7 +120,7 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
         raise InputError(f"scenario: expected a field such as controller.law, received {shown(dotted)}")
     value = copy.deepcopy(value)
     fields = scenario.model_dump(mode="json")
-    if isinstance(scenario.controller, OwnController):
+    if isinstance(scenario.controller, UserController):
         del fields["controller"]["parameters"]
         fields["controller"]["law"] = next(iter(LAWS))
     untouched = _set_aside(fields, dotted)
@@ -223,7 +223,7 @@ def _keep_common(
             return
         owner = kind.chosen(inside)[0].model_fields.get(section, field)
         inside, present, kind = inside[section], getattr(present, section), kind_of(owner)
-    if kind and kind.told_apart_by == name and isinstance(value, str) and value in kind.members:
+    if kind and kind.discriminator == name and isinstance(value, str) and value in kind.members:
         old, new = type(present).model_fields, kind.members[value].model_fields
         for each in list(inside):
             same = each in new and each in old and new[each].annotation == old[each].annotation

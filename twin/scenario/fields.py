@@ -27,13 +27,13 @@ class Kind:
 
     members: Mapping[str, type[BaseModel]]
     """By tag; a plain section is the only one, under no tag."""
-    told_apart_by: str | None
+    discriminator: str | None
     """Field that holds the tag."""
     is_list: bool = False
 
     def chosen(self, fields: Mapping[str, Any]) -> list[type[BaseModel]]:
         """Members that given fields may be of: all where they do not say."""
-        tag = fields.get(self.told_apart_by) if self.told_apart_by else ""
+        tag = fields.get(self.discriminator) if self.discriminator else ""
         named = self.members.get(tag) if isinstance(tag, str) else None
         return [named] if named else list(self.members.values())
 
@@ -100,7 +100,7 @@ def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> Place:
         elif kind.is_list:
             dotted.append(str(part))
             kind = replace(kind, is_list=False)
-            entered = None if kind.told_apart_by else kind.members[""]
+            entered = None if kind.discriminator else kind.members[""]
         elif entered is None and part in kind.members:
             entered = kind.members[str(part)]
             kind = section_kind(entered)
@@ -109,7 +109,7 @@ def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> Place:
             field = entered.model_fields.get(str(part)) if entered else None
             kind = kind_of(field) if field else None
             has_keys = field is None or _holds(field.annotation, Mapping)
-            entered = kind.members[""] if kind and not kind.told_apart_by and not kind.is_list else None
+            entered = kind.members[""] if kind and not kind.discriminator and not kind.is_list else None
     return Place(".".join(dotted), kind)
 
 
@@ -146,24 +146,24 @@ def _names_file(field: FieldInfo, value: Any) -> bool:
     return bool(mark and isinstance(value, str) and value and not is_name)
 
 
-def _kind(annotation: Any, told_apart_by: Any) -> Kind | None:
+def _kind(annotation: Any, discriminator: Any) -> Kind | None:
     origin, inside = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         tags = [each.discriminator for each in inside[1:] if isinstance(each, FieldInfo)]
-        return _kind(inside[0], next(filter(None, tags), told_apart_by))
+        return _kind(inside[0], next(filter(None, tags), discriminator))
     if origin is tuple and inside[-1] is Ellipsis:
         kind = _kind(inside[0], None)
         return kind and replace(kind, is_list=True)
     if origin in (Union, UnionType):
-        return _of_union([each for each in inside if each is not NoneType], told_apart_by)
+        return _of_union([each for each in inside if each is not NoneType], discriminator)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return _of_union([annotation], told_apart_by) if told_apart_by else section_kind(annotation)
+        return _of_union([annotation], discriminator) if discriminator else section_kind(annotation)
     return None
 
 
-def _of_union(members: list[Any], told_apart_by: Any) -> Kind | None:
-    if isinstance(told_apart_by, str):
-        return Kind({each.model_fields[told_apart_by].default: each for each in members}, told_apart_by)
+def _of_union(members: list[Any], discriminator: Any) -> Kind | None:
+    if isinstance(discriminator, str):
+        return Kind({each.model_fields[discriminator].default: each for each in members}, discriminator)
     return _kind(members[0], None) if len(members) == 1 else None
 
 
@@ -240,16 +240,16 @@ def _expected(error: Mapping[str, Any]) -> str:
 
 def _untold(kind: Kind, table: Any) -> str:
     """Complaint about a member that its family does not have."""
-    tag = table.get(kind.told_apart_by) if isinstance(table, dict) else None  # the error's own tag is text
+    tag = table.get(kind.discriminator) if isinstance(table, dict) else None  # the error's own tag is text
     near = did_you_mean(str(tag), kind.members)
     received = "none" if tag is None else shown(tag)
     own = " or FILE.py:NAME" if _may_be_own(kind) else ""
-    return f"{kind.told_apart_by}: expected one of {', '.join(kind.members)}{own}, received {received}{near}"
+    return f"{kind.discriminator}: expected one of {', '.join(kind.members)}{own}, received {received}{near}"
 
 
 def _may_be_own(kind: Kind) -> bool:
     member = next(iter(kind.members.values()))
-    extra = member.model_fields[kind.told_apart_by or ""].json_schema_extra
+    extra = member.model_fields[kind.discriminator or ""].json_schema_extra
     return isinstance(extra, dict) and extra.get("path") == "code"
 
 
@@ -282,4 +282,4 @@ def _field_of_another(path: tuple[str | int, ...], scenario: type[BaseModel]) ->
     if family is None or family.is_list or tag not in family.members:
         return ""
     owners = [each for each, member in family.members.items() if name in member.model_fields]
-    return f", a field of {family.told_apart_by} {' and '.join(owners)}, not of {tag}" if owners else ""
+    return f", a field of {family.discriminator} {' and '.join(owners)}, not of {tag}" if owners else ""

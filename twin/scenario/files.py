@@ -47,7 +47,7 @@ def nominal_curve(scenario: Scenario) -> str:
     return (scenario.plant.torque_curve if follows else None) or SHIPPED
 
 
-def files_again(files: Files, before: ResolvedScenario, scenario: Scenario) -> Files:
+def reload_files(files: Files, before: ResolvedScenario, scenario: Scenario) -> Files:
     """Files of a changed scenario: what it names as before stays as it was read."""
     if scenario.plant.mjcf != before.plant.mjcf:
         return files_of(scenario)

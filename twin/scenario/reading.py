@@ -128,7 +128,7 @@ def with_files(fields: dict[str, Any], told: Callable[[str, str], str]) -> dict[
     return fields
 
 
-def value_beside(folder: str, dotted: str, value: Any) -> Any:
+def resolve_value_paths(folder: str, dotted: str, value: Any) -> Any:
     """Value of one field, the paths in it taken from a folder."""
     return value_with_files(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
 
@@ -291,9 +291,9 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
 def described(scenario: Scenario) -> list[tuple[str, str, str]]:
     """Flag, value in force and meaning of every field of a scenario."""
     families = {
-        f"{name}.{kind.told_apart_by}": f": {', '.join(kind.members)}"
+        f"{name}.{kind.discriminator}": f": {', '.join(kind.members)}"
         for name, field in every_field(type(scenario))
-        if (kind := kind_of(field)) and kind.told_apart_by
+        if (kind := kind_of(field)) and kind.discriminator
     }
     return [
         (

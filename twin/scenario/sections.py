@@ -82,18 +82,18 @@ HARDWARE: dict[str, dict[str, Any]] = {
 """Fields by dotted name that a set gives a value to; each of them can be set alone as well."""
 
 
-def left_open(fields: dict[str, Any], name: Any) -> dict[str, Any]:
+def hardware_defaults(fields: dict[str, Any], name: Any) -> dict[str, Any]:
     """Return the fields of a set that given fields by section do not state."""
     nominal = fields.get(NOMINAL)
     knows_truth = isinstance(nominal, dict) and nominal.get("equals_truth") is True
     return {
         dotted: value
-        for dotted, value in fields_of_set(name, knows_truth).items()
+        for dotted, value in hardware_fields(name, knows_truth).items()
         if not _said(fields, dotted)
     }
 
 
-def fields_of_set(name: str, knows_truth: bool) -> dict[str, Any]:
+def hardware_fields(name: str, knows_truth: bool) -> dict[str, Any]:
     """Return the fields of a set; a nominal model that equals the truth takes none of its own from it."""
     return {
         dotted: value
@@ -142,13 +142,13 @@ class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class OwnController(ControllerSection):
+class UserController(ControllerSection):
     """What a run under a law that its user made in Python says of it, in the place of a law's parameters."""
 
     parameters: tuple[float, ...] = Field(description="numbers handed to the law")
 
 
-class OwnPath(_Section):
+class UserPath(_Section):
     """What a run along a trajectory that its user made in Python says of it, in a shape's place."""
 
     shape: str = Field(description="class of the object that is followed")
@@ -345,7 +345,7 @@ class Scenario(_Section):
                 )
             step_s = {"adc": self.controller.period_s, "controller": self.plant.step_s}.get(fault.kind.name)
             if fault.mode == "delay" and step_s is not None:
-                _check_late(f"fault.{place}.value", fault.number, step_s, self.controller.period_s)
+                _check_late(f"fault.{place}.value", fault.effective_value, step_s, self.controller.period_s)
         check_gains(self.fault)
         return self
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from spheretwin.scenario.changes import fields_with
 from spheretwin.scenario.reading import override, read, shipped, validated
-from spheretwin.scenario.sections import Scenario, left_open
+from spheretwin.scenario.sections import Scenario, hardware_defaults
 
 # A shipped scenario that sets little: one that is not shipped is told by how it differs from it.
 PLAIN = "tilt"
@@ -76,7 +76,7 @@ def _differences(fields: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[s
 def _completed(fields: dict[str, Any]) -> dict[str, Any]:
     """All fields, as they are where a file says only some."""
     fields = copy.deepcopy(fields)
-    for dotted, value in left_open(fields, fields.get("hardware")).items():
+    for dotted, value in hardware_defaults(fields, fields.get("hardware")).items():
         override(fields, dotted, value)
     return validated(fields, "to be written").model_dump(mode="json")
 

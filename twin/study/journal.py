@@ -56,7 +56,7 @@ def _contents(rows: Rows) -> Iterator[Any]:
     named += [("controller", dict(law)) for law in study.law]
     for dotted, value in named:
         if isinstance(value, str | list | dict):  # a number names no file
-            found = reading.alone(dotted, reading.value_beside(study.folder, dotted, value))
+            found = reading.alone(dotted, reading.resolve_value_paths(study.folder, dotted, value))
             yield reading.with_files(found, _content)
     for name in study.metrics:
         if is_reference(name):

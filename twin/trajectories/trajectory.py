@@ -117,7 +117,7 @@ class Shape(BaseModel):
         return self
 
 
-class OwnTrajectory:
+class UserTrajectory:
     """A trajectory of the user's, each of its samples checked.
 
     Parameters
@@ -174,7 +174,7 @@ class OwnTrajectory:
         return np.array(samples, dtype=np.float64, order="C")
 
 
-def checked(own: Sampled) -> OwnTrajectory:
+def checked(own: Sampled) -> UserTrajectory:
     """A trajectory of the user's, found usable; one that is checked already stays as it is.
 
     Raises
@@ -182,7 +182,7 @@ def checked(own: Sampled) -> OwnTrajectory:
     InputError
         It has no ``sample(t)``, or what that gives at the start is no finite motion.
     """
-    return own if isinstance(own, OwnTrajectory) else OwnTrajectory(own)
+    return own if isinstance(own, UserTrajectory) else UserTrajectory(own)
 
 
 def _shape_of(samples: Any) -> object:

@@ -69,7 +69,7 @@ class Prepared:
         self._sessions = [self._rows.session(self._rows.scenario(each)) for each in self._grid]
         for session in self._sessions:
             session.check_horizon(1)
-            session._exogenous.rows(0, 1)
+            session._inputs.rows(0, 1)
 
     def __call__(self) -> None:
         """Run them over all cores."""

@@ -88,7 +88,7 @@ def test_the_solver_s_warm_start_is_restored(sticky):
     assert rows(other.advance(200)) == expected
     # Without the warm start, which lies among the numbers of the state, the bits are others.
     other.restore(taken)
-    data = other._machine._moving.rotor.data
+    data = other._runtime._rotor.rotor.data
     assert np.any(data.qacc_warmstart)
     data.qacc_warmstart[:] = 0.0
     assert rows(other.advance(200)) != expected
