@@ -28,7 +28,7 @@ from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated, check_rows
 from spheretwin.runtime import Runtime
 from spheretwin.scenario import files as scenario_files
-from spheretwin.scenario.changes import from_now_on, is_fixed, planned
+from spheretwin.scenario.changes import from_now_on, is_fixed, scheduled_changes
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.reading import as_plain, is_dotted
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserPath
@@ -374,7 +374,7 @@ class Session:
         return ticks
 
     def _change(self, name: str, value: Any) -> None:
-        before, self._config = self._config, self._config.after(name, value)
+        before, self._config = self._config, self._config.with_change(name, value)
         scenario, user_law = self.scenario, self._config.user_law
         # What comes from outside is no part of the machine.
         outside = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
@@ -395,7 +395,7 @@ class Session:
         """
         seen, made = self._seen, 0
         try:
-            for in_force in self._config.after_each(self._planned):
+            for in_force in self._config.with_changes(self._planned):
                 seen, made = with_more(seen, in_force.signals), made + 1
         except InputError as error:
             at_s = self._planned[made].tick * self.scenario.controller.period_s
@@ -408,7 +408,7 @@ class Session:
         self._runtime = Runtime(self.scenario, files, self._config.law)
         self._runtime.restore(snapshot.runtime)
         self._seen = with_more(self._seen, self.signals)
-        self.begun_as, self._planned = snapshot.begun_as, planned(snapshot.begun_as)
+        self.begun_as, self._planned = snapshot.begun_as, scheduled_changes(snapshot.begun_as)
         self.tick, self._status = snapshot.tick, snapshot.status
         self.journal, self.events = snapshot.journal, snapshot.events
         self._inputs = self._outside()
@@ -418,5 +418,5 @@ class Session:
 def _recorded(value: Any) -> Any:
     """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
     if isinstance(value, Law):
-        return active_config.name_of_own(value.name)
+        return active_config.name_of_user_object(value.name)
     return json.loads(json.dumps(value, default=as_plain))

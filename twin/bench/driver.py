@@ -36,7 +36,7 @@ def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
         raise InputError(f"bench: expected a mode instead of {name}, as manual or hold")
     if name == "trajectory" and isinstance(value, dict) and value.get("approach") is not None:
         raise InputError("bench: expected a trajectory without approach, which the bench makes")
-    after = changed(settings, name, value)
+    after = with_change(settings, name, value)
     return after if name != "hardware" else _with_hardware(settings, after.hardware)
 
 

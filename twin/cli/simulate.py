@@ -145,7 +145,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     if options.help:
         options.parser.print_help()
         scenario = scenarios.load(options.scenario or EXAMPLE, reading.overrides(rest))
-        runs.print_fields(scenario.name, reading.described(scenario))
+        runs.print_fields(scenario.name, reading.field_descriptions(scenario))
         return True
     if _is_bare(options, rest):
         runs.print_scenarios({name: scenarios.load(name).description for name in shipped()})
@@ -200,7 +200,7 @@ def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     return options.scenario is None and not any(chosen) and not rest
 
 
-def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
+def _planned(options: argparse.Namespace, rest: Sequence[str]) -> RunPlan:
     """What to run, from a scenario and flags or from a run's own file."""
     if options.replay:
         if options.scenario or rest:
@@ -215,11 +215,11 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
     if options.scenario is None:
         raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
     scenario = scenarios.load(options.scenario, reading.overrides(rest))
-    return Plan(scenario, scenario.ticks, ())
+    return RunPlan(scenario, scenario.ticks, ())
 
 
 def _report(
-    session: Session, plan: Plan, status: Status, told: dict[str, Any], own: Sequence[str], as_json: bool
+    session: Session, plan: RunPlan, status: Status, told: dict[str, Any], own: Sequence[str], as_json: bool
 ) -> None:
     """Print the figures, and how the run ended where it did not complete."""
     scenario = session.begun_as

@@ -28,7 +28,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.mujoco_rotor import MujocoRotor
-from spheretwin.scenario.changes import changed
+from spheretwin.scenario.changes import with_change
 from spheretwin.simulation import simulate
 from spheretwin.trajectories.shapes import Nutation
 
@@ -265,7 +265,7 @@ def compare_closed_loop(mjcf: Path) -> ClosedLoop:
 def _run(mjcf: Path, overrides: dict[str, Any]) -> Pair:
     scenario = scenarios.load(SCENARIO, {**overrides, "plant.mjcf": str(mjcf)})
     on_mujoco = simulate(scenario)
-    on_lagrangian = simulate(changed(scenario, "plant.engine", "lagrangian"))
+    on_lagrangian = simulate(with_change(scenario, "plant.engine", "lagrangian"))
     tables = on_mujoco.telemetry, on_lagrangian.telemetry
     same_end = on_mujoco.status == on_lagrangian.status and len(tables[0]) == len(tables[1])
     return Pair(*tables, same_end)

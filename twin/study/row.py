@@ -237,7 +237,7 @@ class Rows:
             fields, hardware if isinstance(hardware, str) else None
         ).items():
             reading.override(fields, dotted, value)
-        return reading.beside("", fields) if self._names_files else fields
+        return reading.resolve_paths("", fields) if self._names_files else fields
 
     def _check_axes(self) -> None:
         """Find out before the first row whether each axis names a field."""

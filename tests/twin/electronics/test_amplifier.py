@@ -299,10 +299,10 @@ def test_no_number_however_large_or_small_gives_anything_but_numbers(groups, R, 
     assert np.all(passed.voltage_limited_s <= 3 * step_s * (1 + 1e-12))
 
 
-@pytest.mark.parametrize("place", ["asked", "emf", "current"])
+@pytest.mark.parametrize("place", ["setpoint", "emf", "current"])
 def test_what_is_not_a_number_stays_so_in_its_group_alone(place):
     amplifiers, coils = made(CASES[0], groups=3)
-    inputs = {"asked": np.full(3, 2.0), "emf": np.full(3, 0.5), "current": np.zeros(3)}
+    inputs = {"setpoint": np.full(3, 2.0), "emf": np.full(3, 0.5), "current": np.zeros(3)}
     inputs[place][1] = np.nan
     passed = zero_flow(3)
     drive_coils(amplifiers, coils, **inputs, flow=passed)
