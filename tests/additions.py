@@ -309,10 +309,10 @@ class Gear(NamedTuple):
 
 
 @allocation_free
-def turn(stage, measurement, numbers):
+def turn(stage, measurement, noise):
     for i in range(3):
         turned = stage.ratio[i] * measurement[0, i]
-        measurement[0, i] = through(stage.line, i, turned, numbers.faults)
+        measurement[0, i] = through(stage.line, i, turned, noise.faults)
 ''',
         "twin/electronics/sensor_chain.py",
         (

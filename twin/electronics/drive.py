@@ -1,6 +1,6 @@
-"""One name for what comes between commands and currents: a plain lag, or the chain of the drive's stages.
+"""Drive of all groups: a plain current lag or the chain of drive stages, under common functions.
 
-As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
+As with the engines in `plant.step`, the loop is compiled only for the drive that a run has.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from spheretwin.models.base.compiled import part_of_its_caller
 
 
 class LagDrive(NamedTuple):
-    """Amplifiers without a supply, right behind their commands."""
+    """Amplifiers without a supply and without delay: a first-order lag of the currents."""
 
     lag: CurrentLag
 
@@ -68,12 +68,12 @@ def build_drive(
     seed: int,
     faults: DriveFaults | None = None,
 ) -> DriveModel:
-    """What a resolved section asks for, at rest.
+    """Return the drive of a resolved section, at rest.
 
     Parameters
     ----------
     section, step_s, substeps, groups, seed, faults
-        As `chain.drive_chain` has them.
+        As in `drive_chain.drive_chain`.
     """
     if section.supply_V is None and not section.converts and faults is None:
         return LagDrive(current_lag(section.lag_s, step_s, section.current_limit_A))
@@ -81,13 +81,13 @@ def build_drive(
 
 
 def transfer_drive(before: DriveModel, after: DriveModel, command: NDArray) -> None:
-    """Go on as before with other figures, from the last commands (n,), A."""
+    """Transfer the state to a drive with other parameters, from the last commands (n,), A."""
     if isinstance(after, DriveChain):
         chain.transfer(before if isinstance(before, DriveChain) else None, after, command)
 
 
 def begin(drive: DriveModel, command: NDArray) -> None:
-    """Take the commands (n,), A, of a control period."""
+    """Accept the commands (n,), A, of a control period."""
     _BEGIN[type(drive)](drive, command)
 
 
@@ -107,12 +107,12 @@ def advance_currents(
 
 
 def end(drive: DriveModel) -> bool:
-    """End a control period; whether the amplifiers may go on."""
+    """End a control period; return True if no coil is too hot."""
     return bool(_END[type(drive)](drive))
 
 
 def write_telemetry(drive: DriveModel, row: NDArray) -> None:
-    """Write what the telemetry says of the control period; a lag says nothing."""
+    """Write the telemetry of the control period; a lag has none."""
     _WRITE_TELEMETRY[type(drive)](drive, row)
 
 
@@ -122,19 +122,19 @@ def _of_kind(table: dict[type, Any], drive: Any) -> Any:
 
 @overload(begin, inline="always")
 def _compiled_begin(drive: Any, command: Any) -> Callable[..., Any] | None:
-    chosen = _of_kind(_BEGIN, drive)
+    implementation = _of_kind(_BEGIN, drive)
 
     def call(drive: Any, command: Any) -> None:
-        chosen(drive, command)
+        implementation(drive, command)
 
-    return call if chosen else None
+    return call if implementation else None
 
 
 @overload(advance_currents, inline="always")
 def _compiled_advance(
     drive: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
 ) -> Callable[..., Any] | None:
-    chosen = _of_kind(_ADVANCE, drive)
+    implementation = _of_kind(_ADVANCE, drive)
 
     def call(
         drive: Any,
@@ -147,26 +147,26 @@ def _compiled_advance(
         current: Any,
         mean: Any,
     ) -> None:
-        chosen(drive, command, substep, q, qdot, G, gain, current, mean)
+        implementation(drive, command, substep, q, qdot, G, gain, current, mean)
 
-    return call if chosen else None
+    return call if implementation else None
 
 
 @overload(end, inline="always")
 def _compiled_end(drive: Any) -> Callable[..., Any] | None:
-    chosen = _of_kind(_END, drive)
+    implementation = _of_kind(_END, drive)
 
     def call(drive: Any) -> Any:
-        return chosen(drive)
+        return implementation(drive)
 
-    return call if chosen else None
+    return call if implementation else None
 
 
 @overload(write_telemetry, inline="always")
 def _compiled_write_telemetry(drive: Any, row: Any) -> Callable[..., Any] | None:
-    chosen = _of_kind(_WRITE_TELEMETRY, drive)
+    implementation = _of_kind(_WRITE_TELEMETRY, drive)
 
     def call(drive: Any, row: Any) -> None:
-        chosen(drive, row)
+        implementation(drive, row)
 
-    return call if chosen else None
+    return call if implementation else None

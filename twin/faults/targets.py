@@ -24,7 +24,7 @@ def _silence_adc(effects: Effects, fault: ActiveFault) -> None:
 
 
 def _delay_adc(effects: Effects, fault: ActiveFault) -> None:
-    effects.sensors.stage("adc").late_ticks[0] += round(fault.value / effects.period_s)
+    effects.sensors.stage("adc").delay_ticks[0] += round(fault.value / effects.period_s)
 
 
 ADC_SIGNAL = FaultSignal(

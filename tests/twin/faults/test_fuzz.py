@@ -117,7 +117,7 @@ INPUTS = {
     "belief": lambda machine: machine._controller.belief.current,
     "detector": lambda machine: machine._controller.supervision.detector.shorted_A,
     "wiper": lambda machine: machine._sensors.stage("potentiometer").line.table[:, LAST],
-    "converted": lambda machine: machine._sensors.stage("adc").on_the_way_rad.ravel(),
+    "converted": lambda machine: machine._sensors.stage("adc").delayed_rad.ravel(),
     "seen": lambda machine: machine._controller.supervision.watchdog.last_rad,
 }
 
