@@ -68,7 +68,7 @@ class Ramp(Shape):
     "disturbance": Addition(
         "",
         '''
-class Kick(Term):
+class Kick(DisturbanceTerm):
     """One pulse."""
 
     kind: Literal["kick"] = Field("kick", description="kind of disturbance")
@@ -78,7 +78,7 @@ class Kick(Term):
         return np.outer((t >= 0.01) & (t < 0.02), [0.0, self.torque_Nm, 0.0])
 ''',
         "twin/disturbances.py",
-        ("    | Random,\n", "    | Random\n    | Kick,\n"),
+        ("    | RandomDisturbance,\n", "    | RandomDisturbance\n    | Kick,\n"),
     ),
     "telemetry column": Addition(
         "",

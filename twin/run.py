@@ -261,11 +261,11 @@ class Figures:
 
     Parameters
     ----------
-    planned : Planned
+    planned : PlannedRun
         The run to come.
     """
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         self._metrics = {name: metric(planned) for name, metric in METRICS.items()}
 
     def write(self, rows: Table) -> None:
@@ -306,7 +306,7 @@ def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[
     """
     own = extra or {}
     check_names(own)
-    figures = Figures(Planned(run.scenario, run.actuator, run.scenario.ticks))
+    figures = Figures(PlannedRun(run.scenario, run.actuator, run.scenario.ticks))
     figures.write(run.telemetry)
     return {**figures.values(), **{name: own_value(name, metric, run) for name, metric in own.items()}}
 

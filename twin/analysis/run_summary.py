@@ -171,7 +171,7 @@ def _figures(run: Reviewed) -> dict[str, Any]:
 
 def _metrics(run: Reviewed) -> dict[str, Any]:
     scenario, files, *_ = of_the_actuator(run)
-    gathered = Figures(Planned(scenario, files.actuator, scenario.ticks))
+    gathered = Figures(PlannedRun(scenario, files.actuator, scenario.ticks))
     gathered.write(run.every_tick)
     return gathered.values()
 

@@ -29,8 +29,8 @@ class Recording:
     def __init__(self, tell: Callable[[str | None], None]) -> None:
         self._tell = tell
         self.kept: tuple[str, ...] = ()
-        self._present: Keeping | None = None
-        self._completing: list[Keeping] = []
+        self._present: RecordingFiles | None = None
+        self._completing: list[RecordingFiles] = []
         self.begin_anew()
 
     @property
@@ -51,10 +51,10 @@ class Recording:
         """What was changed until now has been told."""
         self._noted = len(session.journal), len(session.events)
 
-    def begin(self, files: Files, desk: Desk) -> None:
+    def begin(self, files: OpenedFiles, desk: Desk) -> None:
         """Write opened files from the next tick on."""
         self.note_changes(desk.session)
-        self._present = Keeping(files, desk.session, desk.begun)
+        self._present = RecordingFiles(files, desk.session, desk.begun)
         self._completing.append(self._present)
 
     def write(self, rows: Table) -> None:
@@ -100,7 +100,7 @@ class Recording:
         for keeping in list(self._completing):
             keeping.join()
 
-    def _completed(self, keeping: Keeping) -> None:
+    def _completed(self, keeping: RecordingFiles) -> None:
         self.kept = tuple(str(path) for path in keeping.paths)
         if keeping.faults:
             self.kept = ()

@@ -16,7 +16,7 @@ from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, warn
 from spheretwin.loop import is_user_law
-from spheretwin.metrics import Planned
+from spheretwin.metrics import PlannedRun
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.base.user_code import load_function
@@ -158,7 +158,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     outputs.check([path for path in (options.record, options.telemetry) if path])
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
-        figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
+        figures = Figures(PlannedRun(session.begun_as, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
         files = Outputs(

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.metrics import METRICS, Metric, Planned
+from spheretwin.metrics import METRICS, Metric, PlannedRun
 from spheretwin.models.base.errors import (
     InputError,
     LawError,
@@ -198,7 +198,7 @@ class Rows:
 
     def _followed(self, row: Row, scenario: Scenario, session: Session) -> Result:
         metrics = {
-            name: METRICS[name](Planned(session.begun_as, session.actuator, scenario.ticks))
+            name: METRICS[name](PlannedRun(session.begun_as, session.actuator, scenario.ticks))
             for name in self.metrics
         }
         sinks: list[Sink] = [follower(metrics)]
