@@ -65,16 +65,16 @@ def _with_moved_files(record: RunRecord, folder: Path) -> RunRecord:
 
     return replace(
         record,
-        scenario=reading.with_files(copy.deepcopy(dict(record.scenario)), place),
+        scenario=reading.replace_files(copy.deepcopy(dict(record.scenario)), place),
         journal=tuple(
-            change._replace(value=reading.value_with_files(change.name, change.value, place))
+            change._replace(value=reading.replace_value_files(change.name, change.value, place))
             for change in record.journal
         ),
         files={moved.get(path, path): digest for path, digest in record.files.items()},
     )
 
 
-def _plan(record: RunRecord, source: str) -> Plan:
+def _plan(record: RunRecord, source: str) -> RunPlan:
     scenario = scenarios.from_record(record.scenario, source)
     for change in record.journal:
         if change.name == "controller.law" and change.value not in LAWS and not is_reference(change.value):
@@ -95,7 +95,7 @@ def _plan(record: RunRecord, source: str) -> Plan:
 
 def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | None], source: str) -> None:
     for path, dotted in named:
-        if path in digests and provenance.digest(dotted, path) != digests[path]:  # older files hold none
+        if path in digests and provenance.digest(dotted, path) != digests[path]:  # not in older files
             raise InputError(
                 f"replay {source}: expected {dotted} {path} as it was when the run was made,"
                 " received one that is missing or was changed since"

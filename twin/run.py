@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spheretwin.faults.fault_injector import FaultLines
-from spheretwin.metrics import METRICS, Planned
+from spheretwin.faults.fault_injector import FaultMessages
+from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, exception_text, shown
 from spheretwin.models.telemetry.run_record import RunRecord, versions
@@ -23,7 +23,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import change_text, facts_of
-from spheretwin.scenario.changes import planned
+from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
 
@@ -212,9 +212,9 @@ class Run:
     def _log(self) -> list[tuple[float, str]]:
         """Faults, and the changes that the scenario planned or the user made, in the order of time."""
         record, period_s = self.provenance, self.scenario.controller.period_s
-        changes = [each for each in planned(self.scenario) if each.tick < len(self.telemetry)]
+        changes = [each for each in scheduled_changes(self.scenario) if each.tick < len(self.telemetry)]
         lines = [(each.tick * period_s, change_text(each)) for each in (*changes, *record.journal)]
-        return sorted([*lines, *FaultLines().of(self.telemetry)] if len(self.telemetry) else lines)
+        return sorted([*lines, *FaultMessages().of(self.telemetry)] if len(self.telemetry) else lines)
 
 
 def _text(value: Any) -> str:
@@ -239,7 +239,7 @@ def _imported(package: str) -> Any:
         ) from None
 
 
-OwnMetric = Callable[[Run], Any]
+UserMetric = Callable[[Run], Any]
 """Function of the user: from a complete run to a value that JSON holds."""
 
 # Keys of the JSON of a run that are no metrics.
@@ -265,8 +265,8 @@ class Figures:
         The run to come.
     """
 
-    def __init__(self, planned: PlannedRun) -> None:
-        self._metrics = {name: metric(planned) for name, metric in METRICS.items()}
+    def __init__(self, scheduled_changes: PlannedRun) -> None:
+        self._metrics = {name: metric(scheduled_changes) for name, metric in METRICS.items()}
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk."""

@@ -19,7 +19,7 @@ from spheretwin.active_config import initial_config
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.control.user_law import reference_of
-from spheretwin.inputs import Exogenous
+from spheretwin.inputs import InputGenerator
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
 from spheretwin.models.telemetry.run_record import Change
@@ -95,7 +95,7 @@ class Session:
         self._config = initial_config(scenario, law, trajectory, files)
         self.begun_as = self.scenario
         self.law_reference = reference_of(law)
-        self._planned = planned(self.begun_as)
+        self._planned = scheduled_changes(self.begun_as)
         self._inputs = self._outside()
         self._runtime = Runtime(self.scenario, self._config.files, self._config.law)
         self._seen = with_more({}, self.signals)

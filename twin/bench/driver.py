@@ -10,7 +10,7 @@ from spheretwin.bench.modes import Limits
 from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of
-from spheretwin.scenario.changes import FAULT, changed, is_fixed
+from spheretwin.scenario.changes import FAULT, is_fixed, with_change
 from spheretwin.scenario.reading import override, validated
 from spheretwin.scenario.sections import Scenario, hardware_fields
 from spheretwin.session import Session

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from spheretwin.bench.driver import Desk
 from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import Files, Keeping
+from spheretwin.outputs import OpenedFiles, RecordingFiles
 from spheretwin.provenance import change_text
 from spheretwin.session import Session
 

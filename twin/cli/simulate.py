@@ -24,8 +24,8 @@ from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import KeptTelemetry
 from spheretwin.outputs import Outputs
-from spheretwin.replay import Plan
-from spheretwin.run import Figures, OwnMetric, Run, check_names, own_value, summary
+from spheretwin.replay import RunPlan
+from spheretwin.run import Figures, Run, UserMetric, check_names, own_value, summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session

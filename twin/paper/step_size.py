@@ -20,7 +20,7 @@ from spheretwin.paper.experiment import (
     Section,
 )
 from spheretwin.run import Run
-from spheretwin.scenario.sections import Plant
+from spheretwin.scenario.sections import PlantSection
 
 SCENARIOS = ("sinusoid", "nutation", "tilt", "hold")
 SAMPLE_s = 0.01

@@ -124,18 +124,18 @@ def replace_files(fields: dict[str, Any], replace: Callable[[str, str], str]) ->
     for named in files_in(fields, section_kind(Scenario)):
         named.fields[named.name] = replace(named.fields[named.name], named.dotted)
     for event in _events(fields):
-        event["value"] = value_with_files(event["set"], event["value"], told)
+        event["value"] = replace_value_files(event["set"], event["value"], replace)
     return fields
 
 
 def resolve_value_paths(folder: str, dotted: str, value: Any) -> Any:
-    """Value of one field, the paths in it taken from a folder."""
-    return value_with_files(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
+    """Return the value of one field with its paths resolved relative to a folder."""
+    return replace_value_files(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
 
 
-def value_with_files(dotted: str, value: Any, told: Callable[[str, str], str]) -> Any:
-    """Value of one field with other files; `told` as in `with_files`."""
-    inside: Any = with_files(alone(dotted, copy.deepcopy(value)), told)
+def replace_value_files(dotted: str, value: Any, replace: Callable[[str, str], str]) -> Any:
+    """Return the value of one field with replaced files; `replace` is as in `replace_files`."""
+    inside: Any = replace_files(single_field(dotted, copy.deepcopy(value)), replace)
     for part in dotted.split("."):
         inside = inside[0] if isinstance(inside, list) else inside[part]
     return inside

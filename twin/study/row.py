@@ -24,7 +24,7 @@ from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import KeptTelemetry
 from spheretwin.provenance import record_of
-from spheretwin.run import OwnMetric, Run, check_names, own_value
+from spheretwin.run import Run, UserMetric, check_names, own_value
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field
