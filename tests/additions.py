@@ -68,7 +68,7 @@ class Ramp(Shape):
     "disturbance": Addition(
         "",
         '''
-class Kick(Term):
+class Kick(DisturbanceTerm):
     """One pulse."""
 
     kind: Literal["kick"] = Field("kick", description="kind of disturbance")
@@ -78,7 +78,7 @@ class Kick(Term):
         return np.outer((t >= 0.01) & (t < 0.02), [0.0, self.torque_Nm, 0.0])
 ''',
         "twin/disturbances.py",
-        ("    | Random,\n", "    | Random\n    | Kick,\n"),
+        ("    | RandomDisturbance,\n", "    | RandomDisturbance\n    | Kick,\n"),
     ),
     "telemetry column": Addition(
         "",
@@ -309,10 +309,10 @@ class Gear(NamedTuple):
 
 
 @allocation_free
-def turn(stage, measurement, numbers):
+def turn(stage, measurement, noise):
     for i in range(3):
         turned = stage.ratio[i] * measurement[0, i]
-        measurement[0, i] = through(stage.line, i, turned, numbers.faults)
+        measurement[0, i] = through(stage.line, i, turned, noise.faults)
 ''',
         "twin/electronics/sensor_chain.py",
         (
@@ -355,10 +355,10 @@ class Filter(NamedTuple):
 
 
 @part_of_its_caller
-def attenuate(stage, asked, draws):
-    for j in range(asked.shape[0]):
-        asked[j] *= stage.gain
-    pass_line(stage, asked, draws)
+def attenuate(stage, setpoint, draws):
+    for j in range(setpoint.shape[0]):
+        setpoint[j] *= stage.gain
+    pass_line(stage, setpoint, draws)
 ''',
         "twin/electronics/drive_chain.py",
         (
@@ -381,8 +381,8 @@ FUSE = Target("fuse", {"blown": Mode(_blow)}, each_group=True)
     "sensor stage's fault": Addition(
         "",
         """
-GEAR_SIGNAL = Signal(lambda effects: effects.sensors.stage("gear").line, "rad")
-GEAR = Target("gear", line_modes.modes(GEAR_SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
+GEAR_SIGNAL = FaultSignal(lambda effects: effects.sensors.stage("gear").line, "rad")
+GEAR = Target("gear", signal_modes(GEAR_SIGNAL), places=("alpha", "beta", "gamma"), measured=True)
 """,
         "twin/faults/targets.py",
         ("        DAC,\n", "        DAC,\n        GEAR,\n"),
@@ -390,8 +390,8 @@ GEAR = Target("gear", line_modes.modes(GEAR_SIGNAL), places=("alpha", "beta", "g
     "drive stage's fault": Addition(
         "",
         """
-FILTER_SIGNAL = Signal(lambda effects: effects.drive.stage("filter").line, "A")
-FILTER_MODES = {**line_modes.modes(FILTER_SIGNAL), **line_modes.silent_modes(FILTER_SIGNAL)}
+FILTER_SIGNAL = FaultSignal(lambda effects: effects.drive.stage("filter").line, "A")
+FILTER_MODES = {**signal_modes(FILTER_SIGNAL), **silent_modes(FILTER_SIGNAL)}
 FILTER = Target("filter", FILTER_MODES, each_group=True)
 """,
         "twin/faults/targets.py",

@@ -43,7 +43,7 @@ def drawn_numbers():
     from spheretwin.electronics.drive_chain import drive_chain
     from spheretwin.electronics.random_streams import noise_table
     from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
-    from spheretwin.faults.schedule import FaultPlan
+    from spheretwin.faults.schedule import FaultSchedule
     from spheretwin.shared_buffers import fault_streams
     from spheretwin.session import Session
 
@@ -55,7 +55,7 @@ def drawn_numbers():
     scenario = scenarios.load("hold", {"hardware": "prototype", "seed": 3, "fault": faults})
     with Session(scenario) as session:
         scenario = session.scenario
-    plan = FaultPlan(scenario.fault, 18, 1e-3, 3)
+    plan = FaultSchedule(scenario.fault, 18, 1e-3, 3)
     sensors = sensor_chain(scenario.sensors, 3)
     drive = drive_chain(scenario.drive, 5e-4, 2, 18, 3)
     noise, measurement = noise_table(3, 0, 5, noise_streams(scenario.sensors)), np.empty((3, 3))

@@ -1,4 +1,4 @@
-"""What is in force in a session: a scenario, what its files hold, and what its user put in their places."""
+"""Active configuration of a session: resolved scenario, its files, user law and user trajectory."""
 
 from __future__ import annotations
 
@@ -28,36 +28,36 @@ from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.plant.mujoco_rotor import integrator_name
-from spheretwin.scenario.changes import changed, first_tick, planned
-from spheretwin.scenario.files import Files, files_again, files_of, nominal_curve
+from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
+from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
 from spheretwin.scenario.sections import (
-    OwnController,
-    OwnPath,
+    PlantSection,
     ResolvedNominal,
     ResolvedPlant,
     ResolvedScenario,
     Scenario,
+    UserController,
+    UserPath,
 )
-from spheretwin.scenario.sections import Plant as PlantSection
 from spheretwin.trajectories import SHAPES
 from spheretwin.trajectories.rounding import Triple
-from spheretwin.trajectories.trajectory import OwnTrajectory, Sampled, checked
+from spheretwin.trajectories.trajectory import Sampled, UserTrajectory, checked
 
-# What the engine's compiler takes where a file says nothing.
+# Defaults of MuJoCo's compiler for values that a file does not state.
 UNWRITTEN_STEP_s = 0.002
 UNWRITTEN_INTEGRATOR = "Euler"
 UNWRITTEN_GRAVITY_m_s2 = (0.0, 0.0, -9.81)
 
 
-def resolved(
-    scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None
+def fill_defaults(
+    scenario: Scenario, files: Files, law: Law | None, trajectory: UserTrajectory | None
 ) -> ResolvedScenario:
     """Return a scenario with every default filled in, from its files, its trajectory and its hardware.
 
     Raises
     ------
     InputError
-        The first pose is outside the hinges' range, a list does not fit the actuator, or the law is made for
+        The first pose is outside the range of the hinges, a list does not fit the actuator, or the law is for
         another control period.
     """
     actuator, section = files.actuator, scenario.plant
@@ -70,35 +70,37 @@ def resolved(
         gravity_m_s2=_gravity(section, files.model),
         group_gain=section.group_gain or (1.0,) * len(actuator.groups),
     )
-    made = _with(
+    resolved = _with(
         ResolvedScenario, scenario, drive=drive, plant=plant, nominal=_nominal(scenario, drive, actuator)
     )
     if law:
         law.check_period(scenario.controller.period_s)
-        controller = OwnController(
-            law=name_of_own(law.name),
+        controller = UserController(
+            law=name_of_user_object(law.name),
             period_s=scenario.controller.period_s,
             parameters=tuple(law.parameters.tolist()),
             **scenario.controller.compensators,
         )
-        made = made.model_copy(update={"controller": controller})
+        resolved = resolved.model_copy(update={"controller": controller})
     if trajectory:
-        made = made.model_copy(update={"trajectory": OwnPath(shape=name_of_own(trajectory.name))})
+        resolved = resolved.model_copy(
+            update={"trajectory": UserPath(shape=name_of_user_object(trajectory.name))}
+        )
     _check_pose(plant.initial_rad, actuator)
-    _check_faults(made.fault, actuator)
-    return made
+    _check_faults(resolved.fault, actuator)
+    return resolved
 
 
 Section = TypeVar("Section", bound=BaseModel)
 
 
 def _with(kind: type[Section], section: BaseModel, **values: Any) -> Section:
-    """Section of a resolved kind: the fields of one that is checked, some of them with other values."""
+    """Return a section of a resolved class: the fields of a checked section, some with other values."""
     return kind.model_construct(**{**dict(section), **values})
 
 
 def _drive(section: DriveSection, group: CoilGroup) -> ResolvedDrive:
-    """Drive whose coils and limit are the model file's unless given, and so its lag without a supply."""
+    """Return the drive: coils, limit and, without a supply, lag are those of the model file unless given."""
     sheet = {
         "resistance_ohm": group.resistance_ohm,
         "inductance_H": group.inductance_H,
@@ -111,7 +113,7 @@ def _drive(section: DriveSection, group: CoilGroup) -> ResolvedDrive:
 
 
 def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> ResolvedNominal:
-    """Data sheet of the controller: a value that is not given is the model file's, or the true one."""
+    """Return the data sheet of the controller; default of a value: the model file, or the true value."""
     section = scenario.nominal
     sheet = _truth(scenario, drive, actuator) if section.equals_truth else _model_sheet(actuator)
     sheet["torque_curve"] = nominal_curve(scenario)
@@ -119,13 +121,13 @@ def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> Re
 
 
 def _given_or(section: BaseModel, sheet: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of a sheet, in place of each the value of the section where that is given."""
+    """Return the values of a sheet, replaced by the values that the section gives."""
     given = {name: getattr(section, name) for name in sheet}
     return {name: sheet[name] if value is None else value for name, value in given.items()}
 
 
 def _model_sheet(actuator: Actuator) -> dict[str, Any]:
-    """Nominal values of a model file: ideal sensors, amplifiers and bearings, and the coils' lag."""
+    """Return the nominal values of a model file: ideal sensors, amplifiers and bearings, and the coil lag."""
     group, ideal = actuator.group, (0.0, 0.0, 0.0)
     return {
         "coulomb_Nm": ideal,
@@ -137,7 +139,7 @@ def _model_sheet(actuator: Actuator) -> dict[str, Any]:
 
 
 def _truth(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> dict[str, Any]:
-    """Nominal values that are true: with the modelling error and the payload in the inertia."""
+    """Return the true values as nominal values: the inertia contains modelling error and payload."""
     plant, height_m = scenario.plant, float(actuator.payload_mount_m[2])
     inertia = loaded_inertia((1 + plant.modelling_error) * actuator.inertia, plant.payload_kg, height_m)
     return {
@@ -150,13 +152,13 @@ def _truth(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> dict
 
 
 def warnings_of(scenario: Scenario, files: Files) -> list[str]:
-    """What a user should know of model and scenario before believing the figures; one line each."""
-    late = [change for change in planned(scenario) if change.tick >= scenario.ticks]
+    """Return warnings about model and scenario, one line each."""
+    late = [change for change in scheduled_changes(scenario) if change.tick >= scenario.ticks]
     return [
         *files.model.warnings,
         *disagreements(files.actuator),
         *_overridden(scenario.plant, files.model.described.opt),
-        *(f"the event that sets {change.name} is not made: the run ends before" for change in late),
+        *(f"the event that sets {change.name} does not occur: the run ends before" for change in late),
         *_late_faults(scenario),
     ]
 
@@ -173,27 +175,27 @@ def _late_faults(scenario: Scenario) -> list[str]:
 
 
 def _overridden(section: PlantSection, option: mujoco.MjOption) -> list[str]:
-    """What a model file says and a scenario says otherwise; what a file does not say is not overridden."""
-    found = []
+    """Return a warning for each value of a model file that the scenario overrides."""
+    warnings = []
     if option.timestep not in (section.step_s, UNWRITTEN_STEP_s):
         own, used = distinct_texts(option.timestep, section.step_s)
-        found.append(f"the model's own timestep of {own} s is not used: plant.step_s is {used} s")
+        warnings.append(f"the model's own timestep of {own} s is not used: plant.step_s is {used} s")
     integrator = integrator_name(option.integrator)
     if integrator not in (section.integrator, UNWRITTEN_INTEGRATOR):
-        found.append(
+        warnings.append(
             f"the model's own integrator {integrator} is not used: plant.integrator is {section.integrator}"
         )
     given, gravity = section.gravity_m_s2, mjcf.gravity(option)
     if given is not None and gravity not in ((0.0, 0.0, -given), UNWRITTEN_GRAVITY_m_s2):
         own = " ".join(f"{component:.10g}" for component in gravity)
-        found.append(
+        warnings.append(
             f"the model's own gravity of {own} m/s² is not used: plant.gravity_m_s2 is {given:.10g} m/s²"
         )
-    return found
+    return warnings
 
 
-def name_of_own(name: str) -> str:
-    """Name of a law or trajectory of the user's, where it must not be taken for one that can be had."""
+def name_of_user_object(name: str) -> str:
+    """Return the name of a user law or trajectory, marked if it could be confused with a shipped one."""
     return f"{name} of the user's" if name in LAWS or name in SHAPES or is_reference(name) else name
 
 
@@ -202,11 +204,11 @@ def _first_pose(trajectory: Sampled) -> Triple:
 
 
 def _gravity(section: PlantSection, model: Mjcf) -> float | None:
-    """Gravity along -z; None where the model's is not along it, so that the model's stays in force."""
+    """Return the gravity along -z; None if that of the model has another direction and stays active."""
     if section.gravity_m_s2 is not None:
         return section.gravity_m_s2
     own = mjcf.gravity(model.described.opt)
-    return None if any(own[:2]) or own[2] > 0 else 0.0 - own[2]  # none is 0, not -0
+    return None if any(own[:2]) or own[2] > 0 else 0.0 - own[2]  # 0, not -0
 
 
 def _check_pose(pose: Triple, actuator: Actuator) -> None:
@@ -236,74 +238,79 @@ def _check_faults(faults: tuple[Fault, ...], actuator: Actuator) -> None:
             )
 
 
-class InForce(NamedTuple):
-    """All that a machine is built from; a change gives another."""
+class ActiveConfig(NamedTuple):
+    """Configuration that a `Runtime` is built from; a change returns a new one."""
 
     scenario: ResolvedScenario
     files: Files
-    own_law: Law | None
-    own_trajectory: OwnTrajectory | None
+    user_law: Law | None
+    user_trajectory: UserTrajectory | None
 
     @property
     def law(self) -> Law:
-        """Law that is asked for; one that a scenario names is made anew at each call."""
-        return self.own_law or assembly.law_of(self.scenario)
+        """Law of the configuration; a law that the scenario names is built at each call."""
+        return self.user_law or assembly.law_of(self.scenario)
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Columns that a run has."""
+        """Telemetry columns of a run."""
         return assembly.signals_of(self.scenario, self.files.actuator, self.law)
 
-    def after(self, name: str, value: Any) -> InForce:
-        """With another value of one field, or another law.
+    def with_change(self, name: str, value: Any) -> ActiveConfig:
+        """Return the configuration with another value of one field, or with another law.
 
         Raises
         ------
         InputError
-            A field that is unknown, of the wrong type or out of range, or one of what the user replaced.
+            A field that is unknown, of the wrong type or out of range, or a field of a law or trajectory that
+            the user replaced.
         """
         if isinstance(value, Law):
-            return _resolved(self.scenario, self.files, value, self.own_trajectory)
-        if self.own_trajectory and name.split(".")[0] == "trajectory":
+            return _config_of(self.scenario, self.files, value, self.user_trajectory)
+        if self.user_trajectory and name.split(".")[0] == "trajectory":
             raise InputError(
-                "session: expected no field of a scenario's trajectory, as"
-                f" {self.own_trajectory.name} is followed instead"
+                "session: expected no field of the scenario's trajectory, because"
+                f" {self.user_trajectory.name} replaces it"
             )
-        own_law = None if name == "controller.law" else self.own_law
-        of_the_law = name.startswith("controller.") and name.split(".")[1] not in COMPENSATORS
-        if own_law and of_the_law:
-            raise InputError(f"session: expected no field of a shipped law, as {own_law.name} is not one")
-        scenario = changed(self.scenario, name, value)
-        files = files_again(self.files, self.scenario, scenario)
-        return _resolved(scenario, files, own_law, self.own_trajectory)
+        user_law = None if name == "controller.law" else self.user_law
+        is_law_field = name.startswith("controller.") and name.split(".")[1] not in COMPENSATORS
+        if user_law and is_law_field:
+            raise InputError(
+                f"session: expected no field of a shipped law, because {user_law.name} is a user law"
+            )
+        scenario = with_change(self.scenario, name, value)
+        files = reload_files(self.files, self.scenario, scenario)
+        return _config_of(scenario, files, user_law, self.user_trajectory)
 
-    def after_each(self, plan: tuple[Change, ...]) -> Iterator[InForce]:
-        """After each of some changes in turn.
+    def with_changes(self, changes: tuple[Change, ...]) -> Iterator[ActiveConfig]:
+        """Yield the configuration after each of some changes.
 
         Raises
         ------
         InputError
-            One of them cannot be made.
+            A change is invalid.
         """
-        now = self
-        for change in plan:
-            now = now.after(change.name, change.value)
-            yield now
+        config = self
+        for change in changes:
+            config = config.with_change(change.name, change.value)
+            yield config
 
 
-def at_start(
+def initial_config(
     scenario: Scenario, law: Law | None, trajectory: Sampled | None, files: Files | None = None
-) -> InForce:
-    """What a session begins with; its files are read unless given.
+) -> ActiveConfig:
+    """Return the configuration at the start of a session; default of `files`: read from the scenario.
 
     Raises
     ------
     InputError
         The model file, the torque curve, the trajectory or a value of the scenario cannot be used.
     """
-    own = None if trajectory is None else checked(trajectory)
-    return _resolved(scenario, files or files_of(scenario), law, own)
+    user_trajectory = None if trajectory is None else checked(trajectory)
+    return _config_of(scenario, files or files_of(scenario), law, user_trajectory)
 
 
-def _resolved(scenario: Scenario, files: Files, law: Law | None, trajectory: OwnTrajectory | None) -> InForce:
-    return InForce(resolved(scenario, files, law, trajectory), files, law, trajectory)
+def _config_of(
+    scenario: Scenario, files: Files, law: Law | None, trajectory: UserTrajectory | None
+) -> ActiveConfig:
+    return ActiveConfig(fill_defaults(scenario, files, law, trajectory), files, law, trajectory)

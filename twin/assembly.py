@@ -1,4 +1,4 @@
-"""From a resolved scenario to the parts of its loop: law, controller, plant, and the columns they log."""
+"""Assembly of the loop from a resolved scenario: law, controller, plant, telemetry columns."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from spheretwin.control.law import Law, NominalModel
 from spheretwin.control.manual_currents import manual
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.faults.schedule import part_names
-from spheretwin.loop import Places
+from spheretwin.loop import ColumnOffsets
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
 from spheretwin.plant.friction import Friction, friction
-from spheretwin.plant.rotor import Rotor, Setting
+from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.plant.step import ENGINES, Plant
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedPlant, ResolvedScenario
-from spheretwin.shared_buffers import Wires, driving_of
+from spheretwin.shared_buffers import SharedBuffers, drive_of
 
 Array = NDArray[np.float64]
 
 
 def law_of(scenario: ResolvedScenario) -> Law:
-    """Law that a resolved scenario names, for its nominal model.
+    """Return the law of a resolved scenario, for its nominal model.
 
     Raises
     ------
     InputError
-        It is one of the user's, and makes none, or one for another control period.
+        A user law that returns no `Law`, or one for another control period.
     """
     section = scenario.controller
     try:
@@ -58,8 +58,8 @@ def law_of(scenario: ResolvedScenario) -> Law:
     return law
 
 
-def same_known(scenario: ResolvedScenario, other: ResolvedScenario) -> bool:
-    """Whether a law is told the same of both."""
+def same_nominal_model(scenario: ResolvedScenario, other: ResolvedScenario) -> bool:
+    """True if the laws of both scenarios receive the same nominal model."""
     first, second = _known(scenario), _known(other)
     same = np.array_equal(first.inertia, second.inertia)
     return same and first._replace(inertia=second.inertia) == second
@@ -74,44 +74,44 @@ def _known(scenario: ResolvedScenario) -> NominalModel:
 
 
 def signals_of(scenario: ResolvedScenario, actuator: Actuator, law: Law) -> tuple[Signal, ...]:
-    """Columns of a run's telemetry: common ones, those of its stages, then the law's own.
+    """Return the telemetry columns of a run: common columns, channels of its stages, signals of the law.
 
     Raises
     ------
     InputError
-        The law has a signal under the name of a stage's.
+        A signal of the law has the name of a signal of a stage.
     """
     groups = len(actuator.groups)
-    taken = {signal.name for columns in CHANNELS for signal in columns.signals(groups)}
-    if twice := sorted(taken & {signal.name for signal in law.signals}):
-        raise InputError(f"law {law.name}: expected new names of signals, received {', '.join(twice)}")
-    found = common_signals(groups)
-    for columns in CHANNELS:
-        if columns.logged(scenario):
-            found += columns.signals(groups)
-    return found + law.signals
+    taken = {signal.name for channel in CHANNELS for signal in channel.signals(groups)}
+    if duplicates := sorted(taken & {signal.name for signal in law.signals}):
+        raise InputError(f"law {law.name}: expected new names of signals, received {', '.join(duplicates)}")
+    signals = common_signals(groups)
+    for channel in CHANNELS:
+        if channel.logged(scenario):
+            signals += channel.signals(groups)
+    return signals + law.signals
 
 
-def places_of(signals: tuple[Signal, ...], law: Law) -> Places:
-    """Where the loop finds the columns that not every run has."""
+def column_offsets(signals: tuple[Signal, ...], law: Law) -> ColumnOffsets:
+    """Return the first columns of the signals that only some runs log."""
     first = offsets(signals)
-    of_stages = tuple(first.get(columns.signals(1)[0].name, -1) for columns in CHANNELS)
-    return Places(of_stages, width(signals) - width(law.signals))
+    channels = tuple(first.get(channel.signals(1)[0].name, -1) for channel in CHANNELS)
+    return ColumnOffsets(channels, width(signals) - width(law.signals))
 
 
 def nominal_magnetics(scenario: ResolvedScenario, files: Files) -> TorqueModel:
-    """Magnetics of the controller's data sheet."""
+    """Return the magnetics of the data sheet of the controller."""
     model, scale = torque_model(files.nominal), scenario.nominal.torque_scale
     return model if scale == 1 else model._replace(line_weights=scale * model.line_weights)
 
 
 def estimator_of(scenario: ResolvedScenario) -> Estimator | None:
-    """Estimator of the rates, tuned to the nominal sensors; None where the rates are true.
+    """Return the rate estimator, tuned to the nominal sensors; None if the rates are exact.
 
     Raises
     ------
     InputError
-        Its parameters do not fit the control period or the sensors.
+        The parameters do not fit the control period or the sensors.
     """
     nominal = scenario.nominal
     noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
@@ -125,14 +125,14 @@ def controller_of(
     estimator: Estimator | None,
     supervision: Supervision,
 ) -> Controller:
-    """Controller of a resolved scenario, at the start of a run."""
+    """Return the controller of a resolved scenario, at the start of a run."""
     nominal, groups = scenario.nominal, magnetics.group_axes.shape[1]
     on = law.asks_torque or scenario.detects or scenario.controller.prediction.on
     applied = applied_torque(
         on, groups, scenario.controller.period_s, nominal.delay_s, nominal.time_constant_s
     )
     compensators = _compensators_of(scenario, magnetics)
-    by_hand = manual(scenario.manual, groups)
+    manual_currents = manual(scenario.manual, groups)
     return controller(
         law,
         magnetics,
@@ -141,13 +141,13 @@ def controller_of(
         applied,
         compensators,
         supervision,
-        by_hand,
+        manual_currents,
         estimator,
     )
 
 
 def _compensators_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Compensators:
-    """What stands around the law of a resolved scenario."""
+    """Return the compensators of a resolved scenario."""
     section, nominal, known = scenario.controller, scenario.nominal, _known(scenario)
     delay = DelayModel(known.period_s, known.ahead_s, nominal.time_constant_s, known.inertia)
     rotor = NominalRotor(known.inertia, np.array(nominal.coulomb_Nm), np.array(nominal.viscous_Nm_s))
@@ -159,15 +159,15 @@ def _compensators_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Comp
     )
 
 
-def plant_of(scenario: ResolvedScenario, actuator: Actuator, stepped: Any, wires: Wires) -> Plant:
-    """Plant of a resolved scenario around a rotor that has been started, without currents as yet."""
+def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers: SharedBuffers) -> Plant:
+    """Return the plant of a resolved scenario with a started rotor and zero currents."""
     section, groups, magnetics = scenario.plant, len(actuator.groups), torque_model(actuator)
     return Plant(
-        rotor=stepped,
+        rotor=rotor,
         magnetics=magnetics,
         G=np.empty((3, groups)),
         scratch=scratch_of(magnetics),
-        driving=driving_of(scenario, groups, wires),
+        drive=drive_of(scenario, groups, buffers),
         friction=_friction(section, actuator),
         group_gain=np.array(section.group_gain),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
@@ -176,19 +176,19 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, stepped: Any, wires
         step_s=section.step_s,
         middle_q=np.empty(3),
         middle_qdot=np.empty(3),
-        last_qdot=stepped.qdot.copy(),
+        last_qdot=rotor.qdot.copy(),
         current=np.zeros(groups),
         mean_current=np.zeros(groups),
-        pulling=np.zeros(groups),
+        effective_current=np.zeros(groups),
         torque_S=np.zeros(3),
         friction_q=np.zeros(3),
         first_friction_q=np.zeros(3),
-        draws=wires.draws,
+        draws=buffers.draws,
         current_sensors=CurrentSensors(
             scenario.senses_currents, scenario.sensors.current.noise_A, np.zeros(groups)
         ),
-        marks=np.zeros(len(part_names(groups))),
-        began_s=np.full(groups, -1.0),
+        fault_modes=np.zeros(len(part_names(groups))),
+        fault_start_s=np.full(groups, -1.0),
     )
 
 
@@ -204,16 +204,16 @@ def _friction(section: ResolvedPlant, actuator: Actuator) -> Friction:
 
 
 def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:
-    """Rotor of a resolved scenario, in the engine that it names.
+    """Return the rotor of a resolved scenario, in its engine.
 
     Raises
     ------
     InputError
-        The engine does not know all that the model holds.
+        The engine does not support the model.
     """
     section = scenario.plant
     return ENGINES[section.engine].set_up(
-        Setting(
+        RotorSettings(
             model=files.model,
             actuator=files.actuator,
             step_s=section.step_s,

@@ -1,4 +1,4 @@
-"""Columns that a stage of the loop adds to the telemetry where it does something."""
+"""Telemetry channels: columns that a stage of the loop adds to the telemetry if it is active."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.control.supervision.enabled_groups import IN_USE, STATES
 from spheretwin.control.supervision.watchdog import REASONS
-from spheretwin.electronics.drive import tell
+from spheretwin.electronics.drive import write_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.base.compiled import part_of_its_caller
@@ -19,53 +19,53 @@ from spheretwin.scenario.sections import Scenario
 
 
 class Channel(NamedTuple):
-    """What one stage logs."""
+    """Telemetry columns of one stage."""
 
     signals: Callable[[int], tuple[Signal, ...]]
-    """For an actuator with a number of coil groups; the same tuple for the same number."""
+    """Signals for a number of coil groups; the same tuple for the same number."""
     logged: Callable[[Scenario], bool]
-    """Whether a run of a resolved scenario has them."""
+    """True if a run of a resolved scenario has the channel."""
     write: Any
-    """``write(row, controller, sensors, plant)`` writes them into the beginning of `row`, once a tick, after
-    the plant has moved. Made with `part_of_its_caller`: it becomes a part of the loop's machine code."""
+    """``write(row, controller, sensors, plant)`` writes the columns into the beginning of `row`, once in each
+    tick, after the plant has advanced. `part_of_its_caller` includes it in the machine code of the loop."""
 
 
 @cache
-def signals(groups: int) -> tuple[Signal, ...]:
-    """Columns for a number of coil groups."""
-    each = tuple(f"group {j}" for j in range(groups))
-    return (Signal("current_measured_A", "A", groups, "group currents as measured at the tick", each),)
+def current_signals(groups: int) -> tuple[Signal, ...]:
+    """Return the columns for a number of coil groups."""
+    labels = tuple(f"group {j}" for j in range(groups))
+    return (Signal("current_measured_A", "A", groups, "group currents as measured at the tick", labels),)
 
 
 @part_of_its_caller
-def write(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+def write_currents(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
     measured_A = plant.current_sensors.measured_A
     for j in range(measured_A.shape[0]):
         row[j] = measured_A[j]
 
 
-COLUMNS = Channel(signals, lambda scenario: scenario.senses_currents, write)
+MEASURED_CURRENTS = Channel(current_signals, lambda scenario: scenario.senses_currents, write_currents)
 
 
 @cache
 def drive_signals(groups: int) -> tuple[Signal, ...]:
-    """Columns for a number of coil groups."""
-    each = tuple(f"group {j}" for j in range(groups))
+    """Return the columns for a number of coil groups."""
+    labels = tuple(f"group {j}" for j in range(groups))
     return (
         Signal("supply_power_W", "W", 1, "drawn from the supply, mean over the control period"),
-        Signal("coil_power_W", "W", groups, "at the ends of the coils, mean over the control period", each),
-        Signal("copper_loss_W", "W", groups, "heat of the coils, mean over the control period", each),
-        Signal("coil_temperature_degC", "°C", groups, "at the end of the control period", each),
-        Signal("voltage_limited", "1", groups, "share of the period with the voltage at its limit", each),
-        Signal("current_limited", "1", groups, "share of the period with the current at its limit", each),
+        Signal("coil_power_W", "W", groups, "at the ends of the coils, mean over the control period", labels),
+        Signal("copper_loss_W", "W", groups, "heat of the coils, mean over the control period", labels),
+        Signal("coil_temperature_degC", "°C", groups, "at the end of the control period", labels),
+        Signal("voltage_limited", "1", groups, "share of the period with the voltage at its limit", labels),
+        Signal("current_limited", "1", groups, "share of the period with the current at its limit", labels),
     )
 
 
 @part_of_its_caller
 def write_drive(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    tell(plant.driving, row)
+    write_telemetry(plant.drive, row)
 
 
 DRIVE = Channel(drive_signals, lambda scenario: scenario.drive.supply_V is not None, write_drive)
@@ -76,18 +76,18 @@ NOT_YET = -1.0
 
 @cache
 def fault_signals(groups: int) -> tuple[Signal, ...]:
-    """Columns for a number of coil groups."""
-    each = tuple(f"group {j}" for j in range(groups))
+    """Return the columns for a number of coil groups."""
+    labels = tuple(f"group {j}" for j in range(groups))
     names = part_names(groups)
     return (
         Signal("fault", "1", len(names), "how a part fails", names, ("works", *MODES)),
-        Signal("group_out", "1", groups, "whether the allocation leaves a group out", each, STATES),
+        Signal("group_out", "1", groups, "whether the allocation leaves a group out", labels, STATES),
         Signal(
             "time_to_detection_s",
             "s",
             groups,
             "from the start of a group's fault until it was left out; -1 as long as it is not",
-            each,
+            labels,
         ),
     )
 
@@ -95,15 +95,17 @@ def fault_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_faults(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    groups, parts = controller.supervision.groups, plant.marks.shape[0]
+    groups, parts = controller.supervision.groups, plant.fault_modes.shape[0]
     count = groups.out.shape[0]
     for part in range(parts):
-        row[part] = plant.marks[part]
+        row[part] = plant.fault_modes[part]
     for j in range(count):
         out = groups.out[j]
         row[parts + j] = out
-        known = out != IN_USE and plant.began_s[j] >= 0.0
-        row[parts + count + j] = max(groups.out_s[j] - plant.began_s[j], 0.0) if known else NOT_YET
+        is_detected = out != IN_USE and plant.fault_start_s[j] >= 0.0
+        row[parts + count + j] = (
+            max(groups.out_s[j] - plant.fault_start_s[j], 0.0) if is_detected else NOT_YET
+        )
 
 
 def _logs_faults(scenario: Scenario) -> bool:
@@ -241,7 +243,7 @@ WATCHDOG = Channel(lambda groups: WATCHDOG_SIGNALS, lambda scenario: scenario.wa
 
 CHANNELS: tuple[Channel, ...] = (
     SENSORS,
-    COLUMNS,
+    MEASURED_CURRENTS,
     REFERENCE_GOVERNOR,
     PREDICTION,
     FEED_FORWARD,
@@ -252,25 +254,25 @@ CHANNELS: tuple[Channel, ...] = (
 )
 
 
-def _chain(columns: tuple[Channel, ...], place: int = 0) -> Any:
-    """One compiled function that writes all columns that a run has, without a loop over functions."""
-    if not columns:
+def _chain(channels: tuple[Channel, ...], place: int = 0) -> Any:
+    """Return one compiled function that writes the columns of all channels, without a loop over functions."""
+    if not channels:
         return _nothing
-    write, others = columns[0].write, _chain(columns[1:], place + 1)
+    write, others = channels[0].write, _chain(channels[1:], place + 1)
 
     @part_of_its_caller
-    def write_and_go_on(row: Any, places: Any, controller: Any, sensors: Any, plant: Any) -> None:
-        if places[place] >= 0:
-            write(row[places[place] :], controller, sensors, plant)
-        others(row, places, controller, sensors, plant)
+    def write_and_continue(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
+        if offsets[place] >= 0:
+            write(row[offsets[place] :], controller, sensors, plant)
+        others(row, offsets, controller, sensors, plant)
 
-    return write_and_go_on
+    return write_and_continue
 
 
 @part_of_its_caller
-def _nothing(row: Any, places: Any, controller: Any, sensors: Any, plant: Any) -> None:
+def _nothing(row: Any, offsets: Any, controller: Any, sensors: Any, plant: Any) -> None:
     pass
 
 
 write_channels = _chain(CHANNELS)
-"""``write_columns(row, places, controller, sensors, plant)``; a place below 0 is that of none."""
+"""``write_channels(row, offsets, controller, sensors, plant)``; a negative offset means no column."""

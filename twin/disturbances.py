@@ -1,4 +1,4 @@
-"""A torque that stays."""
+"""Disturbances: torques on the hinges in addition to those of the coils."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from spheretwin.models.telemetry.csv_series import TIME, LONGEST_s, TimeSeries, 
 
 Array = NDArray[np.float64]
 
-# The generator counts in blocks of four numbers, of which a tick takes the first.
-NUMBERS_A_COUNT = 4
+# The generator counts in blocks of four numbers; a tick uses the first number of its block.
+NUMBERS_PER_COUNT = 4
 
 
 class Draws(NamedTuple):
     """Uniform numbers from 0 to 1 at some control ticks, (n,) each."""
 
     paper: Array
-    """What the paper's r is made of."""
+    """Numbers for the factor r of the paper."""
     of_term: Callable[[int], Array]
-    """Those of a term, by its place among the terms."""
+    """Numbers of a term, by its index among the terms."""
 
 
 def term_draws(seed: int, first: int, ticks: int, place: int) -> Array:
-    """Draws of one term at consecutive control ticks.
+    """Return the random numbers of one term at consecutive control ticks.
 
-    A stream of its own for each seed and place, whose numbers are counted by tick: they are the same in any
-    order and any block, and leave no state behind.
+    Each seed and index has its own stream, whose numbers are indexed by tick: they are the same in any order
+    and any block, and there is no state.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ def term_draws(seed: int, first: int, ticks: int, place: int) -> Array:
     first : int
         First tick.
     ticks : int
-        How many.
+        Number of ticks.
     place : int
-        Place of the term among the terms.
+        Index of the term among the terms.
 
     Returns
     -------
@@ -52,13 +52,13 @@ def term_draws(seed: int, first: int, ticks: int, place: int) -> Array:
         Uniform numbers from 0 to 1.
     """
     counted = np.random.Philox(np.random.SeedSequence(seed, spawn_key=(place,))).advance(first)
-    numbers = np.random.Generator(counted).random(NUMBERS_A_COUNT * ticks)
-    return numbers[::NUMBERS_A_COUNT].copy()
+    numbers = np.random.Generator(counted).random(NUMBERS_PER_COUNT * ticks)
+    return numbers[::NUMBERS_PER_COUNT].copy()
 
 
 CONFIG = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-# Thousands of times what the coils can hold; beyond it only the engine's range is tested.
+# Thousands of times the torque of the coils; larger values would only test the range of the engine.
 LARGEST_Nm = 1000.0
 
 Torque = Annotated[float, Field(ge=-LARGEST_Nm, le=LARGEST_Nm)]
@@ -68,21 +68,21 @@ Time = Annotated[float, Field(ge=0, le=LONGEST_s)]
 ZERO: Torques = (0.0, 0.0, 0.0)
 
 
-class Term(BaseModel):
-    """A kind that a scenario can name: its parameters, and the torque that they make."""
+class DisturbanceTerm(BaseModel):
+    """Disturbance term of a scenario: parameters and torque."""
 
     model_config = CONFIG
 
     @abstractmethod
     def sample(self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """Torque at control ticks, each held for a control period.
+        """Return the torque at control ticks, each held for a control period.
 
         Parameters
         ----------
         t : (n,) array, s
             Times of the ticks.
         draws : callable
-            Gives the term's own random numbers at these ticks, (n,) from 0 to 1.
+            Returns the random numbers of the term at these ticks, (n,) from 0 to 1.
 
         Returns
         -------
@@ -91,8 +91,8 @@ class Term(BaseModel):
         """
 
 
-class Constant(Term):
-    """The same torque throughout."""
+class ConstantDisturbance(DisturbanceTerm):
+    """Constant torque."""
 
     kind: Literal["constant"] = Field("constant", description="kind of disturbance")
     torque_Nm: Torques = Field(ZERO, description="torque on each axis, N·m")
@@ -107,8 +107,8 @@ Envelope = Literal["decaying", "growing"]
 Bound = Annotated[float, Field(ge=0, le=LARGEST_Nm)]
 
 
-class Random(Term):
-    """A uniform random factor a tick, the same on all axes, times ``cos πt``, ``-sin πt`` and ``exp ∓πt``."""
+class RandomDisturbance(DisturbanceTerm):
+    """Uniform random factor per tick, equal on all axes, times ``cos πt``, ``-sin πt`` and ``exp ∓πt``."""
 
     kind: Literal["random"] = Field("random", description="kind of disturbance")
     bound_Nm: tuple[Bound, Bound, Bound] = Field(
@@ -123,7 +123,7 @@ class Random(Term):
 
 
 def random_torque(t: Array, draws: Array, bound_Nm: Array, gamma_envelope: Envelope) -> Array:
-    """Random torque (56) at control ticks.
+    """Return the random torque (56) at control ticks.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def random_torque(t: Array, draws: Array, bound_Nm: Array, gamma_envelope: Envel
     Returns
     -------
     (n, 3) array, N·m
-        Not finite where the growing envelope overflows.
+        Not finite if the growing envelope overflows.
     """
     r = -bound_Nm + 2 * bound_Nm * draws[:, None]  # (n, 3)
     growth = np.pi if gamma_envelope == "growing" else -np.pi
@@ -148,14 +148,14 @@ def random_torque(t: Array, draws: Array, bound_Nm: Array, gamma_envelope: Envel
         return r * np.stack([np.cos(np.pi * t), np.sin(-np.pi * t), third], axis=1)
 
 
-# Far above what a control period can follow.
+# Far above the bandwidth of a control period.
 LARGEST_Hz, LARGEST_rad = 1e6, 1e4
 
 Frequency = Annotated[float, Field(ge=0, le=LARGEST_Hz)]
 Phase = Annotated[float, Field(ge=-LARGEST_rad, le=LARGEST_rad)]
 
 
-class Sinusoidal(Term):
+class SinusoidalDisturbance(DisturbanceTerm):
     """``amplitude sin(2 pi f t + phase)`` on each axis."""
 
     kind: Literal["sinusoidal"] = Field("sinusoidal", description="kind of disturbance")
@@ -175,8 +175,8 @@ class Sinusoidal(Term):
         return np.array(self.amplitude_Nm) * swing
 
 
-class Steps(Term):
-    """No torque, and others from stated times on."""
+class StepDisturbance(DisturbanceTerm):
+    """Torques from stated times on; 0 before the first."""
 
     kind: Literal["steps"] = Field("steps", description="kind of disturbance")
     times_s: Annotated[tuple[Time, ...], Field(min_length=1)] = Field(
@@ -192,7 +192,7 @@ class Steps(Term):
         return TimeSeries(np.array(self.times_s), np.array(self.torques_Nm)).zero_order_hold(t, ZERO)
 
     @model_validator(mode="after")
-    def _usable(self) -> Steps:
+    def _usable(self) -> StepDisturbance:
         if len(self.times_s) != len(self.torques_Nm):
             raise ValueError(
                 f"expected as many torques_Nm as times_s, received {len(self.torques_Nm)}"
@@ -205,15 +205,15 @@ class Steps(Term):
 COLUMNS = ("alpha_Nm", "beta_Nm", "gamma_Nm")
 
 
-class Table(Term):
+class TableDisturbance(DisturbanceTerm):
     """Torques of a CSV file at their times; the first before, the last after them.
 
-    The file is read when the term is made: what becomes of it later changes nothing.
+    The file is read when the term is created; later changes of the file have no effect.
 
     Raises
     ------
     InputError
-        The file is no series of torques.
+        The file is not a series of torques.
     """
 
     kind: Literal["table"] = Field("table", description="kind of disturbance")
@@ -222,7 +222,7 @@ class Table(Term):
         json_schema_extra={"path": True},
     )
     between: Literal["linear", "held"] = Field(
-        "linear", description="torque between two rows: on a straight line, or the earlier one"
+        "linear", description="torque between two rows: linear interpolation, or the earlier row held"
     )
 
     _torques: TimeSeries = PrivateAttr()
@@ -235,33 +235,33 @@ class Table(Term):
         return self._torques.interpolate(t)
 
     @model_validator(mode="after")
-    def _read(self) -> Table:
+    def _read(self) -> TableDisturbance:
         self._torques = read("disturbance", Path(self.file), COLUMNS, LARGEST_Nm)
         return self
 
 
 AnyDisturbance = Annotated[
-    Constant  # one row each
-    | Steps
-    | Sinusoidal
-    | Table
-    | Random,
+    ConstantDisturbance  # one row each
+    | StepDisturbance
+    | SinusoidalDisturbance
+    | TableDisturbance
+    | RandomDisturbance,
     Field(discriminator="kind"),
 ]
 
-KINDS: dict[str, type[Term]] = {
+KINDS: dict[str, type[DisturbanceTerm]] = {
     kind.model_fields["kind"].default: kind for kind in get_args(get_args(AnyDisturbance)[0])
 }
 
 
 LOAD_UNIT_Nm = 0.05  # paper: torque of L = 1 on each axis
 
-# A hundred times what the coils can hold.
+# A hundred times the torque of the coils.
 LARGEST_LOAD = 1000.0
 
 
 class Disturbance(BaseModel):
-    """What acts on the hinges beside the coils."""
+    """Disturbance torque on the hinges."""
 
     model_config = CONFIG
 
@@ -273,11 +273,11 @@ class Disturbance(BaseModel):
         "decaying", description="exp(-πt) or, as printed, exp(πt) on the third axis"
     )
     terms: tuple[AnyDisturbance, ...] = Field(
-        (), description="what adds to these: constant, steps, sinusoidal, table, random"
+        (), description="terms to be added: constant, steps, sinusoidal, table, random"
     )
 
     def sample(self, t: NDArray[np.float64], draws: Draws) -> NDArray[np.float64]:
-        """Disturbance at the control ticks, each held for a control period.
+        """Return the disturbance at the control ticks, each held for a control period.
 
         Parameters
         ----------
@@ -289,7 +289,7 @@ class Disturbance(BaseModel):
         Returns
         -------
         (n, 3) array, N·m
-            Generalised torque, subtracted in (1); not finite where a growing envelope overflows.
+            Generalised torque, subtracted in (1); not finite if a growing envelope overflows.
         """
         bound = np.full(3, self.random_bound_Nm)
         torque = self.load * LOAD_UNIT_Nm + random_torque(t, draws.paper, bound, self.gamma_envelope)

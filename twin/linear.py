@@ -1,4 +1,4 @@
-"""Currents to torque on the hinges about a pose, and torques asked for to currents."""
+"""Linear model of the actuator about a pose: linearised actuation and equations of motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spheretwin import assembly
-from spheretwin.active_config import at_start
+from spheretwin.active_config import initial_config
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
 from spheretwin.models.kinematics import rate_jacobian, rotation
@@ -22,138 +22,139 @@ from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
 
 class Magnetics(NamedTuple):
-    """A torque matrix: that of an actuator, each column times a gain."""
+    """Torque matrix of an actuator, each column times a gain."""
 
     actuator: Actuator
     gain: Array  # (n,)
 
 
-class Knowledge(NamedTuple):
-    """The numbers of a resolved scenario that a linear model depends on."""
+class LinearisationData(NamedTuple):
+    """Values of a resolved scenario that a linear model depends on."""
 
     inertia: Array
     """Principal inertias about the joint centre, (3,) in kg·m²; payload included."""
     weight_moment: float
     """m g l of the payload, N·m."""
     viscous_Nm_s: Array
-    """Of each hinge, (3,)."""
-    unknown_torque_Nm: Array
-    """Constant, (3,): it pulls against the coils."""
+    """Viscous friction of each hinge, (3,)."""
+    unmodelled_torque_Nm: Array
+    """Constant torque against the coils, (3,)."""
     magnetics: Magnetics
-    """What makes torque of currents."""
-    believed: Magnetics
-    """What the allocation makes currents of torque by."""
+    """Magnetics from currents to torque."""
+    nominal_magnetics: Magnetics
+    """Magnetics of the allocation, from torque to currents."""
     lag_s: float
     """Time constant of the currents."""
     current_limit_A: float
-    """Of the allocation; that of the drive where it is the lower of the two and the model is the true one."""
+    """Limit of the allocation; for the true model at most that of the drive."""
 
 
-def knowledge(scenario: ResolvedScenario, files: Files, *, nominal: bool) -> Knowledge:
-    """Numbers of a resolved scenario, true or nominal.
+def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: bool) -> LinearisationData:
+    """Return the values of a resolved scenario, true or nominal.
 
     Raises
     ------
     InputError
-        The Lagrangian does not know all that the model holds.
+        The Lagrangian does not support the model.
     """
-    known, section, drive = scenario.nominal, scenario.plant, scenario.drive
+    sheet, section, drive = scenario.nominal, scenario.plant, scenario.drive
     groups = len(files.actuator.groups)
-    believed = Magnetics(files.nominal, np.full(groups, known.torque_scale))
+    nominal_magnetics = Magnetics(files.nominal, np.full(groups, sheet.torque_scale))
     if nominal:
-        return Knowledge(
-            inertia=np.array(known.inertia_kg_m2),
+        return LinearisationData(
+            inertia=np.array(sheet.inertia_kg_m2),
             weight_moment=0.0,
-            viscous_Nm_s=np.array(known.viscous_Nm_s),
-            unknown_torque_Nm=np.zeros(3),
-            magnetics=believed,
-            believed=believed,
-            lag_s=known.time_constant_s,
-            current_limit_A=known.current_limit_A,
+            viscous_Nm_s=np.array(sheet.viscous_Nm_s),
+            unmodelled_torque_Nm=np.zeros(3),
+            magnetics=nominal_magnetics,
+            nominal_magnetics=nominal_magnetics,
+            lag_s=sheet.time_constant_s,
+            current_limit_A=sheet.current_limit_A,
         )
     rotor = _lagrangian_rotor(scenario, files)
-    return Knowledge(
+    return LinearisationData(
         inertia=rotor.inertia,
         weight_moment=rotor.weight_moment,
         viscous_Nm_s=np.array(section.viscous_Nm_s),
-        unknown_torque_Nm=np.array(section.modelling_torque_Nm),
+        unmodelled_torque_Nm=np.array(section.modelling_torque_Nm),
         magnetics=Magnetics(files.actuator, np.array(section.group_gain)),
-        believed=believed,
+        nominal_magnetics=nominal_magnetics,
         lag_s=drive.lag_s,
-        current_limit_A=min(known.current_limit_A, drive.current_limit_A),
+        current_limit_A=min(sheet.current_limit_A, drive.current_limit_A),
     )
 
 
 def _lagrangian_rotor(scenario: ResolvedScenario, files: Files) -> LagrangianRotor:
-    """Rotor whose equations of motion are known in closed form, whichever engine is to move it."""
+    """Return the rotor with equations of motion in closed form, for any engine of the scenario."""
     section = scenario.plant.model_copy(update={"engine": "lagrangian", "integrator": "RK4"})
     return cast("LagrangianRotor", assembly.rotor_of(scenario.model_copy(update={"plant": section}), files))
 
 
 Array = NDArray[np.float64]
 
-# Of fourth-order differences: with a tenth of it slopes differ by 3e-10 of the largest, with ten times it by
-# 6e-7, as the steps then reach over knots of the curve's spline.
+# Step of fourth-order differences: with a tenth of it slopes differ by 3e-10 of the largest, with ten times
+# it by 6e-7, as the steps then extend over knots of the spline of the curve.
 DIFFERENCE_rad = 1e-4
 
 
 class Actuation(NamedTuple):
-    """Torque of the coils on the hinges about a pose, where currents of n groups hold the rotor."""
+    """Torque of the coils on the hinges about a pose at which currents of n groups hold the rotor."""
 
     of_currents: Array
-    """(3, n) N·m/A: the torque of one ampere."""
+    """(3, n) N·m/A: torque per ampere."""
     of_commands: Array
-    """(3, 3): the torque that one N·m asked for leads to; the unit matrix where nothing is mistaken."""
+    """(3, 3): torque per commanded N·m; the unit matrix if the nominal magnetics are true."""
     holding_torque_Nm: Array
-    """(3,): the command that holds the rotor."""
+    """(3,): commanded torque that holds the rotor."""
     holding_current_A: Array
-    """(n,): the currents that answer it."""
+    """(n,): currents of that command."""
     stiffness_of_currents: Array
-    """(3, 3) N·m/rad: how their torque changes with the pose while they stay the same."""
+    """(3, 3) N·m/rad: derivative of the torque by the pose with constant currents."""
     stiffness_of_commands: Array
-    """(3, 3) N·m/rad: how it does while the command stays and the allocation follows the pose."""
+    """(3, 3) N·m/rad: derivative of the torque by the pose with a constant command."""
 
 
-def actuation(known: Knowledge, q: Array, held_Nm: Array) -> Actuation:
-    """Actuation about a pose.
+def actuation(data: LinearisationData, q: Array, holding_Nm: Array) -> Actuation:
+    """Return the actuation about a pose.
 
     Parameters
     ----------
-    known : Knowledge
+    data : LinearisationData
     q : (3,) array, rad
         Pose.
-    held_Nm : (3,) array, N·m
-        Torque on the hinges that the coils hold there.
+    holding_Nm : (3,) array, N·m
+        Torque of the coils on the hinges that holds the rotor.
     """
-    own, own_slopes = hinge_matrix(q, known.magnetics), slopes(q, known.magnetics)
-    believed = hinge_matrix(q, known.believed)
-    inverse = np.asarray(np.linalg.pinv(believed), np.float64)
-    mistaken = not _same(known.magnetics, known.believed)
-    of_commands = own @ inverse if mistaken else np.eye(3)
-    command = np.asarray(np.linalg.solve(of_commands, held_Nm), np.float64)
+    matrix, matrix_slopes = hinge_matrix(q, data.magnetics), slopes(q, data.magnetics)
+    nominal_matrix = hinge_matrix(q, data.nominal_magnetics)
+    inverse = np.asarray(np.linalg.pinv(nominal_matrix), np.float64)
+    differs = not _same(data.magnetics, data.nominal_magnetics)
+    of_commands = matrix @ inverse if differs else np.eye(3)
+    command = np.asarray(np.linalg.solve(of_commands, holding_Nm), np.float64)
     current = inverse @ command
-    stiffness = np.column_stack([each @ current for each in own_slopes])
-    turning = np.zeros((3, 3))
-    if mistaken:
-        follows = [
-            _inverse_slope(believed, inverse, each) @ command for each in slopes(q, known.believed)
+    stiffness = np.column_stack([slope @ current for slope in matrix_slopes])
+    command_stiffness = np.zeros((3, 3))
+    if differs:
+        current_slopes = [
+            _inverse_slope(nominal_matrix, inverse, slope) @ command
+            for slope in slopes(q, data.nominal_magnetics)
         ]  # (n,) each, A/rad
-        turning = stiffness + own @ np.column_stack(follows)
-    return Actuation(own, of_commands, command, current, stiffness, turning)
+        command_stiffness = stiffness + matrix @ np.column_stack(current_slopes)
+    return Actuation(matrix, of_commands, command, current, stiffness, command_stiffness)
 
 
 def hinge_matrix(q: Array, magnetics: Magnetics) -> Array:
-    """Torque on the hinges of one ampere in each group, ``E^T G_t(q)`` times the gains; (3, n) in N·m/A.
+    """Return the torque on the hinges per ampere of each group, ``E^T G_t(q)`` times gain; (3, n), N·m/A.
 
-    From the torque curve itself: the table of the compiled torque matrix meets it within 2e-7 of its peak,
-    but has no slopes of use.
+    It uses the torque curve itself: the table of the compiled torque matrix agrees with it within 2e-7 of its
+    peak, but its slopes are not accurate.
     """
     actuator = magnetics.actuator
     return rate_jacobian(q).T @ _torque_matrix(q, actuator) * magnetics.gain
 
 
 def slopes(q: Array, magnetics: Magnetics) -> Array:
-    """Derivatives of `hinge_matrix` by the three angles; (3, 3, n), the first index the angle."""
+    """Return the derivatives of `hinge_matrix` by the angles; (3, 3, n), the first index is the angle."""
 
     def moved(angle: int, steps: int) -> Array:
         return hinge_matrix(q + steps * DIFFERENCE_rad * np.eye(3)[angle], magnetics)
@@ -167,7 +168,7 @@ def slopes(q: Array, magnetics: Magnetics) -> Array:
 
 
 def _torque_matrix(q: Array, actuator: Actuator) -> Array:
-    """G_t(q) (15) as a sum over every pole and the two coils of every group."""
+    """Return G_t(q) (15) as a sum over every pole and the two coils of every group."""
     poles, axes = actuator.pole_axes @ rotation(q).T, actuator.group_axes  # (p, 3), (n, 3)
     cosine = poles @ axes.T
     curve = actuator.torque_curve
@@ -177,7 +178,7 @@ def _torque_matrix(q: Array, actuator: Actuator) -> Array:
 
 
 def _inverse_slope(matrix: Array, inverse: Array, slope: Array) -> Array:
-    """Derivative of the least-norm inverse of a matrix whose rows are independent."""
+    """Return the derivative of the least-norm inverse of a matrix with independent rows."""
     across = np.eye(matrix.shape[1]) - inverse @ matrix
     return -inverse @ slope @ inverse + across @ slope.T @ inverse.T @ inverse
 
@@ -192,16 +193,16 @@ Kind = Literal["scipy", "control"]
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """The actuator about a pose at rest: ``x' = A x + B u, y = C x``, each as what it differs by from there.
+    """Linear model about a pose at rest: ``x' = A x + B u, y = C x``, with deviations from this pose.
 
     Attributes
     ----------
     system : scipy.signal.StateSpace or control.StateSpace
         Continuous.
     pose_rad : (3,) array, rad
-        Where it rests.
+        Pose at rest.
     input_at_rest : (m,) array, N·m or A
-        What holds it there, beside which an input of the system comes.
+        Input that holds the pose; inputs of the system are deviations from it.
     states, inputs, outputs : tuple of str
         Names, each with its unit at the end.
     """
@@ -223,63 +224,62 @@ def linearise(
     nominal: bool = False,
     kind: Kind = "scipy",
 ) -> LinearModel:
-    """Linear model of a scenario's actuator about a pose at rest.
+    """Return the linear model of the actuator of a scenario about a pose at rest.
 
     Parameters
     ----------
     scenario : Scenario
         From `scenario.load`, or built in Python.
     pose_rad : (3,) array, rad, optional
-        Where the rotor rests; the scenario's first pose unless given.
+        Pose at rest; default: the first pose of the scenario.
     inputs : {"torque", "currents"}
-        What the model is driven by: the generalised torque that a law asks for (N·m), through the allocation
-        and the coils, or the currents of the groups (A).
+        Inputs of the model: the generalised torque that a law commands (N·m), through the allocation and the
+        coils, or the currents of the groups (A).
     lag : bool
-        Whether the lag of the currents, where the drive has one, adds states: the torque of the coils, or
-        their currents.
+        If true, the lag of the currents, if the drive has one, adds states: the torque of the coils, or their
+        currents.
     nominal : bool
-        The model as the controller has it, not the true one: nominal inertia, magnetics, friction, lag
-        and current limit; no payload or gravity.
+        If true, the nominal model of the controller instead of the true one: nominal inertia, magnetics,
+        friction, lag and current limit; no payload or gravity.
     kind : {"scipy", "control"}
-        Whose class the system is of; python-control is imported for its own alone.
+        Library of the class of the system; python-control is only imported for its own class.
 
     Returns
     -------
     LinearModel
-        States: the angles (rad), their rates (rad/s), and what the lag adds. Outputs: the angles.
+        States: the angles (rad), their rates (rad/s), and the states of the lag. Outputs: the angles.
 
     Raises
     ------
     InputError
-        A pose beyond the workspace (and so where the joint locks), or one that the coils cannot hold within
-        the current limit; a model that holds what the Lagrangian does not know; a library that is not there.
+        A pose beyond the workspace (where the joint locks), or one that the coils cannot hold within the
+        current limit; a model that the Lagrangian does not support; a missing library.
 
-    Notes
-    -----
-    What has no linear part at rest is left out: Coulomb friction, limits of current and voltage. So are
-    delays and sampling, which belong to the discretisation, and disturbances, sensors and faults. Mass,
-    gravity and friction are differentiated in closed form, the torque of currents by differences.
+    Notes ----- Effects without a linear part at rest are omitted: Coulomb friction, limits of current and
+    voltage. Delays and sampling, which belong to the discretisation, and disturbances, sensors and faults are
+    also omitted. Mass, gravity and friction are differentiated in closed form, the torque of currents by
+    differences.
     """
     _check_choice("inputs", inputs, ("torque", "currents"))
     _check_choice("kind", kind, ("scipy", "control"))
-    # Before the work, so that a library that is missing is told at once.
+    # Before the computation, so that a missing library is reported at once.
     library = _python_control() if kind == "control" else importlib.import_module("scipy.signal")
-    in_force = at_start(scenario, None, None)
-    actuator = in_force.files.actuator
-    pose = _pose(in_force.scenario.plant.initial_rad if pose_rad is None else pose_rad, actuator)
-    known = knowledge(in_force.scenario, in_force.files, nominal=nominal)
-    coils, lag_s = _held(known, pose), known.lag_s if lag else 0.0
+    config = initial_config(scenario, None, None)
+    actuator = config.files.actuator
+    pose = _pose(config.scenario.plant.initial_rad if pose_rad is None else pose_rad, actuator)
+    data = linearisation_data(config.scenario, config.files, nominal=nominal)
+    coils, lag_s = _holding_actuation(data, pose), data.lag_s if lag else 0.0
     if inputs == "torque":
-        at_rest, (A, B) = coils.holding_torque_Nm, _driven_by_torque(known, coils, pose, lag_s)
-        what, unit, channels = "torque", "Nm", tuple(HINGES)
+        at_rest, (A, B) = coils.holding_torque_Nm, _driven_by_torque(data, coils, pose, lag_s)
+        quantity, unit, channels = "torque", "Nm", tuple(HINGES)
     else:
-        at_rest, (A, B) = coils.holding_current_A, _driven_by_currents(known, coils, pose, lag_s)
-        what, unit, channels = "current", "A", tuple(f"{j:02}" for j in range(len(actuator.groups)))
-    lagging = tuple(f"{what}_{channel}_{unit}" for channel in channels) if lag_s else ()
+        at_rest, (A, B) = coils.holding_current_A, _driven_by_currents(data, coils, pose, lag_s)
+        quantity, unit, channels = "current", "A", tuple(f"{j:02}" for j in range(len(actuator.groups)))
+    lagging = tuple(f"{quantity}_{channel}_{unit}" for channel in channels) if lag_s else ()
     angles, rates = (tuple(f"{hinge}_{end}" for hinge in HINGES) for end in ("rad", "rad_s"))
     names = {
         "states": angles + rates + lagging,
-        "inputs": tuple(f"{what}_command_{channel}_{unit}" for channel in channels),
+        "inputs": tuple(f"{quantity}_command_{channel}_{unit}" for channel in channels),
         "outputs": angles,
     }
     matrices = A, B, np.eye(3, len(A)), np.zeros((3, B.shape[1]))
@@ -287,24 +287,28 @@ def linearise(
     return LinearModel(system, pose, at_rest, **names)
 
 
-def _driven_by_torque(known: Knowledge, coils: Actuation, q: Array, lag_s: float) -> tuple[Array, Array]:
-    """Matrices A and B where a torque is asked for.
+def _driven_by_torque(
+    data: LinearisationData, coils: Actuation, q: Array, lag_s: float
+) -> tuple[Array, Array]:
+    """Return the matrices A and B for a commanded torque.
 
-    With a lag the torque itself is a state: ``T' = (W u + turning q - T) / lag + stiffness qdot``, for it
-    follows what is asked for late, and changes at once where the rotor turns under the same currents.
+    With a lag the torque is a state: ``T' = (W u + turning q - T) / lag + stiffness qdot``. It follows the
+    command with the lag, and changes at once when the rotor turns under constant currents.
     """
     if not lag_s:
-        A, per_torque = _rotor_matrices(known, q, coils.stiffness_of_commands)
+        A, per_torque = _rotor_matrices(data, q, coils.stiffness_of_commands)
         return A, np.vstack([np.zeros((3, 3)), per_torque @ coils.of_commands])
-    A, per_torque = _rotor_matrices(known, q, np.zeros((3, 3)))
+    A, per_torque = _rotor_matrices(data, q, np.zeros((3, 3)))
     follows = np.hstack([coils.stiffness_of_commands / lag_s, coils.stiffness_of_currents])
     commanded = np.vstack([np.zeros((6, 3)), coils.of_commands / lag_s])
     return _behind_lag(A, per_torque, follows, lag_s), commanded
 
 
-def _driven_by_currents(known: Knowledge, coils: Actuation, q: Array, lag_s: float) -> tuple[Array, Array]:
-    """Matrices A and B where currents are asked for; with a lag they are states."""
-    A, per_torque = _rotor_matrices(known, q, coils.stiffness_of_currents)
+def _driven_by_currents(
+    data: LinearisationData, coils: Actuation, q: Array, lag_s: float
+) -> tuple[Array, Array]:
+    """Return the matrices A and B for commanded currents; with a lag the currents are states."""
+    A, per_torque = _rotor_matrices(data, q, coils.stiffness_of_currents)
     groups = coils.of_currents.shape[1]
     per_ampere = per_torque @ coils.of_currents
     if not lag_s:
@@ -313,41 +317,41 @@ def _driven_by_currents(known: Knowledge, coils: Actuation, q: Array, lag_s: flo
     return _behind_lag(A, per_ampere, np.zeros((groups, 6)), lag_s), commanded
 
 
-def _rotor_matrices(known: Knowledge, q: Array, pull: Array) -> tuple[Array, Array]:
-    """Matrix A of angles and rates, and the accelerations of one N·m, the inverse of M.
+def _rotor_matrices(data: LinearisationData, q: Array, pull: Array) -> tuple[Array, Array]:
+    """Return the matrix A of angles and rates, and the accelerations per N·m, the inverse of M.
 
-    Rates are 0 at rest, and so is all that Coriolis torques, quadratic in them, have of first order; the
-    derivative of M meets accelerations that are 0.
+    Rates are 0 at rest, and so are the first-order terms of the Coriolis torques, which are quadratic in
+    them. The derivative of M is multiplied by accelerations that are 0.
     """
-    per_torque = np.linalg.inv(inertia_matrix(q, known.inertia))
-    stiffness = gravity_stiffness(q, known.weight_moment) - pull
+    per_torque = np.linalg.inv(inertia_matrix(q, data.inertia))
+    stiffness = gravity_stiffness(q, data.weight_moment) - pull
     A = np.zeros((6, 6))
     A[:3, 3:] = np.eye(3)
-    A[3:, :3], A[3:, 3:] = -per_torque @ stiffness, -per_torque * known.viscous_Nm_s
+    A[3:, :3], A[3:, 3:] = -per_torque @ stiffness, -per_torque * data.viscous_Nm_s
     return A, per_torque
 
 
 def _behind_lag(A: Array, per_input: Array, follows: Array, lag_s: float) -> Array:
-    """Matrix A of a rotor whose inputs are states that decay with a lag and follow the motion."""
+    """Return the matrix A of a rotor whose inputs are states with a lag that follow the motion."""
     lagging = len(follows)
     pushed = np.vstack([np.zeros((3, lagging)), per_input])
     return np.block([[A, pushed], [follows, -np.eye(lagging) / lag_s]])
 
 
-def _held(known: Knowledge, pose: Array) -> Actuation:
-    """Actuation about a pose where the coils hold what pulls at the rotor."""
+def _holding_actuation(data: LinearisationData, pose: Array) -> Actuation:
+    """Return the actuation about a pose at which the coils balance gravity and unmodelled torque."""
     try:
-        coils = actuation(known, pose, gravity_torque(pose, known.weight_moment) + known.unknown_torque_Nm)
+        coils = actuation(data, pose, gravity_torque(pose, data.weight_moment) + data.unmodelled_torque_Nm)
     except np.linalg.LinAlgError:
         raise InputError(
-            "linear model: expected coils that give torque, received some that give none"
+            "linear model: expected coils that give torque, received coils without torque"
         ) from None
     current_A = float(np.abs(coils.holding_current_A).max())
-    if current_A > known.current_limit_A:
-        most, received = distinct_texts(known.current_limit_A, current_A)
+    if current_A > data.current_limit_A:
+        most, received = distinct_texts(data.current_limit_A, current_A)
         raise InputError(
             f"linear model: expected a pose that the coils hold within {most} A,"
-            f" received one that takes {received} A"
+            f" received one that needs {received} A"
         )
     return coils
 
@@ -364,9 +368,9 @@ def _python_control() -> Any:
         library: Any = importlib.import_module("control")
     except ImportError:
         library = None
-    if not hasattr(library, "StateSpace"):  # also a folder of that name, where Python was started
+    if not hasattr(library, "StateSpace"):  # it may be a folder of that name in the working folder
         raise InputError(
-            "linear model: expected python-control to be there for kind control, received none;"
+            "linear model: expected an installed python-control for kind control, received none;"
             " pip install control"
         )
     return library
@@ -379,7 +383,7 @@ def _pose(given: Any, actuator: Actuator) -> Array:
         pose = np.empty(0)
     if pose.shape != (3,) or not np.all(np.isfinite(pose)):
         raise InputError(f"linear model: expected a pose of three finite angles, received {shown(given)}")
-    # A model whose beta reaches +-90 degrees, where the joint locks, is none of an actuator.
+    # No model of an actuator has a range of beta up to +-90 degrees, where the joint locks.
     for hinge, angle, (low, high) in zip(HINGES, pose, actuator.hinge_range_rad, strict=True):
         if not low <= angle <= high:
             least, most, received = distinct_texts(low, high, angle)

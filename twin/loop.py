@@ -1,4 +1,4 @@
-"""The closed loop, tick by tick: measure, control, move the plant, keep a row. Compiled, or in Python."""
+"""Closed loop: in each tick measure, control, advance the plant, log a row. Compiled, or in Python."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from spheretwin.models.base.compiled import (
 )
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
-from spheretwin.plant.step import DIVERGED, FAILSAFE, GOING, LEFT_WORKSPACE, Delivered, Plant, plant_tick
+from spheretwin.plant.step import DIVERGED, FAILSAFE, GOING, LEFT_WORKSPACE, Plant, PlantOutput, plant_tick
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ DISTURBANCE, CURRENT_COMMAND = _OFFSETS["disturbance_Nm"], width(MOTION_SIGNALS)
 
 
 class Inputs(NamedTuple):
-    """What comes from outside, one row a tick."""
+    """External inputs of the loop, one row for each tick."""
 
     t: NDArray[np.float64]  # (n,) s
     reference: NDArray[np.float64]  # (n, 3, 3) angle, rate, acceleration as rows
@@ -52,18 +52,18 @@ class Inputs(NamedTuple):
     fault_noise: NDArray[np.float64]  # (n, m) of faults, and of the sensors of currents
 
 
-class Places(NamedTuple):
-    """First columns of the signals that not every run logs."""
+class ColumnOffsets(NamedTuple):
+    """First columns of the signals that only some runs log."""
 
-    of_stages: tuple[int, ...]  # in the order of `columns.registry.ALL`; -1 where they are not logged
-    of_the_law: int
+    channels: tuple[int, ...]  # in the order of `channels.CHANNELS`; -1 if they are not logged
+    law_signals: int
 
 
 class Scratch(NamedTuple):
-    """Working space."""
+    """Buffers for intermediate values."""
 
-    reference: NDArray[np.float64]  # (3, 3), what the law is handed
-    measurement: NDArray[np.float64]  # (3, 3), or (6, 3) where the law is handed a prediction too
+    reference: NDArray[np.float64]  # (3, 3), passed to the law
+    measurement: NDArray[np.float64]  # (3, 3), or (6, 3) if the law also receives a prediction
 
 
 @allocation_free
@@ -75,7 +75,7 @@ def loop(
     controller: Controller,
     sensors: Sensors,
     plant: Plant,
-    places: Places,
+    column_offsets: ColumnOffsets,
     scratch: Scratch,
     log: Array,
 ) -> tuple[int, int]:
@@ -85,17 +85,18 @@ def loop(
     ----------
     inputs : Inputs
         At least as many rows as `log`.
-    law, allocate : address, or callable in the uncompiled loop (``loop.py_func``)
-        Of `control.law.SIGNATURE` and `control.allocations.SIGNATURE`.
+    law, allocate, estimate : address, or callable in the uncompiled loop (``loop.py_func``)
+        Functions of `control.law.SIGNATURE`, `control.allocation.SIGNATURE` and
+        `control.estimators.estimator.SIGNATURE`.
     controller : Controller
-        Changed in place, as is the plant; neither sees the other.
+        Changed in place, like the plant; neither accesses the other.
     sensors : Sensors
     plant : Plant
-    places : Places
+    column_offsets : ColumnOffsets
     scratch : Scratch
-        What it holds does not matter.
+        The content is irrelevant.
     log : (ticks, width) array
-        Telemetry; rows are written as they happen.
+        Telemetry; each tick writes its row.
 
     Returns
     -------
@@ -110,11 +111,11 @@ def loop(
     for tick in range(log.shape[0]):
         row, t, disturbance = log[tick], inputs.t[tick], inputs.disturbance[tick]
         copy_into(plant.draws, 0, inputs.fault_noise[tick], plant.draws.shape[0])
-        measured = sense(sensors, plant.rotor.q, plant.rotor.qdot, inputs.noise[tick], measurement)
+        is_finite = sense(sensors, plant.rotor.q, plant.rotor.qdot, inputs.noise[tick], measurement)
         copy_rows(inputs.reference[tick], reference)
-        # Logged before the law is called: it may write into all that it is handed.
+        # Logged before the law is called, because the law may overwrite its arguments.
         write_motion(row, t, reference, plant.rotor.q, plant.rotor.qdot, disturbance)
-        if not (measured or replace_invalid(watchdog, measurement)):
+        if not (is_finite or replace_invalid(watchdog, measurement)):
             return tick, DIVERGED
         if plant.current_sensors.on:
             sense_currents(plant.current_sensors, plant.current, plant.draws)
@@ -126,13 +127,15 @@ def loop(
             return tick, DIVERGED
         row[scale] = share
         copy_into(row, TORQUE_COMMAND, controller.torque_q, 3)
-        copy_into(row, places.of_the_law, controller.memory, controller.logged)
-        delivered = Delivered(row[first_current:first_mean], row[first_mean:scale], row[TORQUE : TORQUE + 3])
+        copy_into(row, column_offsets.law_signals, controller.memory, controller.logged)
+        delivered = PlantOutput(
+            row[first_current:first_mean], row[first_mean:scale], row[TORQUE : TORQUE + 3]
+        )
         status = plant_tick(plant, command, disturbance, delivered)
         if status == FAILSAFE and watchdog.reason[0] == 0:
             trip(watchdog, _TEMPERATURE)
-        write_channels(row, places.of_stages, controller, sensors, plant)
-        if not all_finite(row):  # nor is there a state to go on from
+        write_channels(row, column_offsets.channels, controller, sensors, plant)
+        if not all_finite(row):  # the state cannot be continued either
             return tick, DIVERGED
         if status == FAILSAFE and watchdog.on:
             status = GOING  # the currents run down first
@@ -145,7 +148,7 @@ def loop(
 
 @allocation_free
 def all_finite(row: Array) -> bool:
-    """Whether a row holds numbers alone."""
+    """True if all numbers of a row are finite."""
     finite = True
     for column in range(row.shape[0]):
         finite = finite and isfinite(row[column])
@@ -154,7 +157,7 @@ def all_finite(row: Array) -> bool:
 
 @allocation_free
 def write_motion(row: Array, t: float, reference: Array, q: Array, qdot: Array, disturbance: Array) -> None:
-    """Write the part of a telemetry row that says where the rotor is and should be."""
+    """Write the actual and the desired motion into a telemetry row."""
     row[TIME] = t
     for i in range(3):
         row[ANGLE + i], row[RATE + i] = q[i], qdot[i]
@@ -163,25 +166,25 @@ def write_motion(row: Array, t: float, reference: Array, q: Array, qdot: Array, 
 
 
 class Functions(NamedTuple):
-    """The loop, and the functions of its users as it takes them."""
+    """The loop and its callback functions in the form that the loop accepts."""
 
     loop: Callable[..., tuple[int, int]]
     law: Any
     allocate: Any
     estimate: Any
-    """0 where nothing is estimated."""
-    alive: tuple[Any, ...]
-    """Compiled code holds bare addresses: what they belong to must not go."""
+    """0 if no rates are estimated."""
+    callbacks: tuple[Any, ...]
+    """Kept because compiled code holds only their addresses."""
 
 
-def matching(
+def dispatch(
     law: Law,
     allocate: Callable[..., float],
     estimate: Callable[..., None] | None = None,
     *,
     check_bounds: bool = False,
 ) -> Functions:
-    """Loop and callbacks for a law, an allocation and an estimator of rates.
+    """Return the loop and the callbacks for a law, an allocation and an estimator of rates.
 
     Parameters
     ----------
@@ -193,29 +196,29 @@ def matching(
     Raises
     ------
     InputError
-        The law is to be compiled, and cannot be.
+        numba cannot compile the law.
     """
-    own = is_own(law)
-    if not COMPILES or (own and not isinstance(law.step, Dispatcher)):
+    is_user = is_user_law(law)
+    if not COMPILES or (is_user and not isinstance(law.step, Dispatcher)):
         return Functions(
             uncompiled(loop), uncompiled(law.step), allocate, estimate and uncompiled(estimate), ()
         )
     try:
-        stepping = compiled_callback(laws.SIGNATURE, law.step, check_bounds=check_bounds)
-    except Exception as error:  # numba lets errors of other kinds pass, as AttributeError
-        if not own:
+        law_callback = compiled_callback(laws.SIGNATURE, law.step, check_bounds=check_bounds)
+    except Exception as error:  # numba also raises errors of other kinds, such as AttributeError
+        if not is_user:
             raise
         raise InputError(
             f"law {law.name}: expected a function of (t, reference, measurement, parameters, state,"
             f" torque) that numba compiles, received {compile_error(error, law.step)}"
         ) from error
-    alive = [stepping, compiled_callback(allocations.SIGNATURE, allocate)]
+    callbacks = [law_callback, compiled_callback(allocations.SIGNATURE, allocate)]
     if estimate:
-        alive.append(compiled_callback(estimators.SIGNATURE, estimate))
-    addresses = [each.address for each in alive]
-    return Functions(loop, addresses[0], addresses[1], addresses[2] if estimate else 0, tuple(alive))
+        callbacks.append(compiled_callback(estimators.SIGNATURE, estimate))
+    addresses = [callback.address for callback in callbacks]
+    return Functions(loop, addresses[0], addresses[1], addresses[2] if estimate else 0, tuple(callbacks))
 
 
-def is_own(law: Law) -> bool:
-    """True if a law is the user's, not one of this package."""
+def is_user_law(law: Law) -> bool:
+    """True if a law is a user law, not one of this package."""
     return not (law.step.__module__ or "").startswith("spheretwin.")

@@ -1,4 +1,4 @@
-"""What a metric is: a reducer that follows a run chunk by chunk, in memory that does not hold its rows."""
+"""Metrics: reducers that process a run chunk by chunk without storing its rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.drive_chain import drive
+from spheretwin.electronics.drive_chain import current_lag
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
@@ -18,17 +18,17 @@ from spheretwin.scenario.sections import ResolvedScenario
 
 
 @dataclass(frozen=True)
-class Planned:
-    """What a metric may know of a run before its first row.
+class PlannedRun:
+    """Facts about a run that a metric knows before the first row.
 
     Attributes
     ----------
     scenario : ResolvedScenario
-        In force at the start.
+        Scenario at the start.
     actuator : Actuator
-        What is simulated.
+        Simulated actuator.
     ticks : int
-        Control ticks that the run is to have; it may end before.
+        Planned control ticks; the run may end earlier.
     """
 
     scenario: ResolvedScenario
@@ -42,30 +42,30 @@ class Planned:
 
 
 class Metric(ABC):
-    """One figure of a run; its bits do not depend on the chunks that the run comes in.
+    """Metric of a run; the result is bit-identical for any chunks.
 
     Parameters
     ----------
-    planned : Planned
-        The run to come.
+    planned : PlannedRun
+        Facts about the run.
     """
 
     labels: ClassVar[tuple[str, ...]] = ()
-    """Names of its entries, where its value is a list."""
+    """Names of the entries, if the value is a list."""
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         self.planned = planned
 
     @abstractmethod
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
 
     @abstractmethod
     def value(self) -> Any:
-        """The figure as JSON holds it; None where there are too few rows for one."""
+        """Return the value of the metric in JSON types; None if there are too few rows."""
 
     def warnings(self) -> list[str]:
-        """What a user should know before believing any figure of the run; one line each."""
+        """Return warnings that concern the validity of the figures, one line each."""
         return []
 
 
@@ -96,11 +96,11 @@ def add_squares_by_piece(rows: Array, first: int, piece_rows: int, sums: Array) 
     ----------
     rows : (n, k) array
     first : int
-        Place of the first row, counted from the start of the first piece.
+        Index of the first row, counted from the start of the first piece.
     piece_rows : int
-        Rows of a piece.
+        Number of rows of a piece.
     sums : (pieces, k) array
-        Added to.
+        Result, increased.
     """
     for i in range(rows.shape[0]):
         piece = (first + i) // piece_rows
@@ -110,7 +110,7 @@ def add_squares_by_piece(rows: Array, first: int, piece_rows: int, sums: Array) 
 
 @rounding_each
 def add_variation(rows: Array, last: Array, total: Array) -> None:
-    """Add how far each column of rows (n, k) goes from row to row to a total (k,); `last` (k,) goes along."""
+    """Add the variation of each column of rows (n, k) to a total (k,); update the last row `last` (k,)."""
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             total[j] += abs(rows[i, j] - last[j])
@@ -127,15 +127,15 @@ def raise_to_largest(rows: Array, largest: Array) -> None:
 
 @rounding_each
 def raise_to_farthest(rows: Array, direction: Array, farthest: Array) -> None:
-    """Raise `farthest` (k,) to how far rows (n, k) go in a direction (k,), 1 or -1; 0 for none."""
+    """Raise `farthest` (k,) to the largest values of rows (n, k) in a direction (k,), 1 or -1; 0: none."""
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             farthest[j] = max(farthest[j], direction[j] * rows[i, j])
 
 
 @rounding_each
-def note_last_outside(rows: Array, band: float, first: int, last: NDArray[np.int64]) -> None:
-    """Write into `last` (k,) where a magnitude of rows (n, k), counted from `first`, last leaves a band."""
+def update_last_outside(rows: Array, band: float, first: int, last: NDArray[np.int64]) -> None:
+    """Update `last` (k,) with the last row (n, k), counted from `first`, that is outside a band."""
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             if abs(rows[i, j]) > band:
@@ -145,24 +145,24 @@ def note_last_outside(rows: Array, band: float, first: int, last: NDArray[np.int
 class CopperLoss(Metric):
     """Energy lost in the copper over the run, ∫ R i² dt added over the groups, J.
 
-    Amplifiers with a supply tell it themselves, by ``copper_loss_W``, with R as warm as it is. Without one, R
-    is that of a cold group. Within a tick each current goes from where it was towards
-    its command as the drive's exponential; ``current_A``, its mean over the physics step that begins at the
-    tick, tells where it was, so that the integral over the tick is exact, however hard a law chatters.
-    Lag and limit of the drive are those at the start of the run: the rows do not say where they change on the
-    way. Behind a delay or a converter, which come between command and target, ``current_A`` is taken for the
-    whole tick. A tick in which a run ends counts whole.
+    With a supply the telemetry contains the loss, ``copper_loss_W``, with R at the present temperature.
+    Without one, R is that of a cold group. Within a tick each current relaxes exponentially towards its
+    command; ``current_A``, its mean over the physics step that begins at the tick, determines its initial
+    value, so that the integral over the tick is exact, also under chattering. Lag and limit of the drive are
+    those at the start of the run: the rows do not contain their changes. After a delay or a converter, which
+    act between command and target, ``current_A`` is used for the complete tick. The tick in which a run ends
+    counts completely.
     """
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         section = planned.scenario.drive
         lag_s, self._limit_A = section.lag_s, section.current_limit_A
-        # Shares of the distance to the command that are left on average: over the first step, over the tick,
-        # and of its square over the tick, which decays twice as fast.
+        # Mean remaining shares of the distance to the command: over the first step, over the tick, and of its
+        # square over the tick, which decays twice as fast.
         self._first_step, self._tick, self._tick_squared = (
-            drive(each_lag_s, span_s, self._limit_A).mean_share
-            for each_lag_s, span_s in (
+            current_lag(time_constant_s, span_s, self._limit_A).mean_share
+            for time_constant_s, span_s in (
                 (lag_s, planned.scenario.plant.step_s),
                 (lag_s, planned.period_s),
                 (0.5 * lag_s, planned.period_s),
@@ -171,26 +171,26 @@ class CopperLoss(Metric):
         self._follows = not section.converts
         self._resistance_ohm = section.resistance_ohm
         self._rows, self._squares = 0, np.zeros(len(planned.actuator.groups))
-        self._told_W = np.zeros(len(planned.actuator.groups))
+        self._logged_W = np.zeros(len(planned.actuator.groups))
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         self._rows += len(rows)
         if any(signal.name == "copper_loss_W" for signal in rows.signals):
-            add_rows(np.ascontiguousarray(rows["copper_loss_W"]), self._told_W)
+            add_rows(np.ascontiguousarray(rows["copper_loss_W"]), self._logged_W)
             return
         if not self._follows:
             add_squares(np.ascontiguousarray(rows["current_A"]), self._squares)
             return
-        command, current = (np.ascontiguousarray(rows[f"current{each}_A"]) for each in ("_command", ""))
+        command, current = (np.ascontiguousarray(rows[f"current{part}_A"]) for part in ("_command", ""))
         shares = self._first_step, self._tick, self._tick_squared
         _add_lagging_squares(command, current, self._limit_A, shares, self._squares)
 
     def value(self) -> float | None:
-        """In J; None without a row."""
+        """Return the loss in J; None without a row."""
         if not self._rows:
             return None
-        heat_W = np.sum(self._resistance_ohm * self._squares) + np.sum(self._told_W)
+        heat_W = np.sum(self._resistance_ohm * self._squares) + np.sum(self._logged_W)
         return float(heat_W * self.planned.period_s)
 
 
@@ -198,12 +198,12 @@ class CopperLoss(Metric):
 def _add_lagging_squares(
     command: Array, current: Array, limit_A: float, shares: tuple[float, float, float], total: Array
 ) -> None:
-    """Add the mean squares over their ticks of currents that follow their commands (n, k) to a total (k,)."""
+    """Add the mean squares over the ticks of currents that follow commands (n, k) to a total (k,)."""
     first_step, tick, tick_squared = shares
     for i in range(command.shape[0]):
         for j in range(command.shape[1]):
             target = min(max(command[i, j], -limit_A), limit_A)
-            distance = 0.0  # at the start of the tick; without a lag there is none
+            distance = 0.0  # at the start of the tick; 0 without a lag
             if first_step > 0:
                 distance = (current[i, j] - target) / first_step
             crossed = 2.0 * tick * target * distance
@@ -211,21 +211,21 @@ def _add_lagging_squares(
 
 
 class CurrentVariation(Metric):
-    """Total variation of ``current_command_A`` a group a second, A/s.
+    """Total variation of ``current_command_A`` per group and second, A/s.
 
-    Σ|Δi| from tick to tick, as the mean over the groups, over the time from the first tick to the last. Of
-    the commands, not of the currents: a command is held from tick to tick, so that nothing of its variation
-    lies between the rows, and what the controller asks for is not smoothed by the lag of the coils.
+    Σ|Δi| from tick to tick, mean over the groups, divided by the time from the first tick to the last. It
+    uses the commands, not the currents: a command is held from tick to tick, so that the rows contain its
+    complete variation, and the lag of the coils does not smooth it.
     """
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         groups = len(planned.actuator.groups)
         self._rows, self._variation = 0, np.zeros(groups)
         self._last = np.zeros(groups)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         command = np.ascontiguousarray(rows["current_command_A"])
         if not self._rows:
             self._last = command[0].copy()
@@ -233,7 +233,7 @@ class CurrentVariation(Metric):
         self._rows += len(rows)
 
     def value(self) -> float | None:
-        """In A/s; None with fewer than two rows."""
+        """Return the variation in A/s; None with fewer than two rows."""
         if self._rows < 2:
             return None
         return float(self._variation.mean() / ((self._rows - 1) * self.planned.period_s))
@@ -242,63 +242,63 @@ class CurrentVariation(Metric):
 class MaxAbsCurrent(Metric):
     """Largest ``|current_A|`` of any group, A: of means over the physics step that begins at each tick."""
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._largest = -np.inf
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         self._largest = max(self._largest, float(np.abs(rows["current_A"]).max()))
 
     def value(self) -> float | None:
-        """In A; None without a row."""
+        """Return the current in A; None without a row."""
         return self._largest if self._largest >= 0 else None
 
 
 class RmsTorque(Metric):
     """Root mean square over the run of the length of ``torque_Nm``, N·m.
 
-    The length is that of the Cartesian vector, x, y and z in one figure: what the coils gave, at the
-    physics step that begins at each tick.
+    The length is that of the Cartesian vector (x, y, z) of the coil torque, at the physics step that begins
+    at each tick.
     """
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._rows, self._squares = 0, np.zeros(3)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         self._rows += len(rows)
         add_squares(np.ascontiguousarray(rows["torque_Nm"]), self._squares)
 
     def value(self) -> float | None:
-        """In N·m; None without a row."""
+        """Return the torque in N·m; None without a row."""
         return float(np.sqrt(self._squares.sum() / self._rows)) if self._rows else None
 
 
-# Above this share of ticks at the current limit a run says so beside its figures.
+# Above this share of ticks at the current limit a run has a warning.
 SATURATED_SHARE = 0.05
 
 
 class SaturatedFraction(Metric):
-    """Share of the ticks at which the current limit left less than the commanded torque, 0 to 1."""
+    """Share of the ticks at which the current limit reduced the commanded torque, 0 to 1."""
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._rows = self._saturated = self._rank_lost = 0
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         self._rows += len(rows)
         self._saturated += int(np.count_nonzero(saturated(rows)))
         self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
 
     def value(self) -> float | None:
-        """0 to 1; None without a row."""
+        """Return the share, 0 to 1; None without a row."""
         return self._saturated / self._rows if self._rows else None
 
     def warnings(self) -> list[str]:
-        """Report where the limit, or a torque matrix without rank, determines the figures."""
+        """Return warnings if the limit, or a torque matrix without full rank, determines the figures."""
         warnings = []
         if self._rank_lost:
             warnings.append(
@@ -308,8 +308,8 @@ class SaturatedFraction(Metric):
         share = self.value() or 0.0
         if share > SATURATED_SHARE:
             warnings.append(
-                f"the current limit cut the torque at {100 * share:.0f} % of the ticks: the figures are those"
-                " of the limit more than of the law"
+                f"the current limit reduced the torque at {100 * share:.0f} % of the ticks: the figures"
+                " depend more on the limit than on the law"
             )
         return warnings
 
@@ -319,16 +319,16 @@ class MaxAbsError(Metric):
 
     labels = ANGLES
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._largest = np.full(3, -np.inf)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         raise_to_largest(np.ascontiguousarray(rows["error_rad"]), self._largest)
 
     def value(self) -> list[float] | None:
-        """[3] in rad; None without a row."""
+        """Return [3] in rad; None without a row."""
         return self._largest.tolist() if self._largest[0] >= 0 else None
 
 
@@ -340,28 +340,28 @@ class RmsError(Metric):
 
     labels = ANGLES
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._squares = SquaresByPiece(planned.ticks)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         self._squares.add(rows["error_rad"])
 
     def value(self) -> list[float] | None:
-        """[3] in rad; None without a row."""
+        """Return [3] in rad; None without a row."""
         return self._squares.rms(0)
 
 
 class SquaresByPiece:
     """Sums of squares over pieces of 256 ticks, one of which begins at half of the planned ticks.
 
-    A second half can be told from them without the rows; they grow by a kilobyte for 10,000 ticks.
+    They give the value of the second half without the rows, and grow by a kilobyte for 10,000 ticks.
 
     Parameters
     ----------
     planned : int
-        Ticks that the run is to have.
+        Planned ticks of the run.
     """
 
     def __init__(self, planned: int) -> None:
@@ -370,7 +370,7 @@ class SquaresByPiece:
         self.rows = 0
 
     def add(self, values: NDArray[np.float64]) -> None:
-        """Take the next rows (n, 3)."""
+        """Add the next rows (n, 3)."""
         first = self.rows - self._offset + PIECE_TICKS  # from the start of piece 0
         missing = max(0, self.piece(self.rows + len(values) - 1) + 1 - len(self._sums))
         self._sums = np.concatenate([self._sums, np.zeros((missing, 3))])
@@ -378,45 +378,45 @@ class SquaresByPiece:
         self.rows += len(values)
 
     def rms(self, first: int) -> list[float] | None:
-        """Root mean square from the first tick of a piece on; None where there is no row."""
+        """Return the root mean square from the first tick of a piece on; None without a row."""
         if not self.rows:
             return None
         begins = max(0, (first - 1) * PIECE_TICKS + self._offset)
         return np.sqrt(self._sums[first:].sum(axis=0) / (self.rows - begins)).tolist()
 
     def piece(self, tick: int) -> int:
-        """Piece that a tick is in."""
+        """Return the piece that contains a tick."""
         return (tick - self._offset) // PIECE_TICKS + 1
 
 
 BAND_rad = 0.01
-"""The usual 5 % band around 0.2 rad, the amplitude of the shipped motions.
+"""Settling band: the usual 5 % of 0.2 rad, the amplitude of the shipped motions.
 
-Of a fixed size: a share of each run's own excursion would leave a spinning hinge, which goes many turns, a
+The size is fixed: a share of the motion of each run would give a spinning hinge, which makes many turns, a
 band as wide as its errors.
 """
 
 
 class SettlingTime(Metric):
-    """Time from which on ``|error_rad|`` of each hinge stays within 0.01 rad to the end, [3] in s.
+    """Time from which ``|error_rad|`` of each hinge stays within 0.01 rad to the end, [3] in s.
 
-    0 for a hinge that never leaves the band, None for one that is outside at the last tick. A change on the
-    way starts the clock anew only by what it does to the error.
+    0 for a hinge that never leaves the band, None for a hinge that is outside at the last tick. A change
+    during the run affects the time only through the error.
     """
 
     labels = ANGLES
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._rows, self._last_outside = 0, np.full(3, -1)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
-        note_last_outside(np.ascontiguousarray(rows["error_rad"]), BAND_rad, self._rows, self._last_outside)
+        """Process the rows of one chunk, at least one."""
+        update_last_outside(np.ascontiguousarray(rows["error_rad"]), BAND_rad, self._rows, self._last_outside)
         self._rows += len(rows)
 
     def value(self) -> list[float | None] | None:
-        """[3] in s; None without a row."""
+        """Return [3] in s; None without a row."""
         if not self._rows:
             return None
         settled = (self._last_outside + 1).tolist()
@@ -424,20 +424,20 @@ class SettlingTime(Metric):
 
 
 class Overshoot(Metric):
-    """Largest ``error_rad`` of each hinge on the other side of its reference than it began, [3] in rad.
+    """Largest ``error_rad`` of each hinge with the sign opposite to that of the initial error, [3] in rad.
 
-    0 for one that never crosses it, None for one that begins within 0.01 rad of it, the band of settling:
-    there is no step that it could overshoot.
+    0 for a hinge that never crosses its reference, None for a hinge that begins within 0.01 rad of it, the
+    settling band: without a step there is no overshoot.
     """
 
     labels = ANGLES
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._rows, self._start, self._largest = 0, np.zeros(3), np.zeros(3)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         error = np.ascontiguousarray(rows["error_rad"])
         if not self._rows:
             self._start = error[0].copy()
@@ -445,11 +445,11 @@ class Overshoot(Metric):
         raise_to_farthest(error, -np.sign(self._start), self._largest)
 
     def value(self) -> list[float | None] | None:
-        """[3] in rad; None without a row."""
+        """Return [3] in rad; None without a row."""
         if not self._rows:
             return None
         steps = np.abs(self._start) > BAND_rad
-        return [float(far) if step else None for far, step in zip(self._largest, steps, strict=True)]
+        return [float(largest) if step else None for largest, step in zip(self._largest, steps, strict=True)]
 
 
 class TailRmsError(Metric):
@@ -461,16 +461,16 @@ class TailRmsError(Metric):
 
     labels = ANGLES
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         self._squares = SquaresByPiece(planned.ticks)
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, at least one."""
+        """Process the rows of one chunk, at least one."""
         self._squares.add(rows["error_rad"])
 
     def value(self) -> list[float] | None:
-        """[3] in rad; None without a row."""
+        """Return [3] in rad; None without a row."""
         return self._squares.rms(self._squares.piece(self._squares.rows // 2))
 
 

@@ -1,4 +1,4 @@
-"""Files and live view of a run: opened before it, closed after it, each whatever becomes of the other."""
+"""Outputs of a run: files and live view, opened before and closed after it, independent of each other."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ if TYPE_CHECKING:
 
 
 def check(paths: list[Path]) -> None:
-    """Find out before a run whether its files can be written.
+    """Check before a run that its files can be written.
 
     Raises
     ------
     InputError
-        One cannot, or two are one.
+        A file cannot be written, or two paths are equal.
     """
     for path in paths:
         check_writable(path)
     if len({path.resolve() for path in paths}) < len(paths):
-        raise InputError(f"output: expected a path of its own for each file, received {paths[0]} twice")
+        raise InputError(f"output: expected a separate path for each file, received {paths[0]} twice")
 
 
 def rate_Hz(text: str) -> float:
-    """A rate from the command line, Hz."""
+    """Return a rate from the command line, Hz."""
     try:
         rate = float(text)
     except ValueError:
@@ -54,12 +54,12 @@ def rate_Hz(text: str) -> float:
 
 
 def check_rate(rate: float | None, record: Path | None, period_s: float) -> None:
-    """Refuse a rate of a recording that is not asked for, or one that no run has the rows for.
+    """Check the rate of a recording: there must be a recording, and the run must have enough rows.
 
     Raises
     ------
     InputError
-        It is one of these.
+        There is no recording, or the rate is above the control rate.
     """
     if rate is None:
         return
@@ -67,13 +67,13 @@ def check_rate(rate: float | None, record: Path | None, period_s: float) -> None
         raise InputError("command line: expected --record FILE.rrd with --record-rate, received none")
     if rate * period_s > 1 + 1e-9:  # both are rounded
         raise InputError(
-            f"command line: expected --record-rate of at most {1 / period_s:g} Hz, at which the controller"
-            f" works, received {rate:g}"
+            f"command line: expected --record-rate of at most {1 / period_s:g} Hz, the rate of the"
+            f" controller, received {rate:g}"
         )
 
 
 class Outputs:
-    """What follows a session into files and into a viewer.
+    """Files and viewer that receive the telemetry of a session.
 
     Parameters
     ----------
@@ -82,25 +82,25 @@ class Outputs:
     record, telemetry : Path, optional
         Files to write.
     live : bool
-        Serve a viewer on 127.0.0.1.
+        Serve a viewer at 127.0.0.1.
     view : str
-        What of the recording is open at first.
+        View of the recording that is open at first.
     record_rate_Hz : float, optional
-        Rows a second that the recording keeps beside those that stand out; every row unless given.
+        Rows per second of the recording, in addition to extremes and events; default: every row.
     first_tick : int
-        Tick of the first row that the files keep.
+        Tick of the first row of the files.
 
     Attributes
     ----------
     record, telemetry : Path or None
-        Files that were written whole, once they are closed.
+        After `close`: files that were written completely.
 
     Raises
     ------
     InputError
-        A file cannot be made, or the model cannot be drawn; nothing is left behind.
+        A file cannot be created, or the model cannot be drawn; no file remains.
     SpheretwinError
-        There is no viewer to serve; nothing is left behind.
+        No viewer can be served; no file remains.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class Outputs:
             self._begun = record_of(session, first_tick=first_tick)
             self._file = TelemetryFile(telemetry, session.signals, self._begun.metadata())
         self._live = _live_view(session, view) if live else None
-        # The recorder last: it alone leaves something where it is made and another is refused.
+        # The recorder last: it would leave a file if a later output were refused.
         try:
             self._recorder = _recorder_at_rate(session, record, view, record_rate_Hz) if record else None
         except SpheretwinError:
@@ -130,48 +130,48 @@ class Outputs:
 
     @property
     def sinks(self) -> list[Sink]:
-        """To be handed the telemetry."""
+        """Sinks of the telemetry."""
         sinks: list[Sink] = [sink for sink in (self._file, self._recorder, self._live) if sink]
-        return [_From(self._first_tick, sink) for sink in sinks] if self._first_tick else sinks
+        return [_FromTick(self._first_tick, sink) for sink in sinks] if self._first_tick else sinks
 
     def close(self) -> list[SpheretwinError]:
-        """Complete every file; returns what went wrong."""
-        faults = []
+        """Complete every file; return the errors."""
+        errors = []
         if self._live:
             try:
                 self._live.close()
             except SpheretwinError as error:
-                faults.append(error)
-        if self._recorder:  # before the telemetry: its memory is free then
+                errors.append(error)
+        if self._recorder:  # before the telemetry, as this frees memory
             try:
                 self._recorder.close()
             except SpheretwinError as error:
-                faults.append(error)
+                errors.append(error)
                 self.record = None
         if self._file:
             try:
                 record = record_of(self._session, self._begun, self._first_tick)
                 self._file.close(record.metadata())
             except SpheretwinError as error:
-                faults.append(error)
+                errors.append(error)
                 self.telemetry = None
-        return faults
+        return errors
 
 
-class _From:
-    """Hands a sink the rows from a tick on."""
+class _FromTick:
+    """Passes the rows from a tick on to a sink."""
 
     def __init__(self, first_tick: int, sink: Sink) -> None:
-        self._left, self._sink = first_tick, sink
+        self._remaining, self._sink = first_tick, sink
 
     def write(self, rows: Table) -> None:
-        passed = min(self._left, len(rows))
-        self._left -= passed
-        if passed < len(rows):
-            self._sink.write(rows.rows(passed, len(rows)))
+        skipped = min(self._remaining, len(rows))
+        self._remaining -= skipped
+        if skipped < len(rows):
+            self._sink.write(rows.rows(skipped, len(rows)))
 
     def note(self, t_s: float, text: str) -> None:
-        if not self._left:
+        if not self._remaining:
             self._sink.note(t_s, text)
 
     def finish(self, status: Status) -> None:
@@ -196,56 +196,56 @@ def _recorder_at_rate(session: Session, path: Path, view: str, rate_Hz: float | 
 if TYPE_CHECKING:
     from spheretwin.viz.recording.recorder import Recorder
 
-# Chunks handed over and not yet written; beyond these the loop waits, so that they do not gather in memory.
+# Chunks that may wait to be written; the loop waits for more, so that they do not accumulate in memory.
 PENDING_CHUNKS = 64
 
 
-class Files:
-    """The files of one recording, opened.
+class OpenedFiles:
+    """Opened files of one recording.
 
     Parameters
     ----------
     session : Session
-        Read alone.
+        Only read.
     recording, telemetry : Path, optional
 
     Raises
     ------
     InputError
-        None is given, one cannot be made, or two are one; nothing is left behind.
+        No path is given, a file cannot be created, or two paths are equal; no file remains.
     """
 
     def __init__(self, session: Session, recording: Path | None, telemetry: Path | None) -> None:
         self.paths = tuple(path for path in (recording, telemetry) if path)
         if not self.paths:
             raise InputError("bench: expected a file to record into, received none")
-        warm()
+        import_writers()
         for path in self.paths:
             check_writable(path)
         if len({path.resolve() for path in self.paths}) < len(self.paths):
-            raise InputError(f"output: expected a path of its own for each file, received {recording} twice")
+            raise InputError(f"output: expected a separate path for each file, received {recording} twice")
         self.telemetry = telemetry
         self.recorder = _recorder(session, recording) if recording else None
 
     def discard(self) -> None:
-        """Close what was opened for nothing."""
+        """Close files that are not used."""
         if self.recorder:
             self.recorder.close()
 
 
-class Keeping:
-    """One recording, from the next tick on.
+class RecordingFiles:
+    """Files of one recording, from the next tick on; a thread writes them.
 
     Parameters
     ----------
-    files : Files
+    files : OpenedFiles
     session : Session
-        The files are of its run.
+        Session of the run.
     begun : RunRecord
-        Record of the run when it began.
+        Record of the run at its start.
     """
 
-    def __init__(self, files: Files, session: Session, begun: RunRecord) -> None:
+    def __init__(self, files: OpenedFiles, session: Session, begun: RunRecord) -> None:
         self.paths, self._recorder = files.paths, files.recorder
         self._begun, self._first_tick = begun, session.tick
         self._file = None
@@ -256,32 +256,32 @@ class Keeping:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="keeping")
         self._room = Semaphore(PENDING_CHUNKS)
         self.faults: list[str] = []
-        """What went wrong, one line each."""
+        """Errors, one line each."""
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, which must not change any more."""
+        """Write the rows of one chunk, which must not change afterwards."""
         self._submit(lambda: [sink.write(rows) for sink in self._sinks])
 
     def note(self, t_s: float, text: str) -> None:
-        """Take note of what happened before the tick at `t_s`."""
+        """Note an event before the tick at `t_s`."""
         self._submit(lambda: [sink.note(t_s, text) for sink in self._sinks])
 
-    def ending(self, session: Session) -> Callable[[Callable[[Keeping], None]], None]:
-        """What completes the files as the session is now, beside the loop, and tells its argument then."""
+    def ending(self, session: Session) -> Callable[[Callable[[RecordingFiles], None]], None]:
+        """Return a function that completes the files in the thread and then calls its argument."""
         status = Status.COMPLETED if session.status == Status.RUNNING else session.status
         record = record_of(session, self._begun, self._first_tick)
 
-        def complete(done: Callable[[Keeping], None]) -> None:
+        def complete(done: Callable[[RecordingFiles], None]) -> None:
             for sink in self._sinks:
                 sink.finish(status)
             if self._recorder:
-                self._tried(self._recorder.close)
+                self._attempt(self._recorder.close)
             if self._file:
                 file = self._file
-                self._tried(lambda: file.close(record.metadata()))
+                self._attempt(lambda: file.close(record.metadata()))
             done(self)
 
-        def end(done: Callable[[Keeping], None]) -> None:
+        def end(done: Callable[[RecordingFiles], None]) -> None:
             self._submit(lambda: complete(done))
             self._worker.shutdown(wait=False)
 
@@ -291,7 +291,7 @@ class Keeping:
         """Wait until the files are complete."""
         self._worker.shutdown()
 
-    def _tried(self, work: Callable[[], None]) -> None:
+    def _attempt(self, work: Callable[[], None]) -> None:
         try:
             work()
         except SpheretwinError as error:
@@ -304,14 +304,14 @@ class Keeping:
     def _perform(self, work: Callable[[], object]) -> None:
         try:
             work()
-        except Exception as error:  # of the disk, Arrow or Rerun: the run goes on, and its faults are told
+        except Exception as error:  # of the disk, Arrow or Rerun: the run continues and the error is reported
             self.faults.append(without_breaks(error) or type(error).__name__)
         finally:
             self._room.release()
 
 
-def warm() -> None:
-    """Import what a recording needs: slow, and it holds the interpreter."""
+def import_writers() -> None:
+    """Import the modules of a recording in advance: the import is slow and blocks the interpreter."""
     for module in ("pyarrow.parquet", "spheretwin.viz.recording.recorder"):
         import_module(module)
 

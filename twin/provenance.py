@@ -12,7 +12,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.telemetry.run_record import Change, RunFacts, RunRecord, versions
 from spheretwin.scenario import reading
-from spheretwin.scenario.sections import OwnController, ResolvedScenario
+from spheretwin.scenario.sections import ResolvedScenario, UserController
 from spheretwin.session import Session
 
 
@@ -48,8 +48,8 @@ def record_of(session: Session, before: RunRecord | None = None, first_tick: int
     first_tick : int
         Tick from which on the rows are kept.
     """
-    scenario = reading.beside(os.getcwd(), session.begun_as.model_dump(mode="json"))
-    if session.law_reference and isinstance(session.begun_as.controller, OwnController):
+    scenario = reading.resolve_paths(os.getcwd(), session.begun_as.model_dump(mode="json"))
+    if session.law_reference and isinstance(session.begun_as.controller, UserController):
         scenario["controller"]["law"] = session.law_reference
     journal = tuple(map(_from_root, session.journal))
     digests = dict(before.files) if before else {}
@@ -63,7 +63,7 @@ def files_of(scenario: dict[str, Any], journal: Iterable[Change]) -> Iterator[tu
     """Files that a run names at its start or on its way, each with the dotted name of its field."""
     yield from reading.named_files(scenario)
     for change in journal:
-        yield from reading.named_files(reading.alone(change.name, change.value))
+        yield from reading.named_files(reading.single_field(change.name, change.value))
 
 
 def digest(dotted: str, path: str) -> str | None:
@@ -78,7 +78,7 @@ def digest(dotted: str, path: str) -> str | None:
 
 def _from_root(change: Change) -> Change:
     """A change whose paths, if it holds any, begin at the root."""
-    return change._replace(value=reading.value_beside(os.getcwd(), change.name, change.value))
+    return change._replace(value=reading.resolve_value_paths(os.getcwd(), change.name, change.value))
 
 
 def _sections(fields: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

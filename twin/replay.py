@@ -1,4 +1,4 @@
-"""A run told by its own telemetry file: scenario at its start, command journal, ticks, model and curves."""
+"""Replay of a run from its telemetry file: initial scenario, command journal, ticks, model and curves."""
 
 from __future__ import annotations
 
@@ -19,24 +19,23 @@ from spheretwin.scenario import reading
 from spheretwin.scenario.sections import Scenario
 
 
-class Plan(NamedTuple):
-    """What to run."""
+class RunPlan(NamedTuple):
+    """Run to be carried out: scenario, ticks and journal."""
 
     scenario: Scenario
     ticks: int
     journal: tuple[Change, ...]
     first_tick: int = 0
-    """Of the first row that is kept."""
+    """Tick of the first row that the files contain."""
 
 
-def read(path: Path) -> Plan:
-    """Read from a telemetry file what was run; run again, it gives the same bytes.
+def read(path: Path) -> RunPlan:
+    """Read the plan of a run from its telemetry file; the replayed run gives the same bytes.
 
     Raises
     ------
     InputError
-        The file is no telemetry of a run, was made under a law that it does not hold, or a model or curve
-        is no longer what it was.
+        The file is not telemetry of a run, its law is not in a file, or a model or curve was changed.
     """
     _, metadata = read_parquet(path, rows=False)
     try:
@@ -66,22 +65,22 @@ def _with_moved_files(record: RunRecord, folder: Path) -> RunRecord:
 
     return replace(
         record,
-        scenario=reading.with_files(copy.deepcopy(dict(record.scenario)), place),
+        scenario=reading.replace_files(copy.deepcopy(dict(record.scenario)), place),
         journal=tuple(
-            change._replace(value=reading.value_with_files(change.name, change.value, place))
+            change._replace(value=reading.replace_value_files(change.name, change.value, place))
             for change in record.journal
         ),
         files={moved.get(path, path): digest for path, digest in record.files.items()},
     )
 
 
-def _plan(record: RunRecord, source: str) -> Plan:
+def _plan(record: RunRecord, source: str) -> RunPlan:
     scenario = scenarios.from_record(record.scenario, source)
     for change in record.journal:
         if change.name == "controller.law" and change.value not in LAWS and not is_reference(change.value):
             raise InputError(
                 f"replay {source}: expected changes to {', '.join(LAWS)}, received one to {change.value}"
-                f" at tick {change.tick}, a law that the file does not hold"
+                f" at tick {change.tick}, a law that the file does not contain"
             )
     if record.ticks <= record.first_tick:
         raise InputError(
@@ -91,12 +90,12 @@ def _plan(record: RunRecord, source: str) -> Plan:
         )
     named = provenance.files_of(scenario.model_dump(mode="json"), record.journal)
     _check_files(named, record.files, source)
-    return Plan(scenario, record.ticks, record.journal, record.first_tick)
+    return RunPlan(scenario, record.ticks, record.journal, record.first_tick)
 
 
 def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | None], source: str) -> None:
     for path, dotted in named:
-        if path in digests and provenance.digest(dotted, path) != digests[path]:  # older files hold none
+        if path in digests and provenance.digest(dotted, path) != digests[path]:  # not in older files
             raise InputError(
                 f"replay {source}: expected {dotted} {path} as it was when the run was made,"
                 " received one that is missing or was changed since"

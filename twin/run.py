@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spheretwin.faults.fault_injector import FaultLines
-from spheretwin.metrics import METRICS, Planned
+from spheretwin.faults.fault_injector import FaultMessages
+from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, exception_text, shown
 from spheretwin.models.telemetry.run_record import RunRecord, versions
@@ -23,7 +23,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import change_text, facts_of
-from spheretwin.scenario.changes import planned
+from spheretwin.scenario.changes import scheduled_changes
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.session import Session
 
@@ -212,9 +212,9 @@ class Run:
     def _log(self) -> list[tuple[float, str]]:
         """Faults, and the changes that the scenario planned or the user made, in the order of time."""
         record, period_s = self.provenance, self.scenario.controller.period_s
-        changes = [each for each in planned(self.scenario) if each.tick < len(self.telemetry)]
+        changes = [each for each in scheduled_changes(self.scenario) if each.tick < len(self.telemetry)]
         lines = [(each.tick * period_s, change_text(each)) for each in (*changes, *record.journal)]
-        return sorted([*lines, *FaultLines().of(self.telemetry)] if len(self.telemetry) else lines)
+        return sorted([*lines, *FaultMessages().of(self.telemetry)] if len(self.telemetry) else lines)
 
 
 def _text(value: Any) -> str:
@@ -239,7 +239,7 @@ def _imported(package: str) -> Any:
         ) from None
 
 
-OwnMetric = Callable[[Run], Any]
+UserMetric = Callable[[Run], Any]
 """Function of the user: from a complete run to a value that JSON holds."""
 
 # Keys of the JSON of a run that are no metrics.
@@ -261,12 +261,12 @@ class Figures:
 
     Parameters
     ----------
-    planned : Planned
+    planned : PlannedRun
         The run to come.
     """
 
-    def __init__(self, planned: Planned) -> None:
-        self._metrics = {name: metric(planned) for name, metric in METRICS.items()}
+    def __init__(self, scheduled_changes: PlannedRun) -> None:
+        self._metrics = {name: metric(scheduled_changes) for name, metric in METRICS.items()}
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk."""
@@ -289,7 +289,7 @@ class Figures:
         return [line for metric in self._metrics.values() for line in metric.warnings()]
 
 
-def figures_of(run: Run, extra: Mapping[str, OwnMetric] | None = None) -> dict[str, Any]:
+def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[str, Any]:
     """Figures of a run whose telemetry is in memory.
 
     Parameters
@@ -306,12 +306,12 @@ def figures_of(run: Run, extra: Mapping[str, OwnMetric] | None = None) -> dict[s
     """
     own = extra or {}
     check_names(own)
-    figures = Figures(Planned(run.scenario, run.actuator, run.scenario.ticks))
+    figures = Figures(PlannedRun(run.scenario, run.actuator, run.scenario.ticks))
     figures.write(run.telemetry)
     return {**figures.values(), **{name: own_value(name, metric, run) for name, metric in own.items()}}
 
 
-def check_names(own: Mapping[str, OwnMetric]) -> None:
+def check_names(own: Mapping[str, UserMetric]) -> None:
     """Find out whether functions of the user's have names of their own.
 
     Raises
@@ -325,7 +325,7 @@ def check_names(own: Mapping[str, OwnMetric]) -> None:
             raise InputError(f"metric: expected another name than {taken}, received {name}")
 
 
-def own_value(name: str, metric: OwnMetric, run: Run) -> Any:
+def own_value(name: str, metric: UserMetric, run: Run) -> Any:
     """What a function of the user's says of a run, as JSON holds it.
 
     Raises

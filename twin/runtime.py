@@ -1,4 +1,4 @@
-"""The parts of one twin at work: built from a scenario, built anew where it changes, kept and restored."""
+"""Runtime of one twin: builds, rebuilds, saves and restores the components of the loop."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 
 from spheretwin import assembly
 from spheretwin import loop as loops
-from spheretwin import shared_buffers as wiring
 from spheretwin.control.allocation import ALLOCATIONS
 from spheretwin.control.applied_torque import transfer_applied_torque
 from spheretwin.control.compensators import transfer_compensators
 from spheretwin.control.controller import Supervision
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_watchdog
-from spheretwin.electronics import drive as drivings
-from spheretwin.electronics import sensors as senses
-from spheretwin.loop import is_own, matching
+from spheretwin.electronics.drive import transfer_drive
+from spheretwin.electronics.sensors import transfer_sensors
+from spheretwin.loop import dispatch, is_user_law
 from spheretwin.models.base.compiled import (
     callback_errors,
     check_length,
@@ -32,39 +31,40 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario
+from spheretwin.shared_buffers import faults_of, sensors_of, shared_buffers, supervision_of
 
-# For their types alone.
+# Only for the types.
 NO_INPUTS = loops.Inputs(
     np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)), np.empty((0, 0))
 )
 
 
-class Last(NamedTuple):
-    """The last tick, as far as what begins to be held needs it; nothing in it before the first."""
+class LastTick(NamedTuple):
+    """Values of the last tick that a new hold element needs; empty before the first tick."""
 
     q: NDArray[np.float64]  # (3,) rad
     noise: NDArray[np.float64]  # (k,) of the sensors
     command: NDArray[np.float64]  # (n,) A
 
 
-class State(NamedTuple):
-    """All that the parts go on from."""
+class RuntimeState(NamedTuple):
+    """Complete state of a `Runtime`."""
 
     rotor: NDArray[np.float64]
     parts: dict[str, NDArray[np.float64]]
-    """By the names of `Machine.parts`."""
-    last: Last
+    """By the names of `Runtime.parts`."""
+    last: LastTick
 
 
-class Moving(NamedTuple):
-    """A rotor that has been started, and what compiled code steps of it."""
+class StartedRotor(NamedTuple):
+    """A started rotor and the data that compiled code steps."""
 
     rotor: Rotor
-    stepped: Any
+    data: Any
 
 
-class Machine:
-    """Controller, sensors and plant of a scenario, put into the order of the loop.
+class Runtime:
+    """Controller, sensors and plant of a scenario, and the loop that runs them.
 
     Parameters
     ----------
@@ -72,53 +72,53 @@ class Machine:
     files : Files
         Model and torque curves.
     law : Law
-        In force.
-    moving : Moving, optional
-        A rotor at work; one that starts as the scenario says unless given.
+        Active law.
+    rotor : StartedRotor, optional
+        Default: a rotor that starts at the initial pose and rates of the scenario.
 
     Attributes
     ----------
     law : Law
-        In force.
+        Active law.
     signals : tuple of Signal
         Columns of the telemetry.
-    columns : int
-        Numbers in a row of it.
+    row_width : int
+        Numbers in a row of the telemetry.
     law_error : LawError or None
-        Exception of the law in compiled code; one of a law in plain Python is raised.
+        Exception of the law in compiled code. An exception of a law in plain Python is raised instead.
 
     Raises
     ------
     InputError
-        The engine does not know all that the model holds, or the law cannot be used.
+        The engine does not support the model, or the law cannot be used.
     """
 
     def __init__(
-        self, scenario: ResolvedScenario, files: Files, law: Law, moving: Moving | None = None
+        self, scenario: ResolvedScenario, files: Files, law: Law, rotor: StartedRotor | None = None
     ) -> None:
         self._scenario = scenario
-        self._moving = moving or _started(scenario, files)
-        self._last = Last(np.empty(0), np.empty(0), np.zeros(len(files.actuator.groups)))
+        self._rotor = rotor or _start_rotor(scenario, files)
+        self._last = LastTick(np.empty(0), np.empty(0), np.zeros(len(files.actuator.groups)))
         self.law = law
         self.law_error: LawError | None = None
         self.signals = assembly.signals_of(scenario, files.actuator, self.law)
-        self.columns = width(self.signals)
+        self.row_width = width(self.signals)
         magnetics = assembly.nominal_magnetics(scenario, files)
         estimator = assembly.estimator_of(scenario)
-        joined = wiring.wires_of(scenario, len(files.actuator.groups))
-        supervision = wiring.supervision_of(scenario, files.nominal, joined)
+        buffers = shared_buffers(scenario, len(files.actuator.groups))
+        supervision = supervision_of(scenario, files.nominal, buffers)
         self._controller = assembly.controller_of(scenario, self.law, magnetics, estimator, supervision)
-        self._plant = assembly.plant_of(scenario, files.actuator, self._moving.stepped, joined)
-        self._sensors = wiring.sensors_of(scenario, joined)
-        self._faults = wiring.faults_of(scenario, self._plant, self._sensors, supervision.groups)
-        # The loop has bare addresses of its functions: they are held for as long as it is.
-        self._functions = matching(
+        self._plant = assembly.plant_of(scenario, files.actuator, self._rotor.data, buffers)
+        self._sensors = sensors_of(scenario, buffers)
+        self._faults = faults_of(scenario, self._plant, self._sensors, supervision.groups)
+        # The loop holds only addresses of its functions: this object keeps the functions alive.
+        self._functions = dispatch(
             self.law,
             ALLOCATIONS[scenario.allocation],
             estimator.step if estimator else None,
             check_bounds=scenario.controller.check_bounds,
         )
-        self._may_raise = is_own(law) or scenario.controller.check_bounds
+        self._may_raise = is_user_law(law) or scenario.controller.check_bounds
         self._parts = (
             self._functions.law,
             self._functions.allocate,
@@ -126,36 +126,38 @@ class Machine:
             self._controller,
             self._sensors,
             self._plant,
-            assembly.places_of(self.signals, self.law),
+            assembly.column_offsets(self.signals, self.law),
             loops.Scratch(np.empty((3, 3)), np.empty((6 if scenario.controller.prediction.on else 3, 3))),
         )
-        self._loop = for_types_of(self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.columns)))
+        self._loop = for_types_of(
+            self._functions.loop, NO_INPUTS, *self._parts, np.empty((0, self.row_width))
+        )
 
     @property
     def q_rad(self) -> NDArray[np.float64]:
-        """Hinge angles now, (3,) in rad."""
-        return self._moving.stepped.q.copy()
+        """Current hinge angles, (3,) in rad."""
+        return self._rotor.data.q.copy()
 
     @property
     def qdot_rad_s(self) -> NDArray[np.float64]:
-        """Hinge rates now, (3,) in rad/s."""
-        return self._moving.stepped.qdot.copy()
+        """Current hinge rates, (3,) in rad/s."""
+        return self._rotor.data.qdot.copy()
 
     @property
     def reason(self) -> Reason:
-        """Why a watchdog has taken the currents away, if one has."""
+        """Reason for which a watchdog has switched off the currents, if it has."""
         return REASONS[int(self._controller.supervision.watchdog.reason[0])]
 
     def apply_faults(self, tick: int) -> int:
-        """Apply the faults that are due at a control tick; returns the next one at which others may be."""
+        """Apply the faults that are due at a control tick; return the next tick at which they may change."""
         return self._faults.apply(tick)
 
     def run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
-        """Run a control tick for each row of `log`: rows written, and the code of a status."""
+        """Run a control tick for each row of `log`; return the rows written and the code of a status."""
         ticks, code = self._run(inputs, log)
         if ticks:
             row, first = log[ticks - 1], loops.CURRENT_COMMAND
-            self._last = Last(
+            self._last = LastTick(
                 row[loops.ANGLE : loops.ANGLE + 3].copy(),
                 inputs.noise[ticks - 1].copy(),
                 row[first : first + len(self._plant.current)].copy(),
@@ -163,77 +165,77 @@ class Machine:
         return ticks, code
 
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
-        """Run the loop; keep the first exception of a compiled law."""
+        """Run the loop and store the first exception of a compiled law."""
         if not self._may_raise:
             return self._loop(inputs, *self._parts, log)
         raised: list[BaseException] = []
 
         def receive(error: BaseException) -> None:
             raised.append(error)
-            self._controller.torque_q[:] = np.nan  # whatever it wrote before
+            self._controller.torque_q[:] = np.nan  # the law may have written part of a torque
 
         with callback_errors(receive):
             ticks, code = self._loop(inputs, *self._parts, log)
         if raised and self.law_error is None:
-            # A watchdog lets the currents run down from the tick on.
+            # With a watchdog the loop goes on after the exception, while the currents decay.
             t_s = inputs.t[ticks - int(self._controller.supervision.watchdog.ticks_since_trip[0])]
             self.law_error = LawError.of(self.law.name, t_s, raised[0])
         return ticks, code
 
-    def changed(self, scenario: ResolvedScenario, files: Files, own_law: Law | None) -> Machine:
-        """Machine of another scenario that carries on what this one is in the midst of.
+    def transfer_to(self, scenario: ResolvedScenario, files: Files, user_law: Law | None) -> Runtime:
+        """Return a runtime of another scenario that continues from the state of this one.
 
-        A law that stays keeps its memory, and its parameters, which it may have changed. With other gains, or
-        told of another nominal model, it keeps its memory where that is still of the same size. After
-        currents by hand it begins anew, as does what stands around it.
+        An unchanged law keeps its memory and its parameters, which it may have modified. A law with other
+        gains or another nominal model keeps its memory if the size is still the same. After manual currents
+        the law and its compensators start again.
         """
         same = scenario.plant == self._scenario.plant
-        moving = self._moving if same else _carried_on(self._moving, scenario, files)
-        law = own_law or self._law_for(scenario)
-        made = Machine(scenario, files, law, moving)
-        made._plant.current[:] = self._plant.current
-        made._plant.last_qdot[:] = self._plant.last_qdot
-        made._last = self._last
-        drivings.carried_on(self._plant.driving, made._plant.driving, self._last.command)
-        senses.carried_on(self._sensors, made._sensors, scenario.sensors, self._last.q, self._last.noise)
-        _supervised_on(self._controller.supervision, made._controller.supervision)
+        rotor = self._rotor if same else _transfer_rotor(self._rotor, scenario, files)
+        law = user_law or self._law_for(scenario)
+        other = Runtime(scenario, files, law, rotor)
+        other._plant.current[:] = self._plant.current
+        other._plant.last_qdot[:] = self._plant.last_qdot
+        other._last = self._last
+        transfer_drive(self._plant.drive, other._plant.drive, self._last.command)
+        transfer_sensors(self._sensors, other._sensors, scenario.sensors, self._last.q, self._last.noise)
+        _transfer_supervision(self._controller.supervision, other._controller.supervision)
         if scenario.manual.on or not self._scenario.manual.on:
-            self._law_carried_on(made, own_law)
-        transfer_applied_torque(self._controller.applied_torque, made._controller.applied_torque)
+            self._transfer_law(other, user_law)
+        transfer_applied_torque(self._controller.applied_torque, other._controller.applied_torque)
         if type(scenario.estimator) is type(self._scenario.estimator):
-            made._controller.estimator_state.memory[:] = self._controller.estimator_state.memory
-        return made
+            other._controller.estimator_state.memory[:] = self._controller.estimator_state.memory
+        return other
 
-    def _law_carried_on(self, made: Machine, own_law: Law | None) -> None:
-        """Let the law of another machine, and what stands around it, go on from where these are."""
-        before, after = self._controller, made._controller
-        same_kind = own_law is None and type(made._scenario.controller) is type(self._scenario.controller)
-        if made.law is self.law:
+    def _transfer_law(self, other: Runtime, user_law: Law | None) -> None:
+        """Transfer the state of the law and of its compensators to another runtime."""
+        before, after = self._controller, other._controller
+        same_kind = user_law is None and type(other._scenario.controller) is type(self._scenario.controller)
+        if other.law is self.law:
             after.parameters[:] = before.parameters
-        if made.law is self.law or (same_kind and len(after.memory) == len(before.memory)):
+        if other.law is self.law or (same_kind and len(after.memory) == len(before.memory)):
             after.memory[:] = before.memory
         transfer_compensators(before.compensators, after.compensators)
 
     def _law_for(self, scenario: ResolvedScenario) -> Law:
-        """Law that a scenario names: the present one where nothing that it is made from has changed."""
+        """Return the law of a scenario: the active law if nothing that it is built from has changed."""
         before = self._scenario
         same = before.controller.without_compensators() == scenario.controller.without_compensators()
-        same = same and assembly.same_known(before, scenario)
+        same = same and assembly.same_nominal_model(before, scenario)
         return self.law if same else assembly.law_of(scenario)
 
-    def state(self) -> State:
-        """All that it goes on from."""
+    def state(self) -> RuntimeState:
+        """Return the complete state."""
         parts = {name: save_state(part) for name, part in self.parts.items()}
-        return State(self._moving.rotor.state(), parts, self._last)
+        return RuntimeState(self._rotor.rotor.state(), parts, self._last)
 
     @property
     def parts(self) -> dict[str, Any]:
-        """Parts that it goes on from, apart from the rotor, by the names that messages use."""
+        """Components with a state, except the rotor, by the names that messages use."""
         controller, supervision = self._controller, self._controller.supervision
         return {
             "currents": self._plant.current,
             "the last rates": self._plant.last_qdot,
-            "the drive's state": self._plant.driving,
+            "the drive's state": self._plant.drive,
             "the law's parameters": controller.parameters,
             "the law's memory": controller.memory,
             "the applied torque": controller.applied_torque,
@@ -245,13 +247,13 @@ class Machine:
             "the watchdog's state": supervision.watchdog,
         }
 
-    def restore(self, state: State) -> None:
-        """Go on from a state of a machine of the same scenario.
+    def restore(self, state: RuntimeState) -> None:
+        """Restore the state of a runtime of the same scenario.
 
         Raises
         ------
         InputError
-            It is that of another.
+            The state is from another scenario.
         """
         own, last = self.state(), state.last
         # Everything is checked before anything is written: a snapshot that is refused changes nothing.
@@ -260,28 +262,28 @@ class Machine:
             check_length(name, state.parts.get(name, np.empty(0)), len(numbers))
         check_length("the last command", last.command, len(self._plant.current))
         check_length("the last pose", last.q, 3 if len(last.q) else 0)
-        self._moving.rotor.restore(state.rotor)
+        self._rotor.rotor.restore(state.rotor)
         for name, part in self.parts.items():
             restore_state(part, state.parts[name], name)
         self._last = last
 
 
-def _started(scenario: ResolvedScenario, files: Files) -> Moving:
+def _start_rotor(scenario: ResolvedScenario, files: Files) -> StartedRotor:
     rotor, section = assembly.rotor_of(scenario, files), scenario.plant
-    return Moving(rotor, rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s)))
+    return StartedRotor(rotor, rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s)))
 
 
-def _carried_on(moving: Moving, scenario: ResolvedScenario, files: Files) -> Moving:
-    """Rotor of another scenario, in the same state."""
-    rotor, state = assembly.rotor_of(scenario, files), moving.rotor.state()
-    stepped = rotor.start(moving.stepped.q, moving.stepped.qdot)
-    if len(rotor.state()) == len(state):  # else a body has come or gone: pose and rates are what remains
-        rotor.restore(state)
-    return Moving(rotor, stepped)
+def _transfer_rotor(rotor: StartedRotor, scenario: ResolvedScenario, files: Files) -> StartedRotor:
+    """Return the rotor of another scenario in the state of a started one."""
+    other, state = assembly.rotor_of(scenario, files), rotor.rotor.state()
+    data = other.start(rotor.data.q, rotor.data.qdot)
+    if len(other.state()) == len(state):  # otherwise a body was added or removed: only pose and rates remain
+        other.restore(state)
+    return StartedRotor(other, data)
 
 
-def _supervised_on(before: Supervision, after: Supervision) -> None:
-    """Go on with what was seen before, under other figures."""
+def _transfer_supervision(before: Supervision, after: Supervision) -> None:
+    """Transfer the state of the supervision to one with other parameters."""
     transfer_state(before.groups, after.groups)
     if before.detector.on:
         transfer_state(before.detector, after.detector)

@@ -15,24 +15,24 @@ from numpy.typing import NDArray
 
 from spheretwin import active_config
 from spheretwin import loop as loops
-from spheretwin.active_config import at_start
+from spheretwin.active_config import initial_config
 from spheretwin.control.law import Law
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.control.user_law import reference_of
-from spheretwin.inputs import Exogenous
+from spheretwin.inputs import InputGenerator
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError, shown
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.models.telemetry.status import BY_CODE, Status
 from spheretwin.models.telemetry.table import Table, allocated, check_rows
-from spheretwin.runtime import Machine
+from spheretwin.runtime import Runtime
 from spheretwin.scenario import files as scenario_files
-from spheretwin.scenario.changes import from_now_on, is_fixed, planned
+from spheretwin.scenario.changes import from_now_on, is_fixed, scheduled_changes
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.reading import as_plain, is_dotted
-from spheretwin.scenario.sections import OwnPath, ResolvedScenario, Scenario
-from spheretwin.snapshot import OwnLaws, Snapshot
+from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserPath
+from spheretwin.snapshot import Snapshot, UserLaws
 from spheretwin.trajectories.trajectory import Sampled
 
 
@@ -87,17 +87,17 @@ class Session:
     ) -> None:
         self._busy = threading.Lock()
         self._closed = False
-        self._own_laws = OwnLaws().with_law(law)
+        self._own_laws = UserLaws().with_law(law)
         self.tick, self.loop_s = 0, 0.0
         self.journal: tuple[Change, ...] = ()
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
-        self._in_force = at_start(scenario, law, trajectory, files)
+        self._config = initial_config(scenario, law, trajectory, files)
         self.begun_as = self.scenario
         self.law_reference = reference_of(law)
-        self._planned = planned(self.begun_as)
-        self._exogenous = self._outside()
-        self._machine = Machine(self.scenario, self._in_force.files, self._in_force.law)
+        self._planned = scheduled_changes(self.begun_as)
+        self._inputs = self._outside()
+        self._runtime = Runtime(self.scenario, self._config.files, self._config.law)
         self._seen = with_more({}, self.signals)
         self._check_plan()
         self._make_planned()
@@ -105,12 +105,12 @@ class Session:
     @property
     def actuator(self) -> Actuator:
         """What is simulated."""
-        return self._in_force.files.actuator
+        return self._config.files.actuator
 
     @property
     def scenario(self) -> ResolvedScenario:
         """In force now: what was left open is filled in from the model and the trajectory."""
-        return self._in_force.scenario
+        return self._config.scenario
 
     @property
     def status(self) -> Status:
@@ -125,12 +125,12 @@ class Session:
     @property
     def reason(self) -> Reason:
         """Why the currents were taken away, by a watchdog or a coil that is too hot, if they were."""
-        return self._machine.reason
+        return self._runtime.reason
 
     @property
     def law_error(self) -> LawError | None:
         """Exception of a compiled law, which ended the run; one of a law in plain Python is raised."""
-        return self._machine.law_error
+        return self._runtime.law_error
 
     @property
     def t_s(self) -> float:
@@ -140,22 +140,22 @@ class Session:
     @property
     def q_rad(self) -> NDArray[np.float64]:
         """Hinge angles now, (3,) in rad."""
-        return self._machine.q_rad
+        return self._runtime.q_rad
 
     @property
     def qdot_rad_s(self) -> NDArray[np.float64]:
         """Hinge rates now, (3,) in rad/s."""
-        return self._machine.qdot_rad_s
+        return self._runtime.qdot_rad_s
 
     @property
     def signals(self) -> tuple[Signal, ...]:
         """Columns of the telemetry: the common ones, those of its stages, then the law's own."""
-        return self._machine.signals
+        return self._runtime.signals
 
     @property
     def law(self) -> Law:
         """In force now."""
-        return self._machine.law
+        return self._runtime.law
 
     def advance(self, ticks: int) -> Table:
         """Run some control ticks.
@@ -175,7 +175,7 @@ class Session:
             raise InputError(f"session: expected a number of ticks from 0 on, received {shown(ticks)}")
         with self._alone():
             self._make_planned()
-            log = allocated(int(ticks), self._machine.columns)
+            log = allocated(int(ticks), self._runtime.row_width)
             return Table(self.signals, log[: self._advance(log)])
 
     def advance_into(self, log: NDArray[np.float64]) -> int:
@@ -188,7 +188,7 @@ class Session:
         """
         with self._alone():
             self._make_planned()
-            check_rows(log, self._machine.columns)
+            check_rows(log, self._runtime.row_width)
             return self._advance(log)
 
     def check_horizon(self, ticks: int) -> None:
@@ -200,7 +200,7 @@ class Session:
             They are not.
         """
         waiting = [change.tick for change in self._waiting()[:1]]
-        self._exogenous.check_horizon(max(min([ticks, *waiting]) - 1, self.tick))
+        self._inputs.check_horizon(max(min([ticks, *waiting]) - 1, self.tick))
 
     def set(self, name: str, value: Any) -> None:
         """Change a field of the scenario from the next tick on, or the law itself.
@@ -242,13 +242,13 @@ class Session:
             return Snapshot(
                 self.scenario,
                 self.begun_as,
-                self._own_laws.key_of(self._in_force.own_law),
-                scenario_files.digest(self._in_force.files),
+                self._own_laws.key_of(self._config.user_law),
+                scenario_files.digest(self._config.files),
                 self.scenario.controller.source,
                 self.tick,
                 self._status,
-                self._machine.state(),
-                self._exogenous.state(),
+                self._runtime.state(),
+                self._inputs.state(),
                 self.journal,
                 self.events,
             )
@@ -265,13 +265,13 @@ class Session:
         with self._alone(), self._all_or_nothing():
             if not isinstance(snapshot, Snapshot):
                 raise InputError(f"session: expected a snapshot of a session, received {shown(snapshot)}")
-            own_law = self._own_laws.under(snapshot.own_law)
-            if isinstance(snapshot.scenario.trajectory, OwnPath) != bool(self._in_force.own_trajectory):
+            user_law = self._own_laws.under(snapshot.user_law)
+            if isinstance(snapshot.scenario.trajectory, UserPath) != bool(self._config.user_trajectory):
                 raise InputError(
                     "session: expected a snapshot along the trajectory that it follows itself,"
                     f" received one along {snapshot.scenario.trajectory.shape}"
                 )
-            self._restore(snapshot, own_law)
+            self._restore(snapshot, user_law)
 
     def close(self) -> None:
         """End the session: to advance, set, keep or restore it is refused from then on."""
@@ -291,7 +291,7 @@ class Session:
 
     def warnings(self) -> list[str]:
         """What a user should know of model and scenario before believing the figures; one line each."""
-        return active_config.warnings_of(self.scenario, self._in_force.files)
+        return active_config.warnings_of(self.scenario, self._config.files)
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -320,9 +320,9 @@ class Session:
         done = 0
         while done < len(log) and self._status == Status.RUNNING:
             try:
-                until = self._machine.apply_faults(self.tick)
+                until = self._runtime.apply_faults(self.tick)
                 most = min(self._most(len(log) - done), until - self.tick)
-                inputs = self._exogenous.rows(self.tick, most)
+                inputs = self._inputs.rows(self.tick, most)
             except InputError:
                 if done:  # first hand over what there is; the next call will say it
                     break
@@ -337,8 +337,8 @@ class Session:
                 break
         return done
 
-    def _outside(self) -> Exogenous:
-        return Exogenous(self.scenario, self._in_force.own_trajectory, len(self.actuator.groups))
+    def _outside(self) -> InputGenerator:
+        return InputGenerator(self.scenario, self._config.user_trajectory, len(self.actuator.groups))
 
     def _waiting(self) -> tuple[Change, ...]:
         return self._planned[len(self.events) :]
@@ -362,7 +362,7 @@ class Session:
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> int:
         started = time.perf_counter()
         try:
-            ticks, code = self._machine.run(inputs, log)
+            ticks, code = self._runtime.run(inputs, log)
         except BaseException as error:  # a law in plain Python: the state is somewhere within a tick
             self._status = Status.DIVERGED
             if isinstance(error, Exception | KeyboardInterrupt):
@@ -374,16 +374,16 @@ class Session:
         return ticks
 
     def _change(self, name: str, value: Any) -> None:
-        before, self._in_force = self._in_force, self._in_force.after(name, value)
-        scenario, own_law = self.scenario, self._in_force.own_law
+        before, self._config = self._config, self._config.with_change(name, value)
+        scenario, user_law = self.scenario, self._config.user_law
         # What comes from outside is no part of the machine.
         outside = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
         built = before._replace(scenario=before.scenario.model_copy(update=outside))
-        if built != self._in_force or own_law not in (None, self.law):
-            self._machine = self._machine.changed(scenario, self._in_force.files, own_law)
+        if built != self._config or user_law not in (None, self.law):
+            self._runtime = self._runtime.transfer_to(scenario, self._config.files, user_law)
             self._seen = with_more(self._seen, self.signals)
-        self._own_laws = self._own_laws.with_law(own_law)
-        self._exogenous.scenario = scenario  # last: it is altered, and what fails must have changed nothing
+        self._own_laws = self._own_laws.with_law(user_law)
+        self._inputs.scenario = scenario  # last: it is altered, and what fails must have changed nothing
 
     def _check_plan(self) -> None:
         """Find out before the first tick what an event would only be refused for at its own.
@@ -395,28 +395,28 @@ class Session:
         """
         seen, made = self._seen, 0
         try:
-            for in_force in self._in_force.after_each(self._planned):
+            for in_force in self._config.with_changes(self._planned):
                 seen, made = with_more(seen, in_force.signals), made + 1
         except InputError as error:
             at_s = self._planned[made].tick * self.scenario.controller.period_s
             raise InputError(f"{error}, as the event at {at_s:g} s sets it") from None
 
-    def _restore(self, snapshot: Snapshot, own_law: Law | None) -> None:
-        files = scenario_files.files_again(self._in_force.files, self.scenario, snapshot.scenario)
+    def _restore(self, snapshot: Snapshot, user_law: Law | None) -> None:
+        files = scenario_files.reload_files(self._config.files, self.scenario, snapshot.scenario)
         snapshot.check_fits(files)
-        self._in_force = self._in_force._replace(scenario=snapshot.scenario, files=files, own_law=own_law)
-        self._machine = Machine(self.scenario, files, self._in_force.law)
-        self._machine.restore(snapshot.machine)
+        self._config = self._config._replace(scenario=snapshot.scenario, files=files, user_law=user_law)
+        self._runtime = Runtime(self.scenario, files, self._config.law)
+        self._runtime.restore(snapshot.runtime)
         self._seen = with_more(self._seen, self.signals)
-        self.begun_as, self._planned = snapshot.begun_as, planned(snapshot.begun_as)
+        self.begun_as, self._planned = snapshot.begun_as, scheduled_changes(snapshot.begun_as)
         self.tick, self._status = snapshot.tick, snapshot.status
         self.journal, self.events = snapshot.journal, snapshot.events
-        self._exogenous = self._outside()
-        self._exogenous.restore(snapshot.exogenous)
+        self._inputs = self._outside()
+        self._inputs.restore(snapshot.inputs)
 
 
 def _recorded(value: Any) -> Any:
     """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
     if isinstance(value, Law):
-        return active_config.name_of_own(value.name)
+        return active_config.name_of_user_object(value.name)
     return json.loads(json.dumps(value, default=as_plain))

@@ -1,4 +1,4 @@
-"""What both sides of a loop touch, and the stages that a fault can modify or that look after it."""
+"""Buffers that controller and plant share; stages that faults can modify; supervision."""
 
 from __future__ import annotations
 
@@ -13,16 +13,14 @@ from spheretwin.control.supervision.enabled_groups import EnabledGroups
 from spheretwin.control.supervision.enabled_groups import groups as all_in_use
 from spheretwin.control.supervision.fault_detector import NominalCurrents, detector
 from spheretwin.control.supervision.watchdog import MeasurementLimits, watchdog
-from spheretwin.electronics import drive
-from spheretwin.electronics import sensors as senses
-from spheretwin.electronics.drive import Stages
+from spheretwin.electronics.drive import DriveModel, build_drive
 from spheretwin.electronics.drive_chain import DriveChain, DriveFaults
 from spheretwin.electronics.random_streams import Streams, width_of
 from spheretwin.electronics.sensor_chain import SensorChain, SensorFaults
-from spheretwin.electronics.sensors import Sensors
+from spheretwin.electronics.sensors import Sensors, build_sensors
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.fault_injector import FaultInjector
-from spheretwin.faults.schedule import FaultPlan, noise_streams
+from spheretwin.faults.schedule import FaultSchedule, noise_streams
 from spheretwin.models.actuator import Actuator
 from spheretwin.plant.step import Plant
 from spheretwin.scenario.sections import ResolvedNominal, ResolvedScenario, Scenario
@@ -30,64 +28,68 @@ from spheretwin.scenario.sections import ResolvedNominal, ResolvedScenario, Scen
 Array = NDArray[np.float64]
 
 
-class Wires(NamedTuple):
-    """What the near and the far side of the loop both touch, beside measurements and commands."""
+class SharedBuffers(NamedTuple):
+    """Buffers that controller and plant share in addition to measurements and commands."""
 
     fresh: Array
-    """(3,) the sensors write which angles are new, a watchdog reads it."""
+    """(3,) flags of new angles: written by the sensors, read by a watchdog."""
     halt: NDArray[np.int64]
-    """(1,) a watchdog writes whether there shall be currents, the drive reads it."""
+    """(1,) state of the currents: written by a watchdog, read by the drive."""
     draws: Array
-    """Standard normal numbers of a tick, for faults and for the sensors of currents."""
+    """Standard normal numbers of a tick, for faults and for the current sensors."""
 
 
-def wires_of(scenario: Scenario, groups: int) -> Wires:
-    """Wires of a scenario's loop."""
+def shared_buffers(scenario: Scenario, groups: int) -> SharedBuffers:
+    """Return the shared buffers of the loop of a scenario."""
     draws = np.zeros(width_of(fault_streams(scenario, groups)))
-    return Wires(np.ones(3), np.zeros(1, dtype=np.int64), draws)
+    return SharedBuffers(np.ones(3), np.zeros(1, dtype=np.int64), draws)
 
 
 def fault_streams(scenario: Scenario, groups: int) -> Streams:
-    """Random streams of the noise of faults, and last, those of the sensors of currents."""
+    """Return the random streams of the noise of faults and, as the last one, of the current sensors."""
     sensors = (("sensors.current noise", groups),) if scenario.sensors.current.noise_A > 0 else ()
     return (*noise_streams(scenario.fault, groups), *sensors)
 
 
-def sensors_of(scenario: Scenario, wires: Wires) -> Sensors:
-    """Sensors of a scenario, with the errors that its seed gives them."""
+def sensors_of(scenario: Scenario, buffers: SharedBuffers) -> Sensors:
+    """Return the sensors of a scenario, with errors drawn from its seed."""
     if not scenario.fault:
-        return senses.made(scenario.sensors, scenario.seed)
-    most_late = sum(_delays_s(scenario, "adc")) / scenario.controller.period_s
-    faults = SensorFaults(round(most_late), wires.fresh, wires.draws)
-    return senses.made(scenario.sensors, scenario.seed, faults)
+        return build_sensors(scenario.sensors, scenario.seed)
+    longest_delay = sum(_delays_s(scenario, "adc")) / scenario.controller.period_s
+    faults = SensorFaults(round(longest_delay), buffers.fresh, buffers.draws)
+    return build_sensors(scenario.sensors, scenario.seed, faults)
 
 
 def _delays_s(scenario: Scenario, target: str) -> list[float]:
-    """Delays that faults of a part may bring, all at once."""
-    return [each.number for each in scenario.fault if each.mode == "delay" and each.kind.name == target]
+    """Return the delays that faults of a part can cause; they can act at the same time."""
+    return [
+        fault.effective_value
+        for fault in scenario.fault
+        if fault.mode == "delay" and fault.kind.name == target
+    ]
 
 
-def driving_of(scenario: ResolvedScenario, groups: int, wires: Wires) -> Stages:
-    """Drive of a resolved scenario, at rest; with what may fail where faults are planned.
+def drive_of(scenario: ResolvedScenario, groups: int, buffers: SharedBuffers) -> DriveModel:
+    """Return the drive of a resolved scenario, at rest; with fault inputs if faults are scheduled.
 
-    A watchdog acts on the drive itself: it would else wait for commands that are on their way.
+    A watchdog acts on the drive itself, so that it does not wait for delayed commands.
     """
     step_s, faults = scenario.plant.step_s, None
     if scenario.fault or scenario.watchdog.on:
-        most_late = round(sum(_delays_s(scenario, "controller")) / step_s)
-        faults = DriveFaults(bool(scenario.fault), most_late, wires.halt, wires.draws)
-    return drive.made(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults)
+        longest_delay = round(sum(_delays_s(scenario, "controller")) / step_s)
+        faults = DriveFaults(bool(scenario.fault), longest_delay, buffers.halt, buffers.draws)
+    return build_drive(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults)
 
 
-def supervision_of(scenario: ResolvedScenario, actuator: Actuator, wires: Wires) -> Supervision:
-    """What looks after the groups, the measurements and the commands.
+def supervision_of(scenario: ResolvedScenario, actuator: Actuator, buffers: SharedBuffers) -> Supervision:
+    """Return the supervision of groups, measurements and commands.
 
     Parameters
     ----------
     scenario : ResolvedScenario
     actuator : Actuator
-        As the controller has it.
-    wires : Wires
+        Nominal actuator of the controller.
+    buffers : SharedBuffers
     """
     groups, period_s, nominal = len(actuator.groups), scenario.controller.period_s, scenario.nominal
     noise_rad, quantum_rad = np.array(nominal.angle_noise_rad), np.array(nominal.angle_resolution_rad)
@@ -95,12 +97,12 @@ def supervision_of(scenario: ResolvedScenario, actuator: Actuator, wires: Wires)
     return Supervision(
         all_in_use(groups),
         detector(scenario.detector, scenario.detects, groups, _nominal_currents(nominal, period_s)),
-        watchdog(scenario.watchdog, limits, wires.fresh, wires.halt),
+        watchdog(scenario.watchdog, limits, buffers.fresh, buffers.halt),
     )
 
 
 def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurrents:
-    """How well healthy currents follow, by the controller's data sheet."""
+    """Return the tracking accuracy of fault-free currents according to the data sheet of the controller."""
     return NominalCurrents(
         period_s=period_s,
         current_limit_A=nominal.current_limit_A,
@@ -116,10 +118,10 @@ def _nominal_currents(nominal: ResolvedNominal, period_s: float) -> NominalCurre
 def faults_of(
     scenario: ResolvedScenario, plant: Plant, sensors: Sensors, groups: EnabledGroups
 ) -> FaultInjector:
-    """Faults of a scenario, and the stages of its loop that they modify."""
+    """Return the fault injector of a scenario with the stages of its loop that faults modify."""
     period_s, count = scenario.controller.period_s, len(plant.current)
-    plan = FaultPlan(scenario.fault, count, period_s, scenario.seed)
+    schedule = FaultSchedule(scenario.fault, count, period_s, scenario.seed)
     effects = None
-    if isinstance(plant.driving, DriveChain) and isinstance(sensors, SensorChain):
-        effects = Effects(plant.driving, sensors, plant.group_gain, period_s, scenario.plant.step_s)
-    return FaultInjector(plan, effects, groups, plant.marks, plant.began_s)
+    if isinstance(plant.drive, DriveChain) and isinstance(sensors, SensorChain):
+        effects = Effects(plant.drive, sensors, plant.group_gain, period_s, scenario.plant.step_s)
+    return FaultInjector(schedule, effects, groups, plant.fault_modes, plant.fault_start_s)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.control.law import Law
-from spheretwin.faults.fault_injector import FaultLines
+from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.status import Status
@@ -20,7 +20,7 @@ from spheretwin.models.telemetry.table import Table, TelemetryBuffer, allocated
 from spheretwin.provenance import change_text, record_of
 from spheretwin.run import Run
 from spheretwin.scenario import load
-from spheretwin.scenario.changes import changed
+from spheretwin.scenario.changes import with_change
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.trajectories.trajectory import Sampled
@@ -98,7 +98,7 @@ def _scenario(given: Scenario | str | Path, changes: Mapping[str, Any]) -> Scena
     if not isinstance(given, Scenario):
         return load(os.fspath(given), changes)
     for dotted, value in changes.items():
-        given = changed(given, dotted, value)
+        given = with_change(given, dotted, value)
     return given
 
 
@@ -145,7 +145,7 @@ def follow(
     session.check_horizon(_known_to(ticks, waiting))
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
-    noted, told = _note_events(session, 0, sinks), FaultLines()
+    noted, told = _note_events(session, 0, sinks), FaultMessages()
     while session.tick < ticks and not session.ended and not stop_requested():
         _make(session, ticks, waiting, sinks)
         last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))

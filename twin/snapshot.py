@@ -1,4 +1,4 @@
-"""All that a session goes on from."""
+"""Snapshot: the complete state of a session."""
 
 from __future__ import annotations
 
@@ -10,39 +10,39 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.status import Status
-from spheretwin.runtime import State
+from spheretwin.runtime import RuntimeState
 from spheretwin.scenario.files import Files, digest
 from spheretwin.scenario.sections import ResolvedScenario
 
 
-class OwnLaws:
-    """Laws of the user's by the keys under which snapshots know them: they cannot be kept themselves.
+class UserLaws:
+    """User laws by key. A snapshot stores the key, because the law itself cannot be stored.
 
-    A key is the law's name, told apart from others' of it.
+    A key is the name of the law, with a number if several laws have this name.
     """
 
     def __init__(self, laws: dict[str, Law] | None = None) -> None:
         self._laws = laws or {}
 
-    def with_law(self, law: Law | None) -> OwnLaws:
-        """These and one more, unless it is among them; these themselves do not change."""
+    def with_law(self, law: Law | None) -> UserLaws:
+        """Return these laws and one more, unless it is among them; this object does not change."""
         if law is None or self.key_of(law) is not None:
             return self
         taken = [key for key, other in self._laws.items() if other.name == law.name]
         key = law.name if not taken else f"{law.name} #{len(taken) + 1}"
-        return OwnLaws({**self._laws, key: law})
+        return UserLaws({**self._laws, key: law})
 
     def key_of(self, law: Law | None) -> str | None:
-        """Key of one of them, if it is one."""
+        """Return the key of a law; None if it is not among these laws."""
         return next((key for key, other in self._laws.items() if other is law), None)
 
     def under(self, key: str | None) -> Law | None:
-        """The law of a key; none where a snapshot was taken under a shipped one.
+        """Return the law of a key; None if the snapshot was taken under a shipped law.
 
         Raises
         ------
         InputError
-            There is none of this key.
+            No law has this key.
         """
         if key is None:
             return None
@@ -56,29 +56,29 @@ class OwnLaws:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A session at one tick; it can be pickled."""
+    """State of a session at one tick; it can be pickled."""
 
     scenario: ResolvedScenario
     begun_as: ResolvedScenario
-    own_law: str | None
+    user_law: str | None
     files: str
     """Digest of model and torque curves."""
     law_source: str
-    """Digest of the file that the law is from, if it is one of the user's."""
+    """Digest of the file of the law, if it is a user law."""
     tick: int
     status: Status
-    machine: State
-    exogenous: dict[str, Any]
+    runtime: RuntimeState
+    inputs: dict[str, Any]
     journal: tuple[Change, ...]
     events: tuple[Change, ...]
 
     def check_fits(self, files: Files) -> None:
-        """Find out whether model, curves and law are what they were.
+        """Check that model, curves and law are those of the snapshot.
 
         Raises
         ------
         InputError
-            A file has changed since, or is another.
+            A file was changed or is another file.
         """
         controller = self.scenario.controller
         if controller.source != self.law_source:

@@ -28,7 +28,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_matrix, torque_model
 from spheretwin.models.telemetry.signals import width
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.provenance import facts_of
 from spheretwin.scenario.sections import HARDWARE, Scenario
 from spheretwin.session import Session
@@ -197,9 +197,9 @@ def process_seconds(*command: str) -> Callable[[], float]:
     )
 
 
-def _rotor() -> Rotor:
+def _rotor() -> MujocoRotor:
     plant = scenarios.load(SCENARIO).plant
-    rotor = Rotor(
+    rotor = MujocoRotor(
         mjcf.read(actuators.MJCF_PATH),
         plant.step_s,
         plant.integrator,

@@ -8,7 +8,7 @@ import numpy as np
 from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
 
 TICKS = 30
@@ -22,7 +22,7 @@ def test_plain_loop_runs_the_same_physics():
     table = simulate(scenario).telemetry
     reference = scenario.trajectory.sample(table["t_s"])
     section = scenario.plant
-    rotor = Rotor(
+    rotor = MujocoRotor(
         mjcf.read(actuators.MJCF_PATH), section.step_s, section.integrator, section.modelling_error, 0.0
     )
     rotor.start(np.zeros(3), np.zeros(3))

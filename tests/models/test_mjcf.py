@@ -11,7 +11,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
 
 TEXT = actuators.MJCF_PATH.read_text(encoding="utf-8")
@@ -208,7 +208,7 @@ def test_a_run_does_not_change_what_is_kept():
 
     before = numbers()
     for payload_kg in (0.0, 0.05):
-        Rotor(kept, 1e-3, "Euler", 0.2, payload_kg, 1.62)
+        MujocoRotor(kept, 1e-3, "Euler", 0.2, payload_kg, 1.62)
     for ours, theirs in zip(before, numbers(), strict=True):
         np.testing.assert_equal(ours, theirs)
 

@@ -99,7 +99,7 @@ def numbers(part, path=""):
 
 def controller(changes):
     with Session(scenarios.load("tilt", changes)) as session:
-        return numbers(session._machine._controller)
+        return numbers(session._runtime._controller)
 
 
 def same_controller(one, other):
@@ -259,10 +259,10 @@ def test_the_curve_of_a_machine_of_one_s_own_is_in_its_data_sheet(half):
 @pytest.mark.parametrize("fields", [{"nominal.equals_truth": True}, {"plant.mjcf": str(actuators.MJCF_PATH)}])
 def test_a_curve_that_was_resolved_does_not_follow_a_later_one(fields, half):
     with Session(scenarios.load("hold", fields | {"controller.law": "pd"})) as session:
-        nominal = session._in_force.files.nominal.torque_curve
+        nominal = session._config.files.nominal.torque_curve
         session.set("plant.torque_curve", half)
         assert session.scenario.nominal.torque_curve == "shipped"
-        assert session._in_force.files.nominal.torque_curve is nominal
+        assert session._config.files.nominal.torque_curve is nominal
         assert session.actuator.torque_curve.peak_Nm_per_A == 0.5 * nominal.peak_Nm_per_A
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.inputs import BLOCK_TICKS, Exogenous
+from spheretwin.inputs import BLOCK_TICKS, InputGenerator
 from spheretwin.models.base.errors import InputError
 from spheretwin.trajectories.shapes import Nutation
 
@@ -26,15 +26,15 @@ def run(exogenous, cuts=(), start=0, end=LENGTH):
 
 
 def test_chunks_change_no_bit_of_a_random_term():
-    whole = run(Exogenous(scenario(RANDOM_TERM)))
-    cut = run(Exogenous(scenario(RANDOM_TERM)), [1, 999, 1000, 1001, 1500, 2000])
+    whole = run(InputGenerator(scenario(RANDOM_TERM)))
+    cut = run(InputGenerator(scenario(RANDOM_TERM)), [1, 999, 1000, 1001, 1500, 2000])
     for one, other in zip(whole, cut, strict=True):
         assert one.tobytes() == other.tobytes()
 
 
 def test_a_random_term_is_what_it_adds_and_leaves_the_paper_s_stream_alone():
     torque = [
-        run(Exogenous(scenario(*terms, **changes)))[2]
+        run(InputGenerator(scenario(*terms, **changes)))[2]
         for terms, changes in (
             ((), {}),
             ((RANDOM_TERM,), {}),
@@ -49,28 +49,28 @@ def test_a_random_term_is_what_it_adds_and_leaves_the_paper_s_stream_alone():
 
 @pytest.mark.parametrize("tick", [1, 999, 1000, 1700])
 def test_a_state_goes_on_with_every_stream(tick):
-    first = Exogenous(scenario(RANDOM_TERM))
+    first = InputGenerator(scenario(RANDOM_TERM))
     run(first, end=tick)
     state = first.state()
     ahead = run(first, start=tick)
-    other = Exogenous(scenario(RANDOM_TERM))
+    other = InputGenerator(scenario(RANDOM_TERM))
     other.restore(state)
     for one, again in zip(ahead, run(other, start=tick), strict=True):
         assert one.tobytes() == again.tobytes()
 
 
 def test_a_term_may_come_in_between():
-    exogenous = Exogenous(scenario())
+    exogenous = InputGenerator(scenario())
     before = run(exogenous, end=500)[2]
     exogenous.scenario = scenario(RANDOM_TERM)
     after = run(exogenous, start=500)[2]
-    whole = run(Exogenous(scenario(RANDOM_TERM)))[2]
-    assert before.tobytes() == run(Exogenous(scenario()))[2][:500].tobytes()
+    whole = run(InputGenerator(scenario(RANDOM_TERM)))[2]
+    assert before.tobytes() == run(InputGenerator(scenario()))[2][:500].tobytes()
     assert after.tobytes() == whole[500:].tobytes()
 
 
 def test_a_growing_random_term_is_refused_before_it_overflows():
-    grown = Exogenous(scenario(RANDOM_TERM | {"gamma_envelope": "growing"}))
+    grown = InputGenerator(scenario(RANDOM_TERM | {"gamma_envelope": "growing"}))
     grown.check_horizon(200_000)
     with pytest.raises(InputError, match="finite disturbance, received infinity at 240 s"):
         grown.check_horizon(240_000)
@@ -90,25 +90,25 @@ class Own:
 
 
 def test_a_trajectory_of_the_user_s_is_followed_instead():
-    own = run(Exogenous(scenario(), Own()))
-    named = run(Exogenous(scenarios.load("nutation")))
+    own = run(InputGenerator(scenario(), Own()))
+    named = run(InputGenerator(scenarios.load("nutation")))
     assert own[1].tobytes() == named[1].tobytes()
-    assert own[2].tobytes() == run(Exogenous(scenario()))[2].tobytes()
-    kept = Exogenous(scenario(), Own())
+    assert own[2].tobytes() == run(InputGenerator(scenario()))[2].tobytes()
+    kept = InputGenerator(scenario(), Own())
     kept.scenario = scenario(RANDOM_TERM)
     assert run(kept)[1].tobytes() == named[1].tobytes()
 
 
 def test_one_that_fails_later_is_refused_then():
-    exogenous = Exogenous(scenario(), Own(1.5, lambda samples: samples[:, 0]))
+    exogenous = InputGenerator(scenario(), Own(1.5, lambda samples: samples[:, 0]))
     run(exogenous, end=1000)
     with pytest.raises(InputError, match=r"expected float64 of shape \(1000, 3, 3\)"):
         exogenous.rows(1000, 1)
-    lost = Exogenous(
+    lost = InputGenerator(
         scenario(), Own(1.5, lambda samples: np.where(np.arange(1000)[:, None, None] < 700, samples, np.nan))
     )
     assert len(run(lost, end=1700)[0]) == 1700
     with pytest.raises(InputError, match=r"expected a finite trajectory, received NaN at 1\.7 s"):
         lost.rows(1700, 1)
     with pytest.raises(InputError, match=r"an object with sample\(t\)"):
-        Exogenous(scenario(), 3.0)
+        InputGenerator(scenario(), 3.0)

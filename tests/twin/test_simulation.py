@@ -114,7 +114,7 @@ def test_compiled_and_uncompiled_loop_agree(name, monkeypatch):
     compiled = run("nutation", **overrides)
     monkeypatch.setattr(
         machines,
-        "matching",
+        "dispatch",
         lambda law, allocate, estimate, **options: Functions(
             loops.loop.py_func, law.step, allocate, estimate, ()
         ),
@@ -141,14 +141,14 @@ def proportional(t, reference, measurement, parameters, state, torque):
         torque[axis] = -parameters[0] * error - parameters[1] * rate
 
 
-def own_law(step):
+def user_law(step):
     calls = (Signal("calls", "1", 1, "calls so far"),)
     return Law("mine", step, np.array([0.5, 0.05]), np.zeros(1), calls)
 
 
 def test_a_plain_python_law_runs_as_a_compiled_one_does():
-    plain = run("hold", own_law(proportional), duration=0.3)
-    fast = run("hold", own_law(numba.njit(proportional)), duration=0.3)
+    plain = run("hold", user_law(proportional), duration=0.3)
+    fast = run("hold", user_law(numba.njit(proportional)), duration=0.3)
     np.testing.assert_array_equal(plain.telemetry["calls"], np.arange(1, 301))
     np.testing.assert_allclose(plain.telemetry.values, fast.telemetry.values, rtol=1e-9, atol=1e-12)
     # 0.05 N·m of load against 0.5 N·m/rad of stiffness.

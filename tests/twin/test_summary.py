@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, Planned
+from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.models.base.errors import InputError
 from spheretwin.run import BESIDE, Figures, figures_of, summary
 from spheretwin.session import Session
@@ -21,7 +21,7 @@ def run():
 def followed(ticks):
     """Summary of a session that was followed for some ticks."""
     with Session(scenarios.load("hold", {"duration": 0.2})) as session:
-        figures = Figures(Planned(session.begun_as, session.actuator, 200))
+        figures = Figures(PlannedRun(session.begun_as, session.actuator, 200))
         status = follow(session, ticks, [figures])
         return summary(session, status, figures.values(), figures.warnings())
 

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from spheretwin.active_config import InForce, at_start
+from spheretwin.active_config import ActiveConfig, initial_config
 from spheretwin.analysis import recovery
 from spheretwin.analysis.recovery import held, ticks_of
-from spheretwin.faults.fault_injector import FaultLines
+from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.checksums import has_checksums
@@ -29,7 +29,7 @@ from spheretwin.run import Run
 from spheretwin.scenario import from_record
 from spheretwin.scenario.changes import first_tick, from_now_on
 from spheretwin.scenario.reading import validated
-from spheretwin.scenario.sections import OwnController
+from spheretwin.scenario.sections import UserController
 
 _BETWEEN = " set to "
 
@@ -163,21 +163,21 @@ def open_run(path: str | Path) -> Run:
     return Run(start.scenario, status, recorded.every_tick, math.nan, actuator, record=recorded.record)
 
 
-def _start(recorded: Reviewed) -> InForce:
+def _start(recorded: Reviewed) -> ActiveConfig:
     """Scenario and files of a run; where the law or the trajectory is gone, they are known by name alone."""
     fields = recorded.record.scenario
     try:
-        return at_start(from_record(fields, str(recorded.path)), None, None)
+        return initial_config(from_record(fields, str(recorded.path)), None, None)
     except InputError:
         start = of_the_actuator(recorded)
-    controller = OwnController(
+    controller = UserController(
         law=str(fields["controller"]["law"]), period_s=recorded.period_s, parameters=()
     )
     described = {"description": str(fields["description"]), "controller": controller}
     return start._replace(scenario=start.scenario.model_copy(update=described))
 
 
-def of_the_actuator(run: Reviewed) -> InForce:
+def of_the_actuator(run: Reviewed) -> ActiveConfig:
     """Return plant, drive and files of a run; law and trajectory, whose files may be gone, are others.
 
     Raises
@@ -191,7 +191,7 @@ def of_the_actuator(run: Reviewed) -> InForce:
         "controller": {"law": "pd", "period_s": run.period_s},
         "trajectory": {"shape": "hold"},
     }
-    return at_start(validated(fields, str(run.path)), None, None)
+    return initial_config(validated(fields, str(run.path)), None, None)
 
 
 def _of_telemetry(
@@ -245,7 +245,7 @@ def events(run: Reviewed) -> list[Event]:
     else:
         log = Events()
         found = log.of(run.every_tick) if len(run.table) else []
-        found += [(t_s, Level.INFO, text) for t_s, text in FaultLines().of(run.every_tick)]
+        found += [(t_s, Level.INFO, text) for t_s, text in FaultMessages().of(run.every_tick)]
         found += [(each.tick * run.period_s, Level.INFO, change_text(each)) for each in _changes(run)]
         end = [log.end(ended)] if ended else []
     return [*sorted(found, key=lambda event: (event[0], event[2])), *end]

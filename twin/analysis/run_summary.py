@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
-from spheretwin.metrics import Planned
+from spheretwin.metrics import PlannedRun
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
@@ -171,7 +171,7 @@ def _figures(run: Reviewed) -> dict[str, Any]:
 
 def _metrics(run: Reviewed) -> dict[str, Any]:
     scenario, files, *_ = of_the_actuator(run)
-    gathered = Figures(Planned(scenario, files.actuator, scenario.ticks))
+    gathered = Figures(PlannedRun(scenario, files.actuator, scenario.ticks))
     gathered.write(run.every_tick)
     return gathered.values()
 

@@ -17,7 +17,7 @@ from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import FASTEST, SLOWEST
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.files import whole_file
-from spheretwin.outputs import Files
+from spheretwin.outputs import OpenedFiles
 from spheretwin.scenario.changes import FAULT, is_fixed
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_toml
@@ -41,12 +41,12 @@ def _restore(works: Works, _: None, name: str) -> None:
     works.went_back(end)
 
 
-def _opened(works: Works, recording: str | None, telemetry: str | None) -> Callable[[], Files]:
+def _opened(works: Works, recording: str | None, telemetry: str | None) -> Callable[[], OpenedFiles]:
     paths = [Path(path) if path else None for path in (recording, telemetry)]
-    return lambda: Files(works.desk.session, *paths)
+    return lambda: OpenedFiles(works.desk.session, *paths)
 
 
-def _record(works: Works, files: Files, recording: str | None, telemetry: str | None) -> None:
+def _record(works: Works, files: OpenedFiles, recording: str | None, telemetry: str | None) -> None:
     if works.recording.on or works.desk.reason is not None:
         files.discard()
         raise InputError(

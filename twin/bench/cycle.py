@@ -15,7 +15,7 @@ from spheretwin.bench.bench_state import Player, Works
 from spheretwin.bench.command_queue import Command, Ticket, Waiting
 from spheretwin.bench.status import State, picture
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, one_line
-from spheretwin.outputs import warm
+from spheretwin.outputs import import_writers
 
 
 def run(works: Works, ticks: int) -> int:
@@ -255,7 +255,7 @@ class Thread:
 
     def begin(self) -> None:
         """Be at work from now on; until `end`, the interpreter goes from thread to thread more often."""
-        warm()  # here: beside the loop it makes its first chunks late
+        import_writers()  # here, as during the loop it would delay the first chunks
         self._switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_s)
         self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)

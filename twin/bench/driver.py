@@ -10,9 +10,9 @@ from spheretwin.bench.modes import Limits
 from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of
-from spheretwin.scenario.changes import FAULT, changed, is_fixed
+from spheretwin.scenario.changes import FAULT, is_fixed, with_change
 from spheretwin.scenario.reading import override, validated
-from spheretwin.scenario.sections import Scenario, fields_of_set
+from spheretwin.scenario.sections import Scenario, hardware_fields
 from spheretwin.session import Session
 from spheretwin.snapshot import Snapshot
 from spheretwin.trajectories.trajectory import Shape
@@ -36,7 +36,7 @@ def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
         raise InputError(f"bench: expected a mode instead of {name}, as manual or hold")
     if name == "trajectory" and isinstance(value, dict) and value.get("approach") is not None:
         raise InputError("bench: expected a trajectory without approach, which the bench makes")
-    after = changed(settings, name, value)
+    after = with_change(settings, name, value)
     return after if name != "hardware" else _with_hardware(settings, after.hardware)
 
 
@@ -45,8 +45,8 @@ def _with_hardware(settings: Scenario, hardware: str) -> Scenario:
     fields["hardware"] = hardware
     untouched = Scenario(trajectory=settings.trajectory).model_dump(mode="json")
     knows_truth = settings.nominal.equals_truth
-    plain = {dotted: _value(untouched, dotted) for dotted in fields_of_set(settings.hardware, knows_truth)}
-    for dotted, value in (plain | fields_of_set(hardware, knows_truth)).items():
+    plain = {dotted: _value(untouched, dotted) for dotted in hardware_fields(settings.hardware, knows_truth)}
+    for dotted, value in (plain | hardware_fields(hardware, knows_truth)).items():
         if dotted == "estimator.kind":  # another member of a family has other fields
             fields["estimator"] = {}
         override(fields, dotted, value)

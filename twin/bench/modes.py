@@ -103,7 +103,7 @@ def approached(
         Where the shape does not leave it, neither does the way to it, or it is left by as little as may be.
     """
     begun = np.clip(begun, -LARGEST, LARGEST)
-    difference = begun - shape.led_to(np.array([shape_s]))[0]
+    difference = begun - shape.sample_after_approach(np.array([shape_s]))[0]
     lasts_s = lasting_s(difference, limits)
     while lasts_s > 2 * LASTING_s[0] and _leaves(shape, difference, shape_s, lasts_s, hinge_range_rad):
         lasts_s /= 2
@@ -134,7 +134,7 @@ def lasting_s(difference: Array, limits: Limits) -> float:
 def _leaves(shape: Shape, difference: Array, shape_s: float, lasts_s: float, hinge_range_rad: Array) -> bool:
     """Whether the way to a shape leaves a hinge's range where the shape itself does not."""
     since = lasts_s * SHARES
-    alone = shape.led_to(shape_s + since)[:, 0]
+    alone = shape.sample_after_approach(shape_s + since)[:, 0]
     way = alone + faded(difference, since, lasts_s)[:, 0]
     low, high = hinge_range_rad.T
     return bool(np.any(((way < low) | (way > high)) & (low <= alone) & (alone <= high)))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from spheretwin.bench.driver import Desk
-from spheretwin.faults.fault_injector import FaultLines
+from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import Files, Keeping
+from spheretwin.outputs import OpenedFiles, RecordingFiles
 from spheretwin.provenance import change_text
 from spheretwin.session import Session
 
@@ -29,8 +29,8 @@ class Recording:
     def __init__(self, tell: Callable[[str | None], None]) -> None:
         self._tell = tell
         self.kept: tuple[str, ...] = ()
-        self._present: Keeping | None = None
-        self._completing: list[Keeping] = []
+        self._present: RecordingFiles | None = None
+        self._completing: list[RecordingFiles] = []
         self.begin_anew()
 
     @property
@@ -45,16 +45,16 @@ class Recording:
 
     def begin_anew(self) -> None:
         """A run begins: nothing has happened in it."""
-        self._faults, self._noted = FaultLines(), (0, 0)
+        self._faults, self._noted = FaultMessages(), (0, 0)
 
     def go_on_from(self, session: Session) -> None:
         """What was changed until now has been told."""
         self._noted = len(session.journal), len(session.events)
 
-    def begin(self, files: Files, desk: Desk) -> None:
+    def begin(self, files: OpenedFiles, desk: Desk) -> None:
         """Write opened files from the next tick on."""
         self.note_changes(desk.session)
-        self._present = Keeping(files, desk.session, desk.begun)
+        self._present = RecordingFiles(files, desk.session, desk.begun)
         self._completing.append(self._present)
 
     def write(self, rows: Table) -> None:
@@ -100,7 +100,7 @@ class Recording:
         for keeping in list(self._completing):
             keeping.join()
 
-    def _completed(self, keeping: Keeping) -> None:
+    def _completed(self, keeping: RecordingFiles) -> None:
         self.kept = tuple(str(path) for path in keeping.paths)
         if keeping.faults:
             self.kept = ()

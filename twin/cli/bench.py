@@ -147,9 +147,9 @@ def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> 
 @cache
 def _families() -> dict[str, tuple[str, ...]]:
     return {
-        f"{name}.{kind.told_apart_by}": tuple(kind.members)
+        f"{name}.{kind.discriminator}": tuple(kind.members)
         for name, field in every_field(Scenario)
-        if (kind := kind_of(field)) and kind.told_apart_by
+        if (kind := kind_of(field)) and kind.discriminator
     }
 
 
@@ -169,7 +169,7 @@ def _field_of(name: str, values: Mapping[str, Any]) -> FieldInfo | None:
             kind = kind_of(field) if field else None
         if kind is None:
             return None
-        tag = kind.told_apart_by
+        tag = kind.discriminator
         which = values.get(f"{prefix}{tag}", "") if tag else ""
         if tag and which and which not in kind.members:
             return None

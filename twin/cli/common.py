@@ -32,7 +32,7 @@ def warn(lines: Iterable[str]) -> None:
         print(f"spheretwin: warning: {line}", file=sys.stderr)
 
 
-def warn_of_model(path: Path) -> None:
+def warn_about_model(path: Path) -> None:
     """Print what the engine warns of in a model file."""
     warn(mjcf.read(path).warnings)
 

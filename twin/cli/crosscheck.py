@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from spheretwin.cli.common import add_verbose, kept, print_json, warn_of_model
+from spheretwin.cli.common import add_verbose, kept, print_json, warn_about_model
 from spheretwin.crosscheck.part import STATES
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             f"command line: expected --out, --json, --states, --mjcf or --verbose, received {' '.join(rest)}"
         )
     actuators.load(options.mjcf)  # a model that cannot be read leaves no folder
-    warn_of_model(options.mjcf)
+    warn_about_model(options.mjcf)
     from spheretwin.crosscheck import suite
     from spheretwin.crosscheck import suite as page  # their libraries are slow to import
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from spheretwin.cli.common import add_verbose, kept, print_json, warn, warn_of_model, write_text
+from spheretwin.cli.common import add_verbose, kept, print_json, warn, warn_about_model, write_text
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
@@ -168,7 +168,7 @@ def run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         )
     actuator = actuators.load(options.mjcf, options.csv)
     verdict = field_check.judge(actuator, options.poses, options.seed, tracked("direct sums"))
-    warn_of_model(options.mjcf)
+    warn_about_model(options.mjcf)
     warn(verdict.warnings)
     if options.json:
         print_json(verdict._asdict())
@@ -204,7 +204,7 @@ def run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
 def _compute(options: argparse.Namespace) -> bool:
     """Compute the curve, check it, write it."""
     computed = curve_check.compute(options.mjcf, tracked("torque curve"))
-    warn_of_model(options.mjcf)
+    warn_about_model(options.mjcf)
     warn(computed.warnings)
     if options.out:
         write_text(options.out, computed.csv)
@@ -241,7 +241,7 @@ def _print_text(computed: ComputedCurve) -> None:
 def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
     """Tell how smooth a user's curve is, and how far it is from the geometry's."""
     judged = curve_check.judge(torque_curve.read(csv), mjcf, tracked("the geometry's own curve"))
-    warn_of_model(mjcf)
+    warn_about_model(mjcf)
     warn(judged.warnings)
     if as_json:
         print_json(
@@ -278,7 +278,7 @@ def run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         make_folder(options.out)
     surveyed = torque_map.survey(actuator, options.largest_tilt, tracked("torque capability"))
     verdict = torque_map.judge(surveyed, options.need)
-    warn_of_model(options.mjcf)
+    warn_about_model(options.mjcf)
     warn(verdict.warnings)
     files = _draw(plots, options.out, surveyed) if plots else []
     if options.json:

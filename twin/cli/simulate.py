@@ -15,8 +15,8 @@ import numpy as np
 from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, warn
-from spheretwin.loop import is_own
-from spheretwin.metrics import Planned
+from spheretwin.loop import is_user_law
+from spheretwin.metrics import PlannedRun
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.base.user_code import load_function
@@ -24,8 +24,8 @@ from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.outputs import Outputs
-from spheretwin.replay import Plan
-from spheretwin.run import Figures, OwnMetric, Run, check_names, own_value, summary
+from spheretwin.replay import RunPlan
+from spheretwin.run import Figures, Run, UserMetric, check_names, own_value, summary
 from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
@@ -35,7 +35,7 @@ from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import Progress
 
 
-class OwnMetrics:
+class UserMetrics:
     """Keeps what functions of the user's are to be handed, and asks them when the run is over.
 
     Parameters
@@ -55,7 +55,7 @@ class OwnMetrics:
     """
 
     def __init__(self, specs: Sequence[str]) -> None:
-        self._functions: dict[str, OwnMetric] = {}
+        self._functions: dict[str, UserMetric] = {}
         self._kept: TelemetryBuffer | None = None
         self.faults: list[str] = []
         for spec in specs:
@@ -83,7 +83,7 @@ class OwnMetrics:
         run = Run(session.begun_as, status, self._kept.table, session.loop_s, session.actuator)
         return {name: self._value(name, metric, run) for name, metric in self._functions.items()}
 
-    def _value(self, name: str, metric: OwnMetric, run: Run) -> Any:
+    def _value(self, name: str, metric: UserMetric, run: Run) -> Any:
         try:
             with contextlib.redirect_stdout(sys.stderr):  # stdout is for the figures alone
                 return own_value(name, metric, run)
@@ -145,7 +145,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     if options.help:
         options.parser.print_help()
         scenario = scenarios.load(options.scenario or EXAMPLE, reading.overrides(rest))
-        runs.print_fields(scenario.name, reading.described(scenario))
+        runs.print_fields(scenario.name, reading.field_descriptions(scenario))
         return True
     if _is_bare(options, rest):
         runs.print_scenarios({name: scenarios.load(name).description for name in shipped()})
@@ -154,11 +154,11 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         raise InputError(
             f"command line: expected --view with --record or --live, received {options.view} alone"
         )
-    own = OwnMetrics(options.metric)
+    own = UserMetrics(options.metric)
     outputs.check([path for path in (options.record, options.telemetry) if path])
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
-        figures = Figures(Planned(session.begun_as, session.actuator, plan.ticks))
+        figures = Figures(PlannedRun(session.begun_as, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
         files = Outputs(
@@ -200,7 +200,7 @@ def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     return options.scenario is None and not any(chosen) and not rest
 
 
-def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
+def _planned(options: argparse.Namespace, rest: Sequence[str]) -> RunPlan:
     """What to run, from a scenario and flags or from a run's own file."""
     if options.replay:
         if options.scenario or rest:
@@ -215,11 +215,11 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> Plan:
     if options.scenario is None:
         raise InputError(f"command line: expected a scenario ({', '.join(shipped())}), received none")
     scenario = scenarios.load(options.scenario, reading.overrides(rest))
-    return Plan(scenario, scenario.ticks, ())
+    return RunPlan(scenario, scenario.ticks, ())
 
 
 def _report(
-    session: Session, plan: Plan, status: Status, told: dict[str, Any], own: Sequence[str], as_json: bool
+    session: Session, plan: RunPlan, status: Status, told: dict[str, Any], own: Sequence[str], as_json: bool
 ) -> None:
     """Print the figures, and how the run ended where it did not complete."""
     scenario = session.begun_as
@@ -249,7 +249,7 @@ def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
     except SpheretwinError:
         raise
     except Exception as error:  # the user's code may raise anything
-        if not is_own(session.law):
+        if not is_user_law(session.law):
             raise
         raise LawError.of(session.law.name, session.t_s, error) from error
     if session.law_error:

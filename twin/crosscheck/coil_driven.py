@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 
 from spheretwin import assembly
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import at_start
+from spheretwin.active_config import initial_config
 from spheretwin.crosscheck.part import Part
 from spheretwin.crosscheck.trajectories import ORDER_MARGIN, Convergence
 from spheretwin.linear import Magnetics, hinge_matrix
@@ -28,8 +28,8 @@ from spheretwin.models.base.checks import Check
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration
-from spheretwin.plant.step import GOING, Delivered, plant_tick
-from spheretwin.shared_buffers import wires_of
+from spheretwin.plant.step import GOING, PlantOutput, plant_tick
+from spheretwin.shared_buffers import shared_buffers
 
 Array = NDArray[np.float64]
 
@@ -179,12 +179,12 @@ def _driven(
         "plant.initial_rad_s": START_rad_s,
         "controller.period_s": period_s,
     }
-    begun = at_start(scenarios.load("hold", {**own, **fields}), None, None)
+    begun = initial_config(scenarios.load("hold", {**own, **fields}), None, None)
     scenario, actuator = begun.scenario, begun.files.actuator
     groups = len(actuator.groups)
     rotor = assembly.rotor_of(scenario, begun.files)  # held: what is stepped has addresses within it
     stepped = rotor.start(np.array(START_rad), np.array(START_rad_s))
-    plant = assembly.plant_of(scenario, actuator, stepped, wires_of(scenario, groups))
+    plant = assembly.plant_of(scenario, actuator, stepped, shared_buffers(scenario, groups))
     every = round(SAMPLE_s / period_s)
     states = np.full((len(_samples_s()), 6), np.nan)
     states[0] = np.concatenate([START_rad, START_rad_s])
@@ -193,7 +193,7 @@ def _driven(
         plant,
         commands,
         disturbance,
-        Delivered(np.empty(groups), np.empty(groups), np.empty(3)),
+        PlantOutput(np.empty(groups), np.empty(groups), np.empty(3)),
         every,
         states,
     )

@@ -25,7 +25,7 @@ from spheretwin.models.kinematics import rate_jacobian, rotation
 from spheretwin.models.lagrangian import coriolis_matrix, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf import PAYLOAD, gravity, read
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 
 Array = NDArray[np.float64]
 
@@ -169,7 +169,7 @@ def random_states(count: int) -> States:
 
 def ask_mujoco(mjcf: Path, case: Case, states: States) -> Answers:
     """Answers of MuJoCo, from its public functions."""
-    rotor = Rotor(read(mjcf), STEP_S, "RK4", case.modelling_error, case.payload_kg)
+    rotor = MujocoRotor(read(mjcf), STEP_S, "RK4", case.modelling_error, case.payload_kg)
     model, data, body = rotor.model, rotor.data, rotor.model.body("rotor").id
     answers = _empty(len(states.q))
     axes = np.eye(3)

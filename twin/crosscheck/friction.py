@@ -36,14 +36,14 @@ from spheretwin.crosscheck.hinge import (
 from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.scenario.sections import PROTOTYPE_BEARINGS, Plant
+from spheretwin.scenario.sections import PROTOTYPE_BEARINGS, PlantSection
 
 Array = NDArray[np.float64]
 
 # The prototype's bearing, and the heavier of the two guesses that its figure is the lighter of.
 LEVELS_Nm: tuple[float, ...] = (PROTOTYPE_BEARINGS["plant.coulomb_Nm"][GAMMA], 5e-3)
 VISCOUS_Nm_s: float = PROTOTYPE_BEARINGS["plant.viscous_Nm_s"][GAMMA]
-SMOOTHING_rad_s: float = Plant.model_fields["friction_smoothing_rad_s"].default
+SMOOTHING_rad_s: float = PlantSection.model_fields["friction_smoothing_rad_s"].default
 
 REST_rad_s = 1e-3 * START_rad_s  # what is called rest
 VISCOUS_s = 2.0  # of coasting under viscous friction alone

@@ -30,7 +30,7 @@ from spheretwin.models.base.compiled import compiled
 from spheretwin.models.mjcf import Mjcf, read
 from spheretwin.plant.friction import Friction, friction, slow_down
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.plant.step import step
 
 Array = NDArray[np.float64]
@@ -187,7 +187,7 @@ def by_mujoco(mjcf: Path, hinge: Hinge, rate_rad_s: float, torque_Nm: Array) -> 
         The model cannot be read.
     """
     kept = read(mjcf)
-    rotor = Rotor(_with_bearing(kept, hinge), STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
+    rotor = MujocoRotor(_with_bearing(kept, hinge), STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
     none = friction(np.zeros(3), np.zeros(3), hinge.smoothing_rad_s, np.ones(3), STEP_s)
     return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), none, torque_Nm)
 

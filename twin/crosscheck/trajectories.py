@@ -27,8 +27,8 @@ from spheretwin.models.mjcf import read
 from spheretwin.models.telemetry.table import Table
 from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.mujoco_rotor import Rotor
-from spheretwin.scenario.changes import changed
+from spheretwin.plant.mujoco_rotor import MujocoRotor
+from spheretwin.scenario.changes import with_change
 from spheretwin.simulation import simulate
 from spheretwin.trajectories.shapes import Nutation
 
@@ -139,7 +139,7 @@ def integrate(pieces: Pieces, inertia: Array) -> Array:
 
 def by_mujoco(mjcf: Path, pieces: Pieces, integrator: str, step_s: float) -> Array:
     """States at the ends of the pieces by MuJoCo."""
-    rotor = Rotor(read(mjcf), step_s, integrator, 0.0, 0.0)
+    rotor = MujocoRotor(read(mjcf), step_s, integrator, 0.0, 0.0)
     plant = rotor.start(pieces.start[:3], pieces.start[3:])
     states = [pieces.start]
     for torque in pieces.torque:
@@ -265,7 +265,7 @@ def compare_closed_loop(mjcf: Path) -> ClosedLoop:
 def _run(mjcf: Path, overrides: dict[str, Any]) -> Pair:
     scenario = scenarios.load(SCENARIO, {**overrides, "plant.mjcf": str(mjcf)})
     on_mujoco = simulate(scenario)
-    on_lagrangian = simulate(changed(scenario, "plant.engine", "lagrangian"))
+    on_lagrangian = simulate(with_change(scenario, "plant.engine", "lagrangian"))
     tables = on_mujoco.telemetry, on_lagrangian.telemetry
     same_end = on_mujoco.status == on_lagrangian.status and len(tables[0]) == len(tables[1])
     return Pair(*tables, same_end)

@@ -1,1 +1,1 @@
-"""The prototype's electronics: between the law and the coils, and the joints and the law, a stage a file."""
+"""Electronics: drive stages from the law to the coils, sensor stages from the joints to the law."""

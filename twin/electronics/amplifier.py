@@ -1,25 +1,25 @@
-"""Voltage-to-current amplifiers: each closes a loop around its group's current, with the voltage it has.
+"""Voltage-to-current amplifiers: each closes a loop around the current of its group within its voltage swing.
 
-With the target r, the current i and the closed loop's bandwidth w, an amplifier sets the voltage that makes
-``di/dt = w (r - i)``, which is ``v = R i + L w (r - i) + e``, as far as its swing goes::
+With the target r, the current i and the bandwidth w of the closed loop, an amplifier sets the voltage for
+``di/dt = w (r - i)``, which is ``v = R i + L w (r - i) + e``, limited to its swing::
 
     L di/dt = min(max(v(i), -V_down), V_up) - R i - e
 
-Target and back-EMF e are held over a physics step, and the step is solved exactly, which needs no more than
-exponentials. The right side is continuous in i and falls everywhere, with slope -L w where the amplifier
-follows and -R where its voltage is at a limit. So there is one current at rest, and i moves towards it and
-never back. v is a straight line in i, so v too only rises or only falls (or stays, where R = L w), and meets
-each limit at most once. Within a step there are at most three phases, limit, following, other limit, of
-which a step may begin with any: a limit that is left is never met again, and one that is met is never left.
+Target and back-EMF e are held over a physics step, and the step is solved exactly with exponentials. The
+right side is continuous in i and decreases everywhere, with slope -L w while the amplifier follows and -R
+while its voltage is at a limit. So there is one equilibrium current, and i approaches it monotonically. v is
+a straight line in i, so v is monotonic too (constant if R = L w) and reaches each limit at most once. A step
+has at most three phases: limit, following, other limit. It may begin with any of them. A limit that was left
+is not reached again, and a limit that was reached is not left.
 
-In each phase current and voltage relax with one time constant (1/w following, L/R at a limit) towards values
-that the phase would settle at. What relaxes from u to u_last of the other sign is 0 after
-``log(1 - u / u_last)`` time constants: with u the voltage's distance from a limit, that is when the phase
-ends. A limit that is not reached costs no logarithm and no exponential: where the voltage at the start and
-the one at rest are both within the swing, so is every one between.
+In each phase current and voltage relax with one time constant (1/w following, L/R at a limit) towards the
+final values of the phase. A quantity that relaxes from u towards u_last of the other sign is 0 after
+``log(1 - u / u_last)`` time constants: with u the distance of the voltage from a limit, this is the end of
+the phase. A limit that is not reached costs no logarithm and no exponential: if the voltage at the start and
+the final voltage are within the swing, every voltage between them is too.
 
-Left out, as small beside a physics step of 0.5 ms: the slew rate (9 V/µs: full swing in 5 µs) and the drift
-of the offset (20 µV/K).
+Neglected, as small compared with a physics step of 0.5 ms: the slew rate (9 V/µs: full swing in 5 µs) and the
+drift of the offset (20 µV/K).
 """
 
 from __future__ import annotations
@@ -31,41 +31,41 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from spheretwin.electronics.coil import OPEN, Coil, Relaxation, relaxation
+from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
 from spheretwin.electronics.drive_stage import DriveSetup, DriveStage
 from spheretwin.electronics.random_streams import errors
 from spheretwin.electronics.stages import FaultLine, fault_line
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 
-# No motion of the rotor induces as much: squares of currents remain numbers, whatever comes in.
+# No motion of the rotor induces as much; the bound keeps squares of currents finite.
 LARGEST_EMF_V = 1e9
 
 
 class AmplifierSection(DriveStage):
-    """Amplifiers of the groups; without a supply, they are none of these."""
+    """Parameters of the amplifiers; without a supply they are not used."""
 
     stage: ClassVar[str] = "amplifier"
     supply_V: Annotated[float, Field(ge=1e-3, le=1e6)] | None = Field(
         None,
-        description="supply, plus and minus, V; without one the current follows with time_constant_s alone"
-        " (OPA549, from its sheet: 4 to 30; that it is 24, assumed)",
+        description="supply, plus and minus, V; without one the current follows with time_constant_s only"
+        " (OPA549, from its sheet: 4 to 30; assumed: 24)",
     )
     drop_up_V: Annotated[float, Field(ge=0, le=1e6)] = Field(
         0.0,
-        description="what the largest voltage stays below the supply, V"
+        description="difference between the supply and the largest voltage, V"
         " (OPA549, from its sheet: 4.8 at 8 A at worst)",
     )
     drop_down_V: Annotated[float, Field(ge=0, le=1e6)] = Field(
         0.0,
-        description="what the lowest voltage stays above the negative supply, V"
+        description="difference between the lowest voltage and the negative supply, V"
         " (OPA549, from its sheet: 4.6 at 8 A at worst)",
     )
     bandwidth_rad_s: Annotated[float, Field(ge=1e-3, le=1e9)] = Field(
         12566.370614359172,
-        description="of the closed current loop, rad/s (assumed: 2 kHz)",
+        description="bandwidth of the closed current loop, rad/s (assumed: 2 kHz)",
     )
     transconductance_A_V: Annotated[float, Field(ge=1e-6, le=1e6)] = Field(
-        0.8, description="current asked for a volt of the converter, A/V (assumed)"
+        0.8, description="commanded current per volt of the converter, A/V (assumed)"
     )
     amplifier_offset_V: Annotated[float, Field(ge=0, le=10)] = Field(
         0.0,
@@ -84,12 +84,12 @@ class AmplifierSection(DriveStage):
 
     @staticmethod
     def ideal(section: Any) -> bool:
-        """Always: what an amplifier is asked for is the target of `drive_coils`."""
+        """Return True: without a fault this stage changes no setpoint."""
         return True
 
     @staticmethod
     def build(section: Any, setup: DriveSetup) -> Any:
-        """Inputs of the amplifiers, which only faults change."""
+        """Return the inputs of the amplifiers, which only faults change."""
         return AmplifierStage(setup.faults, fault_line(setup.groups * setup.faults, 0.0))
 
 
@@ -97,13 +97,13 @@ class AmplifierStage(NamedTuple):
     """Inputs of the amplifiers as a stage of the drive."""
 
     on: bool
-    line: FaultLine  # of what the amplifiers are asked for, A
+    line: FaultLine  # of the setpoint, A
 
 
 class Amplifier(NamedTuple):
-    """Amplifiers of all groups as compiled code sees them."""
+    """Amplifiers of all groups, for compiled code."""
 
-    supplied: bool  # whether there is a supply; if not, no voltage is too large
+    supplied: bool  # true if there is a supply; without one no voltage is too large
     highest_V: float
     lowest_V: float
     bandwidth_rad_s: float
@@ -114,21 +114,21 @@ class Amplifier(NamedTuple):
 
 
 class Flow(NamedTuple):
-    """What has passed through the coils: the mean of the last step, sums until they are cleared."""
+    """Currents and energies of the coils: the mean of the last step, and sums until they are reset."""
 
-    mean_current_A: NDArray[np.float64]  # (n,) over the last physics step: what acts on the rotor
+    mean_current_A: NDArray[np.float64]  # (n,) over the last physics step; acts on the rotor
     copper_J: NDArray[np.float64]  # (n,) loss in the coils
-    work_J: NDArray[np.float64]  # (n,) of the voltage at the coil's ends
+    work_J: NDArray[np.float64]  # (n,) electrical energy at the terminals of the coils
     voltage_limited_s: NDArray[np.float64]  # (n,) time with the voltage at a limit
-    current_limited_s: NDArray[np.float64]  # (n,) time with more asked for than the current limit
+    current_limited_s: NDArray[np.float64]  # (n,) time with a setpoint beyond the current limit
 
 
 def amplifier(
     section: AmplifierSection, current_limit_A: float, step_s: float, groups: int, seed: int
 ) -> Amplifier:
-    """Amplifiers of a current limit (A) for a physics step (s), one a group.
+    """Return the amplifiers of all groups for a current limit (A) and a physics step (s).
 
-    Offsets are drawn uniformly within their bound, each from a stream of its own.
+    Offsets are drawn uniformly within their bound, each from a separate stream.
     """
     drawn = (
         errors(seed, "drive.amplifier", groups, 1)[:, 0] if section.amplifier_offset_V else np.zeros(groups)
@@ -146,21 +146,21 @@ def amplifier(
     )
 
 
-def flow(groups: int) -> Flow:
-    """Nothing has passed yet."""
+def zero_flow(groups: int) -> Flow:
+    """Return a flow with all sums at 0."""
     return Flow(*np.zeros((len(Flow._fields), groups)))
 
 
 @part_of_its_caller
-def clear(flow: Flow) -> None:
-    """Begin the sums anew, as at the start of a control period."""
+def reset_sums(flow: Flow) -> None:
+    """Reset the sums at the start of a control period."""
     for j in range(flow.copper_J.shape[0]):
         flow.copper_J[j] = flow.work_J[j] = 0.0
         flow.voltage_limited_s[j] = flow.current_limited_s[j] = 0.0
 
 
 class Phase(NamedTuple):
-    """A stretch of a step in which current and voltage relax with one time constant."""
+    """Phase of a step in which current and voltage relax with one time constant."""
 
     current_A: float  # at its end
     charge_As: float
@@ -171,8 +171,8 @@ class Phase(NamedTuple):
 @part_of_its_caller
 def drive_coils(
     amplifier: Amplifier,
-    coil: Coil,
-    asked: NDArray[np.float64],
+    coil: GroupCoils,
+    setpoint: NDArray[np.float64],
     emf: NDArray[np.float64],
     current: NDArray[np.float64],
     flow: Flow,
@@ -182,17 +182,17 @@ def drive_coils(
     Parameters
     ----------
     amplifier : Amplifier
-    coil : Coil
-        Of which the temperatures are left as they are: `coil.warm` carries them on.
+    coil : GroupCoils
+        Temperatures do not change here: `coil.advance_temperature` advances them.
     asked : (n,) array, A
-        Held over the step. With the amplifier's offset, and within the current limit, it is the target.
-        Any number or infinity; where it is not a number, neither is the current from then on.
+        Held over the step. With the offset of the amplifier, and within the current limit, it is the target.
+        Any number or infinity; after NaN the current stays NaN.
     emf : (n,) array, V
-        Back-EMF, held over the step; beyond `LARGEST_EMF_V`, that.
+        Back-EMF, held over the step; limited to `LARGEST_EMF_V`.
     current : (n,) array, A
         At the start of the step; on return, at its end.
     flow : Flow
-        The mean current is written, the sums are added to.
+        Result: the mean current is written, the sums increase.
     """
     h, limit, highest, lowest = (
         amplifier.step_s,
@@ -202,8 +202,8 @@ def drive_coils(
     )
     stiffness = coil.inductance_H * amplifier.bandwidth_rad_s
     for j in range(current.shape[0]):
-        wanted = asked[j] + amplifier.offset_A[j]
-        target = min(max(wanted, -limit), limit)
+        unlimited = setpoint[j] + amplifier.offset_A[j]
+        target = min(max(unlimited, -limit), limit)
         e = min(max(emf[j], -LARGEST_EMF_V), LARGEST_EMF_V)
         start, R = current[j], coil.resistance_ohm[j]
         volts = R * start + stiffness * (target - start) + e
@@ -217,7 +217,7 @@ def drive_coils(
         flow.mean_current_A[j] = whole.charge_As / h
         flow.copper_J[j] += R * whole.square_A2s
         flow.work_J[j] += whole.work_J
-        if abs(wanted) > limit:
+        if abs(unlimited) > limit:
             flow.current_limited_s[j] += h
 
 
@@ -225,7 +225,7 @@ def drive_coils(
 def _phase(
     shares: Relaxation, duration: float, start: float, last: float, volts: float, last_volts: float
 ) -> Phase:
-    """Integrals over a phase, from current and voltage at its start and those that it would settle at."""
+    """Return the integrals over a phase, from initial and final current and voltage."""
     way = last - start
     crossed = volts * last + last_volts * start
     return Phase(
@@ -250,20 +250,20 @@ def _phase(
 def _within_limits(
     amplifier: Amplifier, inductance_H: float, R: float, e: float, target: float, start: float
 ) -> tuple[Phase, float]:
-    """One step of a group, phase by phase, and the time in it with the voltage at a limit."""
+    """Return one step of a group, phase by phase, and its time with the voltage at a limit."""
     rate, highest, lowest = amplifier.bandwidth_rad_s, amplifier.highest_V, amplifier.lowest_V
     stiffness = inductance_H * rate
     left, limited = amplifier.step_s, 0.0
     volts = R * start + stiffness * (target - start) + e
     last_volts = R * target + e
-    if isnan(volts + last_volts):  # following, the current would not know of the back-EMF
+    if isnan(volts + last_volts):  # while following, the current would not depend on the back-EMF
         return Phase(nan, nan, nan, nan), 0.0
     passed = Phase(start, 0.0, 0.0, 0.0)
 
     if volts > highest or volts < lowest:
         limit = highest if volts > highest else lowest
         last = (limit - e) / R
-        # At rest at the limit, the amplifier would ask for as much more as is short of the target.
+        # At the final current of the limit, the amplifier demands more voltage in proportion to the error.
         duration = _time_to_zero(volts - limit, stiffness * (target - last), inductance_H / R, left)
         passed = _at_limit(passed, limit, last, duration * R / inductance_H, duration)
         left, limited, volts = left - duration, duration, limit
@@ -287,9 +287,9 @@ def _within_limits(
 
 @allocation_free
 def _time_to_zero(start: float, last: float, time_constant: float, longest: float) -> float:
-    """When what relaxes from `start` towards `last` is 0; `longest` where it is not before that.
+    """Return the time at which a relaxation from `start` towards `last` is 0, at most `longest`.
 
-    Of one sign it never is, and what is not a number is not either.
+    Values of one sign and NaN never become 0: the result is `longest`.
     """
     if start <= 0.0 < last or last < 0.0 <= start:
         time = time_constant * log1p(-start / last)
@@ -300,13 +300,13 @@ def _time_to_zero(start: float, last: float, time_constant: float, longest: floa
 
 @allocation_free
 def _at_limit(passed: Phase, limit: float, last: float, x: float, duration: float) -> Phase:
-    """Add a phase of x time constants L/R at a limit of the voltage to what has passed."""
+    """Add a phase of x time constants L/R at a voltage limit to the preceding phases."""
     return _added(passed, _phase(relaxation(x), duration, passed.current_A, last, limit, limit))
 
 
 @part_of_its_caller
 def _added(passed: Phase, more: Phase) -> Phase:
-    """Two phases as one."""
+    """Return two phases as one."""
     return Phase(
         more.current_A,
         passed.charge_As + more.charge_As,
@@ -319,17 +319,24 @@ Array = NDArray[np.float64]
 
 
 @allocation_free
-def undriven(
-    contact: int, coil: Coil, group: int, step_s: float, emf_V: float, current: Array, mean: Array, flow: Flow
+def advance_open_short(
+    contact: int,
+    coil: GroupCoils,
+    group: int,
+    step_s: float,
+    emf_V: float,
+    current: Array,
+    mean: Array,
+    flow: Flow,
 ) -> None:
-    """Advance the current of one undriven group by a physics step.
+    """Advance the current of one open or shorted group by a physics step.
 
     Parameters
     ----------
     contact : int
         `OPEN` or `SHORTED`.
-    coil : Coil
-        Its temperature is left as it is.
+    coil : GroupCoils
+        The temperature does not change here.
     group : int
     step_s : float, s
     emf_V : float, V
@@ -337,9 +344,9 @@ def undriven(
     current : (n,) array, A
         At the start of the step; on return, at its end.
     mean : (n,) array, A
-        Result: over the step.
+        Result: mean over the step.
     flow : Flow
-        The copper loss is added to; nothing passes the coil's ends.
+        The copper loss increases; there is no energy at the terminals.
     """
     if contact == OPEN:
         current[group] = mean[group] = 0.0

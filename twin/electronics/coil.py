@@ -1,8 +1,9 @@
-"""The coils of the groups: resistance that rises with their temperature, inductance, and back-EMF.
+"""Coils of the groups: temperature-dependent resistance, inductance and back-EMF.
 
 A group obeys ``L di/dt = v - R i - e`` with the voltage v at its ends. The turning rotor induces
-``e = G_t^T w``: what it takes as power e i is the power of the torque ``G_t i`` at the rate w, to the last
-digit. Copper loss heats a group, which passes heat on to what surrounds it: one capacity, one resistance.
+``e = G_t^T w``: the electrical power e i equals the power of the torque ``G_t i`` at the rate w, to the last
+digit. Copper loss heats a group, which loses heat to its surroundings: one heat capacity, one thermal
+resistance.
 """
 
 from __future__ import annotations
@@ -17,22 +18,22 @@ from pydantic import BaseModel, ConfigDict, Field
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 
 # Terms -(-x)**n / (n + 1)! and (-x)**n (2**n - 2) / (n + 1)!, without (-x)**n and with the sign of the first;
-# up to x = 1/4, those left out are beyond the last digit.
+# up to x = 1/4, the omitted terms are beyond the last digit.
 _TERMS = 14
 _MEAN = np.array([1 / factorial(n + 1) for n in range(_TERMS + 1)])
 _SQUARE = np.array([(2**n - 2) / factorial(n + 1) for n in range(_TERMS + 1)])
 
-# Up to here series have no more terms than need be; beyond, differences lose no more than their last digits.
+# Below this limit the series need few terms; above it, differences lose only their last digits.
 SERIES_TO = 0.25
 
 
 class Relaxation(NamedTuple):
-    """Shares of start (a) and of where it settles (b), for a time x in time constants."""
+    """Shares of the start value (a) and of the final value (b), for a time x in time constants."""
 
     settled: float
-    """``1 - exp(-x)``: share of the way done at the end."""
+    """``1 - exp(-x)``: share of the way at the end."""
     mean: float
-    """Mean of ``1 - exp(-s)``: share of the way done on average."""
+    """Mean of ``1 - exp(-s)``: mean share of the way."""
     start_start: float
     """Mean of ``exp(-s)**2``."""
     start_settled: float
@@ -43,7 +44,7 @@ class Relaxation(NamedTuple):
 
 @allocation_free
 def relaxation(x: float) -> Relaxation:
-    """Shares for a time of x time constants, x >= 0."""
+    """Return the shares for a time of x time constants, x >= 0."""
     if x < SERIES_TO:
         mean, settled_settled = _series(x)
         remaining = 1.0 - mean  # on average
@@ -64,7 +65,7 @@ def relaxation(x: float) -> Relaxation:
 
 @allocation_free
 def _series(x: float) -> tuple[float, float]:
-    """``1 - (1 - exp(-x)) / x`` and the mean of ``(1 - exp(-s))**2``, for small x."""
+    """Return ``1 - (1 - exp(-x)) / x`` and the mean of ``(1 - exp(-s))**2``, for small x."""
     mean, settled_settled = 0.0, 0.0
     for n in range(_TERMS, 0, -1):
         mean = _MEAN[n] - x * mean
@@ -73,35 +74,35 @@ def _series(x: float) -> tuple[float, float]:
 
 
 DRIVEN, OPEN, SHORTED = 0, 1, 2
-"""How a group is connected."""
+"""Connection of a group."""
 
-# Temperature at which a resistance is told.
+# Temperature of the stated resistances.
 REFERENCE_degC = 20.0
 
 
 class CoilSection(BaseModel):
-    """Electrical and thermal figures of a group."""
+    """Electrical and thermal parameters of a group."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     resistance_ohm: Annotated[float, Field(ge=1e-3, le=1e6)] | None = Field(
-        None, description="of a group at 20 °C, ohm; the model file's unless given (assumed: 1.3)"
+        None, description="resistance of a group at 20 °C, ohm; the model file's unless given (assumed: 1.3)"
     )
     inductance_H: Annotated[float, Field(ge=1e-9, le=1e3)] | None = Field(
-        None, description="of a group, H; the model file's unless given (assumed: 0.9e-3)"
+        None, description="inductance of a group, H; the model file's unless given (assumed: 0.9e-3)"
     )
     resistance_per_K: Annotated[float, Field(ge=0, le=0.01)] = Field(
         0.0,
-        description="relative rise of the resistance, 1/K, reckoned from 20 °C (property of copper: 0.0039)",
+        description="relative rise of the resistance, 1/K, from 20 °C (property of copper: 0.0039)",
     )
     heat_capacity_J_K: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
-        60.0, description="of a group, J/K (assumed)"
+        60.0, description="heat capacity of a group, J/K (assumed)"
     )
     thermal_resistance_K_W: Annotated[float, Field(ge=0, le=1e6)] = Field(
-        4.0, description="from a group to what surrounds it, K/W (assumed)"
+        4.0, description="thermal resistance from a group to its surroundings, K/W (assumed)"
     )
     ambient_degC: Annotated[float, Field(ge=-60, le=300)] = Field(
-        20.0, description="temperature around the coils, and theirs at the start, °C (assumed)"
+        20.0, description="ambient temperature, and initial temperature of the coils, °C (assumed)"
     )
     shutdown_degC: Annotated[float, Field(ge=-60, le=1e4)] | None = Field(
         None,
@@ -110,47 +111,47 @@ class CoilSection(BaseModel):
     )
 
 
-class Coil(NamedTuple):
-    """Coils of all groups as compiled code sees them."""
+class GroupCoils(NamedTuple):
+    """Coils of all groups, for compiled code."""
 
     inductance_H: float
     cold_resistance_ohm: float  # at `REFERENCE_degC`
     resistance_per_K: float
     thermal_resistance_K_W: float
     ambient_degC: float
-    shutdown_degC: float  # infinite where there is none
-    settled: float  # share of the way to its last temperature in a control period
+    shutdown_degC: float  # infinite if there is none
+    settled: float  # share of the way to the final temperature in a control period
     period_s: float
-    temperature_degC: NDArray[np.float64]  # (n,) now
+    temperature_degC: NDArray[np.float64]  # (n,) present temperature
     resistance_ohm: NDArray[np.float64]  # (n,) at that temperature
     contact: NDArray[np.int64]  # (n,) `DRIVEN`, `OPEN` or `SHORTED`, by faults
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Arrays that it goes on from."""
+        """Return the arrays with the state."""
         return self.temperature_degC, self.resistance_ohm
 
     def fault_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Arrays that faults write."""
+        """Return the arrays that faults write."""
         return (self.contact,)
 
 
-def coil(
+def group_coils(
     section: CoilSection, resistance_ohm: float, inductance_H: float, period_s: float, groups: int
-) -> Coil:
-    """Coils at the temperature around them.
+) -> GroupCoils:
+    """Return coils at ambient temperature.
 
     Parameters
     ----------
     section : CoilSection
     resistance_ohm, inductance_H : float, ohm, H
-        Of the model file, in force where the section has none.
+        Values of the model file, used if the section has none.
     period_s : float, s
-        Control period, once in which the temperature is carried on.
+        Control period, in which the temperature advances once.
     groups : int
     """
     cold = resistance_ohm if section.resistance_ohm is None else section.resistance_ohm
     time_constant_s = section.thermal_resistance_K_W * section.heat_capacity_J_K
-    made = Coil(
+    coils = GroupCoils(
         inductance_H=inductance_H if section.inductance_H is None else section.inductance_H,
         cold_resistance_ohm=cold,
         resistance_per_K=section.resistance_per_K,
@@ -163,25 +164,25 @@ def coil(
         resistance_ohm=np.empty(groups),
         contact=np.full(groups, DRIVEN, dtype=np.int64),
     )
-    settle_resistance(made)
-    return made
+    update_resistance(coils)
+    return coils
 
 
 @part_of_its_caller
-def settle_resistance(coil: Coil) -> None:
-    """``R = R20 (1 + a (T - 20 °C))`` at the present temperatures."""
+def update_resistance(coil: GroupCoils) -> None:
+    """Update the resistances: ``R = R20 (1 + a (T - 20 °C))`` at the present temperatures."""
     for j in range(coil.resistance_ohm.shape[0]):
         rise = coil.temperature_degC[j] - REFERENCE_degC
         coil.resistance_ohm[j] = coil.cold_resistance_ohm * (1.0 + coil.resistance_per_K * rise)
 
 
 @part_of_its_caller
-def warm(coil: Coil, copper_J: NDArray[np.float64]) -> None:
-    """Carry temperature and resistance over one control period, exactly for the mean power in it.
+def advance_temperature(coil: GroupCoils, copper_J: NDArray[np.float64]) -> None:
+    """Advance temperature and resistance by one control period, exactly for the mean power in it.
 
     Parameters
     ----------
-    coil : Coil
+    coil : GroupCoils
         Changed in place.
     copper_J : (n,) array, J
         Copper loss of each group in the period.
@@ -190,12 +191,12 @@ def warm(coil: Coil, copper_J: NDArray[np.float64]) -> None:
         power = copper_J[j] / coil.period_s
         last = coil.ambient_degC + coil.thermal_resistance_K_W * power
         coil.temperature_degC[j] += (last - coil.temperature_degC[j]) * coil.settled
-    settle_resistance(coil)
+    update_resistance(coil)
 
 
 @part_of_its_caller
-def overheated(coil: Coil) -> bool:
-    """Whether a group is as hot as its amplifier lets it be, or its temperature is not a number."""
+def is_overheated(coil: GroupCoils) -> bool:
+    """True if the temperature of a group has reached the shutdown limit or is not a number."""
     for j in range(coil.temperature_degC.shape[0]):
         if not coil.temperature_degC[j] < coil.shutdown_degC:
             return True
@@ -209,18 +210,18 @@ def back_emf(
     rate_S: NDArray[np.float64],
     emf: NDArray[np.float64],
 ) -> None:
-    """``e = G_t^T w``, with the true torque matrix.
+    """Compute the back-EMF ``e = G_t^T w`` with the true torque matrix.
 
     Parameters
     ----------
     torque_matrix : (3, n) array, N·m/A
-        Torque on the rotor in the stator's frame an ampere of each group (15), which is V·s as well.
+        Torque on the rotor per ampere of each group, in the frame of the stator (15); equal to V·s.
     gain : (n,) array
-        Torque an ampere of each group over that of the matrix.
+        Torque per ampere of each group over that of the matrix.
     rate_S : (3,) array, rad/s
         Angular velocity of the rotor, in the stator's frame.
     emf : (n,) array, V
-        Result, against the current.
+        Result, opposed to the current.
     """
     for j in range(emf.shape[0]):
         turned = 0.0

@@ -1,17 +1,17 @@
-"""Digital-to-analogue converter: each channel's command as one of the voltages that it can set.
+"""Converters: digital-to-analogue of the commands, analogue-to-digital of the measured voltages.
 
-All channels are set at once (simultaneous latch). A command i is asked for as the voltage i / k, with the
-transconductance k of the amplifier behind; the code is the nearest of ``-2**(bits - 1) .. 2**(bits - 1) - 1``
-(mid-tread: one code is 0 V), the ends where the command lies beyond. Set is ``LSB code (1 + gain) + offset +
-INL(code)``, and the amplifier is asked for k times that.
+Digital-to-analogue converter: all channels are set at once (simultaneous latch). A command i needs the
+voltage i / k, with the transconductance k of the following amplifier. The code is the nearest of ``-2**(bits
+- 1) .. 2**(bits - 1) - 1`` (mid-tread: one code is 0 V), limited to these ends. The output is ``LSB code (1 +
+gain) + offset + INL(code)``, and the setpoint of the amplifier is k times that.
 
-Integral nonlinearity is a smooth curve a channel, nothing at both ends of the codes, as INL is told against
-the straight line through them: ``sum(a_n sin(p) sin(n p))``, a bow, an S and so on, where the codes run from
-one end to the other as cos(p). Each term is a polynomial of the code, so that no sine is computed. It stays
-within a_n, with a slope of at most ``2 n a_n`` over half the codes: far too little to turn 16 bits back, so
-that the converter stays monotonic, as its sheet says.
+The integral nonlinearity (INL) of a channel is a smooth curve that is 0 at both end codes, because INL is
+defined relative to the straight line through them: ``sum(a_n sin(p) sin(n p))``, a bow, an S and so on, where
+cos(p) is the position of the code. Each term is a polynomial of the code, so that no sine is computed. A term
+stays within a_n, with a slope of at most ``2 n a_n`` over half the codes. With 16 bits this slope is too
+small to reverse a step, so that the converter is monotonic, as its sheet states.
 
-Settling (20 µs) and glitches are left out: a few hundredths of a physics step.
+Settling (20 µs) and glitches are neglected: a few hundredths of a physics step.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pydantic import Field
 
 from spheretwin.electronics.drive_stage import DriveSetup, DriveStage
 from spheretwin.electronics.random_streams import errors
-from spheretwin.electronics.sensor_stage import Numbers, SensorSetup, SensorStage
+from spheretwin.electronics.sensor_stage import SensorSetup, SensorStage, TickNoise
 from spheretwin.electronics.stages import FaultLine, fault_line, through
 from spheretwin.electronics.transducers import CHANNELS
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
@@ -34,18 +34,18 @@ HARMONICS = 3
 
 
 class DacSection(DriveStage):
-    """Converter of the commands, one channel a group; neutral with 0 bits."""
+    """Parameters of the converter of the commands, one channel for each group; ideal with 0 bits."""
 
     stage: ClassVar[str] = "dac"
     dac_bits: Annotated[int, Field(ge=0, le=32)] = Field(
         0,
-        description="of a code; with 0 the converter is ideal, without range and errors"
+        description="bits of a code; with 0 the converter is ideal, without range and errors"
         " (AD5370, from its sheet: 16)",
     )
     dac_range_V: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
         10.0,
         description="output from -range to range, V (span 20 V at a reference of 5 V from the sheet;"
-        " that it is centred on 0, assumed)",
+        " assumed: centred on 0)",
     )
     dac_offset_V: Annotated[float, Field(ge=0, le=10)] = Field(
         0.0, description="largest offset of a channel, drawn from the seed, V (assumed: 2e-3)"
@@ -66,13 +66,15 @@ class DacSection(DriveStage):
 
     @staticmethod
     def build(section: Any, setup: DriveSetup) -> Any:
-        """Converter in front of amplifiers of the section's transconductance."""
-        made = dac(section, section.transconductance_A_V, setup.groups, setup.seed)
-        return DacStage(made.converts or setup.faults, made, fault_line(setup.groups * setup.faults, 0.0))
+        """Return the converter for amplifiers of the transconductance of the section."""
+        converter = dac(section, section.transconductance_A_V, setup.groups, setup.seed)
+        return DacStage(
+            converter.converts or setup.faults, converter, fault_line(setup.groups * setup.faults, 0.0)
+        )
 
     @staticmethod
     def convert() -> Any:
-        """Compiled conversion of a command."""
+        """Return the compiled conversion of a command."""
         return convert_command
 
 
@@ -81,37 +83,37 @@ class DacStage(NamedTuple):
 
     on: bool
     dac: Dac
-    line: FaultLine  # of what the amplifiers are asked for, A
+    line: FaultLine  # of the setpoint, A
 
 
 @part_of_its_caller
-def convert_command(stage: DacStage, asked: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
-    """Convert a command (n,), A, in its place."""
-    convert(stage.dac, asked, asked)
+def convert_command(stage: DacStage, setpoint: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+    """Convert a command (n,), A, in place."""
+    convert(stage.dac, setpoint, setpoint)
 
 
 class Dac(NamedTuple):
-    """Converter of a run as compiled code sees it."""
+    """Converter of a run, for compiled code."""
 
-    converts: bool  # whether it is one; if not, a command passes as it is
+    converts: bool  # false if a command passes unchanged
     transconductance_A_V: float
-    span_A: float  # twice what the range is as a current: beyond every code
+    span_A: float  # twice the range as a current: beyond every code
     lsb_V: float
     lowest: float  # code
     highest: float
     offset_V: NDArray[np.float64]  # (n,)
-    gain: NDArray[np.float64]  # (n,) 1 where there is no error
+    gain: NDArray[np.float64]  # (n,) 1 without an error
     inl_lsb: NDArray[np.float64]  # (n, HARMONICS) a_n
 
 
 def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int) -> Dac:
-    """Converter in front of amplifiers of a transconductance (A/V), a channel a group.
+    """Return the converter for amplifiers of a transconductance (A/V), one channel for each group.
 
-    A channel's errors are drawn uniformly within their bounds, INL such that its curve keeps to its bound
-    whatever the code. Each channel has its own stream: no field, group or other stage moves what it draws.
+    The errors of a channel are drawn uniformly within their bounds; the INL curve stays within its bound for
+    every code. Each channel has its own stream: no field, group or other stage changes its numbers.
     """
     drawn = np.zeros((groups, 2 + HARMONICS))
-    if section.dac_bits:  # errors of no converter are not drawn
+    if section.dac_bits:  # an ideal converter needs no numbers
         drawn = errors(seed, "drive.dac", groups, 2 + HARMONICS)
     harmonics = drawn[:, 2:] / np.maximum(1.0, np.abs(drawn[:, 2:]).sum(axis=1, keepdims=True))
     codes = 2.0**section.dac_bits
@@ -129,36 +131,36 @@ def dac(section: DacSection, transconductance_A_V: float, groups: int, seed: int
 
 
 @allocation_free
-def convert(dac: Dac, command: NDArray[np.float64], asked: NDArray[np.float64]) -> None:
+def convert(dac: Dac, command: NDArray[np.float64], setpoint: NDArray[np.float64]) -> None:
     """Convert a command.
 
-    It depends on nothing but the command: it may be called when a command comes into force, or once when it
-    is computed.
+    The result depends only on the command: the function may be called when a command becomes active, or once
+    when it is computed.
 
     Parameters
     ----------
     dac : Dac
     command : (n,) array, A
-        Any number; beyond the range, and infinity, is its end, and what is not a number stays so.
+        Any number; values beyond the range are limited, NaN stays NaN.
     asked : (n,) array, A
-        Result, what the amplifiers are asked for; may be `command` itself.
+        Result, setpoint of the amplifiers; may be `command` itself.
     """
     if not dac.converts:
         for j in range(command.shape[0]):
-            asked[j] = command[j]
+            setpoint[j] = command[j]
         return
     for j in range(command.shape[0]):
-        held = min(max(command[j], -dac.span_A), dac.span_A)  # its quotients stay numbers
+        held = min(max(command[j], -dac.span_A), dac.span_A)  # keeps the quotients finite
         code = np.rint(held / dac.transconductance_A_V / dac.lsb_V)
         code = min(max(code, dac.lowest), dac.highest)
         inl = _inl(dac.inl_lsb[j], (2.0 * code + 1.0) / (dac.highest - dac.lowest))
         volts = dac.lsb_V * (code * dac.gain[j] + inl) + dac.offset_V[j]
-        asked[j] = dac.transconductance_A_V * volts
+        setpoint[j] = dac.transconductance_A_V * volts
 
 
 @allocation_free
 def _inl(amplitudes: NDArray[np.float64], place: float) -> float:
-    """``sum(a_n sin(p) sin(n p))`` with cos(p) the place of a code, -1 to 1.
+    """Return ``sum(a_n sin(p) sin(n p))`` with cos(p) the position of a code, -1 to 1.
 
     ``sin(n p) / sin(p)`` is Chebyshev's polynomial of the second kind, here by its recurrence.
     """
@@ -170,24 +172,24 @@ def _inl(amplitudes: NDArray[np.float64], place: float) -> float:
 
 
 ERRORS = 2
-"""Numbers that are drawn for a channel."""
+"""Random numbers of a channel."""
 
 CONVERSION_s = 4e-6
-"""Of the ADS8364: 20 clocks at 5 MHz, from its sheet."""
+"""Duration of a conversion of the ADS8364: 20 clocks at 5 MHz, from its sheet."""
 
-# What fits into a control period of 1 ms.
+# Conversions that fit into a control period of 1 ms.
 MOST_CONVERSIONS = 250
 
 
 class AdcSection(SensorStage):
-    """Analogue-to-digital converter of α and β; ideal while bits, offset, gain error and noise are 0.
+    """Parameters of the converter of α and β; ideal if bits, offset, gain error and noise are 0.
 
-    All channels are held at the control tick, the encoder's count with them, and what they hold is converted
-    once or several times within the period.
+    All channels and the count of the encoder are sampled at the control tick; the samples are converted once
+    or several times within the period.
     """
 
     bits: Annotated[int, Field(ge=0, le=32)] = Field(
-        0, description="resolution; 0 for neither steps nor ends (ADS8364's sheet: 16)"
+        0, description="resolution; 0 for neither steps nor limits (ADS8364's sheet: 16)"
     )
     range_V: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
         2.5, description="largest input of either sign, V (ADS8364's sheet: ±2.5 V)"
@@ -203,18 +205,18 @@ class AdcSection(SensorStage):
     )
     oversampling: Annotated[int, Field(ge=1, le=MOST_CONVERSIONS)] = Field(
         1,
-        description="conversions averaged in a control period, each with noise of its own, of what is held"
+        description="conversions averaged in a control period, each with separate noise, of the held sample"
         " (4 µs each by ADS8364's sheet)",
     )
 
     @property
     def ideal(self) -> bool:
-        """True if the voltage comes out as it goes in."""
+        """True if the converter does not change the voltage."""
         return self.bits == 0 and self.offset_V == 0 and self.gain_error == 0 and self.noise_V == 0
 
     def build(self, setup: SensorSetup) -> Adcs:
-        """Channels with errors of their own; they convert if the potentiometers have errors, too."""
-        track, late = setup.sensors.potentiometer, setup.most_late_ticks
+        """Return the channels with errors from the seed; they also convert if the tracks have errors."""
+        track, longest_delay = setup.sensors.potentiometer, setup.longest_delay_ticks
         converts = not (self.ideal and track.ideal)
         shares = errors(setup.seed, setup.name, CHANNELS, ERRORS)
         return Adcs(
@@ -226,21 +228,21 @@ class AdcSection(SensorStage):
             setup.first_draw,
             setup.first_draw + self.draws(setup.sensors),
             fault_line(CHANNELS),
-            np.full((late + 1, CHANNELS), nan),
+            np.full((longest_delay + 1, CHANNELS), nan),
             np.zeros(1, dtype=np.int64),
         )
 
     @classmethod
     def function(cls) -> Any:
-        """Compiled function that converts α and β."""
+        """Return the compiled function that converts α and β."""
         return pass_adcs
 
     def draws(self, sensors: Any) -> int:
-        """One number a conversion and channel; none without noise."""
+        """Return one number for each conversion and channel; 0 without noise."""
         return CHANNELS * self.oversampling if self.input_noise_V(sensors) else 0
 
     def input_noise_V(self, sensors: Any) -> float:
-        """Noise of one conversion, V rms, of wiper and converter together, which are independent."""
+        """Return the noise of one conversion, V rms, of wiper and converter, which are independent."""
         track = sensors.potentiometer
         return hypot(track.volts_per_rad * track.noise_rad, self.noise_V)
 
@@ -251,56 +253,56 @@ class AdcSection(SensorStage):
 
 
 class Adcs(NamedTuple):
-    """The converter, for compiled code."""
+    """Analogue-to-digital converter, for compiled code."""
 
     on: bool
-    converts: bool  # whether its codes are more than a line
+    converts: bool  # false if the converter is ideal
     volts_per_rad: float
     channels: tuple[Adc, Adc]
     noise_V: float  # of the wiper and of the conversion together, rms, at the input
     first_draw: int
     end_draw: int
-    line: FaultLine  # of what is converted, in rad of the nominal slope
-    on_the_way_rad: NDArray[np.float64]  # (m, 2) of the last ticks, newest first; NaN before the first
-    late_ticks: NDArray[np.int64]  # (1,) of a fault
+    line: FaultLine  # of the converted angle, in rad of the nominal slope
+    delayed_rad: NDArray[np.float64]  # (m, 2) of the last ticks, newest first; NaN before the first
+    delay_ticks: NDArray[np.int64]  # (1,) additional delay of a fault
 
     def state_arrays(self) -> tuple[Any, ...]:
-        """Arrays that it goes on from."""
-        return self.line, self.on_the_way_rad
+        """Return the arrays with the state."""
+        return self.line, self.delayed_rad
 
     def fault_arrays(self) -> tuple[Any, ...]:
-        """Arrays that faults write."""
-        return self.line, self.late_ticks
+        """Return the arrays that faults write."""
+        return self.line, self.delay_ticks
 
 
 @allocation_free
-def pass_adcs(stage: Adcs, measurement: NDArray[np.float64], numbers: Numbers) -> None:
-    """Replace α and β by the angles, rad, that the controller takes the converted voltages for."""
+def pass_adcs(stage: Adcs, measurement: NDArray[np.float64], noise: TickNoise) -> None:
+    """Replace α and β by the angles, rad, that the controller computes from the converted voltages."""
     for channel in range(CHANNELS):
         angle = measurement[0, channel]
         if stage.converts:
-            held_V, draws = stage.volts_per_rad * angle, numbers.noise[stage.first_draw : stage.end_draw]
+            held_V, draws = stage.volts_per_rad * angle, noise.stages[stage.first_draw : stage.end_draw]
             volts = converted(stage.channels[channel], held_V, stage.noise_V, draws, channel, CHANNELS)
             angle = volts / stage.volts_per_rad
-        angle = through(stage.line, channel, angle, numbers.faults)
+        angle = through(stage.line, channel, angle, noise.faults)
         measurement[0, channel] = _delayed(stage, channel, angle)
 
 
 @allocation_free
 def _delayed(stage: Adcs, channel: int, angle: float) -> float:
-    """Keep an angle, and return the one of as many ticks ago as a fault delays it, or the first one."""
-    ring = stage.on_the_way_rad
+    """Store an angle and return the one delayed by a fault, or the first angle."""
+    ring = stage.delayed_rad
     first = isnan(ring[0, channel])
     for row in range(ring.shape[0] - 1, 0, -1):
         ring[row, channel] = angle if first else ring[row - 1, channel]
     ring[0, channel] = angle
-    return ring[stage.late_ticks[0], channel]
+    return ring[stage.delay_ticks[0], channel]
 
 
 class Adc(NamedTuple):
-    """One channel of the converter, for compiled code."""
+    """Channel of the analogue-to-digital converter, for compiled code."""
 
-    step_V: float  # 0 for none
+    step_V: float  # 0 without steps
     lowest: float  # code
     highest: float
     gain: float
@@ -308,13 +310,13 @@ class Adc(NamedTuple):
 
 
 def adc(section: AdcSection, shares: NDArray[np.float64]) -> Adc:
-    """Channel with an offset and a gain of its own.
+    """Return a channel with its own offset and gain error.
 
     Parameters
     ----------
     section : AdcSection
     shares : (`ERRORS`,) array
-        Of the largest offset and of the largest error of the gain, -1 to 1, drawn for this channel.
+        Shares of the largest offset and of the largest gain error, -1 to 1, drawn for this channel.
     """
     offset, gain = shares.tolist()
     half = 2.0 ** (section.bits - 1)
@@ -331,10 +333,10 @@ def adc(section: AdcSection, shares: NDArray[np.float64]) -> Adc:
 def converted(
     adc: Adc, held_V: float, noise_V: float, draws: NDArray[np.float64], first: int, stride: int
 ) -> float:
-    """Mean voltage (V) that the codes of some conversions stand for.
+    """Return the mean voltage (V) of the codes of some conversions.
 
-    Codes are mid-tread: a step of the staircase has its middle at a whole number of LSB, and 0 V is one. They
-    end at −2ⁿ⁻¹ and 2ⁿ⁻¹ − 1. What is no number stays none.
+    Codes are mid-tread: the middle of a step is a whole number of LSB, and 0 V is a code. The codes are
+    limited to −2ⁿ⁻¹ and 2ⁿ⁻¹ − 1. NaN stays NaN.
 
     Parameters
     ----------
@@ -342,10 +344,10 @@ def converted(
     held_V : float, V
         At the input, the same for all conversions.
     noise_V : float, V
-        Standard deviation of all noise at the input; 0 for one conversion, of which others were copies.
+        Standard deviation of all noise at the input; with 0 there is one conversion, as all would be equal.
     draws : array
-        Standard normal numbers: every `stride`-th from `first` on, one a conversion; none without
-        noise. With noise, and none of them, there is no voltage.
+        Standard normal numbers: every `stride`-th from `first` on, one for each conversion; none without
+        noise. With noise and without numbers the result is NaN.
     first, stride : int
     """
     if noise_V == 0:

@@ -1,4 +1,4 @@
-"""Data sheet of the electronics: the nominal values of a controller whose sheet is that of its hardware."""
+"""Data sheet of the electronics: nominal values of a controller that knows its hardware."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from spheretwin.electronics.sensor_chain import SensorsSection, accuracy
 
 
 def drive_sheet(drive: ResolvedDrive) -> dict[str, Any]:
-    """Nominal values of amplifiers and coils, by field of `nominal`."""
+    """Return the nominal values of amplifiers and coils, by field of `nominal`."""
     return {
         "current_limit_A": drive.current_limit_A,
         "delay_s": drive.delay_s,
@@ -23,7 +23,7 @@ def drive_sheet(drive: ResolvedDrive) -> dict[str, Any]:
 
 
 def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
-    """Nominal values of the sensors, by field of `nominal`."""
+    """Return the nominal values of the sensors, by field of `nominal`."""
     noise_rad, resolution_rad = accuracy(sensors)
     return {
         "angle_noise_rad": noise_rad,
@@ -33,12 +33,12 @@ def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
 
 
 def _swing_V(drive: DriveSection) -> float:
-    """Largest voltage in the worse direction; 0 for amplifiers without a supply, which have no limit."""
+    """Return the largest voltage in the worse direction; 0 for amplifiers without a supply and limit."""
     return 0.0 if drive.supply_V is None else drive.supply_V - max(drive.drop_up_V, drive.drop_down_V)
 
 
 def _offset_V(drive: DriveSection) -> float:
-    """Largest offset at the input of an amplifier: its own, and that of the converter with its rounding."""
+    """Return the largest offset at the input of an amplifier: amplifier, converter and rounding."""
     if not drive.dac_bits:
         return drive.amplifier_offset_V
     lsb_V = 2 * drive.dac_range_V / 2**drive.dac_bits

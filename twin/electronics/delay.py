@@ -1,4 +1,4 @@
-"""Computation delay: a command is in force a while after the sample that it was computed from."""
+"""Computation delay between a sample and the command that is computed from it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import part_of_its_caller
 
-# Clock times are built from decimal fractions; a delay and a step that fit do so to rounding only.
+# Clock times are decimal fractions: a delay is a multiple of a step only up to rounding.
 WHOLE = 1e-9
 
-# A slip of the pen must not fill the memory: each control period of delay keeps one more command.
+# Bounds the memory for a mistyped delay: each control period of delay stores one more command.
 MOST_PERIODS = 1000
 
 
 class DelaySection(BaseModel):
-    """How late a command comes into force."""
+    """Parameters of the delay of commands."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -30,7 +30,7 @@ class DelaySection(BaseModel):
 
 
 class Delay(NamedTuple):
-    """Commands on their way, oldest overwritten first."""
+    """Delayed commands in a ring buffer; the oldest is overwritten first."""
 
     ring: NDArray[np.float64]  # (commands, n) A
     newest: NDArray[np.int64]  # (1,) row of `ring` with the command computed last
@@ -38,12 +38,12 @@ class Delay(NamedTuple):
     substeps: int  # physics steps in a control period
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Arrays that it goes on from."""
+        """Return the arrays with the state."""
         return self.ring, self.newest
 
 
 def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> Delay:
-    """Delay before whose first command there is none: 0 A.
+    """Return a delay; the output before the first command is 0 A.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> D
 
 @part_of_its_caller
 def latch(delay: Delay, command: NDArray[np.float64]) -> None:
-    """Take the command (n,), A, that was computed from this control tick's sample."""
+    """Store the command (n,), A, that was computed from the sample of this control tick."""
     ring = delay.ring
     newest = (delay.newest[0] + 1) % ring.shape[0]
     delay.newest[0] = newest
@@ -83,17 +83,17 @@ def latch(delay: Delay, command: NDArray[np.float64]) -> None:
 
 @part_of_its_caller
 def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
-    """Write the command in force at a physics step of the period.
+    """Write the active command at a physics step of the period.
 
-    That of k periods ago is in force from step ``steps - k substeps`` of this period on, until the next one
-    is: the latest with ``k substeps + substep >= steps``.
+    The command of k periods ago is active from step ``steps - k substeps`` of this period on, until the next
+    command is active: it is the latest with ``k substeps + substep >= steps``.
 
     Parameters
     ----------
     delay : Delay
         After `latch` of this control tick.
     substep : int
-        From 0 to the physics steps of a period, less 1.
+        From 0 to the number of physics steps of a period minus 1.
     out : (n,) array, A
         Result.
     """
@@ -106,7 +106,7 @@ def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
 
 
 def transfer_delay(before: Delay, after: Delay) -> None:
-    """Go on with the commands on their way; where more are kept now, the oldest repeats."""
+    """Transfer the delayed commands; if the new delay is longer, the oldest command repeats."""
     rows = len(before.ring)
     for ago in range(len(after.ring)):
         after.ring[-1 - ago] = before.ring[(before.newest[0] - min(ago, rows - 1)) % rows]

@@ -1,6 +1,6 @@
-"""One name for what comes between commands and currents: a plain lag, or the chain of the drive's stages.
+"""Drive of all groups: a plain current lag or the chain of drive stages, under common functions.
 
-As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
+As with the engines in `plant.step`, the loop is compiled only for the drive that a run has.
 """
 
 from __future__ import annotations
@@ -13,86 +13,86 @@ from numpy.typing import NDArray
 
 from spheretwin.electronics import drive_chain as chain
 from spheretwin.electronics.drive_chain import (
-    Drive,
+    CurrentLag,
     DriveChain,
     DriveFaults,
     ResolvedDrive,
     advance_lag,
-    drive,
+    current_lag,
     drive_chain,
 )
 from spheretwin.models.base.compiled import part_of_its_caller
 
 
-class Lag(NamedTuple):
-    """Amplifiers without a supply, right behind their commands."""
+class LagDrive(NamedTuple):
+    """Amplifiers without a supply and without delay: a first-order lag of the currents."""
 
-    drive: Drive
+    lag: CurrentLag
 
 
 @part_of_its_caller
-def _lag_begins(driving: Any, command: Any) -> None:
+def _lag_begin(drive: Any, command: Any) -> None:
     pass
 
 
 @part_of_its_caller
-def _lag_advances(
-    driving: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
+def _lag_advance(
+    drive: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
 ) -> None:
-    advance_lag(driving.drive, command, current, mean)
+    advance_lag(drive.lag, command, current, mean)
 
 
 @part_of_its_caller
-def _lag_ends(driving: Any) -> bool:
+def _lag_end(drive: Any) -> bool:
     return True
 
 
 @part_of_its_caller
-def _lag_tells(driving: Any, row: Any) -> None:
+def _lag_write_telemetry(drive: Any, row: Any) -> None:
     pass
 
 
-Stages = Lag | DriveChain
+DriveModel = LagDrive | DriveChain
 
-_BEGIN: dict[type, Any] = {Lag: _lag_begins, DriveChain: chain.begin}
-_ADVANCE: dict[type, Any] = {Lag: _lag_advances, DriveChain: chain.advance}
-_END: dict[type, Any] = {Lag: _lag_ends, DriveChain: chain.end}
-_TELL: dict[type, Any] = {Lag: _lag_tells, DriveChain: chain.tell}
+_BEGIN: dict[type, Any] = {LagDrive: _lag_begin, DriveChain: chain.begin}
+_ADVANCE: dict[type, Any] = {LagDrive: _lag_advance, DriveChain: chain.advance}
+_END: dict[type, Any] = {LagDrive: _lag_end, DriveChain: chain.end}
+_WRITE_TELEMETRY: dict[type, Any] = {LagDrive: _lag_write_telemetry, DriveChain: chain.write_telemetry}
 
 
-def made(
+def build_drive(
     section: ResolvedDrive,
     step_s: float,
     substeps: int,
     groups: int,
     seed: int,
     faults: DriveFaults | None = None,
-) -> Stages:
-    """What a resolved section asks for, at rest.
+) -> DriveModel:
+    """Return the drive of a resolved section, at rest.
 
     Parameters
     ----------
     section, step_s, substeps, groups, seed, faults
-        As `chain.drive_chain` has them.
+        As in `drive_chain.drive_chain`.
     """
     if section.supply_V is None and not section.converts and faults is None:
-        return Lag(drive(section.lag_s, step_s, section.current_limit_A))
+        return LagDrive(current_lag(section.lag_s, step_s, section.current_limit_A))
     return drive_chain(section, step_s, substeps, groups, seed, faults)
 
 
-def carried_on(before: Stages, after: Stages, command: NDArray) -> None:
-    """Go on as before with other figures, from the last commands (n,), A."""
+def transfer_drive(before: DriveModel, after: DriveModel, command: NDArray) -> None:
+    """Transfer the state to a drive with other parameters, from the last commands (n,), A."""
     if isinstance(after, DriveChain):
         chain.transfer(before if isinstance(before, DriveChain) else None, after, command)
 
 
-def begin(driving: Stages, command: NDArray) -> None:
-    """Take the commands (n,), A, of a control period."""
-    _BEGIN[type(driving)](driving, command)
+def begin(drive: DriveModel, command: NDArray) -> None:
+    """Accept the commands (n,), A, of a control period."""
+    _BEGIN[type(drive)](drive, command)
 
 
 def advance_currents(
-    driving: Stages,
+    drive: DriveModel,
     command: NDArray,
     substep: int,
     q: NDArray,
@@ -103,41 +103,41 @@ def advance_currents(
     mean: NDArray,
 ) -> None:
     """Advance the currents by one physics step, as `chain.advance` does."""
-    _ADVANCE[type(driving)](driving, command, substep, q, qdot, G, gain, current, mean)
+    _ADVANCE[type(drive)](drive, command, substep, q, qdot, G, gain, current, mean)
 
 
-def end(driving: Stages) -> bool:
-    """End a control period; whether the amplifiers may go on."""
-    return bool(_END[type(driving)](driving))
+def end(drive: DriveModel) -> bool:
+    """End a control period; return True if no coil is too hot."""
+    return bool(_END[type(drive)](drive))
 
 
-def tell(driving: Stages, row: NDArray) -> None:
-    """Write what the telemetry says of the control period; a lag says nothing."""
-    _TELL[type(driving)](driving, row)
+def write_telemetry(drive: DriveModel, row: NDArray) -> None:
+    """Write the telemetry of the control period; a lag has none."""
+    _WRITE_TELEMETRY[type(drive)](drive, row)
 
 
-def _of_kind(table: dict[type, Any], driving: Any) -> Any:
-    return table.get(getattr(driving, "instance_class", object))
+def _of_kind(table: dict[type, Any], drive: Any) -> Any:
+    return table.get(getattr(drive, "instance_class", object))
 
 
 @overload(begin, inline="always")
-def _compiled_begin(driving: Any, command: Any) -> Callable[..., Any] | None:
-    chosen = _of_kind(_BEGIN, driving)
+def _compiled_begin(drive: Any, command: Any) -> Callable[..., Any] | None:
+    implementation = _of_kind(_BEGIN, drive)
 
-    def call(driving: Any, command: Any) -> None:
-        chosen(driving, command)
+    def call(drive: Any, command: Any) -> None:
+        implementation(drive, command)
 
-    return call if chosen else None
+    return call if implementation else None
 
 
 @overload(advance_currents, inline="always")
 def _compiled_advance(
-    driving: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
+    drive: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
 ) -> Callable[..., Any] | None:
-    chosen = _of_kind(_ADVANCE, driving)
+    implementation = _of_kind(_ADVANCE, drive)
 
     def call(
-        driving: Any,
+        drive: Any,
         command: Any,
         substep: Any,
         q: Any,
@@ -147,26 +147,26 @@ def _compiled_advance(
         current: Any,
         mean: Any,
     ) -> None:
-        chosen(driving, command, substep, q, qdot, G, gain, current, mean)
+        implementation(drive, command, substep, q, qdot, G, gain, current, mean)
 
-    return call if chosen else None
+    return call if implementation else None
 
 
 @overload(end, inline="always")
-def _compiled_end(driving: Any) -> Callable[..., Any] | None:
-    chosen = _of_kind(_END, driving)
+def _compiled_end(drive: Any) -> Callable[..., Any] | None:
+    implementation = _of_kind(_END, drive)
 
-    def call(driving: Any) -> Any:
-        return chosen(driving)
+    def call(drive: Any) -> Any:
+        return implementation(drive)
 
-    return call if chosen else None
+    return call if implementation else None
 
 
-@overload(tell, inline="always")
-def _compiled_tell(driving: Any, row: Any) -> Callable[..., Any] | None:
-    chosen = _of_kind(_TELL, driving)
+@overload(write_telemetry, inline="always")
+def _compiled_write_telemetry(drive: Any, row: Any) -> Callable[..., Any] | None:
+    implementation = _of_kind(_WRITE_TELEMETRY, drive)
 
-    def call(driving: Any, row: Any) -> None:
-        chosen(driving, row)
+    def call(drive: Any, row: Any) -> None:
+        implementation(drive, row)
 
-    return call if chosen else None
+    return call if implementation else None

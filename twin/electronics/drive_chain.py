@@ -1,10 +1,10 @@
-"""From commands to currents: the stages of all groups, one after the other, over a control period.
+"""Drive chain: the stages from commands to currents of all groups, over a control period.
 
-Once a control tick the stages convert the command, which is then delayed. At each physics step the command
-in force passes the stages again, and is what the amplifiers are asked for. A fault modifies a stage, by its
-fault line or by a field of its own. Faults of converters and amplifiers act behind the delay, where a
-converter latches. Faults of the coils change how they are connected, those of the supply its voltage, those
-of the controller its output.
+Once in each control tick the stages convert the command, which is then delayed. At each physics step the
+active command passes the stages again and becomes the setpoint of the amplifiers. A fault modifies a stage,
+by its fault line or by another field. Faults of converters and amplifiers act after the delay, where a
+converter latches. Faults of the coils change their connection, faults of the supply its voltage, faults of
+the controller its output.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from spheretwin.electronics.amplifier import (
     Amplifier,
     AmplifierSection,
     Flow,
+    advance_open_short,
     amplifier,
-    clear,
     drive_coils,
-    flow,
-    undriven,
+    reset_sums,
+    zero_flow,
 )
 from spheretwin.electronics.coil import (
     DRIVEN,
     OPEN,
     SHORTED,
-    Coil,
     CoilSection,
+    GroupCoils,
+    advance_temperature,
     back_emf,
-    coil,
-    overheated,
-    settle_resistance,
-    warm,
+    group_coils,
+    is_overheated,
+    update_resistance,
 )
 from spheretwin.electronics.converters import DacSection
 from spheretwin.electronics.delay import Delay, DelaySection, delay, due, latch, transfer_delay
@@ -48,13 +48,13 @@ from spheretwin.models.kinematics import angular_velocity
 
 
 class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
-    """From commands to currents; each stage is ideal until told otherwise, and the coils are the model's.
+    """Parameters of the drive; each stage is ideal by default, and the coils are those of the model.
 
-    Its bases that are a `DriveStage` are the list of the stages, in the order in which commands pass them.
+    The bases that are a `DriveStage` are the list of the stages, in the order in which commands pass them.
     """
 
     time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
-        None, description="current lag L/R, s; 0 for none; of amplifiers without a supply"
+        None, description="current lag L/R of amplifiers without a supply, s; 0 for none"
     )
     current_limit_A: Positive | None = Field(None, description="largest group current of the amplifiers, A")
 
@@ -69,18 +69,18 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
 
     @property
     def converts(self) -> bool:
-        """True if what is asked of the amplifiers is other than the command."""
+        """True if the setpoint of the amplifiers can differ from the command."""
         return self.delay_s > 0 or not all(kind.ideal(self) for kind in STAGES.values())
 
 
 STAGES: dict[str, type[DriveStage]] = {
     kind.stage: kind for kind in DriveSection.__bases__ if issubclass(kind, DriveStage)
 }
-"""Kinds of the stages of the commands by their names, in the order in which the commands pass them."""
+"""Classes of the drive stages by their names, in the order in which the commands pass them."""
 
 
 class ResolvedDrive(DriveSection):
-    """Drive of a run: coils and limit are given, and the lag where there is no supply."""
+    """Drive of a run: coils and limit are given, and the lag if there is no supply."""
 
     resistance_ohm: Positive
     inductance_H: Positive
@@ -88,32 +88,32 @@ class ResolvedDrive(DriveSection):
 
     @property
     def lag_s(self) -> float:
-        """Lag of the currents while no voltage is at its limit."""
+        """Time constant of the currents while no voltage is at its limit."""
         return cast("float", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s
 
 
-class Drive(NamedTuple):
+class CurrentLag(NamedTuple):
     """First-order lag, solved exactly over one physics step with the command held."""
 
     decay: float
-    """Share of the distance to the command that is left after a step."""
+    """Share of the distance to the command that remains after a step."""
     mean_share: float
-    """Share of that distance that is left on average over the step."""
+    """Share of that distance that remains on average over the step."""
     current_limit_A: float
-    """Of the amplifiers, whatever is asked of them."""
+    """Limit of the amplifiers, for any command."""
 
 
-def drive(time_constant_s: float, step_s: float, current_limit_A: float) -> Drive:
-    """Drive for a time constant L/R (s; 0 for ideal amplifiers), a physics step (s) and a limit (A)."""
+def current_lag(time_constant_s: float, step_s: float, current_limit_A: float) -> CurrentLag:
+    """Return the lag for a time constant L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
     if time_constant_s == 0:
-        return Drive(0.0, 0.0, current_limit_A)
+        return CurrentLag(0.0, 0.0, current_limit_A)
     steps = step_s / time_constant_s
-    return Drive(exp(-steps), -expm1(-steps) / steps, current_limit_A)
+    return CurrentLag(exp(-steps), -expm1(-steps) / steps, current_limit_A)
 
 
 @allocation_free
 def advance_lag(
-    drive: Drive,
+    lag: CurrentLag,
     command: NDArray[np.float64],
     current: NDArray[np.float64],
     mean: NDArray[np.float64],
@@ -122,89 +122,91 @@ def advance_lag(
 
     Parameters
     ----------
-    drive : Drive
+    lag : CurrentLag
         Lag of the groups.
     command : (n,) array, A
-        Held over the step; the amplifiers follow it as far as their limit.
+        Held over the step; the amplifiers follow it up to their limit.
     current : (n,) array, A
         At the start of the step; on return, at its end.
     mean : (n,) array, A
-        Mean over the step, which is what acts on the rotor.
+        Result: mean over the step, which acts on the rotor.
     """
-    limit = drive.current_limit_A
+    limit = lag.current_limit_A
     for j in range(command.shape[0]):
         target = min(max(command[j], -limit), limit)
         distance = current[j] - target
-        mean[j] = target + drive.mean_share * distance
-        current[j] = target + drive.decay * distance
+        mean[j] = target + lag.mean_share * distance
+        current[j] = target + lag.decay * distance
 
 
 Array = NDArray[np.float64]
 
-GOING, HANGING, SILENT = 0, 1, 2
-"""What leaves the controller: its commands, its last one for ever, or nothing."""
+NORMAL, STUCK, SILENT = 0, 1, 2
+"""Output of the controller: its commands, only its last command, or nothing."""
 
 RELEASED, BRAKED = 1, 2
-"""What a watchdog may have told: no currents, or shorted coils."""
+"""Requests of a watchdog: no currents, or shorted coils."""
 
 _NAMES = tuple(STAGES)
 _convert = chained([kind.convert() for kind in STAGES.values()])
 _advance = chained([kind.advance() for kind in STAGES.values()])
 
 
-class Output(NamedTuple):
+class ControllerOutput(NamedTuple):
     """Output of the controller, which faults and a watchdog act on."""
 
-    leaves: NDArray[np.int64]  # (1,) `GOING`, `HANGING` or `SILENT`
-    late_steps: NDArray[np.int64]  # (1,) physics steps more of delay
-    halt: NDArray[np.int64]  # (1,) a watchdog's
+    state: NDArray[np.int64]  # (1,) `NORMAL`, `STUCK` or `SILENT`
+    delay_steps: NDArray[np.int64]  # (1,) additional delay in physics steps
+    halt: NDArray[np.int64]  # (1,) request of a watchdog
 
     def fault_arrays(self) -> tuple[NDArray[Any], ...]:
-        """Arrays that faults write."""
-        return self.leaves, self.late_steps
+        """Return the arrays that faults write."""
+        return self.state, self.delay_steps
 
 
 class DriveChain(NamedTuple):
-    """All stages, for compiled code."""
+    """All stages of the drive, for compiled code."""
 
-    converts: bool  # whether what is asked of the amplifiers is other than the command
-    supplied: bool  # whether the amplifiers have a supply, and the coils a voltage
+    converts: bool  # true if the setpoint can differ from the command
+    supplied: bool  # true if the amplifiers have a supply, and the coils a voltage
     supply_V: float
-    lag: Drive
-    output: Output
+    lag: CurrentLag
+    output: ControllerOutput
     stages: tuple[Any, ...]  # in the order of `STAGES`
     delay: Delay
-    supply: FaultLine  # of its voltage
+    supply: FaultLine  # of the supply voltage
     amplifier: Amplifier
-    coil: Coil
+    coil: GroupCoils
     flow: Flow
     draws: Array  # standard normal numbers of this tick, of faults
-    asked: Array  # (n,) A of the amplifiers
+    setpoint: Array  # (n,) A, command at the input of the amplifiers
     emf: Array  # (n,) V
     rate_S: Array  # (3,) rad/s of the rotor, stator frame
-    period: Array  # (3,) of this control period: charge drawn in As, supply in V, 1 if a group is not driven
-    before: Array  # (5, n) current and sums of undriven groups at the start of a step
+    period: (
+        Array  # (3,) of this control period: charge drawn in As, supply in V, 1 for an open or shorted group
+    )
+    before: Array  # (5, n) current and sums of open and shorted groups at step start
 
     def stage(self, name: str) -> Any:
-        """Stage of a name."""
+        """Return the stage of a name."""
         return self.stages[_NAMES.index(name)]
 
 
-DRAWN_As, SUPPLY_V, UNDRIVEN = 0, 1, 2
+DRAWN_As, SUPPLY_V, OPEN_SHORT = 0, 1, 2
 """Places in `DriveChain.period`."""
 
 
 class DriveFaults(NamedTuple):
-    """What a chain needs if faults may come, or a watchdog."""
+    """Inputs of a drive chain with faults or a watchdog."""
 
-    planned: bool
-    """True if faults may come, not a watchdog alone."""
-    most_late_steps: int
-    """Physics steps that faults may delay a command by."""
+    scheduled: bool
+    """True if faults may occur; False if there is only a watchdog."""
+    longest_delay_steps: int
+    """Longest additional delay by faults, in physics steps."""
     halt: NDArray[np.int64]
-    """(1,) a watchdog writes into it."""
+    """(1,) written by a watchdog."""
     draws: Array
-    """The loop writes the random numbers of each tick into it."""
+    """Random numbers of each tick, written by the loop."""
 
 
 def drive_chain(
@@ -215,7 +217,7 @@ def drive_chain(
     seed: int,
     faults: DriveFaults | None = None,
 ) -> DriveChain:
-    """Stages at rest, with errors of their own.
+    """Return the drive chain at rest, with errors drawn from the seed.
 
     Parameters
     ----------
@@ -226,66 +228,66 @@ def drive_chain(
         Physics steps in a control period.
     groups : int
     seed : int
-        Of the run: the same prototype for the same seed.
+        Seed of the run: the same seed gives the same prototype.
     faults : DriveFaults, optional
         None if nothing can fail.
 
     Raises
     ------
     ValueError
-        The delay is no whole number of physics steps.
+        The delay is not a whole number of physics steps.
     """
-    late, planned = delay(section, step_s, substeps, groups), faults is not None and faults.planned
-    setup = DriveSetup(seed, step_s, groups, planned)
+    command_delay = delay(section, step_s, substeps, groups)
+    setup = DriveSetup(seed, step_s, groups, faults is not None and faults.scheduled)
     if faults:
-        more = -(-faults.most_late_steps // substeps)
-        late = late._replace(ring=np.zeros((len(late.ring) + more, groups)))
-    made = DriveChain(
+        more = -(-faults.longest_delay_steps // substeps)
+        command_delay = command_delay._replace(ring=np.zeros((len(command_delay.ring) + more, groups)))
+    chain = DriveChain(
         converts=section.converts or faults is not None,
         supplied=section.supply_V is not None,
         supply_V=0.0 if section.supply_V is None else section.supply_V,
-        lag=drive(section.lag_s, step_s, section.current_limit_A),
-        output=Output(
-            np.full(1, GOING), np.zeros(1, dtype=np.int64), faults.halt if faults else np.full(1, GOING)
+        lag=current_lag(section.lag_s, step_s, section.current_limit_A),
+        output=ControllerOutput(
+            np.full(1, NORMAL), np.zeros(1, dtype=np.int64), faults.halt if faults else np.full(1, NORMAL)
         ),
         stages=tuple(kind.build(section, setup) for kind in STAGES.values()),
-        delay=late,
+        delay=command_delay,
         supply=fault_line(1),
         amplifier=amplifier(section, section.current_limit_A, step_s, groups, seed),
-        coil=coil(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
-        flow=flow(groups),
+        coil=group_coils(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
+        flow=zero_flow(groups),
         draws=faults.draws if faults else np.empty(0),
-        asked=np.zeros(groups),
+        setpoint=np.zeros(groups),
         emf=np.zeros(groups),
         rate_S=np.zeros(3),
         period=np.zeros(3),
         before=np.zeros((5, groups)),
     )
-    made.period[SUPPLY_V] = made.supply_V
-    return made
+    chain.period[SUPPLY_V] = chain.supply_V
+    return chain
 
 
 @part_of_its_caller
 def begin(chain: DriveChain, command: Array) -> None:
-    """Take the commands of a control period, as far as they leave the controller, and begin its sums."""
-    asked, output, period = chain.asked, chain.output, chain.period
+    """Accept the commands of a control period from the output of the controller, and reset the sums."""
+    setpoint, output, period = chain.setpoint, chain.output, chain.period
     if chain.converts:
-        if output.leaves[0] == HANGING:
-            for j in range(asked.shape[0]):
-                asked[j] = chain.delay.ring[chain.delay.newest[0], j]
+        if output.state[0] == STUCK:
+            for j in range(setpoint.shape[0]):
+                setpoint[j] = chain.delay.ring[chain.delay.newest[0], j]
         else:
-            for j in range(asked.shape[0]):
-                asked[j] = 0.0 if output.leaves[0] == SILENT else command[j]
-            _convert(chain.stages, asked, chain.draws)
-        latch(chain.delay, asked)
-    clear(chain.flow)
+            for j in range(setpoint.shape[0]):
+                setpoint[j] = 0.0 if output.state[0] == SILENT else command[j]
+            _convert(chain.stages, setpoint, chain.draws)
+        latch(chain.delay, setpoint)
+    reset_sums(chain.flow)
     period[DRAWN_As] = 0.0
     if chain.supplied:
         period[SUPPLY_V] = max(through(chain.supply, 0, chain.supply_V, chain.draws), 0.0)
-    period[UNDRIVEN] = 0.0
-    for j in range(asked.shape[0]):
+    period[OPEN_SHORT] = 0.0
+    for j in range(setpoint.shape[0]):
         if _contact(chain, j) != DRIVEN:
-            period[UNDRIVEN] = 1.0
+            period[OPEN_SHORT] = 1.0
 
 
 @part_of_its_caller
@@ -306,54 +308,58 @@ def advance(
     ----------
     chain : DriveChain
     command : (n,) array, A
-        Of this control period.
+        Commands of this control period.
     substep : int
         Physics step of the period, from 0.
     q, qdot : (3,) arrays, rad and rad/s
-        That the back-EMF of the step is taken at.
+        Pose and rates for the back-EMF of the step.
     G : (3, n) array, N·m/A
-        True torque matrix there.
+        True torque matrix at this pose.
     gain : (n,) array
-        Of each group, over that matrix.
+        Torque per ampere of each group over that of the matrix.
     current : (n,) array, A
         At the start of the step; on return, at its end.
     mean : (n,) array, A
-        Result: over the step.
+        Result: mean over the step.
     """
-    asked, undriven_groups = chain.asked if chain.converts else command, chain.period[UNDRIVEN] != 0.0
+    setpoint, any_open_short = chain.setpoint if chain.converts else command, chain.period[OPEN_SHORT] != 0.0
     if chain.converts:
-        ask(chain, substep)
-    if chain.supplied or undriven_groups:
+        update_setpoint(chain, substep)
+    if chain.supplied or any_open_short:
         angular_velocity(q, qdot, chain.rate_S)
         back_emf(G, gain, chain.rate_S, chain.emf)
-    if undriven_groups:
-        _keep(chain, current)
+    if any_open_short:
+        _save_open_short_groups(chain, current)
     if chain.supplied:
-        drive_coils(_supplied(chain), chain.coil, asked, chain.emf, current, chain.flow)
+        drive_coils(_amplifier_on_supply(chain), chain.coil, setpoint, chain.emf, current, chain.flow)
         for j in range(mean.shape[0]):
             mean[j] = chain.flow.mean_current_A[j]
     else:
-        advance_lag(chain.lag, asked, current, mean)
-    if undriven_groups:
-        _advance_undriven(chain, current, mean)
+        advance_lag(chain.lag, setpoint, current, mean)
+    if any_open_short:
+        _advance_open_short_groups(chain, current, mean)
     if chain.supplied:
-        _draw(chain, asked, mean)
+        _add_supply_charge(chain, setpoint, mean)
 
 
 @part_of_its_caller
-def ask(chain: DriveChain, substep: int) -> None:
-    """Write what the amplifiers are asked for in a physics step."""
-    asked, late, output = chain.asked, chain.delay, chain.output
-    due(Delay(late.ring, late.newest, late.steps + output.late_steps[0], late.substeps), substep, asked)
-    if output.halt[0] != GOING:
-        for j in range(asked.shape[0]):
-            asked[j] = 0.0
-    _advance(chain.stages, asked, chain.draws)
+def update_setpoint(chain: DriveChain, substep: int) -> None:
+    """Compute the setpoint of the amplifiers for a physics step."""
+    setpoint, fixed, output = chain.setpoint, chain.delay, chain.output
+    due(
+        Delay(fixed.ring, fixed.newest, fixed.steps + output.delay_steps[0], fixed.substeps),
+        substep,
+        setpoint,
+    )
+    if output.halt[0] != NORMAL:
+        for j in range(setpoint.shape[0]):
+            setpoint[j] = 0.0
+    _advance(chain.stages, setpoint, chain.draws)
 
 
 @part_of_its_caller
-def _supplied(chain: DriveChain) -> Amplifier:
-    """Amplifiers on the supply of this period, whose swing is 0 if the drops take all of it."""
+def _amplifier_on_supply(chain: DriveChain) -> Amplifier:
+    """Return the amplifiers with the supply of this period; their swing is 0 if the drops exceed it."""
     amplifier, more_V = chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V
     if more_V == 0.0:
         return amplifier
@@ -370,21 +376,21 @@ def _supplied(chain: DriveChain) -> Amplifier:
 
 
 @part_of_its_caller
-def _draw(chain: DriveChain, asked: Array, mean: Array) -> None:
-    """Add what the amplifiers draw from the supply in a physics step."""
+def _add_supply_charge(chain: DriveChain, setpoint: Array, mean: Array) -> None:
+    """Add the charge that the amplifiers draw from the supply in a physics step."""
     amplifier, period = chain.amplifier, chain.period
     for j in range(mean.shape[0]):
         drawn = mean[j]
-        if period[UNDRIVEN] != 0.0 and _contact(chain, j) == SHORTED:
-            # What turns in the coil is not the supply's; past it, the amplifier drives what it is asked.
+        if period[OPEN_SHORT] != 0.0 and _contact(chain, j) == SHORTED:
+            # The current that circulates in the coil is not drawn; the amplifier drives its target.
             limit = amplifier.current_limit_A
-            drawn = min(max(asked[j] + amplifier.offset_A[j], -limit), limit)
+            drawn = min(max(setpoint[j] + amplifier.offset_A[j], -limit), limit)
         period[DRAWN_As] += abs(drawn) * amplifier.step_s
 
 
 @part_of_its_caller
-def _keep(chain: DriveChain, current: Array) -> None:
-    """Keep currents and sums of the groups that no amplifier drives, before all are driven."""
+def _save_open_short_groups(chain: DriveChain, current: Array) -> None:
+    """Save currents and sums of the open and shorted groups, before all groups are driven."""
     flow, before = chain.flow, chain.before
     for j in range(current.shape[0]):
         if _contact(chain, j) != DRIVEN:
@@ -393,35 +399,37 @@ def _keep(chain: DriveChain, current: Array) -> None:
 
 
 @part_of_its_caller
-def _advance_undriven(chain: DriveChain, current: Array, mean: Array) -> None:
-    """Undo what driving has done to the groups that no amplifier drives, and advance them by themselves."""
+def _advance_open_short_groups(chain: DriveChain, current: Array, mean: Array) -> None:
+    """Restore the open and shorted groups to the start of the step, and advance them without amplifiers."""
     flow, before = chain.flow, chain.before
     for j in range(current.shape[0]):
         contact = _contact(chain, j)
         if contact != DRIVEN:
             current[j], flow.copper_J[j], flow.work_J[j] = before[0, j], before[1, j], before[2, j]
             flow.voltage_limited_s[j], flow.current_limited_s[j] = before[3, j], before[4, j]
-            undriven(contact, chain.coil, j, chain.amplifier.step_s, chain.emf[j], current, mean, flow)
+            advance_open_short(
+                contact, chain.coil, j, chain.amplifier.step_s, chain.emf[j], current, mean, flow
+            )
 
 
 @part_of_its_caller
 def _contact(chain: DriveChain, group: int) -> int:
-    """How a group is connected: a brake shorts all that are not open."""
+    """Return the connection of a group: a brake shorts all groups that are not open."""
     contact = chain.coil.contact[group]
     return SHORTED if contact != OPEN and chain.output.halt[0] == BRAKED else contact
 
 
 @part_of_its_caller
 def end(chain: DriveChain) -> bool:
-    """End a control period: the coils have warmed by what they lost; returns whether none is too hot."""
+    """End a control period: advance the temperatures; return True if no coil is too hot."""
     if chain.supplied:
-        warm(chain.coil, chain.flow.copper_J)
-        return not overheated(chain.coil)
+        advance_temperature(chain.coil, chain.flow.copper_J)
+        return not is_overheated(chain.coil)
     return True
 
 
 @part_of_its_caller
-def tell(chain: DriveChain, row: Array) -> None:
+def write_telemetry(chain: DriveChain, row: Array) -> None:
     """Write power, losses, temperatures and limits of the control period into the beginning of `row`."""
     flow, period_s, groups = chain.flow, chain.coil.period_s, chain.emf.shape[0]
     row[0] = chain.period[SUPPLY_V] * chain.period[DRAWN_As] / period_s
@@ -434,25 +442,25 @@ def tell(chain: DriveChain, row: Array) -> None:
 
 
 def transfer(before: DriveChain | None, after: DriveChain, command: Array) -> None:
-    """Go on as before with other figures.
+    """Transfer the state to a chain with other parameters.
 
     Parameters
     ----------
     before : DriveChain or None
-        None for amplifiers right behind their commands, of which they kept none.
+        None for a `LagDrive`, which stores no commands.
     after : DriveChain
-        Without a fault.
+        Chain without a fault.
     command : (n,) array, A
-        The last one.
+        Last command.
     """
     if before is None:
         after.delay.ring[:] = command
     else:
         transfer_delay(before.delay, after.delay)
         after.coil.temperature_degC[:] = before.coil.temperature_degC
-        settle_resistance(after.coil)
-    if after.converts:  # what is held from now on is what it would have been
-        ask(after, after.delay.substeps - 1)
+        update_resistance(after.coil)
+    if after.converts:  # the held values are those that this chain would have had
+        update_setpoint(after, after.delay.substeps - 1)
     for was, now in zip(before.stages if before else after.stages, after.stages, strict=True):
         if was.on and now.on:
             transfer_state(was, now)

@@ -1,4 +1,4 @@
-"""The prototype as fields of a scenario; README.md beside this says where each value is from."""
+"""Electronics of the prototype as fields of a scenario; README.md in this folder states the sources."""
 
 from math import radians
 from typing import Any

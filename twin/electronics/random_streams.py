@@ -1,11 +1,11 @@
-"""Random numbers of many parts, each with a stream of its own, made without a generator object for each.
+"""Random streams of many parts, computed without a generator object for each.
 
-A stream is keyed by the seed of the run and the name of the part. Neither another part nor its place in a
-list moves a number. A part of the electronics draws its errors from ``np.random.default_rng([seed,
-stream_key(name), channel])``. There are dozens of parts, a generator takes Python ten microseconds to make,
-and few numbers are taken from each: for a short run that would be a tenth of it. Here the same bits come
-out of compiled code: NumPy's ``SeedSequence``, which hashes these numbers, and its ``PCG64``, a
-congruential generator of 128 bits of which each number is a hash of the state. NumPy fixes both for good.
+A stream is keyed by the seed of the run and the name of the part. Neither another part nor its position in a
+list changes a number. A part of the electronics draws its errors from ``np.random.default_rng([seed,
+stream_key(name), channel])``. There are dozens of parts with few numbers each, and Python needs ten
+microseconds to create a generator: a tenth of the time of a short run. Compiled code here computes the same
+bits: NumPy's ``SeedSequence``, which hashes these numbers, and its ``PCG64``, a congruential generator of 128
+bits of which each number is a hash of the state. NumPy guarantees both algorithms.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _HALF, _FULL = np.uint64(32), np.uint64(64)
 _ONE, _FOLD, _TURN, _UNUSED = np.uint64(1), np.uint64(16), np.uint64(58), np.uint64(11)
 
 NUMBER = 2.0**-53
-"""Distance of two numbers that can be drawn."""
+"""Distance between two possible random numbers."""
 
 
 @cache
@@ -42,17 +42,17 @@ def stream_key(name: str) -> int:
 
 
 def uniforms(seed: int, name: str, channels: int, count: int) -> NDArray[np.float64]:
-    """First numbers of the streams of some channels.
+    """Return the first numbers of the streams of some channels.
 
     Parameters
     ----------
     seed : int
-        Of the run; from 0 on.
+        Seed of the run; from 0 on.
     name : str
-        Of the part.
+        Name of the part.
     channels : int
     count : int
-        Numbers of each.
+        Numbers of each channel.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def uniforms(seed: int, name: str, channels: int, count: int) -> NDArray[np.floa
     """
     drawn = np.empty((channels, count))
     entropy = np.array([*_words(seed), *_words(stream_key(name)), 0], dtype=np.uint64)
-    with np.errstate(over="ignore"):  # uncompiled: a product is meant without what does not fit
+    with np.errstate(over="ignore"):  # uncompiled: the overflow of products is intended
         _draw(entropy, np.empty(_POOL, dtype=np.uint64), np.empty(2 * _POOL, dtype=np.uint64), drawn)
     return drawn
 
@@ -72,7 +72,7 @@ def errors(seed: int, name: str, channels: int, count: int) -> NDArray[np.float6
 
 
 def _words(number: int) -> list[int]:
-    """Words of 32 bits of a whole number, the lowest first; one of 0."""
+    """Return the words of 32 bits of a whole number, the lowest first; 0 has one word."""
     words = [number & 0xFFFFFFFF]
     while number := number >> 32:
         words.append(number & 0xFFFFFFFF)
@@ -83,7 +83,7 @@ def _words(number: int) -> list[int]:
 def _draw(
     entropy: NDArray[np.uint64], pool: NDArray[np.uint64], words: NDArray[np.uint64], drawn: NDArray
 ) -> None:
-    """Fill `drawn` (channels, count): `entropy` ends in the number of the channel, the others are scratch."""
+    """Fill `drawn` (channels, count); `entropy` ends with the channel number, other arrays are scratch."""
     for channel in range(drawn.shape[0]):
         entropy[entropy.shape[0] - 1] = channel
         _fill_pool(entropy, pool)
@@ -119,7 +119,7 @@ def _fill_pool(entropy: NDArray[np.uint64], pool: NDArray[np.uint64]) -> None:
 
 @allocation_free
 def _hashed(word: np.uint64, factor: np.uint64) -> tuple[np.uint64, np.uint64]:
-    """A word's hash, and the factor of the next one."""
+    """Return the hash of a word and the factor of the next one."""
     after = factor * _FACTOR_A & _WORD
     word = (word ^ factor) * after & _WORD
     return word ^ word >> _FOLD, after
@@ -143,7 +143,7 @@ def _fill_words(pool: NDArray[np.uint64], words: NDArray[np.uint64]) -> None:
 
 @allocation_free
 def _next(high: np.uint64, low: np.uint64, odd_high: np.uint64, odd_low: np.uint64) -> tuple:
-    """The state behind a state, halves of 64 bits each: times the factor, plus the stream's odd number."""
+    """Return the next state, in halves of 64 bits: times the factor, plus the odd number of the stream."""
     # The high half of the product of the low ones, from products of their halves.
     a, b = low >> _HALF, low & _WORD
     c, d = _FACTOR_LOW >> _HALF, _FACTOR_LOW & _WORD
@@ -159,16 +159,16 @@ def _sum(high: np.uint64, low: np.uint64, other_high: np.uint64, other_low: np.u
     return high + other_high + (_ONE if total < low else _ONE ^ _ONE), total
 
 
-# The generator counts in blocks of four numbers, of which a tick takes one.
-NUMBERS_A_COUNT = 4
+# The generator counts in blocks of four numbers; a tick takes one block.
+NUMBERS_PER_COUNT = 4
 
 
 Streams = tuple[tuple[str, int], ...]
-"""Names of random streams, and how many numbers a tick each of them gives."""
+"""Names of random streams and their widths in numbers per tick."""
 
 
 def width_of(streams: Streams) -> int:
-    """Return how many numbers a tick some streams give together."""
+    """Return the total width of some streams in numbers per tick."""
     return sum(width for _, width in streams)
 
 
@@ -179,13 +179,12 @@ def noise_table(seed: int, first: int, ticks: int, streams: Streams) -> NDArray[
 
 
 def noise_rows(seed: int, first: int, ticks: int, width: int, name: str) -> NDArray[np.float64]:
-    """Standard normal numbers at consecutive control ticks.
+    """Return standard normal numbers at consecutive control ticks.
 
     Every four columns have a stream ``SeedSequence([seed, stream_key(name), block])``, counted by tick:
-    each number depends on seed, name, tick and column alone. Neither blocks of ticks nor further columns
-    move a bit, and no state is left behind. The four come from four uniform numbers by Box and Muller's
-    transform, which takes as many as it gives: the usual ziggurat takes more now and then, and could not be
-    counted.
+    each number depends only on seed, name, tick and column. Neither blocks of ticks nor further columns
+    change a bit, and there is no state. The Box-Muller transform maps four uniform numbers to four normal
+    ones. The usual ziggurat method consumes a varying count of numbers and cannot be indexed by tick.
 
     Parameters
     ----------
@@ -194,11 +193,11 @@ def noise_rows(seed: int, first: int, ticks: int, width: int, name: str) -> NDAr
     first : int
         First tick.
     ticks : int
-        How many.
+        Number of ticks.
     width : int
-        Numbers a tick.
+        Numbers per tick.
     name : str
-        Of the stream.
+        Name of the stream.
 
     Returns
     -------
@@ -206,15 +205,15 @@ def noise_rows(seed: int, first: int, ticks: int, width: int, name: str) -> NDAr
         At most 8.6 in magnitude: the uniform numbers are multiples of 2⁻⁵³.
     """
     rows, key = np.empty((ticks, width)), stream_key(name)
-    for block, column in enumerate(range(0, width, NUMBERS_A_COUNT)):
+    for block, column in enumerate(range(0, width, NUMBERS_PER_COUNT)):
         counted = np.random.Philox(np.random.SeedSequence([seed, key, block])).advance(first)
-        uniform = np.random.Generator(counted).random((ticks, NUMBERS_A_COUNT))
-        rows[:, column : column + NUMBERS_A_COUNT] = _normal(uniform)[:, : width - column]
+        uniform = np.random.Generator(counted).random((ticks, NUMBERS_PER_COUNT))
+        rows[:, column : column + NUMBERS_PER_COUNT] = _normal(uniform)[:, : width - column]
     return rows
 
 
 def _normal(uniform: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Independent standard normal numbers (n, 4) from uniform ones from 0 to below 1."""
+    """Return independent standard normal numbers (n, 4) from uniform numbers from 0 to below 1."""
     radius = np.sqrt(-2 * np.log1p(-uniform[:, :2]))
     angle = 2 * np.pi * uniform[:, 2:]
     return np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], axis=1)

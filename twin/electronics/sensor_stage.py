@@ -12,34 +12,34 @@ from spheretwin.trajectories.rounding import CONFIG
 
 
 class SensorSetup(NamedTuple):
-    """Circumstances that a stage is built for."""
+    """Conditions that a stage is built for."""
 
     sensors: Any
     """Section with the parameters of all stages."""
     seed: int
     name: str
-    """Of the stage, which its random streams are keyed by."""
+    """Name of the stage, which keys its random streams."""
     first_draw: int
     """Column of its first random number."""
     faults: bool
-    """True if a fault may come."""
-    most_late_ticks: int
-    """Longest delay that faults may bring."""
+    """True if a fault may occur."""
+    longest_delay_ticks: int
+    """Longest additional delay by faults."""
 
 
-class Numbers(NamedTuple):
+class TickNoise(NamedTuple):
     """Standard normal numbers of a tick."""
 
-    noise: NDArray  # of the stages
+    stages: NDArray  # of the stages
     faults: NDArray  # of the faults
 
 
 class SensorStage(BaseModel):
-    """Parameters of one stage; ideal unless told otherwise.
+    """Parameters of one stage; ideal by default.
 
-    A new stage is a subclass and a field of `sections.SensorsSection`, whose fields are the list of all
-    stages, in the order in which angles pass them. What is built is a named tuple that has a field ``on``,
-    and a `fault_line.FaultLine` for its faults.
+    A new stage is a subclass and a field of `sensor_chain.SensorsSection`, whose fields are the list of all
+    stages, in the order in which angles pass them. `build` returns a named tuple that has a field ``on`` and
+    a `stages.FaultLine` for its faults.
     """
 
     model_config = CONFIG
@@ -47,17 +47,17 @@ class SensorStage(BaseModel):
     @property
     @abstractmethod
     def ideal(self) -> bool:
-        """True if the angles come out as they go in."""
+        """True if the stage does not change the angles."""
 
     @abstractmethod
     def build(self, setup: SensorSetup) -> Any:
-        """Return the stage for compiled code: a named tuple, on if it is not ideal or if a fault may come."""
+        """Return the named tuple for compiled code; it is on if it is not ideal or a fault may occur."""
 
     @classmethod
     @abstractmethod
     def function(cls) -> Any:
-        """Return the compiled ``f(stage, measurement, numbers)``; it changes angles (rad) in row 0."""
+        """Return the compiled ``f(stage, measurement, noise)``; it changes the angles (rad) in row 0."""
 
     def draws(self, sensors: Any) -> int:
-        """Return how many standard normal numbers a tick it needs, among the stages of a section."""
+        """Return the number of standard normal numbers per tick that the stage needs, given all stages."""
         return 0

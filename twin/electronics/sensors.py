@@ -1,6 +1,6 @@
-"""One name for what comes between the joints and the controller: nothing, or the chain of stages.
+"""Sensors of the rotor: ideal, or the chain of sensor stages, under common functions.
 
-As `plant.stepping` does for engines: the loop is compiled for one of them, and the other is not compiled.
+As with the engines in `plant.step`, the loop is compiled only for the sensors that a run has.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from spheretwin.electronics.sensor_chain import (
 from spheretwin.models.base.compiled import part_of_its_caller
 
 
-class Exact(NamedTuple):
-    """Sensors that hand over the truth."""
+class IdealSensors(NamedTuple):
+    """Sensors that return the true angles and rates."""
 
-    rows: int  # that they write of a measurement
+    rows: int  # of a measurement that the sensors write
 
 
 @part_of_its_caller
-def _exactly(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> bool:
+def _sense_ideal(sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> bool:
     finite = True
     for i in range(3):
         measurement[0, i], measurement[1, i] = q[i], qdot[i]
@@ -40,52 +40,53 @@ def _exactly(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> b
     return finite
 
 
-Sensors = Exact | SensorChain
+Sensors = IdealSensors | SensorChain
 
-_SENSE: dict[type, Any] = {Exact: _exactly, SensorChain: chain.sense}
-
-
-def made(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> Sensors:
-    """Sensors of a section, with the errors that the seed gives them, and the faults that may come."""
-    return Exact(2) if section.ideal and faults is None else sensor_chain(section, seed, faults)
+_SENSE: dict[type, Any] = {IdealSensors: _sense_ideal, SensorChain: chain.sense}
 
 
-def carried_on(before: Sensors, after: Sensors, section: SensorsSection, q: NDArray, noise: NDArray) -> None:
-    """Go on as before with other figures.
+def build_sensors(section: SensorsSection, seed: int, faults: SensorFaults | None = None) -> Sensors:
+    """Return the sensors of a section, with errors drawn from the seed, and with fault inputs if given."""
+    return IdealSensors(2) if section.ideal and faults is None else sensor_chain(section, seed, faults)
+
+
+def transfer_sensors(
+    before: Sensors, after: Sensors, section: SensorsSection, q: NDArray, noise: NDArray
+) -> None:
+    """Transfer the state to sensors with other parameters.
 
     Parameters
     ----------
     before, after : Sensors
     section : SensorsSection
-        Of those after.
+        Section of `after`.
     q : (3,) array, rad
         Pose at the last tick; empty before the first one.
     noise : array
         Random numbers of the last tick.
     """
     if isinstance(after, SensorChain):
-        if len(q):  # what is held from now on is what it would have been
+        if len(q):  # the held values are those that these sensors would have had
             numbers = width_of(noise_streams(section))
-            last = (
-                noise if len(noise) == numbers else np.zeros(numbers)
-            )  # those of other sensors are not its own
-            chain.sense(after, q, np.zeros(3), last, np.empty((3, 3)))
+            # Random numbers of sensors with another width do not apply to these.
+            last_noise = noise if len(noise) == numbers else np.zeros(numbers)
+            chain.sense(after, q, np.zeros(3), last_noise, np.empty((3, 3)))
         if isinstance(before, SensorChain):
             chain.transfer(before, after)
 
 
-def sense(sensing: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:
-    """Write measured angles and true rates into a measurement (3, 3), as `chain.sense` does."""
-    return bool(_SENSE[type(sensing)](sensing, q, qdot, noise, measurement))
+def sense(sensors: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:
+    """Write measured angles and true rates into a measurement (3, 3), as in `sensor_chain.sense`."""
+    return bool(_SENSE[type(sensors)](sensors, q, qdot, noise, measurement))
 
 
 @overload(sense, inline="always")
 def _compiled_sense(
-    sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any
+    sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any
 ) -> Callable[..., Any] | None:
-    chosen: Any = _SENSE.get(getattr(sensing, "instance_class", object))
+    implementation: Any = _SENSE.get(getattr(sensors, "instance_class", object))
 
-    def call(sensing: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> Any:
-        return chosen(sensing, q, qdot, noise, measurement)
+    def call(sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any) -> Any:
+        return implementation(sensors, q, qdot, noise, measurement)
 
-    return call if chosen else None
+    return call if implementation else None

@@ -1,4 +1,4 @@
-"""Compiled chain of stages: one function that passes values through all of them, in their order."""
+"""Compiled chain of stages, and the fault line of a stage."""
 
 from __future__ import annotations
 
@@ -23,53 +23,53 @@ def chained(functions: Sequence[Any], place: int = 0) -> Any:
     Parameters
     ----------
     functions : sequence of compiled functions
-        ``f(stage, values, draws)`` each, in the order of `stages`. These are named tuples whose field
-        ``on`` says whether a stage does anything; one that is off costs a branch.
+        ``f(stage, values, draws)`` each, in the order of `stages`. A stage is a named tuple; its field ``on``
+        is false if it has no effect. A stage that is off costs only a branch.
     place : int
-        Of the first stage that is called.
+        Index of the first stage that is called.
     """
     if place == len(functions):
         return pass_nothing
     function, others = functions[place], chained(functions, place + 1)
 
     @part_of_its_caller
-    def pass_and_go_on(stages: Any, values: Any, draws: Any) -> None:
+    def pass_and_continue(stages: Any, values: Any, draws: Any) -> None:
         stage = stages[place]
         if stage.on:
             function(stage, values, draws)
         others(stages, values, draws)
 
-    return pass_and_go_on
+    return pass_and_continue
 
 
 ACTS, GAIN, OFFSET, NOISE, COLUMN, HOLDS, LAST = range(7)
-"""Columns of a line: 1 if a fault acts, gain, offset, rms of the noise, its column among the random numbers,
-1 if the last value is held, and that value."""
+"""Columns of a fault line: 1 if a fault acts, gain, offset, rms of the noise, column of its random number,
+1 if the last value is held, last value."""
 
 
 class FaultLine(NamedTuple):
     """Fault line of the channels of a stage, for compiled code."""
 
-    table: NDArray[np.float64]  # (channels, 7), one array: each that is handed over costs time
+    table: NDArray[np.float64]  # (channels, 7), one array, as each argument costs time
 
     def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Arrays that it goes on from."""
+        """Return the arrays with the state."""
         return (self.table[:, LAST],)
 
     def fault_arrays(self) -> tuple[NDArray[np.float64], ...]:
-        """Arrays that faults write."""
+        """Return the arrays that faults write."""
         return (self.table[:, :LAST],)
 
 
 def fault_line(channels: int, last: float = nan) -> FaultLine:
-    """Line of a stage without a fault.
+    """Return the fault line of a stage without a fault.
 
     Parameters
     ----------
     channels : int
-        0 if no fault can come.
+        0 if no fault can occur.
     last : float
-        Value that is held if a fault comes before the first one; NaN to hold the first one.
+        Value that is held if a fault occurs before the first value; NaN to hold the first value.
     """
     table = np.zeros((channels, 7))
     table[:, GAIN], table[:, LAST] = 1.0, last
@@ -78,7 +78,7 @@ def fault_line(channels: int, last: float = nan) -> FaultLine:
 
 @allocation_free
 def through(line: FaultLine, channel: int, value: float, draws: NDArray[np.float64]) -> float:
-    """Return the value of a channel behind its fault line, and keep it.
+    """Return the value of a channel after its fault line, and store it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Potentiometers of α and β: from the angle of a joint to the voltage of a wiper."""
+"""Transducers: potentiometers of α and β, encoder of γ, current sensors."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.electronics.random_streams import uniforms
-from spheretwin.electronics.sensor_stage import Numbers, SensorSetup, SensorStage
+from spheretwin.electronics.sensor_stage import SensorSetup, SensorStage, TickNoise
 from spheretwin.electronics.stages import FaultLine, fault_line, through
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.trajectories.rounding import CONFIG
 
 CHANNELS = 2
-"""Angles that are voltages on their way: α and β."""
+"""Number of angles that are measured as voltages: α and β."""
 
 HARMONICS = 4
 
@@ -27,11 +27,11 @@ LARGEST_SHARE = 0.06
 
 
 class PotentiometerSection(SensorStage):
-    """Potentiometers of α and β; ideal while residual and noise are 0."""
+    """Parameters of the potentiometers of α and β; ideal if residual and noise are 0."""
 
     electrical_angle_rad: Annotated[float, Field(ge=1e-2, le=100)] = Field(
         5 * pi / 3,
-        description="angle of the track, centred on 0, at whose ends the wiper stops, rad (assumed: 300°)",
+        description="angle of the track, centred on 0; the wiper stops at its ends, rad (assumed: 300°)",
     )
     supply_V: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
         5.0, description="voltage across the track, centred on 0, V (assumed: the ADC's ±2.5 V)"
@@ -58,11 +58,11 @@ class PotentiometerSection(SensorStage):
 
     @property
     def ideal(self) -> bool:
-        """True if the angle comes out as it goes in."""
+        """True if the stage does not change the angle."""
         return self.nonlinearity_rad == 0 and self.noise_rad == 0
 
     def build(self, setup: SensorSetup) -> Potentiometers:
-        """Potentiometers with residuals of their own; with ends, too, if the converter is not ideal."""
+        """Return the potentiometers with residuals from the seed; with ends if the converter is not ideal."""
         converts = not (self.ideal and setup.sensors.adc.ideal)
         phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
         return Potentiometers(
@@ -75,12 +75,12 @@ class PotentiometerSection(SensorStage):
 
     @classmethod
     def function(cls) -> Any:
-        """Compiled function that takes α and β to the wipers."""
+        """Return the compiled function from α and β to the voltages of the wipers."""
         return pass_potentiometers
 
     @property
     def volts_per_rad(self) -> float:
-        """Slope of the line that the controller takes the track for."""
+        """Slope of the straight line that the controller assumes for the track."""
         return self.supply_V / self.electrical_angle_rad
 
 
@@ -88,20 +88,20 @@ class Potentiometers(NamedTuple):
     """Both potentiometers, for compiled code."""
 
     on: bool
-    converts: bool  # whether they are more than a line
+    converts: bool  # false if they are straight lines
     volts_per_rad: float
     channels: tuple[Potentiometer, Potentiometer]
     line: FaultLine  # of the wipers, in rad of the nominal slope
 
 
 @allocation_free
-def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64], numbers: Numbers) -> None:
-    """Replace α and β by the angles, rad, that the voltages of the wipers stand for."""
+def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64], noise: TickNoise) -> None:
+    """Replace α and β by the angles, rad, of the voltages of the wipers."""
     for channel in range(CHANNELS):
         angle = measurement[0, channel]
         if stage.converts:
             angle = wiper_voltage(stage.channels[channel], angle) / stage.volts_per_rad
-        measurement[0, channel] = through(stage.line, channel, angle, numbers.faults)
+        measurement[0, channel] = through(stage.line, channel, angle, noise.faults)
 
 
 class Potentiometer(NamedTuple):
@@ -110,13 +110,13 @@ class Potentiometer(NamedTuple):
     volts_per_rad: float
     half_angle_rad: float
     half_supply_V: float
-    turns: float  # of the first harmonic for a radian of the joint, in rad
+    turns: float  # phase of the first harmonic per radian of the joint, rad
     cosine_rad: tuple[float, ...]  # (HARMONICS,) of the residual, from the first harmonic on
     sine_rad: tuple[float, ...]  # (HARMONICS,)
 
 
 def potentiometer(section: PotentiometerSection, shares: NDArray[np.float64]) -> Potentiometer:
-    """Potentiometer with a residual of its own.
+    """Return a potentiometer with its own residual.
 
     The residual is a sum of the first harmonics of the track, the k-th with an amplitude of 1/k² and a phase
     drawn at random, scaled so that its largest magnitude on the track is the stated one.
@@ -142,16 +142,16 @@ def potentiometer(section: PotentiometerSection, shares: NDArray[np.float64]) ->
 
 @allocation_free
 def wiper_voltage(potentiometer: Potentiometer, angle_rad: float) -> float:
-    """Voltage of the wiper (V), without its noise, at an angle of the joint (rad).
+    """Return the voltage of the wiper (V), without its noise, at an angle of the joint (rad).
 
-    Beyond an end of the track the wiper stands at that end; what is no number stays none.
+    Beyond an end of the track the wiper is at that end. NaN stays NaN.
     """
     half = potentiometer.half_angle_rad
     if angle_rad > half:
         angle_rad = half
     elif angle_rad < -half:
         angle_rad = -half
-    # Each harmonic is the first one's turn further than the last.
+    # The phase of each harmonic is that of the previous one plus that of the first.
     first_cosine, first_sine = cos(potentiometer.turns * angle_rad), sin(potentiometer.turns * angle_rad)
     cosine, sine, residual = 1.0, 0.0, 0.0
     for k in range(HARMONICS):
@@ -166,7 +166,7 @@ def wiper_voltage(potentiometer: Potentiometer, angle_rad: float) -> float:
 
 
 def _peak(shape: NDArray[np.complex128]) -> float:
-    """Largest magnitude of ``Re Σ shape[k-1]·exp(ikθ)``: exact, at the roots of its slope.
+    """Return the largest magnitude of ``Re Σ shape[k-1]·exp(ikθ)``: exact, from the roots of its slope.
 
     With z = exp(iθ) the slope times zⁿ is a polynomial of degree 2n. Roots off the unit circle are no
     extrema, but the sum is taken at their angle, where it is no larger than its peak.
@@ -178,37 +178,37 @@ def _peak(shape: NDArray[np.complex128]) -> float:
 
 
 class EncoderSection(SensorStage):
-    """Incremental encoder of γ; ideal while it has no counts.
+    """Parameters of the incremental encoder of γ; ideal if it has no counts.
 
-    Its counter is set from the pose at the start, rounded to the grid of the disc, and no count is ever lost:
-    what it holds is then the angle to the nearest line of the grid, over any number of turns. The index, once
-    a turn where γ is a multiple of 2π, lies on that grid. It would find lost counts, and where in a turn a
-    rotor of unknown pose stands, neither of which happens here; it could not tell how many turns were missed.
+    The counter starts from the initial pose, rounded to the grid of the disc, and no count is lost: its value
+    is the angle to the nearest line of the grid, over any number of turns. The index, once per turn where γ
+    is a multiple of 2π, lies on that grid. In reality it reveals lost counts and the angle within a turn of a
+    rotor of unknown pose; neither occurs here. It could not reveal the number of missed turns.
     """
 
     counts: Annotated[int, Field(ge=0, le=2**31)] = Field(
         0,
-        description="counts a turn, rounded to the nearest; 0 for none"
+        description="counts per turn, rounded to the nearest; 0 for none"
         " (assumed: OME-500-2MCA read as 500 pulses × 4 = 2000, 0.18°)",
     )
 
     @property
     def ideal(self) -> bool:
-        """True if the angle comes out as it goes in."""
+        """True if the stage does not change the angle."""
         return self.counts == 0
 
     def build(self, setup: SensorSetup) -> Encoder:
-        """Encoder without errors of its own: a line is where it should be."""
+        """Return the encoder; its lines have no position errors."""
         return Encoder(not self.ideal or setup.faults, float(self.counts), fault_line(1))
 
     @classmethod
     def function(cls) -> Any:
-        """Compiled function that counts γ."""
+        """Return the compiled function that counts γ."""
         return pass_encoder
 
 
 class Encoder(NamedTuple):
-    """The encoder, for compiled code."""
+    """Encoder, for compiled code."""
 
     on: bool
     counts_per_turn: float  # 0 for none
@@ -216,17 +216,17 @@ class Encoder(NamedTuple):
 
 
 @allocation_free
-def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], numbers: Numbers) -> None:
-    """Count γ, rad, behind its fault line."""
-    turned = through(encoder.line, 0, measurement[0, 2], numbers.faults)
-    measurement[0, 2] = counted(encoder, turned)
+def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], noise: TickNoise) -> None:
+    """Count γ, rad, after its fault line."""
+    angle_rad = through(encoder.line, 0, measurement[0, 2], noise.faults)
+    measurement[0, 2] = counted(encoder, angle_rad)
 
 
 @allocation_free
 def counted(encoder: Encoder, angle_rad: float) -> float:
-    """Angle (rad) of the count nearest to an angle (rad), half-way to the even one.
+    """Return the angle (rad) of the count nearest to an angle (rad); ties go to the even count.
 
-    What is no number stays none, and an angle of more counts than a number can hold is infinite.
+    NaN stays NaN, and an angle with more counts than a number can represent is infinite.
     """
     if encoder.counts_per_turn == 0:
         return angle_rad
@@ -235,9 +235,9 @@ def counted(encoder: Encoder, angle_rad: float) -> float:
 
 
 class CurrentSection(BaseModel):
-    """Sensors of the group currents; a detector of faults reads them, and the telemetry has what they say.
+    """Parameters of the current sensors; the fault detector reads them, and the telemetry contains them.
 
-    There are such sensors if they have noise, or if a detector needs them.
+    The sensors exist if they have noise, or if the detector needs them.
     """
 
     model_config = CONFIG
@@ -248,7 +248,7 @@ class CurrentSection(BaseModel):
 
 
 class CurrentSensors(NamedTuple):
-    """Sensors of the group currents, for compiled code."""
+    """Current sensors, for compiled code."""
 
     on: bool
     noise_A: float  # standard deviation
@@ -257,12 +257,12 @@ class CurrentSensors(NamedTuple):
 
 @allocation_free
 def sense_currents(sensors: CurrentSensors, current: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
-    """Measure the currents at a control tick.
+    """Measure the group currents at a control tick.
 
     Parameters
     ----------
     sensors : CurrentSensors
-        The measured currents are written.
+        Result: the measured currents are written.
     current : (n,) array, A
         True.
     draws : array

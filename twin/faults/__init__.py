@@ -1,1 +1,1 @@
-"""What fails, and when: faults that a scenario plans, and what each does to the stage that it strikes."""
+"""Fault injection: faults of a scenario, their schedule, and their effects on the stages."""

@@ -1,4 +1,4 @@
-"""What a part that can fail is: its places, and what each mode of failure does to it."""
+"""Parts that can fail, their failure modes, and the effects of the modes on signals."""
 
 from __future__ import annotations
 
@@ -14,127 +14,127 @@ from spheretwin.electronics.sensor_chain import SensorChain
 from spheretwin.electronics.stages import ACTS, COLUMN, HOLDS, NOISE, OFFSET, FaultLine
 from spheretwin.electronics.stages import GAIN as LINE_GAIN
 
-# Far beyond any voltage, current or angle of the electronics; squares of it remain numbers.
+# Far beyond any voltage, current or angle of the electronics; its square remains finite.
 LARGEST = 1e6
 
 LARGEST_GAIN = 100.0
 
-AS_IT_WAS = "what it was"
+LAST_VALUE = "the last value"
 
 
 class Value(NamedTuple):
-    """What the number of a fault means."""
+    """Meaning and range of the value of a fault."""
 
     meaning: str
     """With its unit."""
     least: float = -LARGEST
     largest: float = LARGEST
     default: float | None = None
-    """None where it must be given."""
+    """None if the value is required."""
 
 
 class Effects(NamedTuple):
-    """What faults modify: the stages, in arrays that compiled code reads."""
+    """Stages that faults modify, in arrays that compiled code reads."""
 
     drive: DriveChain
     sensors: SensorChain
-    group_gain: NDArray[np.float64]  # (n,) torque and back-EMF an ampere over those of the torque matrix
+    group_gain: NDArray[np.float64]  # (n,) torque and back-EMF per ampere over those of the torque matrix
     period_s: float
     step_s: float
 
     def fault_arrays(self) -> tuple[Any, ...]:
-        """Arrays that faults write."""
+        """Return the arrays that faults write."""
         return self.drive, self.sensors, self.group_gain
 
 
 class ActiveFault(NamedTuple):
-    """One fault that acts now."""
+    """A fault that acts at the present tick."""
 
     place: int
     value: float
     column: int
-    """First of two columns of random numbers of its part."""
+    """First of the two columns of random numbers of its part."""
 
 
 class Mode(NamedTuple):
-    """How a part can fail."""
+    """Failure mode of a part."""
 
     apply: Callable[[Effects, ActiveFault], None]
     value: Value | None = None
-    """None where it has none."""
+    """None if the mode has no value."""
     intermittent: bool = False
-    """Whether it comes and goes; its value is then the length of a stretch."""
+    """True if the fault is intermittent; its value is then the length of an interval."""
 
 
 class Target(NamedTuple):
-    """One kind of part that can fail."""
+    """Kind of part that can fail."""
 
     name: str
     modes: Mapping[str, Mode]
     places: tuple[str, ...] = ()
-    """Their names; none where there is one part of the kind, or one a group."""
+    """Names of the parts; empty if there is one part, or one for each group."""
     each_group: bool = False
     needs_supply: bool = False
-    """Whether it is there only where the amplifiers have a supply."""
+    """True if the part exists only if the amplifiers have a supply."""
     measured: bool = False
-    """True if a fault changes the angles that the controller is handed."""
+    """True if a fault changes the angles that the controller receives."""
 
     def names(self, groups: int) -> tuple[str, ...]:
-        """Every part of the kind, as a scenario names it."""
+        """Return the names of all parts of the kind, as in a scenario."""
         if self.each_group:
             return tuple(f"{self.name}.{place:02d}" for place in range(groups))
         return tuple(f"{self.name}.{place}" for place in self.places) or (self.name,)
 
 
-STRETCH = Value("length of a stretch in which it fails or does not, s", 1e-6, 1e3, 0.01)
-"""Of what comes and goes: each stretch fails or not, by a fair coin of the seed."""
+INTERVAL = Value("length of an interval in which the fault is on or off, s", 1e-6, 1e3, 0.01)
+"""Value of an intermittent fault: a random bit of the seed decides each interval."""
 
-GAIN = Value("factor on it", -LARGEST_GAIN, LARGEST_GAIN)
+GAIN = Value("factor on the signal", -LARGEST_GAIN, LARGEST_GAIN)
 
 
 def offset_mode(unit: str) -> Value:
-    """What is added, in a unit."""
-    return Value(f"added to it, {unit}")
+    """Return the value of an offset fault, in a unit."""
+    return Value(f"offset added to the signal, {unit}")
 
 
 def noise_mode(unit: str) -> Value:
-    """What is added at random, in a unit."""
-    return Value(f"normal noise added to it, {unit} rms, new at each control tick", 0.0)
+    """Return the value of a noise fault, in a unit."""
+    return Value(f"normal noise added to the signal, {unit} rms, new at each control tick", 0.0)
 
 
-def held(unit: str) -> Value:
-    """What it stays at, in a unit; the last value unless given."""
-    return Value(f"what it stays at, {unit}; {AS_IT_WAS} unless given", default=-inf)
+def stuck_value(unit: str) -> Value:
+    """Return the value of a stuck fault, in a unit; default: the last value."""
+    return Value(f"value that the signal keeps, {unit}; {LAST_VALUE} unless given", default=-inf)
 
 
-def is_held(value: float) -> bool:
-    """Whether a value stays what it was."""
+def keeps_last_value(value: float) -> bool:
+    """True if a stuck signal keeps its last value."""
     return value == -inf
 
 
-class Signal(NamedTuple):
+class FaultSignal(NamedTuple):
     """A signal that faults act on."""
 
     line: Callable[[Effects], FaultLine]
     unit: str
-    """Of the value of a fault."""
-    in_its_own: Callable[[Effects], float] = lambda effects: 1.0
-    """One of that unit in the unit of the line."""
+    """Unit of the value of a fault."""
+    to_line_unit: Callable[[Effects], float] = lambda effects: 1.0
+    """Factor from that unit to the unit of the fault line."""
     every_channel: bool = False
-    """True if a fault acts on all channels, with noise of its own on each; else on that of its place."""
+    """True if a fault acts on all channels, with separate noise on each; otherwise on that of its place."""
 
 
-def modes(signal: Signal) -> dict[str, Mode]:
-    """Ways in which any signal can be wrong."""
+def signal_modes(signal: FaultSignal) -> dict[str, Mode]:
+    """Return the failure modes of any signal: stuck, offset, gain, noise."""
 
     def stuck(effects: Effects, fault: ActiveFault) -> None:
         for line, channel in _channels(signal, effects, fault):
-            hold(line, channel, fault.value, signal.in_its_own(effects))
+            hold(line, channel, fault.value, signal.to_line_unit(effects))
 
     def offset(effects: Effects, fault: ActiveFault) -> None:
         for line, channel in _channels(signal, effects, fault):
             line.table[channel, ACTS] = 1.0
-            line.table[channel, OFFSET] += signal.in_its_own(effects) * fault.value
+            line.table[channel, OFFSET] += signal.to_line_unit(effects) * fault.value
 
     def gain(effects: Effects, fault: ActiveFault) -> None:
         for line, channel in _channels(signal, effects, fault):
@@ -142,55 +142,55 @@ def modes(signal: Signal) -> dict[str, Mode]:
 
     def noise(effects: Effects, fault: ActiveFault) -> None:
         for place, (line, channel) in enumerate(_channels(signal, effects, fault)):
-            add_noise(line, channel, signal.in_its_own(effects) * fault.value, fault.column + place)
+            add_noise(line, channel, signal.to_line_unit(effects) * fault.value, fault.column + place)
 
     return {
-        "stuck": Mode(stuck, held(signal.unit)),
+        "stuck": Mode(stuck, stuck_value(signal.unit)),
         "offset": Mode(offset, offset_mode(signal.unit)),
         "gain": Mode(gain, GAIN),
         "noise": Mode(noise, noise_mode(signal.unit)),
     }
 
 
-def silent_modes(signal: Signal) -> dict[str, Mode]:
-    """Ways in which a signal can be nothing: for good, or now and then."""
+def silent_modes(signal: FaultSignal) -> dict[str, Mode]:
+    """Return the failure modes with a signal of 0: permanent and intermittent."""
 
     def dropout(effects: Effects, fault: ActiveFault) -> None:
         for line, channel in _channels(signal, effects, fault):
             fix(line, channel, 0.0)
 
-    return {"dropout": Mode(dropout), "intermittent": Mode(dropout, STRETCH, intermittent=True)}
+    return {"dropout": Mode(dropout), "intermittent": Mode(dropout, INTERVAL, intermittent=True)}
 
 
 def fix(line: FaultLine, channel: int, value: float) -> None:
-    """Let it be one value, in the unit of the line."""
+    """Set the channel to a constant value, in the unit of the line."""
     line.table[channel, ACTS] = 1.0
     line.table[channel, [LINE_GAIN, OFFSET, NOISE]] = 0.0, value, 0.0
 
 
 def hold(line: FaultLine, channel: int, value: float, unit: float) -> None:
-    """Let it stay at a value, stated in some unit, or at what it was."""
-    if is_held(value):
+    """Let the channel keep a value, stated in a unit, or its last value."""
+    if keeps_last_value(value):
         line.table[channel, [ACTS, HOLDS]] = 1.0
     else:
         fix(line, channel, unit * value)
 
 
 def scale(line: FaultLine, channel: int, factor: float) -> None:
-    """Multiply it, and what was added before."""
+    """Multiply the channel and everything that earlier faults added."""
     line.table[channel, ACTS] = 1.0
     line.table[channel, [LINE_GAIN, OFFSET]] *= factor
     line.table[channel, NOISE] *= abs(factor)
 
 
 def add_noise(line: FaultLine, channel: int, deviation: float, column: int) -> None:
-    """Add noise to it; what several faults add is one noise of their root sum of squares."""
+    """Add noise to the channel; noise of several faults adds as the root of the sum of squares."""
     line.table[channel, ACTS] = 1.0
     line.table[channel, NOISE] = (line.table[channel, NOISE] ** 2 + deviation**2) ** 0.5
     line.table[channel, COLUMN] = column
 
 
-def _channels(signal: Signal, effects: Effects, fault: ActiveFault) -> list[tuple[FaultLine, int]]:
+def _channels(signal: FaultSignal, effects: Effects, fault: ActiveFault) -> list[tuple[FaultLine, int]]:
     line = signal.line(effects)
     places = range(len(line.table)) if signal.every_channel else (fault.place,)
     return [(line, channel) for channel in places]

@@ -1,4 +1,4 @@
-"""One fault as a scenario plans it, checked against what can fail and how."""
+"""Fault of a scenario, checked against the parts that can fail and their failure modes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from spheretwin.models.base.errors import did_you_mean, shown
 from spheretwin.models.telemetry.csv_series import LONGEST_s
 
 MODES = tuple(dict.fromkeys(mode for target in TARGETS.values() for mode in target.modes))
-"""Names of all ways in which something can fail; the telemetry counts them from 1."""
+"""Names of all failure modes; the telemetry numbers them from 1."""
 
-# More groups than an actuator has, and fewer than would fill the memory with their names.
+# More groups than any actuator has, and few enough that their names fit in memory.
 MOST_GROUPS = 1000
 
 if TYPE_CHECKING:
@@ -28,25 +28,25 @@ Time = Annotated[float, Field(ge=0, le=LONGEST_s)]
 
 
 class Fault(BaseModel):
-    """A part that fails for a while."""
+    """Fault: a part that fails for a time."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     target: Annotated[str, Field(min_length=1)] = Field(
-        description="what fails, such as coil.07 (its group), pot.alpha, encoder.gamma, adc, supply"
+        description="part that fails, such as coil.07 (its group), pot.alpha, encoder.gamma, adc, supply"
     )
-    mode: ModeName = Field(description="how")
-    start_s: Time = Field(0.0, description="from when, s; at the first control tick from then on")
-    end_s: Time | None = Field(None, description="until when, s; to the end unless given")
-    value: float | None = Field(None, description="how much, as the mode has it")
-    known: bool = Field(False, description="whether the allocation is told, and leaves the group out")
-    detect: bool = Field(
-        False, description="whether the controller's detector is on, as detector.detect says"
+    mode: ModeName = Field(description="failure mode")
+    start_s: Time = Field(0.0, description="start of the fault, s; at the first control tick from then on")
+    end_s: Time | None = Field(None, description="end of the fault, s; the end of the run unless given")
+    value: float | None = Field(None, description="size of the fault, as its mode defines it")
+    known: bool = Field(
+        False, description="whether the fault is reported to the allocation, which then leaves the group out"
     )
+    detect: bool = Field(False, description="whether the fault detector is on, as with detector.detect")
 
     @model_validator(mode="after")
     def _can_be(self) -> Fault:
-        target, _ = found(self.target)
+        target, _ = find_target(self.target)
         if self.mode not in target.modes:
             raise ValueError(
                 f"expected one of {', '.join(target.modes)} for {_one(target)}, received mode {self.mode}"
@@ -56,64 +56,64 @@ class Fault(BaseModel):
             raise ValueError(f"expected end_s above start_s, received {self.end_s!r} and {self.start_s!r} s")
         for name in ("known", "detect"):
             if getattr(self, name) and not target.each_group:
-                groups = ", ".join(each.name for each in TARGETS.values() if each.each_group)
+                groups = ", ".join(kind.name for kind in TARGETS.values() if kind.each_group)
                 raise ValueError(f"expected {name} for a fault of {groups}, received one of {self.target}")
         return self
 
     def _check_value(self, mode: Mode) -> None:
-        what = f"{self.mode} of {self.target}"
+        subject = f"{self.mode} of {self.target}"
         if mode.value is None:
             if self.value is not None:
-                raise ValueError(f"expected no value for {what}, received {self.value!r}")
+                raise ValueError(f"expected no value for {subject}, received {self.value!r}")
             return
         if self.value is None:
             if mode.value.default is None:
-                raise ValueError(f"expected a value for {what} ({mode.value.meaning}), received none")
+                raise ValueError(f"expected a value for {subject} ({mode.value.meaning}), received none")
             return
         if not mode.value.least <= self.value <= mode.value.largest:
             raise ValueError(
-                f"expected a value from {mode.value.least:g} to {mode.value.largest:g} for {what}"
+                f"expected a value from {mode.value.least:g} to {mode.value.largest:g} for {subject}"
                 f" ({mode.value.meaning}), received {self.value!r}"
             )
 
     @property
     def kind(self) -> Target:
-        """What fails."""
-        return found(self.target)[0]
+        """Kind of the part that fails."""
+        return find_target(self.target)[0]
 
     @property
     def place(self) -> int:
-        """Which one of its kind."""
-        return found(self.target)[1]
+        """Index of the part among the parts of its kind."""
+        return find_target(self.target)[1]
 
     @property
-    def way(self) -> Mode:
-        """How it fails."""
+    def failure_mode(self) -> Mode:
+        """Failure mode of the part."""
         return self.kind.modes[self.mode]
 
     @property
-    def number(self) -> float:
-        """Its value, or what it is where none is given."""
+    def effective_value(self) -> float:
+        """Value of the fault: the given one, or the default of the mode."""
         if self.value is not None:
             return self.value
-        return self.way.value.default or 0.0 if self.way.value else 0.0
+        return self.failure_mode.value.default or 0.0 if self.failure_mode.value else 0.0
 
 
 def check_gains(faults: Sequence[Fault]) -> None:
-    """See to it that gains of one part, one behind the other, remain numbers that squares can be taken of.
+    """Check that the product of all gains that act on one part stays small enough to be squared.
 
     Raises
     ------
     ValueError
-        Those that act on one part at a time multiply to more than `LARGEST`.
+        The gains that act on a part at one time have a product above `LARGEST`.
     """
     gains = [fault for fault in faults if fault.mode == "gain"]
     for last in gains:
         product = 1.0
         for fault in gains:
-            at_work = fault.start_s <= last.start_s < (inf if fault.end_s is None else fault.end_s)
-            if at_work and found(fault.target) == found(last.target):
-                product *= max(abs(fault.number), 1.0)
+            is_active = fault.start_s <= last.start_s < (inf if fault.end_s is None else fault.end_s)
+            if is_active and find_target(fault.target) == find_target(last.target):
+                product *= max(abs(fault.effective_value), 1.0)
             if product > LARGEST:
                 raise ValueError(
                     f"expected gains of at most {LARGEST:g} in all for faults of {last.target} at"
@@ -121,13 +121,13 @@ def check_gains(faults: Sequence[Fault]) -> None:
                 )
 
 
-def found(name: str) -> tuple[Target, int]:
-    """Kind and place of a part that is named as a scenario does.
+def find_target(name: str) -> tuple[Target, int]:
+    """Return kind and index of a part from its name in a scenario.
 
     Raises
     ------
     ValueError
-        There is no such part.
+        No part has this name.
     """
     kind, dot, place = name.partition(".")
     target = TARGETS.get(kind)
@@ -148,7 +148,7 @@ def found(name: str) -> tuple[Target, int]:
 
 
 def _form(target: Target) -> str:
-    """How a part of a kind is named."""
+    """Return the form of the name of a part."""
     if target.each_group:
         return f"{target.name}.GROUP"
     return " or ".join(target.names(0))

@@ -1,19 +1,21 @@
-"""The converter of the potentiometers' voltages: held, shifted, scaled, noisy, silent or late."""
+"""Parts that can fail and the effects of their failure modes, one target for each kind of part."""
 
 from spheretwin.electronics.coil import OPEN, SHORTED
-from spheretwin.electronics.drive_chain import HANGING, SILENT
+from spheretwin.electronics.drive_chain import SILENT, STUCK
 from spheretwin.electronics.transducers import Potentiometers
-from spheretwin.faults import effects as line_modes
 from spheretwin.faults.effects import (
     GAIN,
-    STRETCH,
+    INTERVAL,
     ActiveFault,
     Effects,
+    FaultSignal,
     Mode,
-    Signal,
     Target,
     Value,
+    fix,
     offset_mode,
+    signal_modes,
+    silent_modes,
 )
 
 
@@ -22,10 +24,10 @@ def _silence_adc(effects: Effects, fault: ActiveFault) -> None:
 
 
 def _delay_adc(effects: Effects, fault: ActiveFault) -> None:
-    effects.sensors.stage("adc").late_ticks[0] += round(fault.value / effects.period_s)
+    effects.sensors.stage("adc").delay_ticks[0] += round(fault.value / effects.period_s)
 
 
-ADC_SIGNAL = Signal(
+ADC_SIGNAL = FaultSignal(
     lambda effects: effects.sensors.stage("adc").line,
     "V",
     lambda effects: 1.0 / effects.sensors.stage("adc").volts_per_rad,
@@ -35,10 +37,10 @@ ADC_SIGNAL = Signal(
 ADC = Target(
     "adc",
     {
-        **line_modes.modes(ADC_SIGNAL),
+        **signal_modes(ADC_SIGNAL),
         "dropout": Mode(_silence_adc),
-        "delay": Mode(_delay_adc, Value("how late it is, s; whole control periods", 0.0, 1.0)),
-        "intermittent": Mode(_silence_adc, STRETCH, intermittent=True),
+        "delay": Mode(_delay_adc, Value("additional delay, s; whole control periods", 0.0, 1.0)),
+        "intermittent": Mode(_silence_adc, INTERVAL, intermittent=True),
     },
     measured=True,
 )
@@ -48,14 +50,14 @@ def _open_amplifier(effects: Effects, fault: ActiveFault) -> None:
     effects.drive.coil.contact[fault.place] = OPEN
 
 
-AMPLIFIER_SIGNAL = Signal(lambda effects: effects.drive.stage("amplifier").line, "A")
+AMPLIFIER_SIGNAL = FaultSignal(lambda effects: effects.drive.stage("amplifier").line, "A")
 
 AMPLIFIER = Target(
     "amplifier",
     {
         "open": Mode(_open_amplifier),
-        **line_modes.modes(AMPLIFIER_SIGNAL),
-        **line_modes.silent_modes(AMPLIFIER_SIGNAL),
+        **signal_modes(AMPLIFIER_SIGNAL),
+        **silent_modes(AMPLIFIER_SIGNAL),
     },
     each_group=True,
 )
@@ -66,12 +68,14 @@ def _open_coil(effects: Effects, fault: ActiveFault) -> None:
 
 
 def _short_coil(effects: Effects, fault: ActiveFault) -> None:
-    if effects.drive.coil.contact[fault.place] != OPEN:  # an open lead stays open, whatever lies behind it
+    if (
+        effects.drive.coil.contact[fault.place] != OPEN
+    ):  # an open lead stays open, also if the coil behind it is shorted
         effects.drive.coil.contact[fault.place] = SHORTED
 
 
 def _fewer_turns(effects: Effects, fault: ActiveFault) -> None:
-    # Resistance and inductance stay: a few turns change them less than the torque of the others matters.
+    # Resistance and inductance stay: the change by a few turns is small compared with that of the torque.
     effects.group_gain[fault.place] *= fault.value
 
 
@@ -81,47 +85,48 @@ COIL = Target(
         "open": Mode(_open_coil),
         "short": Mode(_short_coil),
         "gain": Mode(
-            _fewer_turns, Value("factor on torque and back-EMF an ampere: turns that are left", 0.0, 1.0)
+            _fewer_turns,
+            Value("factor on torque and back-EMF per ampere: share of the turns that are left", 0.0, 1.0),
         ),
-        "intermittent": Mode(_open_coil, STRETCH, intermittent=True),
+        "intermittent": Mode(_open_coil, INTERVAL, intermittent=True),
     },
     each_group=True,
 )
 
 
-def _hang(effects: Effects, fault: ActiveFault) -> None:
-    if effects.drive.output.leaves[0] != SILENT:
-        effects.drive.output.leaves[0] = HANGING
+def _stick_output(effects: Effects, fault: ActiveFault) -> None:
+    if effects.drive.output.state[0] != SILENT:
+        effects.drive.output.state[0] = STUCK
 
 
-def _silence_controller(effects: Effects, fault: ActiveFault) -> None:
-    effects.drive.output.leaves[0] = SILENT
+def _silence_output(effects: Effects, fault: ActiveFault) -> None:
+    effects.drive.output.state[0] = SILENT
 
 
 def _delay_controller(effects: Effects, fault: ActiveFault) -> None:
-    effects.drive.output.late_steps[0] += round(fault.value / effects.step_s)
+    effects.drive.output.delay_steps[0] += round(fault.value / effects.step_s)
 
 
 CONTROLLER = Target(
     "controller",
     {
-        "stuck": Mode(_hang),
-        "dropout": Mode(_silence_controller),
+        "stuck": Mode(_stick_output),
+        "dropout": Mode(_silence_output),
         "delay": Mode(
-            _delay_controller, Value("how much later a command is in force, s; whole physics steps", 0.0, 1.0)
+            _delay_controller, Value("additional delay of a command, s; whole physics steps", 0.0, 1.0)
         ),
-        "intermittent": Mode(_hang, STRETCH, intermittent=True),
+        "intermittent": Mode(_stick_output, INTERVAL, intermittent=True),
     },
 )
 
 
-DAC_SIGNAL = Signal(
+DAC_SIGNAL = FaultSignal(
     lambda effects: effects.drive.stage("dac").line,
     "V",
     lambda effects: float(effects.drive.stage("dac").dac.transconductance_A_V),
 )
 
-DAC = Target("dac", {**line_modes.modes(DAC_SIGNAL), **line_modes.silent_modes(DAC_SIGNAL)}, each_group=True)
+DAC = Target("dac", {**signal_modes(DAC_SIGNAL), **silent_modes(DAC_SIGNAL)}, each_group=True)
 
 
 def _silence_encoder(effects: Effects, fault: ActiveFault) -> None:
@@ -131,9 +136,9 @@ def _silence_encoder(effects: Effects, fault: ActiveFault) -> None:
 ENCODER = Target(
     "encoder",
     {
-        **line_modes.modes(Signal(lambda effects: effects.sensors.stage("encoder").line, "rad")),
+        **signal_modes(FaultSignal(lambda effects: effects.sensors.stage("encoder").line, "rad")),
         "dropout": Mode(_silence_encoder),
-        "intermittent": Mode(_silence_encoder, STRETCH, intermittent=True),
+        "intermittent": Mode(_silence_encoder, INTERVAL, intermittent=True),
     },
     places=("gamma",),
     measured=True,
@@ -147,34 +152,36 @@ def _stage(effects: Effects) -> Potentiometers:
 
 def _open_potentiometer(effects: Effects, fault: ActiveFault) -> None:
     stage = _stage(effects)
-    line_modes.fix(stage.line, fault.place, fault.value / stage.volts_per_rad)
+    fix(stage.line, fault.place, fault.value / stage.volts_per_rad)
 
 
-def _open_now_and_then(effects: Effects, fault: ActiveFault) -> None:
-    line_modes.fix(_stage(effects).line, fault.place, 0.0)
+def _open_intermittently(effects: Effects, fault: ActiveFault) -> None:
+    fix(_stage(effects).line, fault.place, 0.0)
 
 
 def _short_potentiometer(effects: Effects, fault: ActiveFault) -> None:
     stage = _stage(effects)
-    line_modes.fix(stage.line, fault.place, stage.channels[0].half_angle_rad)
+    fix(stage.line, fault.place, stage.channels[0].half_angle_rad)
 
 
 POTENTIOMETER = Target(
     "pot",
     {
-        "open": Mode(_open_potentiometer, Value("what the converter's input drifts to, V", default=0.0)),
+        "open": Mode(
+            _open_potentiometer, Value("voltage to which the input of the converter drifts, V", default=0.0)
+        ),
         "short": Mode(_short_potentiometer),  # to the positive end of the track
-        **line_modes.modes(Signal(lambda effects: _stage(effects).line, "rad")),
-        "intermittent": Mode(_open_now_and_then, STRETCH, intermittent=True),
+        **signal_modes(FaultSignal(lambda effects: _stage(effects).line, "rad")),
+        "intermittent": Mode(_open_intermittently, INTERVAL, intermittent=True),
     },
     places=("alpha", "beta"),
     measured=True,
 )
 
 
-SUPPLY_SIGNAL = Signal(lambda effects: effects.drive.supply, "V")
+SUPPLY_SIGNAL = FaultSignal(lambda effects: effects.drive.supply, "V")
 
-_MODES = line_modes.modes(SUPPLY_SIGNAL)
+_MODES = signal_modes(SUPPLY_SIGNAL)
 
 SUPPLY = Target(
     "supply",
@@ -182,7 +189,7 @@ SUPPLY = Target(
         "offset": _MODES["offset"]._replace(value=offset_mode("V of either sign")),
         "gain": _MODES["gain"]._replace(value=GAIN._replace(least=0.0)),
         "noise": _MODES["noise"],
-        **line_modes.silent_modes(SUPPLY_SIGNAL),
+        **silent_modes(SUPPLY_SIGNAL),
     },
     needs_supply=True,
 )

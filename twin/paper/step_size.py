@@ -20,12 +20,12 @@ from spheretwin.paper.experiment import (
     Section,
 )
 from spheretwin.run import Run
-from spheretwin.scenario.sections import Plant
+from spheretwin.scenario.sections import PlantSection
 
 SCENARIOS = ("sinusoid", "nutation", "tilt", "hold")
 SAMPLE_s = 0.01
 FINE_s = 1.25e-5
-DEFAULT_s: float = Plant.model_fields["step_s"].default
+DEFAULT_s: float = PlantSection.model_fields["step_s"].default
 
 ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
 

@@ -1,1 +1,1 @@
-"""The plant: two engines, drive, friction, disturbance."""
+"""Plant: physics step, two rotor engines, friction."""

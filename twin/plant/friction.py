@@ -1,13 +1,13 @@
-"""Coulomb and viscous friction of the three hinges, for either plant.
+"""Coulomb and viscous friction of the three hinges, for both engines.
 
 On hinge i friction opposes the rate v with ``(viscous + coulomb / sqrt(v**2 + smoothing**2)) v``. Coulomb's
 jump at rest is thus smoothed over a stated rate: the term is odd and grows with v up to the Coulomb level,
-of which it has 71 % at the smoothing rate and 99.5 % at ten times that. A hyperbolic tangent would come
-closer to the level, but as a factor k(v) of the rate it is 0/0 at rest; the root is not, and needs no
-exponential. What holds the rotor at rest is k(0) = viscous + coulomb / smoothing, a stiff damping: as an
-explicit torque it would turn the rotor back as soon as the step times k passes the inertia, and never let it
-rest. The rates are advanced under friction alone instead (`slow_down`), by half a physics step before the
-rotor's step and by half a step after it: this splitting is symmetric (Strang), and of second order.
+of which it has 71 % at the smoothing rate and 99.5 % at ten times that. A hyperbolic tangent comes
+closer to the level, but as a factor k(v) of the rate it is 0/0 at rest; the root is defined at rest and needs
+no exponential. The damping k(0) = viscous + coulomb / smoothing keeps the rotor at rest. It is stiff: as an
+explicit torque it would reverse the motion as soon as the step times k exceeds the inertia, and the rotor
+would never rest. Instead `slow_down` advances the rates under friction alone, by half a physics step before
+the step of the rotor and by half a step after it: this splitting is symmetric (Strang) and of second order.
 """
 
 from math import isfinite, sqrt
@@ -20,23 +20,23 @@ from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import InertiaEntries, Triple, inertia_entries, solve_inertia, triple, turns
 
-# Far below any motion; its square is far above the smallest number, so that k(0) is one too.
+# Far below any motion; its square is far above the smallest number, so that k(0) is finite.
 SLOWEST_SMOOTHING_rad_s = 1e-12
 
-# Where 1 / (1 + x + x**2 / 2) has a pole, as 1 + POLE x = 0; the other is its conjugate.
+# Pole of 1 / (1 + x + x**2 / 2), where 1 + POLE x = 0; the other pole is its conjugate.
 _POLE: Any = 0.5 + 0.5j
 _RESIDUE: Any = 1.0 - 1.0j
 
 
 class Friction(NamedTuple):
-    """Friction of a run as compiled code sees it."""
+    """Friction of a run, for compiled code."""
 
     coulomb_Nm: NDArray[np.float64]  # (3,)
     viscous_Nm_s: NDArray[np.float64]  # (3,)
     smoothing_rate_rad_s: float
     inertia: NDArray[np.float64]  # (3,) kg·m² about the joint centre, modelling error and payload included
     step_s: float
-    acts: bool  # whether there is any; if not, no step needs to ask for it
+    acts: bool  # false if there is no friction, which then costs no time
 
 
 def friction(
@@ -46,20 +46,20 @@ def friction(
     inertia: NDArray[np.float64],
     step_s: float,
 ) -> Friction:
-    """Friction on the hinges (alpha, beta, gamma) of a rotor.
+    """Return the friction on the hinges (alpha, beta, gamma) of a rotor.
 
     Parameters
     ----------
     coulomb_Nm : (3,) array, N·m
-        Level that friction reaches well above the smoothing rate.
+        Friction well above the smoothing rate.
     viscous_Nm_s : (3,) array, N·m·s
-        Friction a unit of rate.
+        Friction per unit of rate.
     smoothing_rate_rad_s : float, rad/s
         Rate over which the Coulomb term changes sign.
     inertia : (3,) array, kg·m²
         Principal inertias about the joint centre, modelling error and payload included.
     step_s : float, s
-        Physics step, of which `slow_down` takes one half.
+        Physics step; `slow_down` advances half of it.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def slow_down(
     qdot : (3,) array, rad/s
         Hinge rates; changed in place.
     mean_torque_q : (3,) array, N·m
-        Friction on (alpha, beta, gamma), mean over a whole physics step: this half is added.
+        Friction on (alpha, beta, gamma), mean over a complete physics step: this half is added.
 
     Notes
     -----
@@ -107,7 +107,7 @@ def slow_down(
     It can neither amplify a motion nor reverse it, whatever the step and the coefficients. X is symmetric in
     the scalar product of the kinetic energy, ``u.M v``, and has no negative eigenvalue, as K has no negative
     entry. On such eigenvalues R is positive and at most 1. So ``|R(X) v| <= |v|`` in the norm of the kinetic
-    energy, and ``v.M R(X) v >= 0``. For large x, R is ``2 / x**2``: what is to rest comes to rest.
+    energy, and ``v.M R(X) v >= 0``. For large x, R is ``2 / x**2``: the motion stops.
 
     R is the real part of ``(1 - i) / (1 + p x)`` with ``p = (1 + i) / 2``: one complex system
     ``(M + p t K) u = M v``, of the same zeros as M.
@@ -127,7 +127,7 @@ def slow_down(
 
 @allocation_free
 def _momentum(M: InertiaEntries, v: Triple) -> Triple:
-    """``M v``."""
+    """Return ``M v``."""
     return (
         M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2],
         M.alpha_beta * v[0] + M.beta * v[1],
@@ -137,7 +137,7 @@ def _momentum(M: InertiaEntries, v: Triple) -> Triple:
 
 @allocation_free
 def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> InertiaEntries:
-    """Inertia matrix plus a real or complex time of friction, its factors those at given rates."""
+    """Return the inertia matrix plus a real or complex time times the friction factors at given rates."""
     return InertiaEntries(
         alpha=M.alpha + time * _factor(friction, rates[0], 0),
         beta=M.beta + time * _factor(friction, rates[1], 1),
@@ -149,7 +149,7 @@ def _damped(friction: Friction, M: InertiaEntries, rates: Triple, time: Any) -> 
 
 @allocation_free
 def _factor(friction: Friction, rate: float, hinge: int) -> float:
-    """Friction of a hinge over its rate, N·m·s."""
+    """Return the friction of a hinge divided by its rate, N·m·s."""
     smoothing = friction.smoothing_rate_rad_s
     return friction.viscous_Nm_s[hinge] + friction.coulomb_Nm[hinge] / sqrt(rate**2 + smoothing**2)
 

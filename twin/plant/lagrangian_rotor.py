@@ -1,6 +1,6 @@
-"""The Lagrangian as the plant: the rotor's equations of motion under our own Runge-Kutta steps.
+"""Lagrangian rotor engine: equations of motion with Runge-Kutta steps.
 
-It knows nothing of MuJoCo, so that a closed loop run on both says what the engine adds of its own.
+It is independent of MuJoCo, so that a closed loop on both engines shows the errors of an engine.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from spheretwin.models.lagrangian import (
     triple,
     turns,
 )
-from spheretwin.plant.rotor import EngineKind, Setting
+from spheretwin.plant.rotor import EngineKind, RotorSettings
 
 
-class Equations(NamedTuple):
-    """The equations of motion as compiled code sees them; the last three are what the loop reads and sets."""
+class LagrangianData(NamedTuple):
+    """Equations of motion for compiled code; the loop reads and writes the last four fields."""
 
     step_s: float
     inertia: NDArray[np.float64]  # (3,) kg·m², payload included
@@ -34,26 +34,26 @@ class Equations(NamedTuple):
     q: NDArray[np.float64]  # (3,) rad
     qdot: NDArray[np.float64]  # (3,) rad/s
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
-    warnings: NDArray[np.int32]  # none: whatever goes wrong shows in the state
+    warnings: NDArray[np.int32]  # always 0: errors are visible in the state
 
 
 class LagrangianRotor:
-    """The rotor as the Lagrangian has it, set up for one run.
+    """Rotor of one run with the Lagrangian equations of motion.
 
     Parameters
     ----------
     actuator : Actuator
-        Its inertia, and where the payload is mounted.
+        Inertia and mount of the payload.
     step_s : float, s
         Physics step.
     integrator : str
-        ``RK4``; there is no other.
+        Only ``RK4``.
     modelling_error : float
         m: the rotor's inertia is (1 + m) times that of the actuator (11), (54).
     payload_kg : float, kg
         Point mass at the payload mount; 0 for none.
     gravity_m_s2 : float, m/s²
-        Pulls the payload along -z of the stator frame where positive.
+        Gravity on the payload along -z of the stator frame.
 
     Raises
     ------
@@ -82,19 +82,19 @@ class LagrangianRotor:
         self.inertia = loaded_inertia((1 + modelling_error) * actuator.inertia, payload_kg, height)
         self.weight_moment = payload_kg * gravity_m_s2 * height
 
-    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Equations:
-        """Set pose and rates at time 0; return what compiled code steps.
+    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> LagrangianData:
+        """Set pose and rates at time 0; return the data that compiled code steps.
 
         Parameters
         ----------
         q : (3,) array, rad
             Hinge angles.
         qdot : (3,) array, rad/s
-            Their rates.
+            Hinge rates.
         """
         pose, rates = np.array(q, dtype=np.float64), np.array(qdot, dtype=np.float64)
         self._state = pose, rates
-        return Equations(
+        return LagrangianData(
             step_s=self._step_s,
             inertia=self.inertia,
             weight_moment=self.weight_moment,
@@ -105,20 +105,20 @@ class LagrangianRotor:
         )
 
     def state(self) -> NDArray[np.float64]:
-        """Everything that the next steps depend on."""
+        """Return the complete state."""
         return np.concatenate(self._state)
 
     def restore(self, state: NDArray[np.float64]) -> None:
-        """Go on from a state; what `start` returned stays valid."""
+        """Restore a state; the data of `start` stays valid."""
         self._state[0][:], self._state[1][:] = state[:3], state[3:]
 
 
 @allocation_free
-def step(plant: Equations) -> None:
-    """One physics step of the classical Runge-Kutta method of order four.
+def step(plant: LagrangianData) -> None:
+    """Advance by one physics step of the classical Runge-Kutta method of order four.
 
-    The torque on the hinges is held over the step, as MuJoCo does. The state goes through the stages as
-    tuples: nothing is allocated, and a step takes a tenth of what it takes with arrays of three.
+    The torque on the hinges is held over the step, as in MuJoCo. The stages use tuples: nothing is allocated,
+    and a step takes a tenth of the time with arrays of three.
     """
     h = plant.step_s
     q1, v1 = triple(plant.q), triple(plant.qdot)
@@ -135,7 +135,7 @@ def step(plant: Equations) -> None:
 
 
 @allocation_free
-def _acceleration(plant: Equations, q: Triple, qdot: Triple) -> Triple:
+def _acceleration(plant: LagrangianData, q: Triple, qdot: Triple) -> Triple:
     torque, inertia = triple(plant.torque_q), triple(plant.inertia)
     return acceleration_entries(turns(q), qdot, torque, inertia, plant.weight_moment)
 
@@ -145,23 +145,23 @@ def _moved(start: Triple, time: float, rate: Triple) -> Triple:
     return start[0] + time * rate[0], start[1] + time * rate[1], start[2] + time * rate[2]
 
 
-def _set_up(setting: Setting) -> LagrangianRotor:
-    gravity_m_s2 = setting.gravity_m_s2
-    known = () if gravity_m_s2 is None else (mjcf.OTHER_GRAVITY,)
-    unknown = [name for name in setting.model.unknown_to_the_lagrangian if name not in known]
-    if unknown:
+def _set_up(settings: RotorSettings) -> LagrangianRotor:
+    gravity_m_s2 = settings.gravity_m_s2
+    supported = () if gravity_m_s2 is None else (mjcf.OTHER_GRAVITY,)
+    unsupported = [name for name in settings.model.unknown_to_the_lagrangian if name not in supported]
+    if unsupported:
         raise InputError(
             "Lagrangian plant: expected a rigid rotor on three ideal hinges, received a model with"
-            f" {', '.join(unknown)}; plant.engine mujoco computes it"
+            f" {', '.join(unsupported)}; plant.engine mujoco computes it"
         )
     return LagrangianRotor(
-        setting.actuator,
-        setting.step_s,
-        setting.integrator,
-        setting.modelling_error,
-        setting.payload_kg,
+        settings.actuator,
+        settings.step_s,
+        settings.integrator,
+        settings.modelling_error,
+        settings.payload_kg,
         gravity_m_s2=0.0 if gravity_m_s2 is None else gravity_m_s2,
     )
 
 
-LAGRANGIAN = EngineKind("lagrangian", _set_up, Equations, step)
+LAGRANGIAN = EngineKind("lagrangian", _set_up, LagrangianData, step)

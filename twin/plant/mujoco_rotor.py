@@ -1,4 +1,4 @@
-"""MuJoCo as the plant: the rotor on its joint, stepped from compiled code."""
+"""MuJoCo rotor engine, stepped from compiled code."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ INTEGRATORS = {
 
 
 def integrator_name(number: int) -> str:
-    """Name of one of MuJoCo's integrators, as MJCF has it."""
-    names = {int(each): name for name, each in INTEGRATORS.items()}
+    """Return the MJCF name of an integrator of MuJoCo."""
+    names = {int(integrator): name for name, integrator in INTEGRATORS.items()}
     return names.get(number, mujoco.mjtIntegrator(number).name.removeprefix("mjINT_").lower())
 
 
-class Engine(NamedTuple):
-    """The engine as compiled code sees it: two addresses, and views of MuJoCo's own arrays."""
+class MujocoData(NamedTuple):
+    """Data of MuJoCo for compiled code: two addresses, and views of MuJoCo's arrays."""
 
     model_address: int
     data_address: int
     q: NDArray[np.float64]  # (3,) rad
     qdot: NDArray[np.float64]  # (3,) rad/s
     torque_q: NDArray[np.float64]  # (3,) N·m on the hinges
-    warnings: NDArray[np.int32]  # how often the engine has warned, of each kind
+    warnings: NDArray[np.int32]  # count of warnings of the engine, of each kind
 
 
-class Rotor:
-    """The rotor in MuJoCo, set up for one run.
+class MujocoRotor:
+    """Rotor of one run in MuJoCo.
 
     Parameters
     ----------
     mjcf : Mjcf
-        Model file, as it is kept.
+        Model file; not changed.
     step_s : float, s
         Physics step.
     integrator : str
@@ -57,7 +57,7 @@ class Rotor:
     payload_kg : float, kg
         Point mass at the payload mount; 0 for none.
     gravity_m_s2 : float, m/s²
-        Gravity along -z; the model's own unless given.
+        Gravity along -z; default: that of the model.
     """
 
     def __init__(
@@ -69,11 +69,11 @@ class Rotor:
         payload_kg: float,
         gravity_m_s2: float | None = None,
     ) -> None:
-        # Without a payload its empty body is left out: it would be a twentieth of a step.
+        # Without a payload its empty body is omitted, which saves a twentieth of a step.
         self.model = copy(mjcf.loaded if payload_kg else mjcf.bare)
         self.model.opt.timestep = step_s
         self.model.opt.integrator = INTEGRATORS[integrator]
-        # A diverged state must stay visible: automatic reset would hide it behind a state of zeros.
+        # A diverged state must stay visible: the automatic reset would replace it by zeros.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | idle_stages(self.model)
         if gravity_m_s2 is not None:
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
@@ -82,23 +82,23 @@ class Rotor:
         if payload_kg:
             payload = self.model.body(PAYLOAD).id
             self.model.body_mass[payload] = payload_kg
-            self.model.body_ipos[payload] = 0.0  # the compiler leaves it elsewhere for a body without mass
+            self.model.body_ipos[payload] = 0.0  # the compiler sets another value for a body without mass
         self.data = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.data)
 
-    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Engine:
-        """Set pose and rates at time 0; return what compiled code steps.
+    def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> MujocoData:
+        """Set pose and rates at time 0; return the data that compiled code steps.
 
         Parameters
         ----------
         q : (3,) array, rad
             Hinge angles.
         qdot : (3,) array, rad/s
-            Their rates.
+            Hinge rates.
         """
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = q, qdot
-        return Engine(
+        return MujocoData(
             self.model._address,
             self.data._address,
             self.data.qpos,
@@ -108,13 +108,13 @@ class Rotor:
         )
 
     def state(self) -> NDArray[np.float64]:
-        """Everything that the next steps depend on, the solver's warm start included."""
+        """Return the complete state, including the warm start of the solver."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
         return state
 
     def restore(self, state: NDArray[np.float64]) -> None:
-        """Go on from a state of a rotor with the same model; what `start` returned stays valid."""
+        """Restore a state of a rotor with the same model; the data of `start` stays valid."""
         mujoco.mj_setState(self.model, self.data, state, _STATE)
 
 
@@ -124,7 +124,7 @@ _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _address = ctypes.cast(library().mj_step, ctypes.c_void_p).value or 0
 _mj_step: Any
 if COMPILES:
-    # A symbol that LLVM resolves by name can be cached; a ctypes function inside compiled code cannot.
+    # Compiled code with a symbol that LLVM resolves by name can be cached; with a ctypes function it cannot.
     llvmlite.binding.add_symbol("mj_step", _address)
     _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 else:
@@ -132,21 +132,21 @@ else:
 
 
 @compiled
-def step(engine: Engine) -> None:
-    """One physics step of MuJoCo, from compiled code or from Python."""
-    _mj_step(engine.model_address, engine.data_address)
+def step(data: MujocoData) -> None:
+    """Advance MuJoCo by one physics step, from compiled code or from Python."""
+    _mj_step(data.model_address, data.data_address)
 
 
 MUJOCO = EngineKind(
     "mujoco",
-    lambda setting: Rotor(
-        setting.model,
-        setting.step_s,
-        setting.integrator,
-        setting.modelling_error,
-        setting.payload_kg,
-        setting.gravity_m_s2,
+    lambda settings: MujocoRotor(
+        settings.model,
+        settings.step_s,
+        settings.integrator,
+        settings.modelling_error,
+        settings.payload_kg,
+        settings.gravity_m_s2,
     ),
-    Engine,
+    MujocoData,
     step,
 )

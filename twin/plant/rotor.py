@@ -1,4 +1,4 @@
-"""What a rotor is to the loop, whichever engine moves it."""
+"""Interface of the rotor engines to the loop."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.mjcf import Mjcf
 
 
-class Setting(NamedTuple):
-    """What a rotor is set up from."""
+class RotorSettings(NamedTuple):
+    """Settings of a rotor."""
 
     model: Mjcf
     actuator: Actuator
@@ -23,11 +23,11 @@ class Setting(NamedTuple):
     """m: the rotor's inertia is (1 + m) times the model's (11), (54)."""
     payload_kg: float
     gravity_m_s2: float | None
-    """Along -z; the model's own where it is None."""
+    """Gravity along -z; None: that of the model."""
 
 
 class Rotor(Protocol):
-    """A rotor that has been set up for one run."""
+    """Rotor of one run."""
 
     def start(self, q: NDArray[np.float64], qdot: NDArray[np.float64]) -> Any:
         """Set pose and rates; return the named tuple that compiled code steps.
@@ -42,28 +42,28 @@ class Rotor(Protocol):
         Returns
         -------
         named tuple
-            It has `q`, `qdot` (3,), and takes `torque_q` (3,) on the hinges; `warnings` (n,) are
-            counts that end a run when one rises.
+            Fields `q`, `qdot` (3,), `torque_q` (3,) on the hinges, and `warnings` (n,): a run ends when one
+            of these counts rises.
         """
         ...
 
     def state(self) -> NDArray[np.float64]:
-        """Everything that the next steps depend on."""
+        """Return the complete state."""
         ...
 
     def restore(self, state: NDArray[np.float64]) -> None:
-        """Go on from a state; what `start` returned stays valid."""
+        """Restore a state; the tuple that `start` returned stays valid."""
         ...
 
 
 class EngineKind(NamedTuple):
-    """One row of the engines that can move a rotor."""
+    """Row of the list of rotor engines."""
 
     name: str
-    """As `plant.engine` has it."""
-    set_up: Callable[[Setting], Rotor]
-    """May refuse, with an InputError, a model that holds what it does not know."""
-    stepped: type
-    """Class of what `Rotor.start` returns."""
+    """Name in `plant.engine`."""
+    set_up: Callable[[RotorSettings], Rotor]
+    """Build a rotor; raises InputError for a model that the engine does not support."""
+    data: type
+    """Class of the named tuple that `Rotor.start` returns."""
     step: Callable[[Any], None]
-    """Takes one physics step of that; compiled."""
+    """Compiled function that advances this tuple by one physics step."""

@@ -1,4 +1,4 @@
-"""One control period of the true plant: from the currents asked for to where the rotor is."""
+"""Control period of the true plant: from commanded currents to the motion of the rotor."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from spheretwin.electronics.drive import Stages, advance_currents, begin, end
+from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
 from spheretwin.models.base.compiled import copy_into, part_of_its_caller
 from spheretwin.models.kinematics import generalised_torque
@@ -27,17 +27,17 @@ ENGINES: dict[str, EngineKind] = {
 }
 
 
-_STEPS: dict[type, Callable[[Any], None]] = {row.stepped: row.step for row in ENGINES.values()}
+_STEPS: dict[type, Callable[[Any], None]] = {row.data: row.step for row in ENGINES.values()}
 
 
 def step(rotor: Any) -> None:
-    """One physics step of what `Rotor.start` returned, from compiled code or from Python."""
+    """Advance the data of `Rotor.start` by one physics step, from compiled code or from Python."""
     _STEPS[type(rotor)](rotor)
 
 
 @overload(step)
 def _compiled_step(rotor: Any) -> Callable[[Any], None] | None:
-    """Tell numba, which knows a named tuple by its class, what `step` does."""
+    """Select the step for numba by the class of the named tuple."""
     kind: Any = getattr(rotor, "instance_class", None)
     if kind not in _STEPS:
         return None
@@ -51,21 +51,21 @@ def _compiled_step(rotor: Any) -> Callable[[Any], None] | None:
 
 GOING, LEFT_WORKSPACE, DIVERGED, FAILSAFE = 0, 1, 2, 3
 
-# The rotor's fastest move within the workspace is some hundred rad/s; far above it, and far below the
-# engine's own bound of 1e10, the motion is no longer one.
+# The fastest motion of the rotor within the workspace is some hundred rad/s. A rate above this bound, which
+# is far below the engine's own bound of 1e10, means divergence.
 FASTEST_RATE_rad_s = 1e6
 
 
 class Plant(NamedTuple):
-    """The far side of the wires: nothing of it is known to the controller."""
+    """True plant; the controller knows nothing of it."""
 
-    rotor: Any  # what compiled code steps, as the engine's row says
+    rotor: Any  # data of `Rotor.start`
     magnetics: TorqueModel  # true
     G: NDArray[np.float64]  # (3, n) N·m/A, true torque matrix in the middle of the physics step
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
-    driving: Stages
+    drive: DriveModel
     friction: Friction
-    group_gain: NDArray[np.float64]  # (n,) torque an ampere over that of the torque matrix
+    group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
     hinge_range: NDArray[np.float64]  # (3, 2) rad
     substeps: int
@@ -73,20 +73,20 @@ class Plant(NamedTuple):
     middle_q: NDArray[np.float64]  # (3,) rad, predicted pose in the middle of the physics step
     middle_qdot: NDArray[np.float64]  # (3,) rad/s, predicted rates there
     last_qdot: NDArray[np.float64]  # (3,) rad/s at the start of the last physics step
-    current: NDArray[np.float64]  # (n,) A, now
+    current: NDArray[np.float64]  # (n,) A, present
     mean_current: NDArray[np.float64]  # (n,) A, over the physics step
-    pulling: NDArray[np.float64]  # (n,) A, the same times the gain
+    effective_current: NDArray[np.float64]  # (n,) A, the mean times the gain
     torque_S: NDArray[np.float64]  # (3,) N·m of the coils, stator frame, in the physics step
     friction_q: NDArray[np.float64]  # (3,) N·m on the hinges, mean over the physics step
     first_friction_q: NDArray[np.float64]  # (3,) the same in the first one of the control period
-    draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and of sensors of currents
+    draws: NDArray[np.float64]  # standard normal numbers of the tick, of faults and current sensors
     current_sensors: CurrentSensors
-    marks: NDArray[np.float64]  # of every part that may fail: the number of its mode, or 0
-    began_s: NDArray[np.float64]  # (n,) when the last fault of each group began, s; below 0 where none has
+    fault_modes: NDArray[np.float64]  # of every part that can fail: number of its failure mode, or 0
+    fault_start_s: NDArray[np.float64]  # (n,) start of the last fault of each group, s; below 0: none
 
 
-class Delivered(NamedTuple):
-    """Currents and torque in a control period: the plant's part of a telemetry row."""
+class PlantOutput(NamedTuple):
+    """Currents and torque in a control period: the part of the plant in a telemetry row."""
 
     current: NDArray[np.float64]  # (n,) A, mean over the first physics step
     mean_current: NDArray[np.float64]  # (n,) A, mean over all physics steps taken
@@ -95,11 +95,11 @@ class Delivered(NamedTuple):
 
 @part_of_its_caller
 def plant_tick(
-    plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], delivered: Delivered
+    plant: Plant, command: NDArray[np.float64], disturbance: NDArray[np.float64], output: PlantOutput
 ) -> int:
     """Advance the plant by one control period.
 
-    Each physics step: half of the friction, coil currents and their torque, rotor, other half of friction.
+    Each physics step: half of the friction, coil currents and torque, rotor, other half of the friction.
     The torque matrix and the back-EMF are those of the predicted pose and rates in the middle of the step.
     With friction split symmetrically around the rotor's step, the whole step is of second order.
 
@@ -108,31 +108,31 @@ def plant_tick(
     plant : Plant
         Changed in place.
     command : (n,) array, A
-        Group currents asked for, held over the period.
+        Commanded group currents, held over the period.
     disturbance : (3,) array, N·m
         Generalised, subtracted in (1), held over the period.
-    delivered : Delivered
+    output : PlantOutput
         Result.
 
     Returns
     -------
     int
-        `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, or `FAILSAFE` where a coil is too hot.
+        `GOING`, `LEFT_WORKSPACE`, `DIVERGED`, or `FAILSAFE` if a coil is too hot.
     """
-    # Taken out of the tuple once: each time costs a count of references.
+    # Read from the tuple once, because each access counts a reference.
     rotor, magnetics, G, scratch = plant.rotor, plant.magnetics, plant.G, plant.scratch
     q, qdot, torque_q, torque_S = rotor.q, rotor.qdot, rotor.torque_q, plant.torque_S
     middle_q, middle_qdot, last_qdot = plant.middle_q, plant.middle_qdot, plant.last_qdot
     hinge_range, half_step_s = plant.hinge_range, 0.5 * plant.step_s
-    current, mean_current, pulling = plant.current, plant.mean_current, plant.pulling
+    current, mean_current, effective_current = plant.current, plant.mean_current, plant.effective_current
     gain, unmodelled, friction, friction_q = (
         plant.group_gain,
         plant.unmodelled_torque,
         plant.friction,
         plant.friction_q,
     )
-    driving = plant.driving
-    begin(driving, command)
+    drive = plant.drive
+    begin(drive, command)
     for substep in range(plant.substeps):
         for i in range(3):
             middle_q[i] = q[i] + half_step_s * qdot[i]
@@ -142,11 +142,11 @@ def plant_tick(
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
         fill_torque_matrix(middle_q, magnetics, G, scratch)
-        advance_currents(driving, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
-        log_mean_current(mean_current, substep, delivered.mean_current)
-        for j in range(pulling.shape[0]):
-            pulling[j] = gain[j] * mean_current[j]
-        rotor_torque(G, pulling, torque_S)
+        advance_currents(drive, command, substep, middle_q, middle_qdot, G, gain, current, mean_current)
+        log_mean_current(mean_current, substep, output.mean_current)
+        for j in range(effective_current.shape[0]):
+            effective_current[j] = gain[j] * mean_current[j]
+        rotor_torque(G, effective_current, torque_S)
         generalised_torque(middle_q, torque_S, torque_q)
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
@@ -154,16 +154,16 @@ def plant_tick(
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
         if substep == 0:
-            copy_into(delivered.current, 0, mean_current, mean_current.shape[0])
-            copy_into(delivered.torque_S, 0, torque_S, 3)
+            copy_into(output.current, 0, mean_current, mean_current.shape[0])
+            copy_into(output.torque_S, 0, torque_S, 3)
             copy_into(plant.first_friction_q, 0, friction_q, 3)
         for i in range(3):
-            if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also where it is not a number
+            if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also if it is NaN
                 return DIVERGED
-        for i in range(3):  # at every step: beyond its range a hinge would meet a stop that is not computed
+        for i in range(3):  # at every step: the stop of a hinge at the end of its range is not simulated
             if not hinge_range[i, 0] <= q[i] <= hinge_range[i, 1]:
                 return LEFT_WORKSPACE
-    if not end(driving):
+    if not end(drive):
         return FAILSAFE
     for kind in range(rotor.warnings.shape[0]):
         if rotor.warnings[kind] > 0:
@@ -173,7 +173,7 @@ def plant_tick(
 
 @part_of_its_caller
 def log_mean_current(current: NDArray[np.float64], substep: int, mean: NDArray[np.float64]) -> None:
-    """Update the mean (n,) over the physics steps of a control period with the one of number `substep`."""
+    """Update the mean (n,) over the physics steps of a control period with step number `substep`."""
     share = 1.0 / (substep + 1)
     for j in range(mean.shape[0]):
         before = mean[j] if substep else 0.0

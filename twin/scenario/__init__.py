@@ -1,4 +1,4 @@
-"""Scenarios: everything one run depends on, from TOML and flags, checked as one."""
+"""Scenarios: all inputs of a run, from TOML and flags, validated together."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.scenario.changes import check_events, fields_with
-from spheretwin.scenario.reading import beside, override, validated
-from spheretwin.scenario.sections import Scenario, left_open
+from spheretwin.scenario.reading import override, resolve_paths, validated
+from spheretwin.scenario.sections import Scenario, hardware_defaults
 from spheretwin.trajectories import SHAPES
 
 
@@ -20,52 +20,53 @@ def load(source: str, overrides: Mapping[str, Any] | None = None) -> Scenario:
     Parameters
     ----------
     source : str
-        A shipped name, or the path of a TOML file; ``~`` is the user's home. Paths in the file are taken
-        from where the file is.
+        A shipped name, or the path of a TOML file; ``~`` is the user's home. Paths in the file are relative
+        to the folder of the file.
     overrides : mapping, optional
-        Values by dotted name, such as ``{"controller.law": "pd"}``; paths are taken from the working folder.
+        Values by dotted name, such as ``{"controller.law": "pd"}``; paths are relative to the working
+        folder.
 
     Raises
     ------
     InputError
-        No such scenario, or a field that is unknown, of the wrong type or out of range.
+        The scenario does not exist, or a field is unknown, of the wrong type or out of range.
     """
     fields = fields_with(source, overrides or {})
     hardware = fields.get("hardware")
-    for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
+    for dotted, value in hardware_defaults(fields, hardware if isinstance(hardware, str) else None).items():
         override(fields, dotted, value)
     try:
-        taken = beside("", fields)
+        resolved = resolve_paths("", fields)
     except RecursionError:
-        raise InputError(f"scenario {source}: expected values of less depth") from None
-    return check_events(validated(taken, source), source)
+        raise InputError(f"scenario {source}: expected values with fewer levels of nesting") from None
+    return check_events(validated(resolved, source), source)
 
 
 def from_record(fields: Mapping[str, Any], source: str) -> Scenario:
-    """Scenario from what a run said of itself, the fields by section.
+    """Return the scenario of the record of a run, its fields by section.
 
     Raises
     ------
     InputError
-        It was run under a law, or along a trajectory, of its user's that is in no file, or by a version with
-        other fields.
+        The law or the trajectory of the run was a Python object that is not in a file, or the version that
+        recorded the run had other fields.
     """
     law = fields.get("controller", {}).get("law")
     if law not in LAWS and not is_reference(law):
         raise InputError(
             f"scenario {source}: expected a run under {', '.join(LAWS)}, received one under {law},"
-            " a law that its file does not hold"
+            " a law that its file does not contain"
         )
     shape = fields.get("trajectory", {}).get("shape")
     if shape not in SHAPES:
         raise InputError(
             f"scenario {source}: expected a run along one of {', '.join(SHAPES)}, received one along {shape},"
-            " a trajectory that its file does not hold"
+            " a trajectory that its file does not contain"
         )
     return validated(_with_truth(fields), source)
 
 
 def _with_truth(fields: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Fields of a record. Before the controller had a data sheet, it knew drive and sensors as they were."""
+    """Return the fields of a record; in old records without a data sheet the controller knew the truth."""
     nominal = fields.get("nominal", {})
     return fields if "equals_truth" in nominal else {**fields, "nominal": {**nominal, "equals_truth": True}}

@@ -1,4 +1,4 @@
-"""What may change of a scenario while it runs, and how: by hand, or by an event that it plans itself."""
+"""Changes of a scenario during a run, by the user or by an event of the scenario."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.scenario.fields import Kind, every_field, kind_of, section_kind
-from spheretwin.scenario.reading import beside, is_dotted, override, read, shipped, validated
-from spheretwin.scenario.sections import OwnController, Scenario, kind_of_scenario, scenario_with
+from spheretwin.scenario.reading import is_dotted, override, read, resolve_paths, shipped, validated
+from spheretwin.scenario.sections import Scenario, UserController, kind_of_scenario, scenario_with
 
-# What a run is begun with cannot be changed on its way.
+# Fields that cannot change during a run.
 FIXED = (
     "name",
     "description",
@@ -39,20 +39,20 @@ FIXED = (
 FAULT = "fault"
 
 TAGS = frozenset(
-    kind.told_apart_by
+    kind.discriminator
     for _, field in every_field(Scenario)
-    if (kind := kind_of(field)) and kind.told_apart_by
+    if (kind := kind_of(field)) and kind.discriminator
 )
-"""Names of the fields that choose a member of a family, as ``shape`` and ``law``."""
+"""Names of the fields that select a member of a family, such as ``shape`` and ``law``."""
 
 
 def fields_with(source: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a scenario with some of them overridden.
 
-    A shipped scenario is not the user's text. If an override chooses another member of a family, such as
-    ``trajectory.shape``, what the shipped file says of the old member alone is dropped, so that the new one
-    starts from its own defaults. Nothing that a user wrote is dropped: a field of another member in a user's
-    file, or among the overrides, is refused when the scenario is checked.
+    A shipped scenario is not the text of the user. If an override selects another member of a family, such
+    as ``trajectory.shape``, fields of the shipped file that only the old member has are dropped, so that the
+    new one starts from its own defaults. Nothing that a user wrote is dropped: a field of another member in
+    a user file, or among the overrides, is refused when the scenario is checked.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def fields_with(source: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The scenario cannot be read, or a name is not that of a field.
+        The scenario cannot be read, or a name is not the name of a field.
     """
     fields = read(source)
     members = {dotted: value for dotted, value in overrides.items() if is_tag(dotted)}
@@ -72,34 +72,34 @@ def fields_with(source: str, overrides: Mapping[str, Any]) -> dict[str, Any]:
         base = validated(fields, source)
         for dotted, value in members.items():
             kind = scenario_with(value) if dotted == "controller.law" else Scenario
-            _keep_common(fields, dotted, value, kind, base)
+            _drop_foreign_fields(fields, dotted, value, kind, base)
     for dotted, value in overrides.items():
         override(fields, dotted, value)
     return fields
 
 
 def is_tag(dotted: object) -> bool:
-    """True if a name may be that of a field that chooses a member of a family."""
+    """True if a name may be the name of a field that selects a member of a family."""
     return isinstance(dotted, str) and dotted.rpartition(".")[2] in TAGS
 
 
 def is_one_fault(dotted: str, value: Any) -> bool:
-    """Whether a change adds a fault to those that are planned."""
+    """True if a change adds a fault to the scheduled faults."""
     return dotted == FAULT and isinstance(value, Mapping)
 
 
 def from_now_on(dotted: str, value: Any, t_s: float) -> Any:
-    """Value of a change at a time: a fault that does not say when it starts does so then."""
+    """Return the value of a change at a time: a fault without a start time starts at this time."""
     return {"start_s": t_s, **value} if is_one_fault(dotted, value) else value
 
 
-def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = None) -> Scenario:
-    """Scenario with another value of one field, checked as a whole; paths are taken as `load` takes them.
+def with_change(scenario: Scenario, dotted: str, value: Any, source: str | None = None) -> Scenario:
+    """Return a scenario with another value of one field, validated as a whole; paths are as in `load`.
 
-    Another member of a family, as another law, keeps the fields that it has too; its own have their defaults.
-    A nominal model that is set to equal the truth keeps no value of its own.
-    One table for the list of faults is one more of them. What files of trajectories and disturbances held
-    stays, unless it is they that are changed.
+    Another member of a family, such as another law, keeps the fields that both members have; its other fields
+    have their defaults. A nominal model that is set to equal the truth keeps none of its values. A single
+    table for the list of faults adds a fault. The content of files of trajectories and disturbances stays,
+    unless the change concerns them.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
     value : any
         As JSON has it.
     source : str, optional
-        Where the scenario comes from, for complaints; its name unless given.
+        Origin of the scenario, for messages; its name unless given.
 
     Raises
     ------
@@ -120,92 +120,96 @@ def changed(scenario: Scenario, dotted: str, value: Any, source: str | None = No
         raise InputError(f"scenario: expected a field such as controller.law, received {shown(dotted)}")
     value = copy.deepcopy(value)
     fields = scenario.model_dump(mode="json")
-    if isinstance(scenario.controller, OwnController):
+    if isinstance(scenario.controller, UserController):
         del fields["controller"]["parameters"]
         fields["controller"]["law"] = next(iter(LAWS))
-    untouched = _set_aside(fields, dotted)
-    # A user's law stays the one that was read, whatever has become of its file.
+    removed = _remove_unchanged(fields, dotted)
+    # A user law stays the one that was read, even if its file has changed.
     kind = scenario_with(value) if dotted in ("controller", "controller.law") else kind_of_scenario(scenario)
-    _keep_common(fields, dotted, value, kind, scenario)
+    _drop_foreign_fields(fields, dotted, value, kind, scenario)
     if dotted == "nominal.equals_truth" and value is True:
         fields["nominal"] = {}
     override(fields, dotted, [*fields[FAULT], value] if is_one_fault(dotted, value) else value)
     chosen = None if dotted == "controller" else kind
-    made = validated(beside("", fields), source or scenario.name, chosen)
-    if "trajectory" in untouched:
-        made = made.model_copy(update={"trajectory": scenario.trajectory})
+    changed = validated(resolve_paths("", fields), source or scenario.name, chosen)
+    if "trajectory" in removed:
+        changed = changed.model_copy(update={"trajectory": scenario.trajectory})
     else:
-        kept = _kept(scenario.trajectory, made.trajectory, "trajectory", dotted)
-        made = made.model_copy(update={"trajectory": kept})
-    if "terms" in untouched:
+        trajectory = _keep_unchanged(scenario.trajectory, changed.trajectory, "trajectory", dotted)
+        changed = changed.model_copy(update={"trajectory": trajectory})
+    if "terms" in removed:
         terms = scenario.disturbance.terms
     else:
-        terms = _kept(scenario.disturbance.terms, made.disturbance.terms, "disturbance.terms", dotted)
-    return made.model_copy(update={"disturbance": made.disturbance.model_copy(update={"terms": terms})})
+        terms = _keep_unchanged(
+            scenario.disturbance.terms, changed.disturbance.terms, "disturbance.terms", dotted
+        )
+    return changed.model_copy(update={"disturbance": changed.disturbance.model_copy(update={"terms": terms})})
 
 
-def _set_aside(fields: dict[str, Any], dotted: str) -> set[str]:
-    """Take out of the fields what holds files and is not changed: it is not to be read again."""
-    untouched = set()
-    if not _leads_into(dotted, "trajectory"):
+def _remove_unchanged(fields: dict[str, Any], dotted: str) -> set[str]:
+    """Remove the unchanged fields with files, so that the files are not read again; return their names."""
+    removed = set()
+    if not _overlaps(dotted, "trajectory"):
         fields["trajectory"] = {"shape": "hold"}
-        untouched.add("trajectory")
-    if not _leads_into(dotted, "disturbance.terms"):
+        removed.add("trajectory")
+    if not _overlaps(dotted, "disturbance.terms"):
         fields["disturbance"]["terms"] = []
-        untouched.add("terms")
-    return untouched
+        removed.add("terms")
+    return removed
 
 
-def _leads_into(dotted: str, section: str) -> bool:
-    """Whether one of two names is that of a part of the other."""
+def _overlaps(dotted: str, section: str) -> bool:
+    """True if one of two dotted names is a part of the other."""
     return f"{dotted}.".startswith(f"{section}.") or f"{section}.".startswith(f"{dotted}.")
 
 
 def is_fixed(dotted: str) -> bool:
-    """Whether a name is that of a fixed field, of a part of one, or of a section that holds one."""
-    return any(_leads_into(dotted, field) for field in FIXED)
+    """True if a name is a fixed field, a part of one, or a section that contains one."""
+    return any(_overlaps(dotted, field) for field in FIXED)
 
 
 def check_events(scenario: Scenario, source: str) -> Scenario:
-    """Find out before a run what an event would only be refused for on its way.
+    """Check the events of a scenario before a run.
 
     Raises
     ------
     InputError
-        An event sets what cannot be set, or to what it cannot be.
+        An event sets a field that cannot be set, or an invalid value.
     """
-    planned = sorted(enumerate(scenario.event), key=lambda event: event[1].t_s)
+    ordered_events = sorted(enumerate(scenario.event), key=lambda event: event[1].t_s)
     after = scenario
-    for place, event in planned:
+    for place, event in ordered_events:
         if is_fixed(event.set):
             raise InputError(
                 f"scenario {source}: event.{place}.set: expected a field that may change during a run,"
                 f" received {event.set}"
             )
         try:
-            after = changed(after, event.set, event.value, source)
+            after = with_change(after, event.set, event.value, source)
         except InputError as error:
             raise InputError(f"{error}, as event.{place} sets it") from None
     return scenario
 
 
-def _kept(before: Any, after: Any, path: str, dotted: str) -> Any:
-    """What comes after, with all that says the same as before left as it is: read when the run began."""
+def _keep_unchanged(before: Any, after: Any, path: str, dotted: str) -> Any:
+    """Return the changed value with all unchanged parts as they were read at the start of the run."""
     if f"{path}.".startswith(f"{dotted}."):
-        return after  # it is this that is set, if to what it says already
+        return after  # the field itself is set, even if to the same value
     within = dotted.startswith(f"{path}.")
     if not within and to_jsonable_python(before) == to_jsonable_python(after):
         return before
     if isinstance(before, tuple) and isinstance(after, tuple):
         pairs = enumerate(zip(before, after, strict=False))
-        return tuple(_kept(*pair, f"{path}.{i}", dotted) for i, pair in pairs) + after[len(before) :]
+        return (
+            tuple(_keep_unchanged(*pair, f"{path}.{i}", dotted) for i, pair in pairs) + after[len(before) :]
+        )
     return after
 
 
-def _keep_common(
+def _drop_foreign_fields(
     fields: dict[str, Any], dotted: str, value: Any, kind_after: type[Scenario], before: Scenario
 ) -> None:
-    """Where a family's member is exchanged, drop what the new one does not have, or has of another kind."""
+    """If a change selects another member of a family, drop the fields that do not fit the new member."""
     *sections, name = dotted.split(".")
     kind: Kind | None = section_kind(kind_after)
     inside: Any = fields
@@ -223,20 +227,21 @@ def _keep_common(
             return
         owner = kind.chosen(inside)[0].model_fields.get(section, field)
         inside, present, kind = inside[section], getattr(present, section), kind_of(owner)
-    if kind and kind.told_apart_by == name and isinstance(value, str) and value in kind.members:
+    if kind and kind.discriminator == name and isinstance(value, str) and value in kind.members:
         old, new = type(present).model_fields, kind.members[value].model_fields
-        for each in list(inside):
-            same = each in new and each in old and new[each].annotation == old[each].annotation
-            if each != name and not same:
-                del inside[each]
+        for field_name in list(inside):
+            in_both = field_name in new and field_name in old
+            same = in_both and new[field_name].annotation == old[field_name].annotation
+            if field_name != name and not same:
+                del inside[field_name]
 
 
-# Times and periods are decimal fractions: a tick that falls on an event does so to rounding only.
+# Times and periods are decimal fractions: the time of an event equals a tick only up to rounding.
 ROUNDING = 1e-6
 
 
-def planned(scenario: Scenario) -> tuple[Change, ...]:
-    """Changes that the events of a scenario make, in the order of their times, then of the file."""
+def scheduled_changes(scenario: Scenario) -> tuple[Change, ...]:
+    """Return the changes of the events of a scenario, in the order of their times, then of the file."""
     return tuple(
         Change(
             first_tick(event.t_s / scenario.controller.period_s),
@@ -248,6 +253,6 @@ def planned(scenario: Scenario) -> tuple[Change, ...]:
 
 
 def first_tick(periods: float) -> int:
-    """Tick that a time, in control periods, has come at."""
+    """Return the first tick at or after a time in control periods."""
     nearest = round(periods)
     return nearest if abs(periods - nearest) <= ROUNDING else ceil(periods)

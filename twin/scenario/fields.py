@@ -1,4 +1,4 @@
-"""The fields of a scenario by dotted name: sections, lists of them, and families told apart by one field."""
+"""Fields of a scenario by dotted name: sections, lists of sections, families selected by one field."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from spheretwin.models.base.errors import did_you_mean, shown
 from spheretwin.models.base.user_code import is_reference
 
 INDEX = "#"
-"""In a dotted name: any place of a list."""
+"""In a dotted name: any index of a list."""
 
 SHIPPED = "shipped"
-"""Name of the shipped file in a field that holds this name or a path; its mark in such a field."""
+"""Name of the shipped file in a field that contains this name or a path; mark of such a field."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a field holds that has fields itself."""
+    """Kind of a field that contains fields: section, family or list of them."""
 
     members: Mapping[str, type[BaseModel]]
-    """By tag; a plain section is the only one, under no tag."""
-    told_apart_by: str | None
-    """Field that holds the tag."""
+    """Members by tag; a plain section is the only member, under the empty tag."""
+    discriminator: str | None
+    """Field that contains the tag."""
     is_list: bool = False
 
     def chosen(self, fields: Mapping[str, Any]) -> list[type[BaseModel]]:
-        """Members that given fields may be of: all where they do not say."""
-        tag = fields.get(self.told_apart_by) if self.told_apart_by else ""
+        """Return the members that given fields can belong to: all if the fields have no valid tag."""
+        tag = fields.get(self.discriminator) if self.discriminator else ""
         named = self.members.get(tag) if isinstance(tag, str) else None
         return [named] if named else list(self.members.values())
 
 
-class Place(NamedTuple):
-    """Where a path of names, tags and indices leads."""
+class FieldLocation(NamedTuple):
+    """Location that a path of names, tags and indices leads to."""
 
     dotted: str
     kind: Kind | None
-    """What is there; None where it has no fields."""
+    """Kind of the field; None if it has no fields."""
 
 
-class Named(NamedTuple):
-    """A file that a field names."""
+class NamedFile(NamedTuple):
+    """File that a field names."""
 
     fields: dict[str, Any]
     name: str
@@ -55,30 +55,30 @@ class Named(NamedTuple):
 
 
 def kind_of(field: FieldInfo) -> Kind | None:
-    """What a field holds that has fields itself; None for a plain value."""
+    """Return the kind of a field that contains fields; None for a plain value."""
     return _kind(field.annotation, field.discriminator)
 
 
 def section_kind(section: type[BaseModel]) -> Kind:
-    """Kind of one plain section."""
+    """Return the kind of one plain section."""
     return Kind({"": section}, None)
 
 
 def fields_of(section: BaseModel, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
-    """Dotted name, value and description of every field of a section, and of the sections in it."""
+    """Yield dotted name, value and description of every field of a section and of its sections."""
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
         if isinstance(value, BaseModel):
             yield from fields_of(value, f"{prefix}{name}.")
         elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
-            for i, each in enumerate(value):
-                yield from fields_of(each, f"{prefix}{name}.{i}.")
+            for i, entry in enumerate(value):
+                yield from fields_of(entry, f"{prefix}{name}.{i}.")
         else:
             yield prefix + name, value, field
 
 
 def every_field(section: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    """Dotted name and description of every field that a section can have, whichever members are chosen."""
+    """Yield dotted name and description of every field that a section can have, for all members."""
     for name, field in section.model_fields.items():
         yield prefix + name, field
         if kind := kind_of(field):
@@ -87,20 +87,20 @@ def every_field(section: type[BaseModel], prefix: str = "") -> Iterator[tuple[st
                 yield from every_field(member, below)
 
 
-def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> Place:
-    """Follow a path as pydantic gives it, in which tags stand where a family is entered."""
+def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> FieldLocation:
+    """Follow a path of pydantic, which contains the tag of each family."""
     dotted: list[str] = []
     kind: Kind | None = section_kind(scenario)
     entered: type[BaseModel] | None = scenario
     has_keys = True
     for part in path:
         if kind is None:
-            if isinstance(part, int) or has_keys:  # else it is the type of a member of a union
+            if isinstance(part, int) or has_keys:  # otherwise it is the type of a member of a union
                 dotted.append(str(part))
         elif kind.is_list:
             dotted.append(str(part))
             kind = replace(kind, is_list=False)
-            entered = None if kind.told_apart_by else kind.members[""]
+            entered = None if kind.discriminator else kind.members[""]
         elif entered is None and part in kind.members:
             entered = kind.members[str(part)]
             kind = section_kind(entered)
@@ -109,29 +109,29 @@ def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> Place:
             field = entered.model_fields.get(str(part)) if entered else None
             kind = kind_of(field) if field else None
             has_keys = field is None or _holds(field.annotation, Mapping)
-            entered = kind.members[""] if kind and not kind.told_apart_by and not kind.is_list else None
-    return Place(".".join(dotted), kind)
+            entered = kind.members[""] if kind and not kind.discriminator and not kind.is_list else None
+    return FieldLocation(".".join(dotted), kind)
 
 
-def files_in(fields: dict[str, Any], kind: Kind, prefix: str = "") -> Iterator[Named]:
-    """Every file that given fields name, sections and lists of them included."""
+def files_in(fields: dict[str, Any], kind: Kind, prefix: str = "") -> Iterator[NamedFile]:
+    """Yield every file that given fields name, also in sections and lists of sections."""
     members = kind.chosen(fields)
     for name, value in fields.items():
-        field = next((each.model_fields[name] for each in members if name in each.model_fields), None)
+        field = next((member.model_fields[name] for member in members if name in member.model_fields), None)
         if field is None:
             continue
         if _names_file(field, value):
-            yield Named(fields, name, prefix + name)
+            yield NamedFile(fields, name, prefix + name)
         elif inside := kind_of(field):
-            whole = isinstance(value, list) and inside.is_list
-            for i, each in enumerate(value if whole else [value]):
-                if isinstance(each, dict):
-                    below = f"{prefix}{name}.{i}." if whole else f"{prefix}{name}."
-                    yield from files_in(each, inside, below)
+            is_list = isinstance(value, list) and inside.is_list
+            for i, entry in enumerate(value if is_list else [value]):
+                if isinstance(entry, dict):
+                    below = f"{prefix}{name}.{i}." if is_list else f"{prefix}{name}."
+                    yield from files_in(entry, inside, below)
 
 
 def _holds(annotation: Any, kind: type) -> bool:
-    """True if an annotation is of a kind, or has a part that is."""
+    """True if an annotation, or a part of it, is of a kind."""
     origin = get_origin(annotation) or annotation
     is_kind = isinstance(origin, type) and issubclass(origin, kind)
     return is_kind or any(_holds(part, kind) for part in get_args(annotation))
@@ -146,24 +146,24 @@ def _names_file(field: FieldInfo, value: Any) -> bool:
     return bool(mark and isinstance(value, str) and value and not is_name)
 
 
-def _kind(annotation: Any, told_apart_by: Any) -> Kind | None:
+def _kind(annotation: Any, discriminator: Any) -> Kind | None:
     origin, inside = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        tags = [each.discriminator for each in inside[1:] if isinstance(each, FieldInfo)]
-        return _kind(inside[0], next(filter(None, tags), told_apart_by))
+        tags = [info.discriminator for info in inside[1:] if isinstance(info, FieldInfo)]
+        return _kind(inside[0], next(filter(None, tags), discriminator))
     if origin is tuple and inside[-1] is Ellipsis:
         kind = _kind(inside[0], None)
         return kind and replace(kind, is_list=True)
     if origin in (Union, UnionType):
-        return _of_union([each for each in inside if each is not NoneType], told_apart_by)
+        return _of_union([member for member in inside if member is not NoneType], discriminator)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return _of_union([annotation], told_apart_by) if told_apart_by else section_kind(annotation)
+        return _of_union([annotation], discriminator) if discriminator else section_kind(annotation)
     return None
 
 
-def _of_union(members: list[Any], told_apart_by: Any) -> Kind | None:
-    if isinstance(told_apart_by, str):
-        return Kind({each.model_fields[told_apart_by].default: each for each in members}, told_apart_by)
+def _of_union(members: list[Any], discriminator: Any) -> Kind | None:
+    if isinstance(discriminator, str):
+        return Kind({member.model_fields[discriminator].default: member for member in members}, discriminator)
     return _kind(members[0], None) if len(members) == 1 else None
 
 
@@ -198,30 +198,30 @@ EXPECTED = {
     "too_short": "at least {min_length} entries",
     "tuple_type": "a list",
 }
-"""What a kind of error asks for, with the figures of its context."""
+"""Expected value by the type of a pydantic error, with the values of its context."""
 
 OTHERWISE = "a valid value"
-"""What is expected where a user's own section has a type that no shipped one has."""
+"""Expected value of a type that only a section of the user has."""
 
 
 def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
-    """First complaint of a validation on one line: field, what was expected, what was received."""
+    """Return the first error of a validation on one line: field, expected value, received value."""
     first = error.errors(include_url=False)[0]
     path = first["loc"]
     place, received = place_of(scenario, path), shown(first["input"])
     here = f"{place.dotted}: " if place.dotted else ""
     match first["type"]:
         case "value_error":
-            complaint = str(first["ctx"]["error"])
-            return here + complaint
+            message = str(first["ctx"]["error"])
+            return here + message
         case "json_invalid":
-            return "expected sections and values as TOML has them, nested less deeply or with fewer digits"
+            return "expected sections and values as in TOML, with fewer levels of nesting or fewer digits"
         case "extra_forbidden":
             return _unknown(path, scenario)
         case "missing":
             return f"{here}expected a value, received none"
         case "union_tag_not_found" | "union_tag_invalid" if place.kind:
-            return f"{place.dotted}.{_untold(place.kind, first['input'])}"
+            return f"{place.dotted}.{_unknown_member(place.kind, first['input'])}"
         case "literal_error":
             valid = re.findall("'([^']*)'", first["ctx"]["expected"])
             received += did_you_mean(str(first["input"]), valid)
@@ -229,32 +229,32 @@ def explain(error: ValidationError, scenario: type[BaseModel]) -> str:
 
 
 def _expected(error: Mapping[str, Any]) -> str:
-    """Return what a field asks for, without the words of Python and pydantic."""
+    """Return the expected value of a field, without terms of Python and pydantic."""
     context = error.get("ctx", {})
     try:
         text = EXPECTED.get(error["type"], OTHERWISE).format(**context)
-    except (KeyError, ValueError):  # a bound that is no number
+    except (KeyError, ValueError):  # a bound that is not a number
         text = OTHERWISE
     return text.replace(" 1 characters", " 1 character").replace(" 1 entries", " 1 entry")
 
 
-def _untold(kind: Kind, table: Any) -> str:
-    """Complaint about a member that its family does not have."""
-    tag = table.get(kind.told_apart_by) if isinstance(table, dict) else None  # the error's own tag is text
+def _unknown_member(kind: Kind, table: Any) -> str:
+    """Return the message for a member that its family does not have."""
+    tag = table.get(kind.discriminator) if isinstance(table, dict) else None  # the error's own tag is text
     near = did_you_mean(str(tag), kind.members)
     received = "none" if tag is None else shown(tag)
-    own = " or FILE.py:NAME" if _may_be_own(kind) else ""
-    return f"{kind.told_apart_by}: expected one of {', '.join(kind.members)}{own}, received {received}{near}"
+    more = " or FILE.py:NAME" if _allows_user_code(kind) else ""
+    return f"{kind.discriminator}: expected one of {', '.join(kind.members)}{more}, received {received}{near}"
 
 
-def _may_be_own(kind: Kind) -> bool:
+def _allows_user_code(kind: Kind) -> bool:
     member = next(iter(kind.members.values()))
-    extra = member.model_fields[kind.told_apart_by or ""].json_schema_extra
+    extra = member.model_fields[kind.discriminator or ""].json_schema_extra
     return isinstance(extra, dict) and extra.get("path") == "code"
 
 
 def _unknown(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
-    """Complaint about a name that its section does not have."""
+    """Return the message for a name that its section does not have."""
     *above, name = path
     place = place_of(scenario, tuple(above))
     members = place.kind.members.values() if place.kind else ()
@@ -274,12 +274,12 @@ def _unknown(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
 
 
 def _field_of_another(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
-    """What is amiss where a field is that of another member of its family: a flag may have chosen this."""
+    """Return a hint if a field belongs to another member of its family, which a flag may have selected."""
     if len(path) < 3:
         return ""
     *above, tag, name = path
     family = place_of(scenario, tuple(above)).kind
     if family is None or family.is_list or tag not in family.members:
         return ""
-    owners = [each for each, member in family.members.items() if name in member.model_fields]
-    return f", a field of {family.told_apart_by} {' and '.join(owners)}, not of {tag}" if owners else ""
+    owners = [other for other, member in family.members.items() if name in member.model_fields]
+    return f", a field of {family.discriminator} {' and '.join(owners)}, not of {tag}" if owners else ""

@@ -1,4 +1,4 @@
-"""What the files of a scenario say: model, torque curves, and a digest by which they are known again."""
+"""Files of a scenario: model, torque curves, and a digest that identifies them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
 
 class Files(NamedTuple):
-    """What the files of a scenario say, read once for a session: an edit meanwhile changes nothing of it."""
+    """Content of the files of a scenario, read once for a session: later edits have no effect."""
 
     model: Mjcf
     actuator: Actuator
@@ -27,7 +27,7 @@ class Files(NamedTuple):
 
 
 def files_of(scenario: Scenario) -> Files:
-    """Read model file and torque curves of a scenario."""
+    """Read the model file and the torque curves of a scenario."""
     path = Path(scenario.plant.mjcf or actuators.MJCF_PATH)
     true, nominal = scenario.plant.torque_curve or SHIPPED, nominal_curve(scenario)
     actuator = actuators.load(path, _path(true))
@@ -39,7 +39,7 @@ def files_of(scenario: Scenario) -> Files:
 def nominal_curve(scenario: Scenario) -> str:
     """Return the torque curve of the controller's data sheet: a path, or `SHIPPED`.
 
-    A model file of the user's is another machine: the curve that comes with it belongs to its data sheet.
+    A user model file is another machine: the torque curve of the plant then belongs to its data sheet.
     """
     if scenario.nominal.torque_curve is not None:
         return scenario.nominal.torque_curve
@@ -47,8 +47,8 @@ def nominal_curve(scenario: Scenario) -> str:
     return (scenario.plant.torque_curve if follows else None) or SHIPPED
 
 
-def files_again(files: Files, before: ResolvedScenario, scenario: Scenario) -> Files:
-    """Files of a changed scenario: what it names as before stays as it was read."""
+def reload_files(files: Files, before: ResolvedScenario, scenario: Scenario) -> Files:
+    """Return the files of a changed scenario; a file with an unchanged name is not read again."""
     if scenario.plant.mjcf != before.plant.mjcf:
         return files_of(scenario)
     actuator, nominal, curve = files.actuator, files.nominal, nominal_curve(scenario)
@@ -68,16 +68,16 @@ def _path(curve: str) -> Path:
 
 
 def named_files(scenario: Scenario) -> tuple[str | None, ...]:
-    """Names by which a scenario finds its files."""
+    """Return the names of the files of a scenario."""
     return scenario.plant.mjcf, scenario.plant.torque_curve, nominal_curve(scenario)
 
 
 def digest(files: Files) -> str:
-    """Digest of all that files say of the physics, by which a snapshot knows its model."""
+    """Return the digest of the physical content of files, which identifies the model of a snapshot."""
     models = (files.model.described, files.model.loaded)
     content = [np.empty(mujoco.mj_sizeModel(model), np.uint8) for model in models]
     for model, buffer in zip(models, content, strict=True):
         mujoco.mj_saveModel(model, None, buffer)
     for actuator in (files.actuator, files.nominal):
         content += [actuator.torque_curve.phi_rad, actuator.torque_curve.torque_Nm_per_A]
-    return hashlib.sha256(b"".join(each.tobytes() for each in content)).hexdigest()
+    return hashlib.sha256(b"".join(array.tobytes() for array in content)).hexdigest()

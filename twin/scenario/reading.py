@@ -1,4 +1,4 @@
-"""From TOML and flags to a scenario: files found, paths taken from where they are written, all checked."""
+"""Reading of scenarios from TOML and flags: locate files, resolve paths, validate all fields."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ FOLDER = resources.files("spheretwin") / "scenario" / "shipped"
 
 
 def shipped() -> list[str]:
-    """Names of the scenarios that come with the package."""
+    """Return the names of the scenarios of the package."""
     return sorted(path.name.removesuffix(".toml") for path in FOLDER.iterdir() if path.name.endswith(".toml"))
 
 
 def read(source: str) -> dict[str, Any]:
-    """Fields of a shipped scenario or of a TOML file, by section.
+    """Return the fields of a shipped scenario or of a TOML file, by section.
 
     Raises
     ------
     InputError
-        No such scenario, or a file that cannot be read.
+        The scenario does not exist, or its file cannot be read.
     """
     path = _from_home(source)
     if source in shipped():
@@ -43,7 +43,7 @@ def read(source: str) -> dict[str, Any]:
     elif source.endswith(".toml"):
         try:
             text = Path(path).read_text(encoding="utf-8-sig")  # some editors write a byte-order mark
-        except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a zero in the path
+        except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a null character in the path
             raise InputError(
                 f"scenario {source}: expected a readable TOML file, {without_breaks(error)}"
             ) from None
@@ -56,130 +56,130 @@ def read(source: str) -> dict[str, Any]:
         fields = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"scenario {source}: expected valid TOML, {without_breaks(error)}") from None
-    return beside(os.path.dirname(path), fields)
+    return resolve_paths(os.path.dirname(path), fields)
 
 
 def is_dotted(name: object) -> bool:
-    """Whether a name can be that of a field."""
+    """True if a name can be the dotted name of a field."""
     return isinstance(name, str) and all(name.split(".")) and not name[0].isdecimal()
 
 
 def override(fields: dict[str, Any], dotted: str, value: Any) -> None:
-    """Put a value into fields by section, in place; a number is a place in a list of tables.
+    """Set a value in fields by section, in place; a number is an index of a list of tables.
 
     Raises
     ------
     InputError
-        The name is none of a field, or a place beyond the end of its list.
+        The name is not valid, or an index is beyond the end of its list.
     """
     if not is_dotted(dotted):
         raise InputError(f"scenario: expected a field such as controller.law, received {shown(dotted)}")
     *sections, name = dotted.split(".")
     inside: Any = fields
     for section, below in zip(sections, [*sections[1:], name], strict=False):
-        inside = _entered(inside, section, [] if below.isdecimal() else {}, dotted)
+        inside = _enter(inside, section, [] if below.isdecimal() else {}, dotted)
     if isinstance(inside, list):
-        place = _place(inside, name, dotted)
+        place = _list_index(inside, name, dotted)
         inside[place : place + 1] = [value]
     else:
         inside[name] = value
 
 
-def _entered(inside: Any, part: str, empty: Any, dotted: str) -> Any:
-    """What is in a section or a list under a name or at a place; made where it is not there yet."""
+def _enter(inside: Any, part: str, empty: Any, dotted: str) -> Any:
+    """Return the entry of a section or a list; create it if it does not exist."""
     if isinstance(inside, dict):
-        found = inside.setdefault(part, empty)
+        entry = inside.setdefault(part, empty)
     else:
-        place = _place(inside, part, dotted)
+        place = _list_index(inside, part, dotted)
         if place == len(inside):
             inside.append(empty)
-        found = inside[place]
-    if not isinstance(found, dict | list) and found is not empty:
+        entry = inside[place]
+    if not isinstance(entry, dict | list) and entry is not empty:
         raise InputError(f"scenario: expected a section before the dot, received {dotted}")
-    return found
+    return entry
 
 
-def _place(inside: list[Any], part: str, dotted: str) -> int:
-    """Place in a list, or the one behind its end."""
+def _list_index(inside: list[Any], part: str, dotted: str) -> int:
+    """Return an index of a list, or the one after its end."""
     place = int(part) if part.isdecimal() and len(part) < 6 else len(inside) + 1
     if place > len(inside):
-        raise InputError(f"scenario: expected a place from 0 to {len(inside)} in a list, received {dotted}")
+        raise InputError(f"scenario: expected a list index from 0 to {len(inside)}, received {dotted}")
     return place
 
 
-def beside(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
-    """Take the paths that fields by section name from a folder, in place; a second time changes nothing."""
-    return with_files(fields, lambda path, _: os.path.join(folder, _from_home(path)))
+def resolve_paths(folder: str, fields: dict[str, Any]) -> dict[str, Any]:
+    """Resolve the paths in fields by section relative to a folder, in place; idempotent."""
+    return replace_files(fields, lambda path, _: os.path.join(folder, _from_home(path)))
 
 
-def with_files(fields: dict[str, Any], told: Callable[[str, str], str]) -> dict[str, Any]:
-    """Say otherwise which files fields by section name, in place.
+def replace_files(fields: dict[str, Any], replace: Callable[[str, str], str]) -> dict[str, Any]:
+    """Replace the files that fields by section name, in place.
 
     Parameters
     ----------
     fields : dict
-    told : callable
-        Of a path, or a reference into a file, and the field's name; returns what stands there instead.
+    replace : callable
+        Receives a path, or a reference into a file, and the name of the field; returns the replacement.
     """
     for named in files_in(fields, section_kind(Scenario)):
-        named.fields[named.name] = told(named.fields[named.name], named.dotted)
+        named.fields[named.name] = replace(named.fields[named.name], named.dotted)
     for event in _events(fields):
-        event["value"] = value_with_files(event["set"], event["value"], told)
+        event["value"] = replace_value_files(event["set"], event["value"], replace)
     return fields
 
 
-def value_beside(folder: str, dotted: str, value: Any) -> Any:
-    """Value of one field, the paths in it taken from a folder."""
-    return value_with_files(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
+def resolve_value_paths(folder: str, dotted: str, value: Any) -> Any:
+    """Return the value of one field with its paths resolved relative to a folder."""
+    return replace_value_files(dotted, value, lambda path, _: os.path.join(folder, _from_home(path)))
 
 
-def value_with_files(dotted: str, value: Any, told: Callable[[str, str], str]) -> Any:
-    """Value of one field with other files; `told` as in `with_files`."""
-    inside: Any = with_files(alone(dotted, copy.deepcopy(value)), told)
+def replace_value_files(dotted: str, value: Any, replace: Callable[[str, str], str]) -> Any:
+    """Return the value of one field with replaced files; `replace` is as in `replace_files`."""
+    inside: Any = replace_files(single_field(dotted, copy.deepcopy(value)), replace)
     for part in dotted.split("."):
         inside = inside[0] if isinstance(inside, list) else inside[part]
     return inside
 
 
-def alone(dotted: str, value: Any) -> dict[str, Any]:
-    """Fields by section that hold one value; a list of tables has it in its first place."""
+def single_field(dotted: str, value: Any) -> dict[str, Any]:
+    """Return fields by section with one value; in a list of tables it is the first entry."""
     fields: dict[str, Any] = {}
     override(fields, ".".join("0" if part.isdecimal() else part for part in dotted.split(".")), value)
     return fields
 
 
 def named_files(fields: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Every file that fields by section name, now and by their events: its path, and the field's name."""
+    """Yield path and field name of every file that fields by section and their events name."""
     for named in files_in(fields, section_kind(Scenario)):
         path = named.fields[named.name]
         yield file_of(path) if is_reference(path) else path, named.dotted
     for event in _events(fields):
-        yield from named_files(alone(event["set"], event["value"]))
+        yield from named_files(single_field(event["set"], event["value"]))
 
 
 def _events(fields: dict[str, Any]) -> list[dict[str, Any]]:
-    """Events that are whole enough to look into; what else there is will be refused."""
+    """Return the events that are complete enough to be read; others are refused later."""
     listed = fields.get("event")
-    tables = [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
-    return [each for each in tables if is_dotted(each.get("set")) and "value" in each]
+    tables = [event for event in listed if isinstance(event, dict)] if isinstance(listed, list) else []
+    return [event for event in tables if is_dotted(event.get("set")) and "value" in event]
 
 
 def as_plain(value: Any) -> Any:
-    """Arrays and NumPy's numbers as Python has them; anything else, as a date of a TOML file, as text."""
+    """Return an array or a NumPy number as Python values, and anything else, such as a date, as text."""
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 
 def validated(fields: Mapping[str, Any], source: str, kind: type[Scenario] | None = None) -> Scenario:
-    """Scenario of fields by section.
+    """Return the scenario of fields by section.
 
     Parameters
     ----------
     fields : mapping
-        As JSON and TOML have them.
+        Values as in JSON and TOML.
     source : str
-        Where they come from, for complaints.
+        Origin of the fields, for messages.
     kind : type, optional
-        Class of the scenario; the one that has the law that the fields name unless given.
+        Class of the scenario; default: the class with the law that the fields name.
 
     Raises
     ------
@@ -192,19 +192,19 @@ def validated(fields: Mapping[str, Any], source: str, kind: type[Scenario] | Non
 
 
 def scenario_type(fields: Mapping[str, Any]) -> type[Scenario]:
-    """Class of the scenarios that have the law that fields by section name.
+    """Return the class of the scenarios with the law that fields by section name.
 
     Raises
     ------
     InputError
-        The law is one in a file, and cannot be had.
+        The law is in a file and cannot be loaded.
     """
     controller = fields.get("controller")
     return scenario_with(controller.get("law") if isinstance(controller, Mapping) else None)
 
 
 def from_json(text: str | bytes, source: str, kind: type[Scenario]) -> Scenario:
-    """Scenario of JSON, checked but for its texts, which are `check_texts`'.
+    """Return the scenario of JSON, validated except for its texts, which `check_texts` checks.
 
     Raises
     ------
@@ -220,35 +220,35 @@ def from_json(text: str | bytes, source: str, kind: type[Scenario]) -> Scenario:
 def _from_home(path: str) -> str:
     try:
         return os.path.expanduser(path)
-    except ValueError:  # a zero in the name of a user; it is refused where the path is used
+    except ValueError:  # a null character in a user name; it is refused when the path is used
         return path
 
 
 def as_json(source: str, fields: Any) -> bytes:
-    """Fields as JSON, so that arrays become tuples while numbers stay strictly typed.
+    """Return fields as JSON, so that arrays become tuples while numbers stay strictly typed.
 
     Raises
     ------
     InputError
-        They are not as TOML has them.
+        A value is not possible in TOML.
     """
     try:
         return json.dumps(fields, default=as_plain, ensure_ascii=False).encode()
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(
-            f"scenario {source}: expected sections and values as TOML has them, received {foreign(error)}"
+            f"scenario {source}: expected sections and values as in TOML, received {foreign(error)}"
         ) from None
 
 
 def foreign(error: TypeError | ValueError | RecursionError) -> str:
-    """Return what JSON cannot write, by the error of its writer."""
+    """Return a description of the value that JSON cannot write, from the error of its writer."""
     if isinstance(error, UnicodeEncodeError):
         return f"a text with {shown(error.object[error.start])}"
     return "a name that is no text" if isinstance(error, TypeError) else "digits or levels without end"
 
 
 def check_texts(source: str, scenario: Scenario) -> None:
-    """Refuse what must not end up in terminals, in file names and in other programs' files.
+    """Refuse text that is not safe in terminals, in file names and in files of other programs.
 
     Raises
     ------
@@ -257,7 +257,9 @@ def check_texts(source: str, scenario: Scenario) -> None:
     """
     for dotted, text, _ in fields_of(scenario):
         breaks = "\n\t" if dotted == "description" else ""
-        if isinstance(text, str) and not is_plain("".join(each for each in text if each not in breaks)):
+        if isinstance(text, str) and not is_plain(
+            "".join(character for character in text if character not in breaks)
+        ):
             raise InputError(
                 f"scenario {source}: {dotted}: expected text without control characters,"
                 f" received {shown(text)}"
@@ -268,14 +270,14 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
     """Read ``--section.field value…`` pairs into values by dotted name.
 
     Numbers, ``true``, ``false`` and ``null`` are read as such, several values as a list; all else is text.
-    A place in a list of tables is a number: ``--event.0.t-s 1``.
+    An index of a list of tables is a number: ``--event.0.t-s 1``.
 
     Raises
     ------
     InputError
-        A token is no flag, or a flag has no value.
+        A token is not a flag, or a flag has no value.
     """
-    found: dict[str, Any] = {}
+    values_by_name: dict[str, Any] = {}
     groups = _grouped(tokens)
     law = next((values[0] for flag, values in groups if flag == "controller.law" and values), None)
     texts = _text_fields(scenario_with(law)) if is_reference(law) else _TEXT_FIELDS
@@ -283,36 +285,36 @@ def overrides(tokens: Sequence[str]) -> dict[str, Any]:
         if not values:
             raise InputError(f"command line: expected a value after --{flag}, received none")
         name = flag.replace("-", "_")
-        read = [text if _anywhere(name) in texts else _value(text) for text in values]
-        found[name] = read[0] if len(read) == 1 else read
-    return found
+        read = [text if _without_indices(name) in texts else _value(text) for text in values]
+        values_by_name[name] = read[0] if len(read) == 1 else read
+    return values_by_name
 
 
-def described(scenario: Scenario) -> list[tuple[str, str, str]]:
-    """Flag, value in force and meaning of every field of a scenario."""
+def field_descriptions(scenario: Scenario) -> list[tuple[str, str, str]]:
+    """Return flag, present value and meaning of every field of a scenario."""
     families = {
-        f"{name}.{kind.told_apart_by}": f": {', '.join(kind.members)}"
+        f"{name}.{kind.discriminator}": f": {', '.join(kind.members)}"
         for name, field in every_field(type(scenario))
-        if (kind := kind_of(field)) and kind.told_apart_by
+        if (kind := kind_of(field)) and kind.discriminator
     }
     return [
         (
             "--" + dotted.replace("_", "-"),
             _shown(value),
-            (field.description or "") + families.get(_anywhere(dotted), ""),
+            (field.description or "") + families.get(_without_indices(dotted), ""),
         )
         for dotted, value, field in fields_of(scenario)
     ]
 
 
-def _anywhere(dotted: str) -> str:
-    """Name of a field, whatever its place in a list."""
+def _without_indices(dotted: str) -> str:
+    """Return the name of a field with every list index replaced by `INDEX`."""
     return re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", dotted)
 
 
 def _shown(value: Any) -> str:
     if isinstance(value, tuple):
-        nested = any(isinstance(each, tuple) for each in value)
+        nested = any(isinstance(entry, tuple) for entry in value)
         return json.dumps(value) if nested else " ".join(map(_shown, value))
     if isinstance(value, dict | list | bool):
         return json.dumps(value, ensure_ascii=False)
@@ -340,7 +342,7 @@ def _value(text: str) -> Any:
             value = read(text)
         except (ValueError, RecursionError):
             continue
-        # Digits without end read as infinity; a complaint about them shall show what was given.
+        # Too many digits read as infinity; a message about them must show the given text.
         return text if value in (math.inf, -math.inf) and "inf" not in text.lower() else value
     return text
 

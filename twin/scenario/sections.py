@@ -1,4 +1,4 @@
-"""Everything one run depends on: the sections of a scenario, each value with its range and meaning."""
+"""Sections of a scenario: all inputs of a run, each value with its range and meaning."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ from spheretwin.trajectories.rounding import Bounded, Triple
 
 NOMINAL = "nominal"
 
-# Joint bearings: assumed, as no sheet is at hand (2 mN·m is the lighter of two guesses, 5 the heavier).
+# Joint bearings: assumed, as no data sheet is available (2 mN·m is the lower of two estimates, 5 the higher).
 PROTOTYPE_BEARINGS: dict[str, Any] = {
     "plant.coulomb_Nm": (2e-3, 2e-3, 2e-3),
     "plant.viscous_Nm_s": (1e-4, 1e-4, 1e-4),
 }
 
-# The prototype's software is not described: rates are estimated by the filter of least noise for its lag.
+# The prototype's software is not documented: the estimator is the one with the least noise for its lag.
 PROTOTYPE_ESTIMATOR: dict[str, Any] = {"estimator.kind": "kalman"}
 
-# Assumed: a laboratory does not run such a machine without one.
+# Assumed: a laboratory does not run such a machine without a watchdog.
 PROTOTYPE_WATCHDOG: dict[str, Any] = {"watchdog.on": True}
 
 
 def _section(fields: dict[str, Any]) -> dict[str, Any]:
-    """Fields of one section by name, those of the sections in it as well, from fields by dotted name."""
+    """Return the fields of one section and of its sections, from fields by dotted name."""
     section: dict[str, Any] = {}
     for dotted, value in fields.items():
         _, *above, name = dotted.split(".")
@@ -58,7 +58,7 @@ def _section(fields: dict[str, Any]) -> dict[str, Any]:
     return section
 
 
-# The controller is built by the sheets of its own machine.
+# The controller is designed with the data sheets of its own machine.
 PROTOTYPE_NOMINAL: dict[str, Any] = {
     f"{NOMINAL}.{name}": value
     for name, value in {
@@ -79,30 +79,30 @@ HARDWARE: dict[str, dict[str, Any]] = {
         **PROTOTYPE_NOMINAL,
     },
 }
-"""Fields by dotted name that a set gives a value to; each of them can be set alone as well."""
+"""Hardware sets: fields by dotted name and their values; each field can also be set separately."""
 
 
-def left_open(fields: dict[str, Any], name: Any) -> dict[str, Any]:
-    """Return the fields of a set that given fields by section do not state."""
+def hardware_defaults(fields: dict[str, Any], name: Any) -> dict[str, Any]:
+    """Return the fields of a hardware set that given fields by section do not contain."""
     nominal = fields.get(NOMINAL)
-    knows_truth = isinstance(nominal, dict) and nominal.get("equals_truth") is True
+    equals_truth = isinstance(nominal, dict) and nominal.get("equals_truth") is True
     return {
         dotted: value
-        for dotted, value in fields_of_set(name, knows_truth).items()
-        if not _said(fields, dotted)
+        for dotted, value in hardware_fields(name, equals_truth).items()
+        if not _is_given(fields, dotted)
     }
 
 
-def fields_of_set(name: str, knows_truth: bool) -> dict[str, Any]:
-    """Return the fields of a set; a nominal model that equals the truth takes none of its own from it."""
+def hardware_fields(name: str, equals_truth: bool) -> dict[str, Any]:
+    """Return the fields of a hardware set; without nominal values if the nominal model equals the truth."""
     return {
         dotted: value
         for dotted, value in HARDWARE.get(name, {}).items()
-        if not (knows_truth and dotted.startswith(f"{NOMINAL}."))
+        if not (equals_truth and dotted.startswith(f"{NOMINAL}."))
     }
 
 
-def _said(fields: Any, dotted: str) -> bool:
+def _is_given(fields: Any, dotted: str) -> bool:
     for part in dotted.split("."):
         if not isinstance(fields, dict) or part not in fields:
             return False
@@ -112,19 +112,19 @@ def _said(fields: Any, dotted: str) -> bool:
 
 NonNegativeTriple = tuple[NonNegative, NonNegative, NonNegative]
 
-# A torque matrix of nothing asks for endless currents.
+# A torque matrix near zero needs infinite currents.
 LEAST_SCALE = 1e-3
 
-# A tick must end before its user does: 10,000 physics steps take some 50 ms.
+# A tick must end in reasonable time: 10,000 physics steps take some 50 ms.
 MOST_SUBSTEPS = 10_000
 
-# A slip of the pen must not take for ever: which of them act is asked of each.
+# Bounds the time of a mistyped list: each tick asks every fault whether it acts.
 MOST_FAULTS = 1000
 
-# Commands on their way are kept, and moved on at every tick.
+# Bounds memory and time: delayed commands are stored and shifted at every tick.
 MOST_DELAY = 1000
 
-# Clock times are built from decimal fractions; a period and a step that fit do so to rounding only.
+# Clock times are decimal fractions: a period is a multiple of a step only up to rounding.
 WHOLE = 1e-9
 
 
@@ -142,62 +142,62 @@ class _Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class OwnController(ControllerSection):
-    """What a run under a law that its user made in Python says of it, in the place of a law's parameters."""
+class UserController(ControllerSection):
+    """Record of a user law that was passed as a Python object, in place of the parameters of a law."""
 
-    parameters: tuple[float, ...] = Field(description="numbers handed to the law")
+    parameters: tuple[float, ...] = Field(description="numbers passed to the law")
 
 
-class OwnPath(_Section):
-    """What a run along a trajectory that its user made in Python says of it, in a shape's place."""
+class UserPath(_Section):
+    """Record of a user trajectory that was passed as a Python object, in place of a shape."""
 
     shape: str = Field(description="class of the object that is followed")
 
     def notes(self) -> list[str]:
-        """Nothing is known of it."""
+        """Return no notes: the parameters of the object are unknown."""
         return []
 
 
 class Event(_Section):
-    """A change that the run makes of itself on its way."""
+    """Event: a change at a stated time of the run."""
 
     t_s: Annotated[float, Field(ge=0, le=LARGEST)] = Field(
-        description="time from which the change is in force, s; at the first control tick from then on"
+        description="time of the change, s; effective at the first control tick from then on"
     )
     set: Annotated[str, Field(min_length=1)] = Field(description="field, such as disturbance.load")
     value: JsonValue = Field(description="its new value")
 
 
-class Plant(_Section):
-    """The rotor as it really is, and how its motion is integrated."""
+class PlantSection(_Section):
+    """True rotor, and the integration of its motion."""
 
     engine: EngineName = Field(
-        "mujoco", description="what computes the motion: MuJoCo, or the equations of motion (faster)"
+        "mujoco", description="engine that computes the motion: MuJoCo, or the equations of motion (faster)"
     )
     step_s: Annotated[float, Field(ge=1e-7, le=1)] = Field(5e-4, description="physics step, s")
     integrator: Literal["RK4", "Euler", "implicitfast"] = Field(
-        "RK4", description="integrator of MuJoCo; the Lagrangian has RK4 alone"
+        "RK4", description="integrator of MuJoCo; the Lagrangian has only RK4"
     )
     modelling_error: Annotated[float, Field(gt=-1, le=100)] = Field(
         0.0, description="m: the rotor's inertia is (1 + m) times the model file's"
     )
     modelling_torque_Nm: Triple = Field(
-        (0.0, 0.0, 0.0), description="constant torque the controller does not know, N·m (paper: ΔG)"
+        (0.0, 0.0, 0.0), description="constant torque that the controller does not know, N·m (paper: ΔG)"
     )
     gravity_m_s2: Annotated[float, Field(ge=0, le=100)] | None = Field(
         None, description="gravity along -z, m/s²; the model's unless given"
     )
     coulomb_Nm: NonNegativeTriple = Field(
-        (0.0, 0.0, 0.0), description="Coulomb friction of each hinge, N·m, beside what the model has"
+        (0.0, 0.0, 0.0), description="Coulomb friction of each hinge, N·m, in addition to that of the model"
     )
     viscous_Nm_s: NonNegativeTriple = Field(
-        (0.0, 0.0, 0.0), description="viscous friction of each hinge, N·m·s, beside what the model has"
+        (0.0, 0.0, 0.0), description="viscous friction of each hinge, N·m·s, in addition to that of the model"
     )
     friction_smoothing_rad_s: Annotated[float, Field(ge=1e-9, le=1e3)] = Field(
         0.01, description="rate over which Coulomb friction changes sign, rad/s"
     )
     group_gain: tuple[Bounded, ...] | None = Field(
-        None, description="torque an ampere of each group over that of the torque curve; 1 unless given"
+        None, description="torque per ampere of each group over that of the torque curve; 1 unless given"
     )
     payload_kg: NonNegative = Field(0.0, description="point mass on the shaft's payload mount, kg")
     initial_rad: Triple | None = Field(
@@ -214,17 +214,17 @@ class Plant(_Section):
     )
 
 
-class Nominal(_Section):
-    """Data sheet of the controller: its own value of every quantity that it uses.
+class NominalSection(_Section):
+    """Data sheet of the controller: the nominal value of every quantity that the controller uses.
 
-    `hardware` and the user write it. A change of `plant`, `drive` or `sensors` does not change it. A value
-    that is not given is that of the model file, for ideal sensors, amplifiers and bearings.
+    `hardware` and the user set it. A change of `plant`, `drive` or `sensors` does not change it. The
+    default of a value is that of the model file, with ideal sensors, amplifiers and bearings.
     """
 
     equals_truth: bool = Field(
         False,
-        description="whether a value that is not given here is the true one (plant, drive, sensors) at the"
-        " start, or when this field is set; neither `hardware` nor the model file gives it then",
+        description="whether the default of each value is the true value (plant, drive, sensors) at the"
+        " start, or when this field is set; `hardware` and the model file are not used then",
     )
     torque_curve: Annotated[str, Field(min_length=1)] | None = Field(
         None,
@@ -233,7 +233,7 @@ class Nominal(_Section):
         json_schema_extra={"path": SHIPPED},
     )
     torque_scale: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
-        1.0, description="torque matrix over that of the torque curve; below 0, its sign is wrong"
+        1.0, description="torque matrix over that of the torque curve; its sign is wrong below 0"
     )
     inertia_kg_m2: tuple[Positive, Positive, Positive] | None = Field(
         None, description="principal inertias of the rotor, kg·m²; the model file's unless given"
@@ -254,9 +254,11 @@ class Nominal(_Section):
         None, description="lag of the currents, s; L/R of the model file unless given"
     )
     resistance_ohm: Positive | None = Field(
-        None, description="of a group, ohm; the model file's unless given"
+        None, description="resistance of a group, ohm; the model file's unless given"
     )
-    inductance_H: Positive | None = Field(None, description="of a group, H; the model file's unless given")
+    inductance_H: Positive | None = Field(
+        None, description="inductance of a group, H; the model file's unless given"
+    )
     swing_V: NonNegative | None = Field(
         None, description="largest voltage of the amplifiers, V; 0 for no limit; 0 unless given"
     )
@@ -278,43 +280,44 @@ class Nominal(_Section):
 
     @field_validator("torque_scale")
     @classmethod
-    def _not_nothing(cls, scale: float) -> float:
+    def _not_zero(cls, scale: float) -> float:
         if abs(scale) < LEAST_SCALE:
             raise ValueError(f"expected a magnitude of at least {LEAST_SCALE:g}, received {scale!r}")
         return scale
 
 
 class Scenario(_Section):
-    """Everything a run depends on."""
+    """Scenario: all inputs of a run."""
 
     name: str = Field("unnamed", description="name of the scenario")
-    description: str = Field("", description="what it shows")
+    description: str = Field("", description="purpose of the scenario")
     duration: Positive = Field(5.0, description="length of the run, s")
     seed: Annotated[int, Field(ge=0)] = Field(
-        0, description="seed of all that is drawn: random torque, errors and noise"
+        0, description="seed of all random numbers: random torque, errors and noise"
     )
     allocation: AllocationName = Field(
         "least_norm",
-        description="currents for a torque: least-norm and scaled at the limit (16), or all the limit allows",
+        description="currents for a torque: least-norm and scaled at the limit (16), or the largest torque"
+        " within the limit",
     )
     hardware: HardwareName = Field(
-        "ideal", description="named set of fields; it gives those a value that are not set themselves"
+        "ideal", description="named set of field values; it applies to fields that are not set"
     )
     trajectory: SerializeAsAny[Trajectory]
     controller: SerializeAsAny[AnyLaw] = AFSM()
     manual: ManualSection = ManualSection()
-    nominal: Nominal = Nominal()
+    nominal: NominalSection = NominalSection()
     sensors: SensorsSection = SensorsSection()
     estimator: SerializeAsAny[AnyEstimator] = Ideal()
-    plant: Plant = Plant()
+    plant: PlantSection = PlantSection()
     drive: DriveSection = DriveSection()
     disturbance: Disturbance = Disturbance()
     fault: Annotated[tuple[Fault, ...], Field(max_length=MOST_FAULTS)] = Field(
-        (), description="what fails, [[fault]] each"
+        (), description="faults, one table [[fault]] each"
     )
     detector: DetectorSection = DetectorSection()
     watchdog: WatchdogSection = WatchdogSection()
-    event: tuple[Event, ...] = Field((), description="changes on the way, [[event]] each")
+    event: tuple[Event, ...] = Field((), description="changes during the run, one table [[event]] each")
 
     @model_validator(mode="after")
     def _clocks_fit(self) -> Scenario:
@@ -324,10 +327,10 @@ class Scenario(_Section):
                 f"expected controller.period_s a whole multiple of plant.step_s, 1 to {MOST_SUBSTEPS} times,"
                 f" received {self.controller.period_s!r} and {self.plant.step_s!r} s"
             )
-        known_s = self.nominal.delay_s
-        if known_s is not None and known_s > MOST_DELAY * self.controller.period_s:
+        delay_s = self.nominal.delay_s
+        if delay_s is not None and delay_s > MOST_DELAY * self.controller.period_s:
             raise ValueError(
-                f"expected nominal.delay_s of at most {MOST_DELAY} control periods, received {known_s!r} s"
+                f"expected nominal.delay_s of at most {MOST_DELAY} control periods, received {delay_s!r} s"
             )
         delay(self.drive, self.plant.step_s, self.substeps, 1)  # a whole number of physics steps
         if self.ticks < 1:
@@ -345,7 +348,7 @@ class Scenario(_Section):
                 )
             step_s = {"adc": self.controller.period_s, "controller": self.plant.step_s}.get(fault.kind.name)
             if fault.mode == "delay" and step_s is not None:
-                _check_late(f"fault.{place}.value", fault.number, step_s, self.controller.period_s)
+                _check_late(f"fault.{place}.value", fault.effective_value, step_s, self.controller.period_s)
         check_gains(self.fault)
         return self
 
@@ -360,23 +363,23 @@ class Scenario(_Section):
 
     @property
     def detects(self) -> bool:
-        """Whether the controller looks for groups that do not follow."""
+        """True if the fault detector of the controller is on."""
         return self.detector.detect or any(fault.detect for fault in self.fault)
 
     @property
     def senses_currents(self) -> bool:
-        """True if there are sensors of the group currents."""
+        """True if there are current sensors."""
         return self.detects or self.sensors.current.noise_A > 0
 
     @property
     def measures_truth(self) -> bool:
-        """True if the controller is handed the true angles and rates, whatever fails."""
+        """True if the controller receives the true angles and rates, also during faults."""
         faulty = any(fault.kind.measured for fault in self.fault)
         return self.sensors.ideal and not faulty and self.estimator.kind == "ideal"
 
     @property
     def supervises_groups(self) -> bool:
-        """Whether groups may fail, or are looked after."""
+        """True if groups may fail or are monitored."""
         return bool(self.fault) or self.detects
 
     @property
@@ -390,14 +393,14 @@ class Scenario(_Section):
         return round(self.controller.period_s / self.plant.step_s)
 
 
-class ResolvedPlant(Plant):
-    """Plant of a run. Without a gravity of its own, that of the model file acts, whatever its direction."""
+class ResolvedPlant(PlantSection):
+    """Plant of a run. Without `gravity_m_s2` the gravity of the model file acts, in any direction."""
 
     group_gain: tuple[Bounded, ...]
     initial_rad: Triple
 
 
-class ResolvedNominal(Nominal):
+class ResolvedNominal(NominalSection):
     """Data sheet of the controller of a run: every value is given."""
 
     torque_curve: str
@@ -435,34 +438,34 @@ def _check_late(name: str, delay_s: float, step_s: float, period_s: float) -> No
 
 
 def scenario_with(law: Any) -> type[Scenario]:
-    """Class of scenarios with a law: the common one, or one whose laws are those shipped and a user's.
+    """Return the class of scenarios with a law: the common one, or one with the shipped laws and a user law.
 
     Raises
     ------
     InputError
-        The law is one in a file, and cannot be had.
+        The law is in a file and cannot be loaded.
     """
-    return _extended(parameters_of(law)) if is_reference(law) else Scenario
+    return _scenario_class(parameters_of(law)) if is_reference(law) else Scenario
 
 
 def kind_of_scenario(scenario: Scenario) -> type[Scenario]:
-    """Class of the scenarios with the law of a scenario, as it was read."""
+    """Return the class of the scenarios with the law of a scenario, as it was read."""
     controller = scenario.controller
     if is_reference(controller.law) and isinstance(controller, LawParameters):
-        return _extended(type(controller))
+        return _scenario_class(type(controller))
     return Scenario
 
 
 @lru_cache(maxsize=32)
-def _extended(own: type[LawParameters]) -> type[Scenario]:
-    laws: Any = Annotated[get_args(AnyLaw)[0] | own, Field(discriminator="law")]
+def _scenario_class(user_law: type[LawParameters]) -> type[Scenario]:
+    laws: Any = Annotated[get_args(AnyLaw)[0] | user_law, Field(discriminator="law")]
 
     class Extended(Scenario):
         controller: SerializeAsAny[laws] = Scenario.model_fields["controller"].default
 
         def __reduce__(self) -> tuple[Any, ...]:
-            """A class made for a file is made anew where it is unpickled; what the scenario holds stays."""
-            return _blank, (own.model_fields["law"].default,), self.__getstate__()
+            """Pickle by the name of the law: the class is created again when a scenario is unpickled."""
+            return _blank, (user_law.model_fields["law"].default,), self.__getstate__()
 
     Extended.__name__ = Extended.__qualname__ = Scenario.__name__
     return Extended

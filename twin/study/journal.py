@@ -51,13 +51,13 @@ def _digest(told: Any) -> str:
 def _contents(rows: Rows) -> Iterator[Any]:
     """Values of the base and of what differs from row to row, with the content of each file for its path."""
     study = rows.study
-    yield reading.with_files(rows.base.model_dump(mode="json"), _content)
+    yield reading.replace_files(rows.base.model_dump(mode="json"), _content)
     named = [(axis.field, value) for axis in study.axis for value in getattr(axis, "values", ())]
     named += [("controller", dict(law)) for law in study.law]
     for dotted, value in named:
         if isinstance(value, str | list | dict):  # a number names no file
-            found = reading.alone(dotted, reading.value_beside(study.folder, dotted, value))
-            yield reading.with_files(found, _content)
+            found = reading.single_field(dotted, reading.resolve_value_paths(study.folder, dotted, value))
+            yield reading.replace_files(found, _content)
     for name in study.metrics:
         if is_reference(name):
             yield _content(study.beside(name), "metrics")

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from spheretwin.metrics import METRICS, Metric, Planned
+from spheretwin.metrics import METRICS, Metric, PlannedRun
 from spheretwin.models.base.errors import (
     InputError,
     LawError,
@@ -24,12 +24,12 @@ from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import TelemetryBuffer
 from spheretwin.provenance import record_of
-from spheretwin.run import OwnMetric, Run, check_names, own_value
+from spheretwin.run import Run, UserMetric, check_names, own_value
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field
 from spheretwin.scenario.files import Files, files_of, named_files
-from spheretwin.scenario.sections import Scenario, left_open, scenario_with
+from spheretwin.scenario.sections import Scenario, hardware_defaults, scenario_with
 from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
 from spheretwin.study.axes import Axis
@@ -188,7 +188,7 @@ class Rows:
     def _found_one(self, dotted: str, value: Any) -> Any:
         if not isinstance(value, str | list | tuple | dict):  # a number names no file
             return value
-        return reading.value_beside(self.study.folder, dotted, value)
+        return reading.resolve_value_paths(self.study.folder, dotted, value)
 
     def _names_engine(self) -> bool:
         """Whether the plant is chosen by who wrote the study, or the scenario."""
@@ -198,7 +198,7 @@ class Rows:
 
     def _followed(self, row: Row, scenario: Scenario, session: Session) -> Result:
         metrics = {
-            name: METRICS[name](Planned(session.begun_as, session.actuator, scenario.ticks))
+            name: METRICS[name](PlannedRun(session.begun_as, session.actuator, scenario.ticks))
             for name in self.metrics
         }
         sinks: list[Sink] = [follower(metrics)]
@@ -233,9 +233,11 @@ class Rows:
     def _whole(self, fields: dict[str, Any]) -> dict[str, Any]:
         """Fields with what their hardware says of others, and their paths as they are found from here."""
         hardware = fields.get("hardware")
-        for dotted, value in left_open(fields, hardware if isinstance(hardware, str) else None).items():
+        for dotted, value in hardware_defaults(
+            fields, hardware if isinstance(hardware, str) else None
+        ).items():
             reading.override(fields, dotted, value)
-        return reading.beside("", fields) if self._names_files else fields
+        return reading.resolve_paths("", fields) if self._names_files else fields
 
     def _check_axes(self) -> None:
         """Find out before the first row whether each axis names a field."""
@@ -321,13 +323,13 @@ def _value_at(whole: Mapping[str, Any], dotted: str, value: Any) -> Any:
     return inside if isinstance(inside, list) else value
 
 
-def _own_metrics(references: list[str]) -> dict[str, OwnMetric]:
+def _own_metrics(references: list[str]) -> dict[str, UserMetric]:
     own = {each.rpartition(":")[2]: load_function(each, "metric") for each in references}
     check_names(own)
     return own
 
 
-def _own_value(name: str, metric: OwnMetric, run: Run, complaints: list[str]) -> Any:
+def _own_value(name: str, metric: UserMetric, run: Run, complaints: list[str]) -> Any:
     """A figure of the user's; None where it cannot be had: the row's other figures must not be lost by it."""
     try:
         return own_value(name, metric, run)

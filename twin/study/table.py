@@ -138,7 +138,7 @@ def _base(rows: Rows) -> dict[str, Any]:
     """The base scenario, its paths as they are from where the study is, so that it is one from anywhere."""
     folder = rows.study.folder or os.curdir
     fields = rows.base.model_dump(mode="json")
-    return reading.with_files(fields, lambda path, _: os.path.relpath(path, folder))
+    return reading.replace_files(fields, lambda path, _: os.path.relpath(path, folder))
 
 
 def _record(row: Row, result: Result, rows: Rows, base: dict[str, Any]) -> dict[str, Any]:

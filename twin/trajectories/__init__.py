@@ -1,4 +1,4 @@
-"""Reference trajectories: what one is, how its corners are rounded, and the names of the shapes."""
+"""Reference trajectories: interface, rounding of corners, and the list of shapes."""
 
 from typing import Annotated, get_args
 

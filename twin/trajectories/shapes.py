@@ -1,4 +1,4 @@
-"""A sine whose frequency sweeps."""
+"""Shapes of reference trajectories."""
 
 from typing import Annotated, Literal
 
@@ -14,7 +14,7 @@ Frequency = Annotated[float, Field(ge=1e-9, le=LARGEST)]
 
 
 class Chirp(Shape):
-    """``amplitude sin(phi(t))`` on each axis; after the sweep it goes on at the last frequency."""
+    """``amplitude sin(phi(t))`` on each axis; after the sweep the last frequency continues."""
 
     shape: Literal["chirp"] = Field("chirp", description="kind of trajectory")
     amplitude_rad: Triple = Field((0.1, 0.1, 0.1), description="amplitude on each axis, rad")
@@ -35,7 +35,7 @@ class Chirp(Shape):
         return np.stack(rows, axis=1)[:, :, None] * np.array(self.amplitude_rad)  # (n, 3, 3)
 
     def _swept(self, t: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """Turns done (1), frequency (Hz) and its growth (Hz/s) at times within the sweep."""
+        """Return turns (1), frequency (Hz) and its growth (Hz/s) at times within the sweep."""
         first, last, length = self.start_frequency_Hz, self.end_frequency_Hz, self.sweep_s
         if self.sweep == "linear" or first == last:
             slope = (last - first) / length
@@ -46,7 +46,7 @@ class Chirp(Shape):
 
 
 class Hold(Shape):
-    """One pose throughout: with another starting pose, a step response."""
+    """Constant pose; with another initial pose it gives a step response."""
 
     shape: Literal["hold"] = Field("hold", description="kind of trajectory")
     angle_rad: Triple = Field(ZERO, description="pose to hold, rad")
@@ -61,13 +61,13 @@ Farthest = Annotated[float, Field(gt=0, le=LARGEST)]
 
 
 class Jog(Shape):
-    """Every hinge turns at a steady rate until α or β is as far from upright as it may go."""
+    """Constant rates of all hinges, until α or β reaches its limit."""
 
     shape: Literal["jog"] = Field("jog", description="kind of trajectory")
     start_rad: Triple = Field(ZERO, description="pose at the start, rad")
     rate_rad_s: tuple[Bounded, Bounded, Bounded] = Field((0.0, 0.0, 0.5), description="rates, rad/s")
     farthest_rad: Farthest = Field(
-        1.3, description="largest angle of α and β, rad; one that begins beyond it turns back alone"
+        1.3, description="largest angle of α and β, rad; a hinge that starts beyond it may only turn back"
     )
 
     def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
@@ -85,7 +85,7 @@ class Jog(Shape):
         return Corners(ends[axes], np.zeros_like(jumps), jumps)
 
     def _ends_s(self) -> NDArray[np.float64]:
-        """Times (3,) at which the hinges stop; endless for γ, and for one that does not turn."""
+        """Return the times (3,) at which the hinges stop; infinite for γ and for a hinge at rest."""
         ends = np.full(3, np.inf)
         for axis in range(2):
             rate = self.rate_rad_s[axis]
@@ -110,20 +110,21 @@ class Component(BaseModel):
 
 
 class Multisine(Shape):
-    """A pose and the sines about it; in a file, each is a table ``[[trajectory.components]]``."""
+    """Pose plus sines; in a file, each sine is a table ``[[trajectory.components]]``."""
 
     shape: Literal["multisine"] = Field("multisine", description="kind of trajectory")
-    offset_rad: Triple = Field(ZERO, description="pose that the sines go about, rad")
+    offset_rad: Triple = Field(ZERO, description="mean pose of the sines, rad")
     components: Annotated[tuple[Component, ...], Field(min_length=1)] = Field(
-        (Component(),), description="sines that add: amplitude_rad, frequency_Hz and phase_rad of each axis"
+        (Component(),),
+        description="sines to be added: amplitude_rad, frequency_Hz and phase_rad of each axis",
     )
 
     def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
         samples = np.zeros((len(t), 3, 3))
         samples[:, 0] = self.offset_rad
-        for each in self.components:
-            amplitude, w = np.array(each.amplitude_rad), 2 * np.pi * np.array(each.frequency_Hz)
-            phase = t[:, None] * w + np.array(each.phase_rad)
+        for component in self.components:
+            amplitude, w = np.array(component.amplitude_rad), 2 * np.pi * np.array(component.frequency_Hz)
+            phase = t[:, None] * w + np.array(component.phase_rad)
             samples[:, 0] += amplitude * np.sin(phase)
             samples[:, 1] += amplitude * w * np.cos(phase)
             samples[:, 2] -= amplitude * w**2 * np.sin(phase)
@@ -165,7 +166,7 @@ class Sinusoid(Shape):
 
 
 class Steps(Shape):
-    """A pose, and others from stated times on; rates and accelerations are 0."""
+    """Poses from stated times on; rates and accelerations are 0."""
 
     shape: Literal["steps"] = Field("steps", description="kind of trajectory")
     start_rad: Triple = Field(ZERO, description="pose before the first step, rad")
@@ -197,7 +198,7 @@ class Steps(Shape):
 
 
 class Tilt(Shape):
-    """Rise at a steady rate, hold, fall; the other hinges stay at 0 (60)."""
+    """Rise at a constant rate, hold, fall; the other hinges stay at 0 (60)."""
 
     shape: Literal["tilt"] = Field("tilt", description="kind of trajectory")
     rate_rad_s: Bounded = Field(np.pi / 30, description="rate of α while rising, rad/s")

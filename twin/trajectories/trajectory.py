@@ -1,4 +1,4 @@
-"""What a trajectory is: angles, rates and accelerations of the three hinges as a function of time alone."""
+"""Trajectories: angles, rates and accelerations of the three hinges as functions of time."""
 
 from abc import abstractmethod
 from typing import Annotated, Any, Protocol
@@ -11,21 +11,28 @@ from spheretwin.models.base.errors import InputError, exception_text, shown
 from spheretwin.trajectories.rounding import CONFIG as CONFIG
 from spheretwin.trajectories.rounding import LARGEST as LARGEST
 from spheretwin.trajectories.rounding import ZERO as ZERO
-from spheretwin.trajectories.rounding import Approach, Corners, least_acceleration, no_corners, rounded, told
+from spheretwin.trajectories.rounding import (
+    Approach,
+    Corners,
+    format_acceleration,
+    least_acceleration,
+    no_corners,
+    rounded,
+)
 from spheretwin.trajectories.rounding import Bounded as Bounded
 from spheretwin.trajectories.rounding import Time as Time
 from spheretwin.trajectories.rounding import Triple as Triple
 
-# The file of a shape finds here all that it needs of these.
+# Re-exported, so that the file of a shape needs one import.
 
 Samples = NDArray[np.float64]
 
 
 class Sampled(Protocol):
-    """What a loop needs of a trajectory; a user's own is any object that has it."""
+    """Interface of a trajectory to the loop; a user trajectory is any object with this method."""
 
     def sample(self, t: NDArray[np.float64]) -> Samples:
-        """Desired motion at times `t` (s), for any times from 0 on and the same for the same times.
+        """Return the desired motion at any times `t` (s) from 0 on; equal times give equal motion.
 
         Returns
         -------
@@ -36,10 +43,10 @@ class Sampled(Protocol):
 
 
 class Shape(BaseModel):
-    """A shape that a scenario can name: its parameters, and the motion that they make.
+    """Shape of a scenario: parameters and motion.
 
-    A subclass says its motion in `sharp`, in `corners` where that jumps, and in `notes` what its parameters
-    alone do not tell.
+    A subclass defines the motion in `sharp`, its jumps in `corners`, and in `notes` facts that do not follow
+    from the parameters.
     """
 
     model_config = CONFIG
@@ -49,11 +56,11 @@ class Shape(BaseModel):
         description="acceleration that rounds corners (start from rest, jumps), rad/s²; sharp unless given",
     )
     approach: Approach | None = Field(
-        None, description="way to the shape from another motion; it begins at 0 s unless given"
+        None, description="transition to the shape from another motion; the shape begins at 0 s unless given"
     )
 
     def sample(self, t: NDArray[np.float64]) -> Samples:
-        """Desired motion at times `t` (s).
+        """Return the desired motion at times `t` (s).
 
         Returns
         -------
@@ -61,16 +68,16 @@ class Shape(BaseModel):
             Angle (rad), rate (rad/s) and acceleration (rad/s²) as rows, for each time.
         """
         if self.approach is not None:
-            return self.approach.join(self.led_to, t)
+            return self.approach.join(self.sample_after_approach, t)
         return self._rounded(t, self._start())
 
-    def led_to(self, t: NDArray[np.float64]) -> Samples:
-        """Motion at times of its own that a way to it leads to: it meets the rates at the start by itself."""
+    def sample_after_approach(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion after an approach, which provides the initial rates, at shape times `t`."""
         return self._rounded(t, np.zeros(3))
 
     @abstractmethod
     def sharp(self, t: NDArray[np.float64]) -> Samples:
-        """Desired motion as `sample` has it, its corners as they are.
+        """Return the desired motion as in `sample`, without rounding of its corners.
 
         Parameters
         ----------
@@ -84,11 +91,11 @@ class Shape(BaseModel):
         """
 
     def corners(self) -> Corners:
-        """Where angle or rate jump after the start, which no shape needs to tell."""
+        """Return the jumps of angle or rate after the start; default: none."""
         return no_corners()
 
     def notes(self) -> list[str]:
-        """What a user may want to know of the motion beside its parameters; one line each."""
+        """Return facts about the motion that do not follow from its parameters, one line each."""
         return []
 
     def _rounded(self, t: NDArray[np.float64], start_rad_s: NDArray[np.float64]) -> Samples:
@@ -98,11 +105,11 @@ class Shape(BaseModel):
         return rounded(samples, t, start_rad_s, self.corners(), self.rounding_rad_s2)
 
     def _start(self) -> NDArray[np.float64]:
-        """Rates (3,) with which it begins, where the rotor is at rest; an approach meets them by itself."""
+        """Return the rates (3,) to be rounded at the start; 0 with an approach, which provides them."""
         return np.zeros(3) if self.approach else self.sharp(np.zeros(1))[0, 1]
 
     def _check(self) -> None:
-        """Refuse what the fields cannot refuse one by one."""
+        """Check relations between fields."""
 
     @model_validator(mode="after")
     def _usable(self) -> "Shape":
@@ -111,49 +118,49 @@ class Shape(BaseModel):
             least = least_acceleration(self._start(), self.corners())
             if self.rounding_rad_s2 < least:
                 raise ValueError(
-                    f"expected rounding_rad_s2 of at least {told(least)} rad/s², so that no corner runs into"
-                    f" the next, received {self.rounding_rad_s2:.10g}"
+                    f"expected rounding_rad_s2 of at least {format_acceleration(least)} rad/s², so that"
+                    f" no corner overlaps the next, received {self.rounding_rad_s2:.10g}"
                 )
         return self
 
 
-class OwnTrajectory:
-    """A trajectory of the user's, each of its samples checked.
+class UserTrajectory:
+    """User trajectory whose samples are checked.
 
     Parameters
     ----------
-    own : Sampled
+    trajectory : Sampled
         Any object with ``sample(t)``.
 
     Attributes
     ----------
     name : str
-        Of its class.
+        Name of its class.
 
     Raises
     ------
     InputError
-        It has no such method, or what that gives at the start is no finite motion.
+        The object has no such method, or its motion at the start is not finite.
     """
 
-    def __init__(self, own: Sampled) -> None:
-        if isinstance(own, type) or not callable(getattr(own, "sample", None)):
-            raise InputError(f"trajectory: expected an object with sample(t), received {shown(own)}")
-        self._own, self.name = own, type(own).__name__
+    def __init__(self, trajectory: Sampled) -> None:
+        if isinstance(trajectory, type) or not callable(getattr(trajectory, "sample", None)):
+            raise InputError(f"trajectory: expected an object with sample(t), received {shown(trajectory)}")
+        self._trajectory, self.name = trajectory, type(trajectory).__name__
         start = self.sample(np.zeros(1))
         if not np.isfinite(start).all():
             raise InputError(f"trajectory: expected finite numbers at 0 s, received {start[0].tolist()}")
 
     def sample(self, t: NDArray[np.float64]) -> Samples:
-        """Desired motion at times `t` (s): a copy, as its maker may use the array again.
+        """Return a copy of the desired motion at times `t` (s), as the object may reuse its array.
 
         Raises
         ------
         InputError
-            The user's method failed, or gave something else than float64 of shape (n, 3, 3).
+            The method of the user failed, or did not return float64 of shape (n, 3, 3).
         """
         try:
-            samples = self._own.sample(t.copy())
+            samples = self._trajectory.sample(t.copy())
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # the user's code may raise anything
@@ -174,15 +181,15 @@ class OwnTrajectory:
         return np.array(samples, dtype=np.float64, order="C")
 
 
-def checked(own: Sampled) -> OwnTrajectory:
-    """A trajectory of the user's, found usable; one that is checked already stays as it is.
+def checked(trajectory: Sampled) -> UserTrajectory:
+    """Return a checked user trajectory; a trajectory that is already checked stays the same object.
 
     Raises
     ------
     InputError
-        It has no ``sample(t)``, or what that gives at the start is no finite motion.
+        It has no ``sample(t)``, or its motion at the start is not finite.
     """
-    return own if isinstance(own, OwnTrajectory) else OwnTrajectory(own)
+    return trajectory if isinstance(trajectory, UserTrajectory) else UserTrajectory(trajectory)
 
 
 def _shape_of(samples: Any) -> object:

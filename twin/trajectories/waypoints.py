@@ -1,8 +1,8 @@
-"""A path through the poses of a file."""
+"""Waypoints: a path through the poses of a file."""
 
 from __future__ import annotations
 
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -24,8 +24,8 @@ Between = Literal["minimum_jerk", "cubic"]
 Limit = Annotated[float, Field(gt=0)]
 
 
-class Peak(NamedTuple):
-    """Where a path is at its largest rate or acceleration."""
+class PathPeak(NamedTuple):
+    """Largest rate or acceleration of a path."""
 
     value: float
     """Magnitude, rad/s or rad/s²."""
@@ -33,7 +33,7 @@ class Peak(NamedTuple):
     axis: str
 
 
-class Path:
+class WaypointPath:
     """Polynomials from pose to pose; at rest before the first and from the last on.
 
     Parameters
@@ -46,20 +46,20 @@ class Path:
     """
 
     def __init__(self, poses: TimeSeries, between: Between) -> None:
-        self._known_by = poses, between
+        self._key = poses, between
         self._times, self._poses = poses.t_s, poses.values
         self._lasts = np.diff(poses.t_s)
-        made = _minimum_jerk(poses) if between == "minimum_jerk" else _cubic(poses)
-        self._polynomials = made  # of the share of a segment done: (powers, segments, 3)
+        polynomials = _minimum_jerk(poses) if between == "minimum_jerk" else _cubic(poses)
+        self._polynomials = polynomials  # of the share of a segment done: (powers, segments, 3)
 
     def __eq__(self, other: object) -> bool:
-        return self._known_by == other._known_by if isinstance(other, Path) else NotImplemented
+        return self._key == other._known_by if isinstance(other, WaypointPath) else NotImplemented
 
     def __hash__(self) -> int:
-        return hash(self._known_by)
+        return hash(self._key)
 
     def sample(self, t: Array) -> Samples:
-        """Motion as a trajectory has it.
+        """Return the motion in the form of a trajectory.
 
         Parameters
         ----------
@@ -81,27 +81,27 @@ class Path:
             samples[moving, row] = _derived(self._polynomials[:, segment], row, share, lasts)
         return samples
 
-    def peaks(self) -> tuple[Peak, Peak]:
-        """Largest rate and largest acceleration."""
+    def peaks(self) -> tuple[PathPeak, PathPeak]:
+        """Return the largest rate and the largest acceleration."""
         return self._peak(1), self._peak(2)
 
-    def _peak(self, row: int) -> Peak:
+    def _peak(self, row: int) -> PathPeak:
         shares = _candidates(self._polynomials)
         sizes = np.abs(_derived(self._polynomials, row, shares, self._lasts[:, None]))  # (k, segments, 3)
-        which, segment, axis = (int(each) for each in np.unravel_index(np.argmax(sizes), sizes.shape))
-        t = self._times[segment] + shares[which, segment, axis] * self._lasts[segment]
-        return Peak(float(sizes[which, segment, axis]), float(t), AXES[axis])
+        place, segment, axis = (int(index) for index in np.unravel_index(np.argmax(sizes), sizes.shape))
+        t = self._times[segment] + shares[place, segment, axis] * self._lasts[segment]
+        return PathPeak(float(sizes[place, segment, axis]), float(t), AXES[axis])
 
 
 class Waypoints(Shape):
     """Through the poses of a CSV file at their times; at rest before the first and from the last on.
 
-    The file is read when the shape is made: what becomes of it later changes nothing.
+    The file is read when the shape is created; later changes of the file have no effect.
 
     Raises
     ------
     InputError
-        The file is no series of poses, or the path breaks a limit.
+        The file is not a series of poses, or the path exceeds a limit.
     """
 
     shape: Literal["waypoints"] = Field("waypoints", description="kind of trajectory")
@@ -121,17 +121,17 @@ class Waypoints(Shape):
         None, description="acceleration that no axis may exceed, rad/s²; any unless given"
     )
 
-    _path: Path = PrivateAttr()
+    _path: WaypointPath = PrivateAttr()
 
     def sharp(self, t: Array) -> Samples:  # noqa: D102
         return self._path.sample(t)
 
-    def peaks(self) -> tuple[Peak, Peak]:
-        """Largest rate (rad/s) and largest acceleration (rad/s²) of the path, and where they are."""
+    def peaks(self) -> tuple[PathPeak, PathPeak]:
+        """Return the largest rate (rad/s) and acceleration (rad/s²) of the path, with their times."""
         return self._path.peaks()
 
     def notes(self) -> list[str]:
-        """Largest rate and acceleration of the path, which its file alone does not tell."""
+        """Return the largest rate and acceleration of the path, which do not follow from its parameters."""
         rate, acceleration = (
             f"{peak.value:.4g} {unit} ({ANGLES[AXES.index(peak.axis)]} at {peak.t_s:.4g} s)"
             for peak, unit in zip(self.peaks(), ("rad/s", "rad/s²"), strict=True)
@@ -139,32 +139,32 @@ class Waypoints(Shape):
         return [f"waypoints {self.file}: largest rate {rate}, largest acceleration {acceleration}"]
 
     def _check(self) -> None:
-        poses = read("waypoints", FilePath(self.file), COLUMNS, LARGEST)
+        poses = read("waypoints", Path(self.file), COLUMNS, LARGEST)
         if len(poses.t_s) < 2:
             raise InputError(f"waypoints {self.file}: expected at least two poses, received one")
-        self._path = Path(poses, self.between)
+        self._path = WaypointPath(poses, self.between)
         rate, acceleration = self._path.peaks()
         self._check_limit("rate", "rad/s", rate, self.largest_rate_rad_s)
         self._check_limit("acceleration", "rad/s²", acceleration, self.largest_acceleration_rad_s2)
 
-    def _check_limit(self, what: str, unit: str, peak: Peak, limit: float | None) -> None:
+    def _check_limit(self, quantity: str, unit: str, peak: PathPeak, limit: float | None) -> None:
         if limit is not None and peak.value > limit:
             most, received = distinct_texts(limit, peak.value)
             raise InputError(
-                f"waypoints {self.file}: expected a largest {what} of {most} {unit},"
+                f"waypoints {self.file}: expected a largest {quantity} of {most} {unit},"
                 f" received {received} {unit} on {peak.axis} at {peak.t_s:g} s"
             )
 
 
 def _minimum_jerk(poses: TimeSeries) -> Array:
-    """``10 u³ - 15 u⁴ + 6 u⁵`` of the way: no rate and no acceleration at either end."""
+    """Return the polynomials ``10 u³ - 15 u⁴ + 6 u⁵``: rate and acceleration are 0 at both ends."""
     way = np.diff(poses.values, axis=0)
     none = np.zeros_like(way)
     return np.stack([poses.values[:-1], none, none, 10 * way, -15 * way, 6 * way])
 
 
 def _cubic(poses: TimeSeries) -> Array:
-    from scipy.interpolate import CubicSpline  # slow to import, and few need it
+    from scipy.interpolate import CubicSpline  # slow to import, and rarely needed
 
     by_power = CubicSpline(poses.t_s, poses.values, bc_type="clamped").c[::-1]  # (4, segments, 3), of seconds
     scale = np.diff(poses.t_s) ** np.arange(4)[:, None]
@@ -172,19 +172,21 @@ def _cubic(poses: TimeSeries) -> Array:
 
 
 def _derived(polynomials: Array, row: int, share: Array, lasts: Array) -> Array:
-    """Angle, rate or acceleration (row 0, 1, 2) at shares of segments that last so many seconds."""
+    """Return angle, rate or acceleration (row 0, 1, 2) at shares of segments with durations in seconds."""
     derived: Array = polyval(share, polyder(polynomials, row), tensor=False) / lasts**row
     return derived
 
 
 def _candidates(polynomials: Array) -> Array:
-    """Shares (k, segments, 3) among which rate and acceleration of each segment are largest.
+    """Return the shares (k, segments, 3) at which rate and acceleration of a segment can be largest.
 
-    Minimum jerk is fastest half way, and pushed and braked hardest at (1 ∓ 1/√3)/2; the acceleration of a
-    cubic is largest at an end, its rate there or where the acceleration vanishes.
+    Minimum jerk has its largest rate at half of the way, and its largest accelerations at (1 ∓ 1/√3)/2. The
+    acceleration of a cubic is largest at an end, its rate at an end or where the acceleration is 0.
     """
     bend, twist = polynomials[2:4]
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # a line turns nowhere
+    with np.errstate(
+        divide="ignore", over="ignore", invalid="ignore"
+    ):  # the acceleration of a straight line has no zero
         turn = np.nan_to_num(np.clip(-bend / (3 * twist), 0.0, 1.0))
     fixed = [0.0, (1 - 1 / np.sqrt(3)) / 2, 0.5, (1 + 1 / np.sqrt(3)) / 2, 1.0]
     return np.stack([*(np.full_like(turn, share) for share in fixed), turn])

@@ -11,7 +11,7 @@ from problem import Problem, problem
 
 from spheretwin import scenario as scenarios
 from spheretwin import study as studies
-from spheretwin.metrics import METRICS, Planned
+from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.study import grid, row
@@ -69,7 +69,7 @@ class Prepared:
         self._sessions = [self._rows.session(self._rows.scenario(each)) for each in self._grid]
         for session in self._sessions:
             session.check_horizon(1)
-            session._exogenous.rows(0, 1)
+            session._inputs.rows(0, 1)
 
     def __call__(self) -> None:
         """Run them over all cores."""
@@ -78,7 +78,7 @@ class Prepared:
 
 
 def _flown(session: Session) -> dict[str, object]:
-    planned = Planned(session.begun_as, session.actuator, session.begun_as.ticks)
+    planned = PlannedRun(session.begun_as, session.actuator, session.begun_as.ticks)
     metrics = {name: METRICS[name](planned) for name in FIGURES}
     table = session.advance(session.begun_as.ticks)
     for metric in metrics.values():

@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.disturbances import Draws
-from spheretwin.electronics.drive_chain import Drive, drive
+from spheretwin.electronics.drive_chain import CurrentLag, current_lag
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.magnetics import TorqueModel, torque_model
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.scenario.sections import Scenario
 
 
@@ -25,7 +25,7 @@ class Problem(NamedTuple):
     nominal_inertia: np.ndarray  # (3,) kg·m²
     inertia: np.ndarray  # (3,) kg·m², the modelling error included
     magnetics: TorqueModel
-    drive: Drive
+    drive: CurrentLag
     period_s: float
     step_s: float
     substeps: int
@@ -52,14 +52,14 @@ def problem(scenario: Scenario) -> Problem:
         nominal_inertia=np.array(actuator.inertia),
         inertia=(1 + plant.modelling_error) * actuator.inertia,
         magnetics=torque_model(actuator),
-        drive=drive(group.inductance_H / group.resistance_ohm, plant.step_s, group.current_limit_A),
+        drive=current_lag(group.inductance_H / group.resistance_ohm, plant.step_s, group.current_limit_A),
         period_s=period_s,
         step_s=plant.step_s,
         substeps=scenario.substeps,
     )
 
 
-def bare_rotor(problem: Problem) -> Rotor:
+def bare_rotor(problem: Problem) -> MujocoRotor:
     """The rotor in MuJoCo, as the product sets it up."""
     modelling_error = problem.inertia[0] / problem.nominal_inertia[0] - 1
-    return Rotor(mjcf.read(actuators.MJCF_PATH), problem.step_s, "RK4", modelling_error, 0.0)
+    return MujocoRotor(mjcf.read(actuators.MJCF_PATH), problem.step_s, "RK4", modelling_error, 0.0)

@@ -11,7 +11,7 @@ from spheretwin.control.laws.afsm_eso import PRESETS, AFSMWithObserver, boosted
 from spheretwin.models.base.compiled import compiled_callback
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.lagrangian import coriolis_matrix, inertia_matrix
-from spheretwin.scenario.changes import changed
+from spheretwin.scenario.changes import with_change
 from spheretwin.simulation import simulate
 
 PERIOD = 1e-3
@@ -179,7 +179,7 @@ def test_ideal_is_the_default():
 
 def test_another_law_in_its_place_starts_with_its_own_gains():
     afsm = scenarios.load("hold", {"controller.law": "afsm"})
-    assert changed(afsm, "controller.law", "afsm_eso").controller == AFSMWithObserver()
+    assert with_change(afsm, "controller.law", "afsm_eso").controller == AFSMWithObserver()
 
 
 @pytest.mark.parametrize("bad", ["slow", 3, ["fast"], None])

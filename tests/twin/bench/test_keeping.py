@@ -8,7 +8,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recorded_run as reviewed
 from spheretwin.analysis import run_summary
-from spheretwin.outputs import Keeping
+from spheretwin.outputs import RecordingFiles
 from spheretwin.scenario import reading
 from tests.twin.bench.cases import begun, done, kept_rows, said
 
@@ -63,7 +63,7 @@ def test_what_goes_wrong_with_a_file_is_told_and_the_run_goes_on(tmp_path, monke
     def fails(self, rows):
         self.faults.append("the disk is full")
 
-    monkeypatch.setattr(Keeping, "write", fails)
+    monkeypatch.setattr(RecordingFiles, "write", fails)
     with begun() as made:
         done(made, "record", telemetry=str(tmp_path / "run.parquet"))
         assert made.advance(50) == 50

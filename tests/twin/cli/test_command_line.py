@@ -152,7 +152,7 @@ def test_hostile_arguments_are_refused_on_one_line(arguments, parts):
         assert part in line
 
 
-NAMES = [flag for flag, *_ in reading.described(scenarios.load("nutation"))]
+NAMES = [flag for flag, *_ in reading.field_descriptions(scenarios.load("nutation"))]
 VALUES = ["0", "-1", "1e999", "nan", "9" * 5000, "true", "null", "[1,2,3]", '{"a": 1}', "pd", "", LONG]
 
 flag = st.sampled_from(NAMES) | st.sampled_from(["--", "-", "--=", "---", "--a..b", "--live", "--json", "-x"])

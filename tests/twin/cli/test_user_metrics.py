@@ -5,7 +5,7 @@ import json
 import pytest
 
 from spheretwin import cli
-from spheretwin.cli.simulate import OwnMetrics
+from spheretwin.cli.simulate import UserMetrics
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.table import read_parquet
 
@@ -173,6 +173,6 @@ def test_nothing_is_kept_where_nothing_asks_for_it(file):
     from spheretwin.session import Session
 
     session = Session(scenarios.load("hold", {"duration": 0.05}))
-    assert OwnMetrics([]).sinks(session, 50) == []
+    assert UserMetrics([]).sinks(session, 50) == []
     with pytest.raises(InputError, match="fit in memory"):
-        OwnMetrics([f"{file}:largest"]).sinks(session, 10**15)
+        UserMetrics([f"{file}:largest"]).sinks(session, 10**15)

@@ -92,7 +92,7 @@ def test_the_error_of_a_run_stays_that_against_the_desired_motion(name):
 def test_every_part_is_a_flag_and_told():
     scenario = scenarios.load("hold", reading.overrides(FLAGS))
     assert scenario.controller.governor.acceleration_rad_s2 == (5.0, 5.0, 5.0)
-    rows = {flag: value for flag, value, _ in reading.described(scenario)}
+    rows = {flag: value for flag, value, _ in reading.field_descriptions(scenario)}
     assert rows["--controller.governor.acceleration-rad-s2"] == "5 5 5"
     assert rows["--controller.prediction.on"] == "true"
     assert rows["--controller.feed-forward.friction"] == "0.8 0.8 0.8"

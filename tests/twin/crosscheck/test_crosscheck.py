@@ -20,7 +20,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.models.lagrangian import coriolis_matrix, coupling_torques
 from spheretwin.plant import lagrangian_rotor as plant
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
 
 FEW = 50
@@ -182,7 +182,9 @@ def test_a_method_of_another_order_breaks_its_row(monkeypatch, actuator):
 def test_another_integrator_breaks_every_row_of_the_free_rotor(monkeypatch, actuator):
     monkeypatch.setattr(free_rotor, "DURATION_s", 2.0)
     monkeypatch.setattr(
-        free_rotor, "Rotor", lambda mjcf, step_s, _, *rest: Rotor(mjcf, step_s, "implicitfast", *rest)
+        free_rotor,
+        "MujocoRotor",
+        lambda mjcf, step_s, _, *rest: MujocoRotor(mjcf, step_s, "implicitfast", *rest),
     )
     checks = free_rotor.check_free_rotor(actuators.MJCF_PATH, actuator).checks
     assert broken(checks) == {check.name for check in checks}

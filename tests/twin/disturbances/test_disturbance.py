@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.disturbances import Constant, Disturbance, Draws, Random, Sinusoidal, Steps, term_draws
+from spheretwin.disturbances import (
+    ConstantDisturbance,
+    Disturbance,
+    Draws,
+    RandomDisturbance,
+    SinusoidalDisturbance,
+    StepDisturbance,
+    term_draws,
+)
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 
@@ -41,11 +49,13 @@ def test_seed_decides():
 
 
 TERMS = (
-    Constant(torque_Nm=(0.01, -0.02, 0.03)),
-    Random(bound_Nm=(0.02, 0.03, 0.04)),
-    Steps(times_s=(0.5, 1.0), torques_Nm=((0.1, 0.0, 0.0), (0.0, -0.1, 0.0))),
-    Sinusoidal(amplitude_Nm=(0.05, 0.0, 0.02), frequency_Hz=(3.0, 1.0, 0.5), phase_rad=(0.0, 0.0, 1.0)),
-    Random(bound_Nm=(0.02, 0.03, 0.04)),
+    ConstantDisturbance(torque_Nm=(0.01, -0.02, 0.03)),
+    RandomDisturbance(bound_Nm=(0.02, 0.03, 0.04)),
+    StepDisturbance(times_s=(0.5, 1.0), torques_Nm=((0.1, 0.0, 0.0), (0.0, -0.1, 0.0))),
+    SinusoidalDisturbance(
+        amplitude_Nm=(0.05, 0.0, 0.02), frequency_Hz=(3.0, 1.0, 0.5), phase_rad=(0.0, 0.0, 1.0)
+    ),
+    RandomDisturbance(bound_Nm=(0.02, 0.03, 0.04)),
 )
 
 
@@ -61,7 +71,7 @@ def test_terms_add():
 def test_a_further_term_moves_no_bit_of_the_others():
     for terms in (TERMS, TERMS[::-1]):
         before = Disturbance(random_bound_Nm=0.05, terms=terms).sample(T, draws())
-        more = Disturbance(random_bound_Nm=0.05, terms=(*terms, Random(bound_Nm=(0.0, 0.0, 0.0))))
+        more = Disturbance(random_bound_Nm=0.05, terms=(*terms, RandomDisturbance(bound_Nm=(0.0, 0.0, 0.0))))
         assert more.sample(T, draws()).tobytes() == before.tobytes()
 
 

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from spheretwin.disturbances import KINDS, Constant, Random, Sinusoidal, Steps, Table, term_draws
+from spheretwin.disturbances import (
+    KINDS,
+    ConstantDisturbance,
+    RandomDisturbance,
+    SinusoidalDisturbance,
+    StepDisturbance,
+    TableDisturbance,
+    term_draws,
+)
 from spheretwin.models.base.errors import InputError
 
 TORQUES = "t_s,alpha_Nm,beta_Nm,gamma_Nm\n0.5,0.1,0,0\n1.5,0.3,-0.2,0\n2.0,0,0,0.4\n"
@@ -27,14 +35,16 @@ def sampled(term, first, ticks, seed=3, place=2):
 
 
 def test_constant_and_steps_hold_on_each_axis_by_itself():
-    np.testing.assert_array_equal(sampled(Constant(torque_Nm=(1.0, 2.0, 3.0)), 7, 3), [[1, 2, 3]] * 3)
-    steps = Steps(times_s=(0.002, 0.004), torques_Nm=((1.0, 0.0, -1.0), (0.0, 5.0, 0.0)))
+    np.testing.assert_array_equal(
+        sampled(ConstantDisturbance(torque_Nm=(1.0, 2.0, 3.0)), 7, 3), [[1, 2, 3]] * 3
+    )
+    steps = StepDisturbance(times_s=(0.002, 0.004), torques_Nm=((1.0, 0.0, -1.0), (0.0, 5.0, 0.0)))
     expected = [[0, 0, 0], [0, 0, 0], [1, 0, -1], [1, 0, -1], [0, 5, 0], [0, 5, 0]]
     np.testing.assert_array_equal(sampled(steps, 0, 6), expected)
 
 
 def test_sinusoidal_swings_on_each_axis_by_itself():
-    term = Sinusoidal(
+    term = SinusoidalDisturbance(
         amplitude_Nm=(0.1, 0.2, 0.3), frequency_Hz=(1.0, 2.0, 0.0), phase_rad=(0.0, np.pi / 2, np.pi / 6)
     )
     quarters = term.sample(np.array([0.0, 0.25, 0.5, 0.75, 1.0]), None)
@@ -44,7 +54,7 @@ def test_sinusoidal_swings_on_each_axis_by_itself():
 
 def test_table_goes_by_its_rows(torques):
     t = np.array([0.0, 0.5, 1.0, 1.5, 1.75, 2.0, 50.0])
-    linear = Table(file=torques).sample(t, None)
+    linear = TableDisturbance(file=torques).sample(t, None)
     expected = [
         [0.1, 0, 0],
         [0.1, 0, 0],
@@ -55,23 +65,23 @@ def test_table_goes_by_its_rows(torques):
         [0, 0, 0.4],
     ]
     np.testing.assert_allclose(linear, expected, atol=1e-16)
-    held = Table(file=torques, between="held").sample(t, None)
+    held = TableDisturbance(file=torques, between="held").sample(t, None)
     rows = [[0.1, 0, 0], [0.3, -0.2, 0], [0, 0, 0.4]]
     np.testing.assert_array_equal(held, np.array(rows)[[0, 0, 0, 1, 1, 2, 2]])
 
 
 def test_an_edit_of_the_file_changes_no_table_that_is_made(tmp_path, torques):
-    term = Table(file=torques)
+    term = TableDisturbance(file=torques)
     before = sampled(term, 0, 100).tobytes()
     (tmp_path / "torques.csv").write_text(TORQUES.replace("0.1", "0.2"))
     assert sampled(term, 0, 100).tobytes() == before
-    assert Table(file=torques) != term
-    assert Table.model_fields["file"].json_schema_extra == {"path": True}
+    assert TableDisturbance(file=torques) != term
+    assert TableDisturbance.model_fields["file"].json_schema_extra == {"path": True}
 
 
 def test_random_is_uniform_within_its_bounds():
     ticks, bound = 100_000, np.array([0.05, 0.02, 0.01])
-    torque = sampled(Random(bound_Nm=tuple(bound.tolist())), 0, ticks)
+    torque = sampled(RandomDisturbance(bound_Nm=tuple(bound.tolist())), 0, ticks)
     t = PERIOD * np.arange(ticks)
     envelope = np.stack([np.cos(np.pi * t), -np.sin(np.pi * t), np.exp(-np.pi * t)], axis=1)
     assert np.all(np.abs(torque) <= bound * np.abs(envelope) + 1e-15)
@@ -129,7 +139,7 @@ def test_parameters_out_of_range_are_refused_by_name(name, fields, complaint):
 def test_bad_table_is_refused_on_one_line(tmp_path, torques):
     (tmp_path / "torques.csv").write_text(TORQUES.replace("0.3", "2000"))
     with pytest.raises(InputError) as refusal:
-        Table(file=torques)
+        TableDisturbance(file=torques)
     expected = (
         f"disturbance {torques}: line 3: expected a number from -1000 to 1000 as alpha_Nm, received '2000'"
     )

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from spheretwin.electronics.amplifier import AmplifierSection, amplifier, clear, drive_coils, flow
-from spheretwin.electronics.coil import CoilSection, coil
-from spheretwin.electronics.drive_chain import advance_lag, drive
+from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, reset_sums, zero_flow
+from spheretwin.electronics.coil import CoilSection, group_coils
+from spheretwin.electronics.drive_chain import advance_lag, current_lag
 
 STEP_S = 5e-4
 SUPPLY = {"supply_V": 24.0, "drop_up_V": 4.8, "drop_down_V": 4.6}
@@ -22,7 +22,7 @@ class Case(NamedTuple):
     """One group in one step."""
 
     start: float
-    asked: float
+    setpoint: float
     emf: float
     phases: str  # F follows, U and D are at the upper and the lower limit
     R: float = 1.3
@@ -77,16 +77,16 @@ def made(case, groups=1):
         drop_down_V=highest + case.lowest,
         bandwidth_rad_s=case.rate,
     )
-    coils = coil(CoilSection(), case.R, case.L, PERIOD_S, groups)
+    coils = group_coils(CoilSection(), case.R, case.L, PERIOD_S, groups)
     return amplifier(section, case.limit, case.step_s, groups, 0), coils
 
 
 def stepped(case, times=1):
     amplifiers, coils = made(case)
-    current, passed = np.array([case.start]), flow(1)
+    current, passed = np.array([case.start]), zero_flow(1)
     charge = 0.0
     for _ in range(times):
-        drive_coils(amplifiers, coils, np.array([case.asked]), np.array([case.emf]), current, passed)
+        drive_coils(amplifiers, coils, np.array([case.setpoint]), np.array([case.emf]), current, passed)
         charge += passed.mean_current_A[0] * case.step_s
     mean = charge / (times * case.step_s)
     return Stepped(current[0], mean, passed.copper_J[0], passed.work_J[0], passed.voltage_limited_s[0])
@@ -94,7 +94,7 @@ def stepped(case, times=1):
 
 def voltage(case, current):
     """What the amplifier would set, had it any voltage."""
-    return case.R * current + case.L * case.rate * (case.asked - current) + case.emf
+    return case.R * current + case.L * case.rate * (case.setpoint - current) + case.emf
 
 
 def integrated(case):
@@ -146,16 +146,16 @@ def test_many_small_steps_are_one_whole(case):
 def test_with_enough_voltage_the_current_is_the_ideal_lag():
     generator, groups = np.random.default_rng(0), 18
     section = AmplifierSection(supply_V=1e6, bandwidth_rad_s=4096.0)  # 1 / rate is exact
-    coils = coil(CoilSection(), 1.3, 0.9e-3, PERIOD_S, groups)
+    coils = group_coils(CoilSection(), 1.3, 0.9e-3, PERIOD_S, groups)
     for amplifiers in (
         amplifier(section, 8.0, STEP_S, groups, 0),
         amplifier(AmplifierSection(bandwidth_rad_s=4096.0), 8.0, STEP_S, groups, 0),
     ):
-        current, ideal, mean, passed = np.zeros(groups), np.zeros(groups), np.empty(groups), flow(groups)
+        current, ideal, mean, passed = np.zeros(groups), np.zeros(groups), np.empty(groups), zero_flow(groups)
         for _ in range(100):
-            asked = generator.uniform(-10, 10, groups)  # some beyond the limit
-            drive_coils(amplifiers, coils, asked, generator.normal(size=groups), current, passed)
-            advance_lag(drive(1 / 4096.0, STEP_S, 8.0), asked, ideal, mean)
+            setpoint = generator.uniform(-10, 10, groups)  # some beyond the limit
+            drive_coils(amplifiers, coils, setpoint, generator.normal(size=groups), current, passed)
+            advance_lag(current_lag(1 / 4096.0, STEP_S, 8.0), setpoint, ideal, mean)
             # Both are the same closed form; the roundings of a few currents of 8 A.
             np.testing.assert_allclose(current, ideal, rtol=0, atol=1e-14)
             np.testing.assert_allclose(passed.mean_current_A, mean, rtol=0, atol=1e-14)
@@ -164,12 +164,12 @@ def test_with_enough_voltage_the_current_is_the_ideal_lag():
 
 def test_at_rest_nothing_moves_by_a_bit():
     amplifiers, coils = made(Case(0, 0, 0, "F"), groups=3)
-    asked, passed = np.array([0.0, 3.3, -8.0]), flow(3)
-    current = asked.copy()
+    setpoint, passed = np.array([0.0, 3.3, -8.0]), zero_flow(3)
+    current = setpoint.copy()
     for _ in range(1000):
-        drive_coils(amplifiers, coils, asked, np.zeros(3), current, passed)
-    np.testing.assert_array_equal(current, asked)
-    np.testing.assert_allclose(passed.copper_J, 1.3 * asked**2 * 0.5, rtol=1e-12)  # 1000 sums
+        drive_coils(amplifiers, coils, setpoint, np.zeros(3), current, passed)
+    np.testing.assert_array_equal(current, setpoint)
+    np.testing.assert_allclose(passed.copper_J, 1.3 * setpoint**2 * 0.5, rtol=1e-12)  # 1000 sums
 
 
 def test_a_rise_under_the_voltage_limit_is_the_ramp_of_the_voltage_that_is_left():
@@ -223,7 +223,7 @@ def signed(numbers):
 ANY = st.builds(
     Case,
     start=signed(decades(-3, 1.5)),
-    asked=signed(decades(-3, 1.5)),
+    setpoint=signed(decades(-3, 1.5)),
     emf=signed(decades(-3, 1.5)),
     phases=st.just(""),
     R=decades(-2, 2),
@@ -263,9 +263,9 @@ def test_two_halves_are_one_whole_whatever_the_phases(case):
 def test_current_goes_towards_its_rest_and_voltage_within_its_swing(case):
     after = stepped(case)
     # At rest: the target, or what the limits allow.
-    rest = np.clip(case.asked, (case.lowest - case.emf) / case.R, (case.highest - case.emf) / case.R)
+    rest = np.clip(case.setpoint, (case.lowest - case.emf) / case.R, (case.highest - case.emf) / case.R)
     swing = max(case.highest, -case.lowest, abs(case.emf)) / case.R
-    slack = 1e-12 * max(abs(case.start), abs(case.asked), swing)  # of what the currents are differences of
+    slack = 1e-12 * max(abs(case.start), abs(case.setpoint), swing)  # of what the currents are differences of
     low, high = sorted((case.start, rest))
     assert low - slack <= after.current <= high + slack
     assert low - slack <= after.mean <= high + slack
@@ -286,25 +286,25 @@ REACHABLE = st.floats(-1e12, 1e12)  # A: of 1e9 V over 1 mohm
     decades(-7, 0),
 )
 def test_no_number_however_large_or_small_gives_anything_but_numbers(groups, R, L, bandwidth, supply, step_s):
-    current, asked, emf = (np.array(column) for column in zip(*groups, strict=True))
+    current, setpoint, emf = (np.array(column) for column in zip(*groups, strict=True))
     section = AmplifierSection(supply_V=supply, bandwidth_rad_s=bandwidth)
     amplifiers = amplifier(section, 8.0, step_s, 4, 0)
-    coils, passed = coil(CoilSection(), R, L, PERIOD_S, 4), flow(4)
+    coils, passed = group_coils(CoilSection(), R, L, PERIOD_S, 4), zero_flow(4)
     most = np.maximum(np.abs(current), (supply + 1e9) / R)
     for _ in range(3):
-        drive_coils(amplifiers, coils, asked, emf, current, passed)
+        drive_coils(amplifiers, coils, setpoint, emf, current, passed)
     for sums in (current, *passed):
         assert np.all(np.isfinite(sums))
     assert np.all(np.abs(current) <= most * (1 + 1e-12))
     assert np.all(passed.voltage_limited_s <= 3 * step_s * (1 + 1e-12))
 
 
-@pytest.mark.parametrize("place", ["asked", "emf", "current"])
+@pytest.mark.parametrize("place", ["setpoint", "emf", "current"])
 def test_what_is_not_a_number_stays_so_in_its_group_alone(place):
     amplifiers, coils = made(CASES[0], groups=3)
-    inputs = {"asked": np.full(3, 2.0), "emf": np.full(3, 0.5), "current": np.zeros(3)}
+    inputs = {"setpoint": np.full(3, 2.0), "emf": np.full(3, 0.5), "current": np.zeros(3)}
     inputs[place][1] = np.nan
-    passed = flow(3)
+    passed = zero_flow(3)
     drive_coils(amplifiers, coils, **inputs, flow=passed)
     lost = np.array([False, True, False])
     for sums in (inputs["current"], passed.mean_current_A, passed.copper_J, passed.work_J):
@@ -315,20 +315,20 @@ def test_the_target_keeps_to_the_current_limit_with_its_offset():
     section = AmplifierSection(**SUPPLY, amplifier_offset_V=5e-3)
     amplifiers = amplifier(section, 8.0, STEP_S, 18, 4)
     assert np.all(np.abs(amplifiers.offset_A) <= 4e-3)  # 5 mV at 0.8 A/V
-    coils, passed = coil(CoilSection(), 1.3, 0.9e-3, PERIOD_S, 18), flow(18)
+    coils, passed = group_coils(CoilSection(), 1.3, 0.9e-3, PERIOD_S, 18), zero_flow(18)
     current = np.zeros(18)
-    for asked, expected in ((1.0, 1.0 + amplifiers.offset_A), (9.0, 8.0), (-np.inf, -8.0)):
-        clear(passed)
+    for setpoint, expected in ((1.0, 1.0 + amplifiers.offset_A), (9.0, 8.0), (-np.inf, -8.0)):
+        reset_sums(passed)
         for _ in range(40):
-            drive_coils(amplifiers, coils, np.full(18, asked), np.zeros(18), current, passed)
+            drive_coils(amplifiers, coils, np.full(18, setpoint), np.zeros(18), current, passed)
         np.testing.assert_allclose(current, expected, rtol=1e-14)
-        limited = 0.0 if asked == 1.0 else 40 * STEP_S
+        limited = 0.0 if setpoint == 1.0 else 40 * STEP_S
         np.testing.assert_allclose(passed.current_limited_s, limited, rtol=1e-13)
 
 
 def test_the_current_limit_itself_may_be_asked_for():
     amplifiers, coils = made(CASES[0], groups=2)
-    current, passed = np.array([8.0, -8.0]), flow(2)
+    current, passed = np.array([8.0, -8.0]), zero_flow(2)
     drive_coils(amplifiers, coils, current.copy(), np.zeros(2), current, passed)
     np.testing.assert_array_equal(passed.current_limited_s, 0)
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from spheretwin.electronics.coil import CoilSection, back_emf, coil, overheated, warm
+from spheretwin.electronics.coil import CoilSection, advance_temperature, back_emf, group_coils, is_overheated
 from spheretwin.models.magnetics import rotor_torque
 
 R, L, PERIOD_S = 1.3, 0.9e-3, 1e-3
@@ -14,8 +14,8 @@ COPPER = CoilSection(resistance_per_K=0.0039)
 
 
 def test_figures_are_the_models_unless_given():
-    model = coil(CoilSection(), R, L, PERIOD_S, 2)
-    given_ = coil(CoilSection(resistance_ohm=2.0, inductance_H=1e-3), R, L, PERIOD_S, 2)
+    model = group_coils(CoilSection(), R, L, PERIOD_S, 2)
+    given_ = group_coils(CoilSection(resistance_ohm=2.0, inductance_H=1e-3), R, L, PERIOD_S, 2)
     assert model.inductance_H == L
     assert given_.inductance_H == 1e-3
     np.testing.assert_array_equal(model.resistance_ohm, R)
@@ -24,23 +24,23 @@ def test_figures_are_the_models_unless_given():
 
 @pytest.mark.parametrize(("ambient", "share"), [(20.0, 1.0), (120.0, 1.39), (-30.0, 0.805)])
 def test_resistance_is_coppers(ambient, share):
-    made = coil(COPPER.model_copy(update={"ambient_degC": ambient}), R, L, PERIOD_S, 3)
+    made = group_coils(COPPER.model_copy(update={"ambient_degC": ambient}), R, L, PERIOD_S, 3)
     np.testing.assert_allclose(made.resistance_ohm, R * share, rtol=1e-15)
 
 
 def test_without_a_coefficient_heat_moves_no_bit_of_the_resistance():
-    made = coil(CoilSection(), R, L, PERIOD_S, 1)
+    made = group_coils(CoilSection(), R, L, PERIOD_S, 1)
     for _ in range(100):
-        warm(made, np.array([5.0]))
+        advance_temperature(made, np.array([5.0]))
     assert made.temperature_degC[0] > 25
     assert made.resistance_ohm[0] == R
 
 
 def test_constant_power_heats_as_one_exponential_to_its_rest():
     watts, period_s = np.array([0.0, 1.0, 80.0]), 0.5
-    made = coil(COPPER, R, L, period_s, 3)
+    made = group_coils(COPPER, R, L, period_s, 3)
     for period in range(1, 4001):
-        warm(made, watts * period_s)
+        advance_temperature(made, watts * period_s)
         if period in (1, 480, 4000):  # 480 periods are one time constant, 240 s
             exact = 20 + 4.0 * watts * -np.expm1(-period * period_s / 240)
             np.testing.assert_allclose(made.temperature_degC, exact, rtol=1e-12)  # 4000 roundings
@@ -51,9 +51,9 @@ def test_constant_power_heats_as_one_exponential_to_its_rest():
 def test_one_period_is_what_an_ode_solver_finds(start, watts, log_period, log_capacity, log_resistance):
     period_s, capacity, thermal = 10.0**log_period, 10.0**log_capacity, 10.0**log_resistance
     section = CoilSection(heat_capacity_J_K=capacity, thermal_resistance_K_W=thermal)
-    made = coil(section, R, L, period_s, 1)
+    made = group_coils(section, R, L, period_s, 1)
     made.temperature_degC[0] = start
-    warm(made, np.array([watts * period_s]))
+    advance_temperature(made, np.array([watts * period_s]))
 
     def slope(t, T):
         return (watts - (T - 20.0) / thermal) / capacity
@@ -67,11 +67,11 @@ def test_one_period_is_what_an_ode_solver_finds(start, watts, log_period, log_ca
 
 def test_heat_is_stored_or_passed_on():
     period_s, generator = 0.1, np.random.default_rng(2)
-    made = coil(COPPER, R, L, period_s, 1)
+    made = group_coils(COPPER, R, L, period_s, 1)
     lost, heat = 0.0, 0.0
     for joules in generator.uniform(0, 20, 2000):
         begin = made.temperature_degC[0]
-        warm(made, np.array([joules]))
+        advance_temperature(made, np.array([joules]))
         # Mean rise over the period, of an exponential towards 20 + 4 P, by its end and start.
         last, time_constant = 20 + 4 * joules / period_s, 240.0
         change = made.temperature_degC[0] - begin
@@ -86,9 +86,9 @@ def test_heat_is_stored_or_passed_on():
 
 def warmed(current_A, periods):
     """Temperature at the end of periods of 1 s with a constant current."""
-    made = coil(COPPER, R, L, 1.0, 1)
+    made = group_coils(COPPER, R, L, 1.0, 1)
     for _ in range(periods):
-        warm(made, made.resistance_ohm * current_A**2)
+        advance_temperature(made, made.resistance_ohm * current_A**2)
     return made.temperature_degC[0]
 
 
@@ -102,20 +102,20 @@ def test_a_constant_current_comes_to_rest_where_copper_lets_it_and_runs_away_bey
 
 
 def test_a_coil_that_is_cooled_at_once_stays_at_the_temperature_around_it():
-    made = coil(CoilSection(thermal_resistance_K_W=0.0, ambient_degC=40.0), R, L, PERIOD_S, 1)
-    warm(made, np.array([100.0]))
+    made = group_coils(CoilSection(thermal_resistance_K_W=0.0, ambient_degC=40.0), R, L, PERIOD_S, 1)
+    advance_temperature(made, np.array([100.0]))
     assert made.temperature_degC[0] == 40.0
 
 
 def test_overheated_is_said_of_the_hottest_group():
-    made = coil(CoilSection(shutdown_degC=155.0), R, L, PERIOD_S, 3)
-    assert not overheated(made)
+    made = group_coils(CoilSection(shutdown_degC=155.0), R, L, PERIOD_S, 3)
+    assert not is_overheated(made)
     for hottest in (155.0, 400.0, np.nan):
         made.temperature_degC[1] = hottest
-        assert overheated(made)
-    endless = coil(CoilSection(), R, L, PERIOD_S, 3)
+        assert is_overheated(made)
+    endless = group_coils(CoilSection(), R, L, PERIOD_S, 3)
     endless.temperature_degC[1] = 1e30
-    assert not overheated(endless)
+    assert not is_overheated(endless)
 
 
 @given(st.integers(0, 2**32), st.sampled_from([12, 18, 24]))
@@ -134,13 +134,13 @@ def test_emf_takes_as_power_what_the_torque_gives(seed, groups):
 @given(st.lists(st.floats(0, 1e30), min_size=4, max_size=4), st.floats(0, 1e6), st.floats(1e-3, 1e6))
 def test_any_heat_leaves_a_temperature_and_a_resistance(joules, thermal, capacity):
     section = CoilSection(resistance_per_K=0.01, thermal_resistance_K_W=thermal, heat_capacity_J_K=capacity)
-    made = coil(section, R, L, PERIOD_S, 4)
+    made = group_coils(section, R, L, PERIOD_S, 4)
     for _ in range(3):
-        warm(made, np.array(joules))
+        advance_temperature(made, np.array(joules))
     assert np.all(np.isfinite(made.temperature_degC))
     assert np.all(made.temperature_degC >= 20)
     assert np.all(made.resistance_ohm >= R)
-    warm(made, np.array([np.nan, 0, 0, 0]))
+    advance_temperature(made, np.array([np.nan, 0, 0, 0]))
     np.testing.assert_array_equal(np.isnan(made.resistance_ohm), [True, False, False, False])
 
 

@@ -15,9 +15,9 @@ CODES = np.arange(-(2**15), 2**15)
 
 
 def converted(made, command):
-    asked = np.empty_like(command)
-    convert(made, command, asked)
-    return asked
+    setpoint = np.empty_like(command)
+    convert(made, command, setpoint)
+    return setpoint
 
 
 def curve(made, channel):
@@ -38,53 +38,53 @@ def test_without_bits_commands_pass_bit_by_bit():
 
 
 def test_every_code_is_a_step_of_one_lsb():
-    asked = curve(dac(PLAIN, GAIN_A_V, 1, 0), 0)
+    setpoint = curve(dac(PLAIN, GAIN_A_V, 1, 0), 0)
     # Code times LSB and transconductance, each product rounded once.
-    np.testing.assert_allclose(asked, CODES * LSB_A, rtol=4e-16)
+    np.testing.assert_allclose(setpoint, CODES * LSB_A, rtol=4e-16)
 
 
 @pytest.mark.parametrize("bits", [1, 2, 8, 16, 24, 32])
 def test_one_code_is_nothing_and_reaches_half_a_step_to_both_sides(bits):
     made = dac(DacSection(dac_bits=bits), GAIN_A_V, 5, 0)
     step = GAIN_A_V * 2 * RANGE_V / 2**bits
-    asked = converted(made, step * np.array([0.0, 0.499, -0.499, -0.501, 0.501]))
+    setpoint = converted(made, step * np.array([0.0, 0.499, -0.499, -0.501, 0.501]))
     up = 0.0 if bits == 1 else step  # of one bit, the codes are -1 and 0
-    np.testing.assert_allclose(asked, [0, 0, 0, -step, up], rtol=4e-16)
+    np.testing.assert_allclose(setpoint, [0, 0, 0, -step, up], rtol=4e-16)
 
 
 @given(st.floats(-7.9997, 7.9997))
 def test_within_the_range_rounding_is_at_most_half_a_step(command):
-    asked = converted(dac(PLAIN, GAIN_A_V, 1, 0), np.array([command]))[0]
-    assert abs(asked - command) <= LSB_A / 2 * (1 + 1e-11)  # 1e-16 of 8 A is 4e-12 of half a step
-    assert asked / LSB_A == pytest.approx(round(asked / LSB_A), abs=1e-10)
+    setpoint = converted(dac(PLAIN, GAIN_A_V, 1, 0), np.array([command]))[0]
+    assert abs(setpoint - command) <= LSB_A / 2 * (1 + 1e-11)  # 1e-16 of 8 A is 4e-12 of half a step
+    assert setpoint / LSB_A == pytest.approx(round(setpoint / LSB_A), abs=1e-10)
 
 
 @given(st.floats(8.0, None, allow_infinity=True))
 def test_beyond_the_range_is_its_end(command):
-    asked = converted(dac(PLAIN, GAIN_A_V, 2, 0), np.array([command, -command]))
-    np.testing.assert_allclose(asked, [8.0 - LSB_A, -8.0], rtol=4e-16)
+    setpoint = converted(dac(PLAIN, GAIN_A_V, 2, 0), np.array([command, -command]))
+    np.testing.assert_allclose(setpoint, [8.0 - LSB_A, -8.0], rtol=4e-16)
 
 
 def test_what_is_not_a_number_stays_so_in_its_channel():
-    asked = converted(dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, np.nan, 1.0]))
-    np.testing.assert_array_equal(np.isnan(asked), [False, True, False])
+    setpoint = converted(dac(PROTOTYPE, GAIN_A_V, 3, 0), np.array([1.0, np.nan, 1.0]))
+    np.testing.assert_array_equal(np.isnan(setpoint), [False, True, False])
 
 
 @given(st.lists(st.floats(allow_nan=False), min_size=GROUPS, max_size=GROUPS), st.integers(0, 2**63))
 def test_any_number_gives_a_current_within_the_range_and_its_errors(command, seed):
-    asked = converted(dac(PROTOTYPE, GAIN_A_V, GROUPS, seed), np.array(command))
+    setpoint = converted(dac(PROTOTYPE, GAIN_A_V, GROUPS, seed), np.array(command))
     most = GAIN_A_V * (RANGE_V * (1 + 1e-3) + 2e-3) + 4 * LSB_A
-    assert np.all(np.abs(asked) <= most)  # and so is none that is not a number
+    assert np.all(np.abs(setpoint) <= most)  # and so is none that is not a number
 
 
 def test_offset_and_gain_are_those_of_a_straight_line_through_the_ends():
     made = dac(PROTOTYPE, GAIN_A_V, GROUPS, 7)
     for channel in range(GROUPS):
-        asked = curve(made, channel)
-        slope = (asked[-1] - asked[0]) / (CODES[-1] - CODES[0]) / LSB_A
+        setpoint = curve(made, channel)
+        slope = (setpoint[-1] - setpoint[0]) / (CODES[-1] - CODES[0]) / LSB_A
         # 1e-15 A of rounding over 16 A.
         assert slope == pytest.approx(made.gain[channel], rel=1e-14)
-        middle = asked[0] + slope * LSB_A * 2**15
+        middle = setpoint[0] + slope * LSB_A * 2**15
         assert middle == pytest.approx(GAIN_A_V * made.offset_V[channel], abs=1e-14)
 
 
@@ -92,11 +92,11 @@ def test_inl_is_smooth_keeps_to_its_bound_and_turns_no_code_back():
     made = dac(PROTOTYPE, GAIN_A_V, GROUPS, 3)
     largest = []
     for channel in range(GROUPS):
-        asked = curve(made, channel)
-        straight = np.linspace(asked[0], asked[-1], len(asked))
-        inl = (asked - straight) / LSB_A
+        setpoint = curve(made, channel)
+        straight = np.linspace(setpoint[0], setpoint[-1], len(setpoint))
+        inl = (setpoint - straight) / LSB_A
         largest.append(np.abs(inl).max())
-        assert np.all(np.diff(asked) > 0)
+        assert np.all(np.diff(setpoint) > 0)
         # The third term is steepest: 4 LSB times 2 * 3 over half the codes. Rounding: 1e-15 A of 2.4e-4 A.
         assert np.abs(np.diff(inl)).max() <= 4 * 2 * 3 / 2**15 + 2e-11
     assert max(largest) <= 4.0 * (1 + 1e-3)  # in ideal steps, which the gain stretches

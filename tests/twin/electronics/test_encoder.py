@@ -12,7 +12,7 @@ COUNTS = st.integers(1, 2**20)
 
 
 def made(counts):
-    setup = SensorSetup(None, 0, "encoder", first_draw=0, faults=False, most_late_ticks=0)
+    setup = SensorSetup(None, 0, "encoder", first_draw=0, faults=False, longest_delay_ticks=0)
     return EncoderSection(counts=counts).build(setup)
 
 

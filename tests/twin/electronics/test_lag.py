@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from spheretwin.electronics.drive_chain import advance_lag, drive
+from spheretwin.electronics.drive_chain import advance_lag, current_lag
 
 
 @pytest.mark.parametrize("time_constant_s", [1e-4, 6.9e-4, 5e-2])
@@ -12,7 +12,7 @@ def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
     step_s = 5e-4
     command, current, mean = np.array([3.0, -1.0]), np.array([0.5, 2.0]), np.empty(2)
     start = current.copy()
-    advance_lag(drive(time_constant_s, step_s, 8.0), command, current, mean)
+    advance_lag(current_lag(time_constant_s, step_s, 8.0), command, current, mean)
 
     def exact(t):
         return command + (start - command) * np.exp(-t / time_constant_s)
@@ -25,13 +25,13 @@ def test_one_step_is_the_exact_exponential_and_its_mean(time_constant_s):
 def test_two_half_steps_are_one_whole():
     command, mean = np.array([4.0]), np.empty(1)
     whole, halves = np.zeros(1), np.zeros(1)
-    advance_lag(drive(7e-4, 1e-3, 8.0), command, whole, mean)
+    advance_lag(current_lag(7e-4, 1e-3, 8.0), command, whole, mean)
     for _ in range(2):
-        advance_lag(drive(7e-4, 5e-4, 8.0), command, halves, mean)
+        advance_lag(current_lag(7e-4, 5e-4, 8.0), command, halves, mean)
     np.testing.assert_allclose(halves, whole, rtol=1e-14)
 
 
 def test_without_lag_the_current_is_the_command():
     command, current, mean = np.array([4.0]), np.zeros(1), np.empty(1)
-    advance_lag(drive(0.0, 5e-4, 8.0), command, current, mean)
+    advance_lag(current_lag(0.0, 5e-4, 8.0), command, current, mean)
     assert current[0] == mean[0] == 4.0

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 from spheretwin.control.law import LARGEST
-from spheretwin.electronics.amplifier import AmplifierSection, amplifier, clear, drive_coils, flow
-from spheretwin.electronics.coil import CoilSection, back_emf, coil, warm
+from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, reset_sums, zero_flow
+from spheretwin.electronics.coil import CoilSection, advance_temperature, back_emf, group_coils
 from spheretwin.electronics.converters import DacSection, convert, dac
 from spheretwin.electronics.delay import DelaySection, delay, due, latch
 from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
@@ -28,24 +28,24 @@ class Chain:
 
     def __init__(self, seed=11, delay_s=1e-3):
         self.delay = delay(section(DelaySection, delay_s=delay_s), STEP_S, SUBSTEPS, GROUPS)
-        self.coil = coil(section(CoilSection), 1.0, 1.0, PERIOD_S, GROUPS)
+        self.coil = group_coils(section(CoilSection), 1.0, 1.0, PERIOD_S, GROUPS)
         stage = section(AmplifierSection)
         self.dac = dac(section(DacSection), stage.transconductance_A_V, GROUPS, seed)
         self.amplifier = amplifier(stage, LIMIT_A, STEP_S, GROUPS, seed)
-        self.flow, self.current = flow(GROUPS), np.zeros(GROUPS)
+        self.flow, self.current = zero_flow(GROUPS), np.zeros(GROUPS)
 
     def tick(self, command, G, gain, rates):
         """One control period; the mean currents of its steps."""
-        asked, emf, means = np.empty(GROUPS), np.empty(GROUPS), []
+        setpoint, emf, means = np.empty(GROUPS), np.empty(GROUPS), []
         latch(self.delay, command)
-        clear(self.flow)
+        reset_sums(self.flow)
         for substep in range(SUBSTEPS):
-            due(self.delay, substep, asked)
-            convert(self.dac, asked, asked)
+            due(self.delay, substep, setpoint)
+            convert(self.dac, setpoint, setpoint)
             back_emf(G, gain, rates[substep], emf)
-            drive_coils(self.amplifier, self.coil, asked, emf, self.current, self.flow)
+            drive_coils(self.amplifier, self.coil, setpoint, emf, self.current, self.flow)
             means.append(self.flow.mean_current_A.copy())
-        warm(self.coil, self.flow.copper_J)
+        advance_temperature(self.coil, self.flow.copper_J)
         return np.array(means)
 
 
@@ -63,9 +63,9 @@ class SlowChain:
         self.history += [command] * SUBSTEPS
         R = 1.3 * (1 + 0.0039 * (self.temperature - 20))
         for substep in range(SUBSTEPS):
-            asked = self.converted(self.history.pop(0))
+            setpoint = self.converted(self.history.pop(0))
             emf = gain * (rates[substep] @ G)
-            target = np.clip(asked + self.offset_A, -LIMIT_A, LIMIT_A)
+            target = np.clip(setpoint + self.offset_A, -LIMIT_A, LIMIT_A)
             steps = [self.stepped(j, R[j], target[j], emf[j]) for j in range(GROUPS)]
             self.current, mean, square, work, limited = np.array(steps).T
             means.append(mean)
@@ -91,10 +91,10 @@ class SlowChain:
         previous = None
         while left > 0:
 
-            def wanted(current):
+            def voltage_at(current):
                 return R * current + L * w * (target - current) + emf
 
-            v = wanted(i)
+            v = voltage_at(i)
             # Where a phase has just ended the voltage is at a limit to rounding; which side is known.
             mode = previous if previous else "up" if v > up else "down" if v < down else "follow"
             rest = {"up": (up - emf) / R, "down": (down - emf) / R, "follow": target}[mode]
@@ -106,17 +106,17 @@ class SlowChain:
             ends = {"follow": [up, down], "up": [up], "down": [down]}[mode]
             over, after = left, None
             for end in ends:
-                begin, finish = v - end, wanted(current(left)) - end
+                begin, finish = v - end, voltage_at(current(left)) - end
                 if begin * finish < 0 and abs(begin) > 1e-9:
                     root = brentq(
-                        lambda t, end=end: wanted(current(t)) - end, 0, left, xtol=1e-19, rtol=1e-15
+                        lambda t, end=end: voltage_at(current(t)) - end, 0, left, xtol=1e-19, rtol=1e-15
                     )
                     if root < over:
                         over = root
                         after = "follow" if mode != "follow" else "up" if end == up else "down"
             t = over * NODES
             along = current(t)
-            volts = {"up": up, "down": down, "follow": wanted(along)}[mode]
+            volts = {"up": up, "down": down, "follow": voltage_at(along)}[mode]
             limited = over * (mode != "follow")
             sums += [
                 over * WEIGHTS @ along,
@@ -166,12 +166,12 @@ def test_the_chain_is_its_slow_copy(delay_s):
 def test_neutral_stages_hand_on_every_bit():
     command = np.random.default_rng(0).normal(size=GROUPS) * 20
     late, ideal = delay(DelaySection(), STEP_S, SUBSTEPS, GROUPS), dac(DacSection(), 0.8, GROUPS, 0)
-    asked = np.empty(GROUPS)
+    setpoint = np.empty(GROUPS)
     latch(late, command)
     for substep in range(SUBSTEPS):
-        due(late, substep, asked)
-        convert(ideal, asked, asked)
-        assert asked.tobytes() == command.tobytes()
+        due(late, substep, setpoint)
+        convert(ideal, setpoint, setpoint)
+        assert setpoint.tobytes() == command.tobytes()
     assert not amplifier(AmplifierSection(), LIMIT_A, STEP_S, GROUPS, 0).supplied
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.control.supervision.enabled_groups import DETECTED_OPEN, DETECTED_SHORTED, REPORTED
-from spheretwin.faults.fault_injector import FaultLines
+from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.table import Table
 from spheretwin.session import Session
@@ -89,7 +89,7 @@ def test_no_healthy_group_is_ever_found(label, name, hardware, ticks, changes):
         while session.tick < ticks and session.status == "running":
             table = session.advance(min(2000, ticks - session.tick))
             assert not table["group_out"].any(), f"{label} at {session.t_s:g} s"
-            threshold_A = session._machine._controller.supervision.detector.threshold_A
+            threshold_A = session._runtime._controller.supervision.detector.threshold_A
             busy += np.count_nonzero(np.abs(table["current_command_A"]) > 2 * threshold_A)
             if hardware == "prototype":
                 limited += np.count_nonzero(table["voltage_limited"])
@@ -106,7 +106,7 @@ def test_a_supply_that_the_controller_does_not_know_leaves_its_thresholds():
     figures = []
     for each in (told, weak, scenario(duration=0.1, **supply(8.0))):
         with Session(each) as session:
-            detector = session._machine._controller.supervision.detector
+            detector = session._runtime._controller.supervision.detector
             figures.append((detector.threshold_A, detector.ticks, detector.reach_A))
     assert figures[0] == figures[1] != figures[2]
 
@@ -142,7 +142,7 @@ def test_what_is_known_is_left_out_from_its_tick_on_and_taken_back():
 def test_a_find_is_told_once_with_its_time():
     fault = {"target": "coil.07", "mode": "open", "start_s": 0.5, "end_s": 1.2}
     run = simulate(scenario(fault=[fault], duration=1.5))
-    lines = FaultLines()
+    lines = FaultMessages()
     signals, values = run.telemetry.signals, run.telemetry.values
     told = []
     for first in range(0, len(values), 333):
@@ -158,9 +158,9 @@ def test_a_find_is_told_once_with_its_time():
 
 def test_detect_of_a_fault_is_the_detector():
     fault = {"target": "coil.07", "mode": "open", "start_s": 0.5}
-    asked = scenario(fault=[{**fault, "detect": True}], duration=1.0, **{"detector.detect": False})
+    by_fault = scenario(fault=[{**fault, "detect": True}], duration=1.0, **{"detector.detect": False})
     general = scenario(fault=[fault], duration=1.0)
-    one, other = simulate(asked).telemetry, simulate(general).telemetry
+    one, other = simulate(by_fault).telemetry, simulate(general).telemetry
     assert one.values.tobytes() == other.values.tobytes()
     assert one["group_out"][-1, 7] == DETECTED_OPEN
 

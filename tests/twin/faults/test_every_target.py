@@ -57,7 +57,7 @@ def test_values_are_those_of_the_mode(name):
         least, largest, meaning = what.value.least, what.value.largest, what.value.meaning
         if mode != "delay":  # which must be whole periods besides
             for value in (least, largest, np.nextafter((least + largest) / 2, largest)):
-                assert planned(fault(name, mode, value=float(value))).fault[0].number == value
+                assert planned(fault(name, mode, value=float(value))).fault[0].effective_value == value
         for value in (np.nextafter(least, -np.inf), np.nextafter(largest, np.inf), -1e300, 1e300):
             told = refused(fault(name, mode, value=float(value)))
             assert f"expected a value from {least:g} to {largest:g} for {mode}" in told
@@ -68,7 +68,7 @@ def test_values_are_those_of_the_mode(name):
         if what.value.default is None:
             assert "received none" in refused(without)
         else:
-            assert planned(without).fault[0].number == what.value.default
+            assert planned(without).fault[0].effective_value == what.value.default
 
 
 @EACH

@@ -56,9 +56,9 @@ def failed_safely(run, reason, at=None):
     assert set(reasons[tripped:].tolist()) == {float(reason)}
     assert at is None or tripped == at
     assert np.isfinite(table.values).all()
-    asked = table["current_command_A"]
+    command = table["current_command_A"]
     after = tripped + (reason == Reason.TEMPERATURE)  # which is known at the end of a period
-    assert not asked[after:].any()
+    assert not command[after:].any()
     assert not table["torque_command_Nm"][after:].any()
     return tripped
 
@@ -113,7 +113,7 @@ def test_a_measurement_that_overflows():
         changes = {"sensors.encoder.counts": 2**31, "watchdog.on": watching}
         with Session(scenario("hold", **changes)) as session:
             session.advance(50)
-            session._machine._moving.stepped.q[2] = 1e300
+            session._runtime._rotor.data.q[2] = 1e300
             table = session.advance(200)
             assert session.status == status
             assert np.isfinite(table.values).all()

@@ -104,20 +104,20 @@ BAD = st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e200, 1e12, 5e-3
 
 # Whatever a tick goes on from, by what it belongs to.
 INPUTS = {
-    "angle": lambda machine: machine._moving.stepped.q,
-    "rate": lambda machine: machine._moving.stepped.qdot,
+    "angle": lambda machine: machine._rotor.data.q,
+    "rate": lambda machine: machine._rotor.data.qdot,
     "current": lambda machine: machine._plant.current,
-    "temperature": lambda machine: machine._plant.driving.coil.temperature_degC,
-    "resistance": lambda machine: machine._plant.driving.coil.resistance_ohm,
-    "on their way": lambda machine: machine._plant.driving.delay.ring.ravel(),
-    "held": lambda machine: machine._plant.driving.stage("dac").line.table[:, LAST],
+    "temperature": lambda machine: machine._plant.drive.coil.temperature_degC,
+    "resistance": lambda machine: machine._plant.drive.coil.resistance_ohm,
+    "on their way": lambda machine: machine._plant.drive.delay.ring.ravel(),
+    "held": lambda machine: machine._plant.drive.stage("dac").line.table[:, LAST],
     "group gain": lambda machine: machine._plant.group_gain,
     "estimate": lambda machine: machine._controller.estimates.memory,
     "law": lambda machine: machine._controller.memory,
     "belief": lambda machine: machine._controller.applied_torque.current,
     "detector": lambda machine: machine._controller.supervision.detector.shorted_A,
     "wiper": lambda machine: machine._sensors.stage("potentiometer").line.table[:, LAST],
-    "converted": lambda machine: machine._sensors.stage("adc").on_the_way_rad.ravel(),
+    "converted": lambda machine: machine._sensors.stage("adc").delayed_rad.ravel(),
     "seen": lambda machine: machine._controller.supervision.watchdog.last_rad,
 }
 
@@ -137,7 +137,7 @@ PLAN = [
 def test_any_value_in_any_place_ends_with_a_status_and_numbers(what, watching, place, bad, tick):
     with Session(scenario(fault=PLAN, **{"watchdog.on": watching, "detector.detect": True})) as session:
         session.advance(tick)
-        array = INPUTS[what](session._machine)
+        array = INPUTS[what](session._runtime)
         array[place % len(array)] = bad
         table = session.advance(TICKS)
         assert session.status in {*ENDS, Status.RUNNING}
@@ -151,7 +151,7 @@ def test_any_draw_ends_with_a_status_and_numbers(watching, column, bad, tick):
     """Of the sensors, and of faults: no generator gives it, but a generator is not all that may break."""
     with Session(scenario(fault=PLAN, **{"watchdog.on": watching})) as session:
         session.advance(tick)
-        inputs = session._exogenous.rows(tick, 1)
+        inputs = session._inputs.rows(tick, 1)
         for rows in (inputs.noise, inputs.fault_noise):
             rows[0, column % rows.shape[1]] = bad
         inputs.fault_noise[0, 0] = bad  # of the supply, the only fault with noise
@@ -197,7 +197,7 @@ def test_any_law_ends_with_a_status_and_numbers(hardware, watching, tick, where,
     )
     law = Law("spoiling", spoiling, np.array([tick, where, axis], float), np.zeros(3), signals)
     with Session(scenario(hardware, **{"watchdog.on": watching}), law) as session:
-        session._machine._controller.memory[1] = bad
+        session._runtime._controller.memory[1] = bad
         table = session.advance(TICKS)
         assert session.status in {*ENDS, Status.RUNNING}
         assert np.isfinite(table.values).all()

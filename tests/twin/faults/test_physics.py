@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.stages import NOISE
-from spheretwin.faults.schedule import FaultPlan
+from spheretwin.faults.schedule import FaultSchedule
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.session import Session
@@ -43,10 +43,10 @@ def emfs(middle_q, middle_qdot, actuator):
 def stepped(scenario, ticks):
     """Rows of a run, one at a time, and the currents (ticks + 1, n), A, between them."""
     with Session(scenario) as session:
-        currents, parts = [session._machine._plant.current.copy()], []
+        currents, parts = [session._runtime._plant.current.copy()], []
         for _ in range(ticks):
             parts.append(session.advance(1))
-            currents.append(session._machine._plant.current.copy())
+            currents.append(session._runtime._plant.current.copy())
         return parts, np.array(currents), session.actuator
 
 
@@ -76,7 +76,7 @@ def test_a_shorted_coil_carries_what_its_emf_drives():
     with Session(prototype({"target": "coil.04", "mode": "short", "start_s": 0.3})) as session:
         session.advance(299)
         before = session.advance(1)
-        start = session._machine._plant.current[4]
+        start = session._runtime._plant.current[4]
         table, actuator = session.advance(200), session.actuator
     assert len(before) == 1
     middle = amid(table["q_rad"], table["qdot_rad_s"], before["qdot_rad_s"])
@@ -165,7 +165,7 @@ def test_a_low_supply_limits_the_ramp(share):
     }  # fmt: skip
     with Session(prototype({"target": "supply", "mode": "gain", "value": share}, **fields)) as session:
         row, actuator = session.advance(1), session.actuator
-        ends = session._machine._plant.current.copy()
+        ends = session._runtime._plant.current.copy()
     up, down, stiffness = 24 * share - 4.8, 4.6 - 24 * share, L_H * 2 * np.pi * 2000
     emf = emfs(row["q_rad"], row["qdot_rad_s"], actuator)[0]  # at rest: none
     limited = 0
@@ -231,7 +231,7 @@ def test_several_noises_of_one_source_are_one_of_their_root_sum_of_squares():
     faults = each("noise", "amplifier", value=0.3) + each("noise", "amplifier", value=0.4)
     with Session(prototype(*faults)) as session:
         session.advance(1)
-        drive = session._machine._plant.driving
+        drive = session._runtime._plant.drive
     np.testing.assert_allclose(drive.stage("amplifier").line.table[:, NOISE], 0.5, rtol=1e-15)
     assert not drive.stage("dac").line.table[:, NOISE].any()
-    assert len(FaultPlan(session.scenario.fault, GROUPS, STEP_S, 0)) == 36
+    assert len(FaultSchedule(session.scenario.fault, GROUPS, STEP_S, 0)) == 36

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from spheretwin.electronics.random_streams import stream_key
 from spheretwin.faults.fault import MODES, Fault
-from spheretwin.faults.schedule import NEVER, FaultPlan, part_names, part_of
+from spheretwin.faults.schedule import NEVER, FaultSchedule, part_names, part_of
 from spheretwin.faults.targets import TARGETS
 
 GROUPS, PERIOD_S = 18, 1e-3
 
 
 def plan(*faults, seed=0, period_s=PERIOD_S):
-    return FaultPlan(tuple(Fault(**each) for each in faults), GROUPS, period_s, seed)
+    return FaultSchedule(tuple(Fault(**each) for each in faults), GROUPS, period_s, seed)
 
 
 def coil(group=0, **more):
@@ -73,7 +73,7 @@ FAULTS = st.lists(
 def test_the_next_change_skips_none(faults, seed):
     """Against asking at every tick: between a tick and the next at which others may act, none do."""
     made = plan(*faults, seed=seed)
-    began = [made.began_s(tick).tobytes() for tick in range(120)]
+    began = [made.fault_start_s(tick).tobytes() for tick in range(120)]
     active = [made.active(tick) for tick in range(120)]
     tick = 0
     while tick < 120:
@@ -138,7 +138,7 @@ def test_marks_are_numbers_of_modes_at_the_parts_places():
         given = {"value": 0.5} if value and value.default is None else {}
         fault = Fault(target=name, mode=mode, **given)
         assert part_of(fault, GROUPS) == place
-        marks = FaultPlan((fault,), GROUPS, PERIOD_S, 0).marks((0,))
+        marks = FaultSchedule((fault,), GROUPS, PERIOD_S, 0).mode_numbers((0,))
         assert marks.nonzero()[0].tolist() == [place]
         assert MODES[int(marks[place]) - 1] == mode
 
@@ -146,11 +146,11 @@ def test_marks_are_numbers_of_modes_at_the_parts_places():
 def test_the_last_of_several_on_one_part_is_marked_and_all_act():
     made = plan(coil(), coil(mode="short", start_s=0.01))
     assert made.active(10) == (0, 1)
-    assert made.marks((0, 1))[0] == 1 + MODES.index("short")
-    assert plan(coil(known=True), coil(3)).told((0, 1)).nonzero()[0].tolist() == [0]
+    assert made.mode_numbers((0, 1))[0] == 1 + MODES.index("short")
+    assert plan(coil(known=True), coil(3)).reported_groups((0, 1)).nonzero()[0].tolist() == [0]
 
 
 def test_a_group_s_fault_began_when_the_last_one_did():
     made = plan(coil(2, start_s=0.01), {"target": "amplifier.02", "mode": "open", "start_s": 0.03})
-    assert [made.began_s(tick)[2] for tick in (9, 10, 29, 30, 31)] == [-1.0, 0.01, 0.01, 0.03, 0.03]
-    assert np.all(np.delete(made.began_s(31), 2) == -1.0)
+    assert [made.fault_start_s(tick)[2] for tick in (9, 10, 29, 30, 31)] == [-1.0, 0.01, 0.01, 0.03, 0.03]
+    assert np.all(np.delete(made.fault_start_s(31), 2) == -1.0)

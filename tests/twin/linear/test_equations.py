@@ -6,8 +6,8 @@ from scipy.signal import cont2discrete
 
 from spheretwin import assembly
 from spheretwin import scenario as scenarios
-from spheretwin.active_config import at_start
-from spheretwin.linear import knowledge, linearise
+from spheretwin.active_config import initial_config
+from spheretwin.linear import linearisation_data, linearise
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
@@ -43,8 +43,8 @@ def inverse(matrix):
 def test_one_physics_step_of_either_engine_has_the_model_s_derivatives(engine, pose):
     """Over a step h a torque is held: x' = exp(A h) x + (∫exp(A s) ds B) u."""
     model = linearise(scenario({"plant.engine": engine}), pose)
-    in_force = at_start(scenario({"plant.engine": engine}), None, None)
-    rotor, h = assembly.rotor_of(in_force.scenario, in_force.files), in_force.scenario.plant.step_s
+    config = initial_config(scenario({"plant.engine": engine}), None, None)
+    rotor, h = assembly.rotor_of(config.scenario, config.files), config.scenario.plant.step_s
 
     def after(at):
         stepped = rotor.start(pose + at[:3], at[3:6])
@@ -214,9 +214,9 @@ def test_nominal_friction_and_limit_are_those_of_the_data_sheet():
     model = linearise(scenario(told), np.zeros(3), nominal=True)
     # A product and a quotient round.
     np.testing.assert_allclose(model.system.A[3:6, 3:6], -np.diag([0.5, 2 / 3, 0.75]), rtol=1e-12, atol=1e-15)
-    resting = at_start(scenario(told), None, None)
-    assert knowledge(resting.scenario, resting.files, nominal=True).current_limit_A == 5.0
-    assert knowledge(resting.scenario, resting.files, nominal=False).current_limit_A == 1e-3
+    resting = initial_config(scenario(told), None, None)
+    assert linearisation_data(resting.scenario, resting.files, nominal=True).current_limit_A == 5.0
+    assert linearisation_data(resting.scenario, resting.files, nominal=False).current_limit_A == 1e-3
 
 
 def test_a_constant_torque_is_held_beside_gravity():

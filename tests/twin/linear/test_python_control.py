@@ -106,5 +106,7 @@ def test_its_systems_are_laws_and_its_designs_run(tmp_path):
 @pytest.mark.parametrize("found", [None, ModuleType("control")], ids=["nothing", "a folder of its name"])
 def test_where_it_is_not_to_be_had_it_is_told_in_one_line(found, monkeypatch):
     monkeypatch.setitem(sys.modules, "control", found)
-    with pytest.raises(InputError, match="expected python-control to be there for kind control, received no"):
+    with pytest.raises(
+        InputError, match="expected an installed python-control for kind control, received no"
+    ):
         linearise(scenario.load("hold"), kind="control")

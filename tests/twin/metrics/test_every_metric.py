@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, Planned
+from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.run import figures_of
@@ -41,7 +41,7 @@ def test_every_metric_is_what_json_holds(runs, name):
 
 
 def planned_for(run):
-    return Planned(run.scenario, run.actuator, run.scenario.ticks)
+    return PlannedRun(run.scenario, run.actuator, run.scenario.ticks)
 
 
 def in_chunks(run, name, ends):
@@ -78,7 +78,7 @@ def test_every_metric_is_none_without_a_row(runs, name):
 def test_every_metric_s_memory_does_not_hold_the_rows(runs, name):
     """A kilobyte for 10,000 ticks at most, where the rows take 600."""
     planned = planned_for(runs[0])
-    metric = METRICS[name](Planned(planned.scenario, planned.actuator, 40_000))
+    metric = METRICS[name](PlannedRun(planned.scenario, planned.actuator, 40_000))
     sizes = []
     signals = runs[0].telemetry.signals
     for _ in range(3):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
-from spheretwin.metrics import METRICS, PIECE_TICKS, BAND_rad, Planned
+from spheretwin.metrics import METRICS, PIECE_TICKS, BAND_rad, PlannedRun
 from spheretwin.models.telemetry.signals import width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.run import figures_of
@@ -119,7 +119,7 @@ def still():
     table = Table(session.signals, np.zeros((1000, width(session.signals))))
     table["t_s"][:] = np.arange(1000) * 1e-3
     table["allocation_scale"][:] = 1.0
-    return Planned(session.scenario, session.actuator, 1000), table
+    return PlannedRun(session.scenario, session.actuator, 1000), table
 
 
 def value(name, planned, table):
@@ -208,7 +208,7 @@ def test_a_lost_rank_is_not_reported_as_the_current_limit(allocation):
     assert not lost[:50].any()
     assert lost[50:].all()
     assert not run.telemetry["current_command_A"][50:].any()
-    metric = METRICS["saturated_fraction"](Planned(run.scenario, run.actuator, run.scenario.ticks))
+    metric = METRICS["saturated_fraction"](PlannedRun(run.scenario, run.actuator, run.scenario.ticks))
     metric.write(run.telemetry)
     assert metric.warnings()[0] == (
         "the torque matrix of the groups in use has less than rank 3 at 50 of 100 ticks:"

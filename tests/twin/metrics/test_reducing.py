@@ -55,7 +55,7 @@ def test_largest_and_last_outside_are_those_of_all_rows(size):
     largest, last, first = np.full(5, -np.inf), np.full(5, -1), 0
     for rows in chunks(size):
         metrics.raise_to_largest(rows, largest)
-        metrics.note_last_outside(rows, 1e-3, first, last)
+        metrics.update_last_outside(rows, 1e-3, first, last)
         first += len(rows)
     np.testing.assert_array_equal(largest, np.abs(ROWS).max(axis=0))
     outside = [np.flatnonzero(np.abs(column) > 1e-3) for column in ROWS.T]

@@ -8,13 +8,13 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.kinematics import rotor_rate_jacobian
 from spheretwin.models.lagrangian import inertia_matrix
-from spheretwin.plant.mujoco_rotor import Rotor, step
+from spheretwin.plant.mujoco_rotor import MujocoRotor, step
 
 STEP_S = 5e-4
 
 
 def rotor(**changes):
-    return Rotor(**{"mjcf": mjcf.read(actuators.MJCF_PATH), "step_s": STEP_S, "integrator": "RK4"}
+    return MujocoRotor(**{"mjcf": mjcf.read(actuators.MJCF_PATH), "step_s": STEP_S, "integrator": "RK4"}
                  | {"modelling_error": 0.0, "payload_kg": 0.0} | changes)  # fmt: skip
 
 

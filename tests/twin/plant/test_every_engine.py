@@ -9,7 +9,7 @@ from spheretwin import scenario as scenarios
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.telemetry.status import Status
-from spheretwin.plant.rotor import Setting
+from spheretwin.plant.rotor import RotorSettings
 from spheretwin.plant.step import ENGINES, step
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
@@ -44,16 +44,16 @@ def test_every_engine_goes_on_from_a_snapshot_bit_for_bit(name):
 def test_every_engine_s_state_is_all_that_its_steps_depend_on(name, actuator):
     row = ENGINES[name]
     assert row.name == name
-    setting = Setting(mjcf.read(actuators.MJCF_PATH), actuator, 5e-4, "RK4", 0.1, 0.0, None)
-    rotor = row.set_up(setting)
-    stepped = rotor.start(np.array([0.1, -0.2, 0.3]), np.array([1.0, 2.0, -3.0]))
-    assert isinstance(stepped, row.stepped)
+    settings = RotorSettings(mjcf.read(actuators.MJCF_PATH), actuator, 5e-4, "RK4", 0.1, 0.0, None)
+    rotor = row.set_up(settings)
+    data = rotor.start(np.array([0.1, -0.2, 0.3]), np.array([1.0, 2.0, -3.0]))
+    assert isinstance(data, row.data)
 
     def after_steps():
-        stepped.torque_q[:] = [0.01, -0.02, 0.03]
+        data.torque_q[:] = [0.01, -0.02, 0.03]
         for _ in range(5):
-            step(stepped)
-        return np.concatenate([stepped.q, stepped.qdot]).tobytes()
+            step(data)
+        return np.concatenate([data.q, data.qdot]).tobytes()
 
     before = rotor.state().copy()
     moved = after_steps()

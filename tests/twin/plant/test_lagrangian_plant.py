@@ -27,7 +27,7 @@ from spheretwin.plant import lagrangian_rotor
 from spheretwin.plant import mujoco_rotor as engine
 from spheretwin.plant import step as stepping
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
-from spheretwin.plant.mujoco_rotor import Rotor
+from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.simulation import simulate
 
 STEP_S, PAYLOAD_KG = 5e-4, 0.05
@@ -207,7 +207,7 @@ def test_a_step_allocates_nothing(actuator):
 def test_one_step_is_mujoco_s(actuator):
     settings = (STEP_S, "RK4", 0.2, PAYLOAD_KG)
     ours = LagrangianRotor(actuator, *settings).start(START[:3], START[3:])
-    mujoco_rotor = Rotor(mjcf.read(actuators.MJCF_PATH), *settings)
+    mujoco_rotor = MujocoRotor(mjcf.read(actuators.MJCF_PATH), *settings)
     theirs = mujoco_rotor.start(START[:3], START[3:])
     for plant in (ours, theirs):
         plant.torque_q[:] = [0.35, -0.1, -0.1]
@@ -229,13 +229,13 @@ def test_compiled_code_steps_what_python_steps(actuator, kind):
         # Kept alive: compiled code holds bare addresses of MuJoCo's own.
         settings = (STEP_S, "RK4", 0.0, 0.0)
         rotor = (
-            Rotor(mjcf.read(actuators.MJCF_PATH), *settings)
+            MujocoRotor(mjcf.read(actuators.MJCF_PATH), *settings)
             if kind is engine
             else LagrangianRotor(actuator, *settings)
         )
         return rotor, rotor.start(START[:3], START[3:])
 
-    (_keep, by_python), (_keep_too, by_compiled) = start(), start()
+    (_keep, by_python), (_kept, by_compiled) = start(), start()
     for _ in range(10):
         stepping.step(by_python)
     ten_steps(by_compiled)

@@ -21,7 +21,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
 from spheretwin.plant.lagrangian_rotor import step as lagrangian_step
-from spheretwin.plant.mujoco_rotor import Rotor, step
+from spheretwin.plant.mujoco_rotor import MujocoRotor, step
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
@@ -70,7 +70,7 @@ def stock(path, torques, pose=POSE, rates=RATES, integrator="RK4"):
 
 
 def ours(path, torques, pose=POSE, rates=RATES, integrator="RK4", payload_kg=0.0):
-    rotor = Rotor(mjcf.read(path), STEP_S, integrator, 0.0, payload_kg)
+    rotor = MujocoRotor(mjcf.read(path), STEP_S, integrator, 0.0, payload_kg)
     engine = rotor.start(pose, rates)
     poses = np.empty((len(torques), 3))
     for row, torque in enumerate(torques):

@@ -35,12 +35,12 @@ def test_currents_are_what_the_stages_make_of_the_commands(engine, delay_s):
     current, emf, last = np.zeros(groups), np.empty(groups), table["qdot_rad_s"][0]
     for tick in range(100):
         begin(stages, table["current_command_A"][tick].copy())
-        due(stages.delay, 0, stages.asked)
+        due(stages.delay, 0, stages.setpoint)
         rates = table["qdot_rad_s"][tick]
         # Pose and rates in the middle of the step, as the plant predicts them.
         q, qdot, last = table["q_rad"][tick] + 5e-4 * rates, rates + 0.5 * (rates - last), rates
         back_emf(torque_matrix(q, actuator), np.ones(groups), rate_jacobian(q) @ qdot, emf)
-        drive_coils(stages.amplifier, stages.coil, stages.asked, emf, current, stages.flow)
+        drive_coils(stages.amplifier, stages.coil, stages.setpoint, emf, current, stages.flow)
         # Torque matrices and sums of three products, rounded in another order: 1e-16 of volts, times 1/R.
         np.testing.assert_allclose(table["current_A"][tick], stages.flow.mean_current_A, rtol=0, atol=1e-11)
         np.testing.assert_allclose(
@@ -74,8 +74,8 @@ def test_work_at_the_coils_is_heat_motion_and_field():
     for step_s in (5e-4, 2.5e-4, 1.25e-4):
         with Session(driven(duration=0.06, **still, **{"plant.step_s": step_s})) as session:
             table, inertia = session.advance(60), session.actuator.inertia
-            current = session._machine._plant.current
-            q, qdot = session.q_rad, session._machine._moving.stepped.qdot
+            current = session._runtime._plant.current
+            q, qdot = session.q_rad, session._runtime._rotor.data.qdot
             work = table["coil_power_W"].sum() * 1e-3
             heat = table["copper_loss_W"].sum() * 1e-3
             kinetic = 0.5 * qdot @ inertia_matrix(q, inertia) @ qdot

@@ -32,8 +32,8 @@ def test_streams_are_those_of_numpy(seed):
 
 @given(st.integers(0, 2**96), st.text(), st.integers(1, 4), st.integers(0, 40))
 def test_so_are_those_of_any_seed_and_name(seed, name, channels, count):
-    wanted = [theirs(seed, name, channel).random(count) for channel in range(channels)]
-    np.testing.assert_array_equal(uniforms(seed, name, channels, count), wanted)
+    expected = [theirs(seed, name, channel).random(count) for channel in range(channels)]
+    np.testing.assert_array_equal(uniforms(seed, name, channels, count), expected)
 
 
 def test_a_key_with_one_word_is_hashed_as_numpy_does(monkeypatch):

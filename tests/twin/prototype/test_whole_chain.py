@@ -120,7 +120,7 @@ class Copy:
         )
         self.wiper, self.converted, self.handed = np.zeros((3, 3))
         self.voltages, self.sent = [], [np.zeros(GROUPS)]
-        self.latched, self.asked, self.current = np.zeros((3, GROUPS))
+        self.latched, self.setpoint, self.current = np.zeros((3, GROUPS))
         self.temperature = np.full(GROUPS, 20.0)
         self.state, self.gain, self.last_rate = None, self.kalman_gain(), None
 
@@ -243,13 +243,15 @@ class Copy:
             else:
                 raise KeyError(mode)
         self.sent.append(leaving)
-        asked = self.sent[max(len(self.sent) - 1 - late, 0)].copy()
+        setpoint = self.sent[max(len(self.sent) - 1 - late, 0)].copy()
         for j in range(GROUPS):
-            asked[j] = self.through(self.acting("dac", j), asked[j], self.latched[j], TRANSCONDUCTANCE_A_V)
-            self.latched[j] = asked[j]
+            setpoint[j] = self.through(
+                self.acting("dac", j), setpoint[j], self.latched[j], TRANSCONDUCTANCE_A_V
+            )
+            self.latched[j] = setpoint[j]
             lines = [fault for fault in self.acting("amplifier", j) if fault[0] != "open"]
-            asked[j] = self.through(lines, asked[j], self.asked[j], 1.0)
-        self.asked = asked
+            setpoint[j] = self.through(lines, setpoint[j], self.setpoint[j], 1.0)
+        self.setpoint = setpoint
 
     def drive(self, q, qdot):
         supply = 24.0
@@ -271,7 +273,7 @@ class Copy:
             for mode, value, _ in self.acting("coil", j):
                 turns[j] *= value if mode == "gain" else 1.0
             emf = turns[j] * (G[:, j] @ (rate_jacobian(middle) @ middle_rate))
-            target = np.clip(self.asked[j] + self.amplifier_A[j], -LIMIT_A, LIMIT_A)
+            target = np.clip(self.setpoint[j] + self.amplifier_A[j], -LIMIT_A, LIMIT_A)
             if "open" in wrong:
                 self.current[j] = 0.0
             elif "short" in wrong:
@@ -297,11 +299,11 @@ class Copy:
         """Phases in the order they come, until the period is over: end, mean and mean square."""
         left, mean, square, mode = PERIOD_S, 0.0, 0.0, None
 
-        def wanted(current):
+        def voltage_at(current):
             return R * current + L_H * RATE_1_S * (target - current) + emf
 
         while left > 0:
-            v = wanted(i)
+            v = voltage_at(i)
             # Where a phase has just ended the voltage is at a limit to rounding; which side is known.
             mode = mode or ("up" if v > up else "down" if v < down else "follow")
             mode = "up" if up == down else mode  # without a swing there is one voltage
@@ -310,9 +312,11 @@ class Copy:
             over, after = left, None
             ends = {"follow": [up, down], "up": [up], "down": [down]}[mode]
             for end in ends if up > down else []:
-                begin, finish = v - end, wanted(along(left)) - end
+                begin, finish = v - end, voltage_at(along(left)) - end
                 if begin * finish < 0 and abs(begin) > 1e-9:
-                    root = brentq(lambda t, e=end, c=along: wanted(c(t)) - e, 0, left, xtol=1e-19, rtol=1e-15)
+                    root = brentq(
+                        lambda t, e=end, c=along: voltage_at(c(t)) - e, 0, left, xtol=1e-19, rtol=1e-15
+                    )
                     if root < over:
                         over, after = (
                             root,

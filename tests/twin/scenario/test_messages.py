@@ -11,7 +11,7 @@ from spheretwin.analysis import tolerances
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.scenario import fields as explaining
 from spheretwin.scenario import reading
-from spheretwin.scenario.changes import changed
+from spheretwin.scenario.changes import with_change
 from spheretwin.scenario.fields import every_field
 from spheretwin.scenario.sections import Scenario
 from spheretwin.study import study as studies
@@ -69,7 +69,7 @@ def test_flags(value):
 
 def test_changes_of_a_run():
     scenario = scenarios.load("hold")
-    told = {message(changed, scenario, name, value) for name in NAMES for value in VALUES}
+    told = {message(with_change, scenario, name, value) for name in NAMES for value in VALUES}
     assert len(told) > 500
     for line in told - {None}:
         assert not FORBIDDEN.search(line), line
@@ -138,7 +138,7 @@ def test_every_kind_of_error_of_the_sections_has_words():
     kinds = set()
     for name in NAMES:
         for value in VALUES:
-            fields = {"trajectory": {"shape": "hold"}, **scenarios.reading.alone(name, value)}
+            fields = {"trajectory": {"shape": "hold"}, **scenarios.reading.single_field(name, value)}
             try:
                 Scenario.model_validate_json(json.dumps(fields))
             except explaining.ValidationError as error:

@@ -5,7 +5,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.disturbances import KINDS
 from spheretwin.models.base.errors import InputError
-from spheretwin.scenario.reading import described
+from spheretwin.scenario.reading import field_descriptions
 from spheretwin.session import Session
 
 HOLD = '[trajectory]\nshape = "hold"\n[[disturbance.terms]]\n'
@@ -54,11 +54,11 @@ def test_complaints_name_the_entry(tmp_path, text, complaint):
 
 def test_help_shows_them_as_they_can_be_given(tmp_path):
     made = loaded(tmp_path, '[trajectory]\nshape = "steps"\n')
-    shown = {flag: value for flag, value, _ in described(made)}
+    shown = {flag: value for flag, value, _ in field_descriptions(made)}
     assert shown["--trajectory.times-s"] == "1"
     assert shown["--trajectory.angles-rad"] == "[[0.2, -0.1, 0.3]]"
     made = loaded(tmp_path, SINES + "frequency_Hz = [1.0, 2.0, 3.0]")
-    shown = {flag: value for flag, value, _ in described(made)}
+    shown = {flag: value for flag, value, _ in field_descriptions(made)}
     assert shown["--trajectory.components.0.frequency-Hz"] == "1 2 3"
 
 

@@ -8,7 +8,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario import reading
 from spheretwin.scenario import reading as flags
-from spheretwin.scenario.changes import changed as changed_in
+from spheretwin.scenario.changes import with_change as changed_in
 from spheretwin.scenario.fields import every_field
 from spheretwin.scenario.sections import Scenario
 
@@ -48,7 +48,7 @@ def test_flags_reach_every_field():
     assert flags.overrides(tokens) == {
         "drive.current_limit_A": 4, "plant.initial_rad": [0, 0, 0.1], "plant.mjcf": "7.xml", "name": "12",
     }  # fmt: skip
-    listed = {flag for flag, *_ in flags.described(scenarios.load("nutation"))}
+    listed = {flag for flag, *_ in flags.field_descriptions(scenarios.load("nutation"))}
     assert {f"--{flag}" for flag in values} < listed
 
 
@@ -213,9 +213,9 @@ def test_the_controller_s_torque_curve_is_taken_as_the_plant_s(tmp_path, monkeyp
 def test_a_tilde_in_a_change_is_the_user_s_home(tmp_path, monkeypatch, name):
     monkeypatch.setenv("HOME", str(tmp_path))
     section, field = name.split(".")
-    changed = changed_in(scenarios.load("hold"), name, "~/a")
-    assert getattr(getattr(changed, section), field) == f"{tmp_path}/a"
-    again = changed_in(changed, "disturbance.load", 1.0)
+    with_change = changed_in(scenarios.load("hold"), name, "~/a")
+    assert getattr(getattr(with_change, section), field) == f"{tmp_path}/a"
+    again = changed_in(with_change, "disturbance.load", 1.0)
     assert getattr(getattr(again, section), field) == f"{tmp_path}/a"
 
 

@@ -333,7 +333,9 @@ def test_an_event_that_would_fail_is_found_before_the_first_tick(file, event):
 def test_an_event_after_the_end_is_warned_of():
     event = {"t_s": 0.2, "set": "disturbance.load", "value": 1.0}
     with Session(hold(event=[event])) as session:
-        assert session.warnings() == ["the event that sets disturbance.load is not made: the run ends before"]
+        assert session.warnings() == [
+            "the event that sets disturbance.load does not occur: the run ends before"
+        ]
 
 
 @pytest.mark.parametrize(("start_s", "warns"), [(0.049, False), (0.0495, True), (0.05, True), (3.0, True)])

@@ -100,15 +100,15 @@ def test_flags_write_the_same_list(planned):
     assert scenario.event == planned.event[:1]
     changed = scenarios.load("hold", reading.overrides([*tokens, "--event.0.value", "3.0"]))
     assert changed.event[0].value == 3.0
-    rows = {flag: value for flag, value, _ in reading.described(scenario)}
+    rows = {flag: value for flag, value, _ in reading.field_descriptions(scenario)}
     assert rows["--event.0.set"] == "disturbance.load"
-    assert "--event" in {flag for flag, *_ in reading.described(scenarios.load("hold"))}
+    assert "--event" in {flag for flag, *_ in reading.field_descriptions(scenarios.load("hold"))}
 
 
 @pytest.mark.parametrize(
     ("tokens", "part"),
     [
-        ("--event.1.t-s 0.1", "expected a place from 0 to 0 in a list, received event.1.t_s"),
+        ("--event.1.t-s 0.1", "expected a list index from 0 to 0, received event.1.t_s"),
         ("--event.0.t-s 0.1", "event.0.set: expected a value, received none"),
         ("--event.0.t-s -1 --event.0.set seed --event.0.value 1", "event.0.t_s: expected a number greater"),
         ("--event.0.t-s 0 --event.0.set seed --event.0.value 1", "event.0.set: expected a field that may"),

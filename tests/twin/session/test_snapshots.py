@@ -88,7 +88,7 @@ def test_the_solver_s_warm_start_is_restored(sticky):
     assert rows(other.advance(200)) == expected
     # Without the warm start, which lies among the numbers of the state, the bits are others.
     other.restore(taken)
-    data = other._machine._moving.rotor.data
+    data = other._runtime._rotor.rotor.data
     assert np.any(data.qacc_warmstart)
     data.qacc_warmstart[:] = 0.0
     assert rows(other.advance(200)) != expected
@@ -190,7 +190,7 @@ def test_a_snapshot_that_does_not_fit_is_refused_and_nothing_changes(sticky):
     mine.advance(10)
     taken = mine.snapshot()
     longer = Law("mine", proportional, np.array([0.5, 0.05]), np.zeros(2), CALLS)
-    fitting = dataclasses.replace(taken, machine=taken.machine._replace(rotor=taken.machine.rotor[:-1]))
+    fitting = dataclasses.replace(taken, runtime=taken.runtime._replace(rotor=taken.runtime.rotor[:-1]))
     for law, snapshot, part in [
         (longer, taken, "the law's memory, received 1"),
         (plain_law(), fitting, "the engine's state"),
@@ -214,7 +214,7 @@ def test_every_part_s_numbers_are_counted_before_anything_is_restored():
     taken = mine.snapshot()
     expected = rows(mine.advance(20))
     mine.restore(taken)
-    machine = taken.machine
+    machine = taken.runtime
     wrong = [
         (name, machine._replace(parts={**machine.parts, name: numbers}))
         for name, saved in machine.parts.items()

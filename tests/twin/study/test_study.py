@@ -50,7 +50,7 @@ def refusal(action):
             "received 'disturbance.laod'; did you mean disturbance.load?",
         ),
         ([values("plant.modelling_error.3", 1.0)], {}, "expected a section before the dot"),
-        ([values("plant.coulomb_Nm.9", 1.0)], {}, "expected a place from 0 to 3 in a list"),
+        ([values("plant.coulomb_Nm.9", 1.0)], {}, "expected a list index from 0 to 3"),
         ([values("plant", 1.0)], {}, "plant: expected a table of fields"),
         ([values("disturbance.load", "1.0", "2")], {}, "expected a number, received '1.0'"),
         ([values("seed", 1)], {}, "expected seeds instead of an axis over seed"),

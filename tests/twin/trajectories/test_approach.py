@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.simulation import simulate
-from spheretwin.trajectories.rounding import FADING, Approach, SOON_s, faded
+from spheretwin.trajectories.rounding import FADING, ACCELERATION_FADE_s, Approach, faded
 from spheretwin.trajectories.shapes import Hold, Jog, Nutation, Sinusoid
 
 STEP = 1e-5
@@ -33,7 +33,9 @@ def test_it_begins_with_the_one_motion_and_ends_with_the_other(kind, rounding, s
     if rounding is None:
         assert shape.sample(after).tobytes() == alone.sharp(after - 2.0 + shape_s).tobytes()
     else:
-        np.testing.assert_array_equal(shape.sample(after), shape.led_to(shape_s + (after - 2.0)))
+        np.testing.assert_array_equal(
+            shape.sample(after), shape.sample_after_approach(shape_s + (after - 2.0))
+        )
 
 
 @pytest.mark.parametrize("kind", SHAPES)
@@ -41,7 +43,7 @@ def test_rates_and_accelerations_are_derivatives_and_nothing_jumps(kind):
     shape = kind(approach=Approach(start_s=0.5, lasts_s=0.9, **BEGUN))
     # A step of the difference beside where a polynomial begins or ends would mix the two.
     t = np.linspace(0.5 + 2 * STEP, 2.0, 400)
-    t = t[np.abs(t - 0.5 - SOON_s) > 2 * STEP]
+    t = t[np.abs(t - 0.5 - ACCELERATION_FADE_s) > 2 * STEP]
     before, now, after = (shape.sample(t + h) for h in (-STEP, 0, STEP))
     # Central differences: h² times a sixth of third derivatives below 1e5, and rounding of 3 rad over h.
     np.testing.assert_allclose(now[:, 1], (after - before)[:, 0] / (2 * STEP), atol=2e-6)
@@ -49,7 +51,7 @@ def test_rates_and_accelerations_are_derivatives_and_nothing_jumps(kind):
     fine = shape.sample(np.arange(0.5, 2.0, 1e-4))
     # The jerk is at most 9 times the difference of accelerations over a tenth of a second.
     largest = np.abs(fine[:, 2]).max()
-    assert np.abs(np.diff(fine[:, 2], axis=0)).max() < 1e-4 * 20 * largest / SOON_s
+    assert np.abs(np.diff(fine[:, 2], axis=0)).max() < 1e-4 * 20 * largest / ACCELERATION_FADE_s
 
 
 def test_the_polynomials_are_those_that_end_at_rest():
@@ -66,7 +68,7 @@ def test_what_is_left_is_bounded_and_vanishes(numbers, lasts_s, since):
     left = faded(difference, np.array([since]), lasts_s)[0]
     bound = np.abs(difference)
     # Of an angle at most all, of a rate 0.2 s a second, of an acceleration 0.02 s²: the polynomials' largest.
-    most = bound[0] + 0.2 * lasts_s * bound[1] + 0.02 * min(lasts_s, SOON_s) ** 2 * bound[2]
+    most = bound[0] + 0.2 * lasts_s * bound[1] + 0.02 * min(lasts_s, ACCELERATION_FADE_s) ** 2 * bound[2]
     assert np.all(np.abs(left[0]) <= most * (1 + 1e-12) + 1e-300)
     if since >= lasts_s:
         np.testing.assert_array_equal(left, 0.0)

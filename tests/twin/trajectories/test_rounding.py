@@ -8,7 +8,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from spheretwin.trajectories.rounding import Corners, least_acceleration, no_corners, rounded, told
+from spheretwin.trajectories.rounding import (
+    Corners,
+    format_acceleration,
+    least_acceleration,
+    no_corners,
+    rounded,
+)
 from spheretwin.trajectories.shapes import Nutation, Sinusoid, Steps, Tilt
 
 FINE = 1e-4
@@ -69,7 +75,7 @@ def test_smallest_acceleration_told_is_the_smallest(shape):
     assume(jumps(shape))
     least = least_of(shape)
     assert with_rounding(shape, least).rounding_rad_s2 == least
-    with pytest.raises(ValidationError, match="no corner runs into the next"):
+    with pytest.raises(ValidationError, match="no corner overlaps the next"):
         with_rounding(shape, least * (1 - 2e-5))  # told in six digits, rounded up
 
 
@@ -78,8 +84,8 @@ def test_smallest_acceleration_told_is_the_smallest(shape):
     [(3.2, "3.2"), (3.2000001, "3.20001"), (1234567.8, "1.23457e+6"), (0.152587, "0.152587")],
 )
 def test_what_is_told_is_never_too_small(value, text):
-    assert told(value) in (text, text + "0000")
-    assert float(told(value)) >= value
+    assert format_acceleration(value) in (text, text + "0000")
+    assert float(format_acceleration(value)) >= value
 
 
 def test_tilt_s_corners_are_parabolas_about_them():

@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.trajectories.shapes import Sinusoid
-from spheretwin.trajectories.trajectory import OwnTrajectory, checked
+from spheretwin.trajectories.trajectory import UserTrajectory, checked
 
 
 class Own:
@@ -18,7 +18,7 @@ def test_it_is_sampled_as_it_is():
     own = checked(Own(Sinusoid().sample))
     assert own.sample(t).tobytes() == Sinusoid().sample(t).tobytes()
     assert checked(own) is own
-    assert isinstance(own, OwnTrajectory)
+    assert isinstance(own, UserTrajectory)
 
 
 def test_what_it_does_with_its_arrays_later_changes_nothing():

@@ -82,7 +82,7 @@ def load(reference, *tokens, name="hold"):
 def test_a_class_has_its_parameters_as_fields(file):
     scenario = load(f"{file}:ComputedTorque", "--controller.stiffness", "400", "--controller.damping", "40")
     assert scenario.controller.stiffness == (400.0, 400.0, 400.0)
-    rows = {flag: (value, text) for flag, value, text in reading.described(scenario)}
+    rows = {flag: (value, text) for flag, value, text in reading.field_descriptions(scenario)}
     assert rows["--controller.stiffness"] == ("400 400 400", "of the error, 1/s²")
     assert rows["--controller.law"][0] == f"{file}:ComputedTorque"
 

@@ -51,7 +51,7 @@ def test_changes_beside_it_leave_it_in_force():
         np.testing.assert_array_equal(table["q_ref_rad"], Spiral().sample(table["t_s"])[:, 0])
         assert session.scenario.trajectory.shape == "Spiral"
         for name, value in (("trajectory.shape", "nutation"), ("trajectory", {"shape": "hold"})):
-            with pytest.raises(InputError, match="Spiral is followed instead"):
+            with pytest.raises(InputError, match="Spiral replaces it"):
                 session.set(name, value)
 
 
@@ -73,7 +73,7 @@ def test_its_telemetry_says_so_and_cannot_be_replayed(tmp_path, capsys):
         table.write_parquet(path, record_of(session).metadata())
     assert '"shape": "Spiral"' in read_parquet(path)[1]["scenario"]
     assert cli.main(["simulate", "--replay", str(path)]) == 2
-    assert "received one along Spiral, a trajectory that its file does not hold" in capsys.readouterr().err
+    assert "received one along Spiral, a trajectory that its file does not contain" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("own", [3, Spiral, type("Empty", (), {})()])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from spheretwin import cli
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.csv_series import TimeSeries
-from spheretwin.trajectories.waypoints import Path, Waypoints
+from spheretwin.trajectories.waypoints import WaypointPath, Waypoints
 
 HEADER = "t_s,alpha_rad,beta_rad,gamma_rad"
 T = np.array([0.5, 1.25, 3.0, 4.5])
@@ -43,7 +43,7 @@ def some_poses(draw):
 @pytest.mark.parametrize("between", KINDS)
 @given(poses=some_poses())
 def test_path_goes_through_the_poses_and_rests_beyond_them(between, poses):
-    path, t = Path(poses, between), poses.t_s
+    path, t = WaypointPath(poses, between), poses.t_s
     scale = 1 / np.diff(t).min()
     samples = path.sample(t)
     # Angles of 2 rad, and polynomials of them over the shortest time.
@@ -62,7 +62,7 @@ def test_path_goes_through_the_poses_and_rests_beyond_them(between, poses):
 
 @given(some_poses())
 def test_minimum_jerk_solves_the_conditions_of_rest_at_both_ends(poses):
-    path = Path(poses, "minimum_jerk")
+    path = WaypointPath(poses, "minimum_jerk")
     for i, lasts in enumerate(np.diff(poses.t_s)):
         # The extremal of ∫ jerk² is a polynomial of degree five; here its six conditions are solved anew.
         powers = np.arange(6)
@@ -81,7 +81,7 @@ def test_minimum_jerk_solves_the_conditions_of_rest_at_both_ends(poses):
 
 
 def test_cubic_is_the_clamped_spline():
-    path = Path(TimeSeries(T, POSES), "cubic")
+    path = WaypointPath(TimeSeries(T, POSES), "cubic")
     # A piecewise cubic of two continuous derivatives with given poses and end rates is the only one: fourth
     # differences within a segment vanish, the rest is checked above.
     for start, end in pairwise(T):
@@ -89,7 +89,7 @@ def test_cubic_is_the_clamped_spline():
         np.testing.assert_allclose(np.diff(angle, 4, axis=0), 0.0, atol=1e-14)
     # Through two poses alone it is Hermite's 3 u² - 2 u³.
     share = np.linspace(0, 0.999, 11)
-    two = Path(TimeSeries(T[:2], POSES[:2]), "cubic").sample(T[0] + 0.75 * share)[:, 0, 2]
+    two = WaypointPath(TimeSeries(T[:2], POSES[:2]), "cubic").sample(T[0] + 0.75 * share)[:, 0, 2]
     np.testing.assert_allclose(two, 3 * share**2 - 2 * share**3, atol=1e-15)
 
 
@@ -97,7 +97,7 @@ def test_cubic_is_the_clamped_spline():
 @given(poses=some_poses())
 @example(poses=TimeSeries(T, np.zeros((4, 3))))
 def test_peaks_are_the_largest_there_are(between, poses):
-    path = Path(poses, between)
+    path = WaypointPath(poses, between)
     t = np.concatenate([np.linspace(start, end, 400, endpoint=False) for start, end in pairwise(poses.t_s)])
     samples = np.abs(path.sample(t))
     for row, peak in zip((1, 2), path.peaks(), strict=True):
