@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.bench.bench_state import Works
-from spheretwin.bench.command_queue import By, Command, Ticket, checked, settled
-from spheretwin.bench.commands import named
-from spheretwin.bench.cycle import Taking, Thread, Turning
+from spheretwin.bench.bench_state import BenchState
+from spheretwin.bench.command_queue import By, Command, Ticket, check_arguments, settled_ticket
+from spheretwin.bench.commands import find_command
+from spheretwin.bench.cycle import CommandProcessor, Cycle, Thread
 from spheretwin.bench.operators import Operators
-from spheretwin.bench.status import State, picture
+from spheretwin.bench.status import BenchStatus, bench_status
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.scenario.fields import fields_of
@@ -71,15 +71,15 @@ class Bench:
     """
 
     def __init__(self, scenario: Scenario, operators: Operators | None = None) -> None:
-        self._works = Works(scenario, operators or Operators())
-        self._taking = Taking(self._works)
-        self._turning = Turning(self._works, self._taking)
-        self._thread = Thread(self._works, self._taking, self._turning)
+        self._bench_state = BenchState(scenario, operators or Operators())
+        self._processor = CommandProcessor(self._bench_state)
+        self._cycle = Cycle(self._bench_state, self._processor)
+        self._thread = Thread(self._bench_state, self._processor, self._cycle)
 
     @property
     def actuator(self) -> Actuator:
         """Of the present run."""
-        return self._works.desk.session.actuator
+        return self._bench_state.driver.session.actuator
 
     def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> Ticket:
         """Tell it something; never waits, whatever is asked.
@@ -100,20 +100,20 @@ class Bench:
             between two chunks.
         """
         try:
-            command = named(name)
-            given = checked(command, arguments)
+            command = find_command(name)
+            values = check_arguments(command, arguments)
             if command.by is By.CLIENT:
-                return self._said(command, client, given)
+                return self._client_command(command, client, values)
             if command.by is By.OPERATOR:
-                self._works.operators.check(client)
-            return self._taking.ask(command, given)
+                self._bench_state.operators.check(client)
+            return self._processor.submit(command, values)
         except InputError as error:
-            self._works.refused = f"{error}"
+            self._bench_state.refused = f"{error}"
             return Ticket(str(error))
 
-    def state(self) -> State:
+    def state(self) -> BenchStatus:
         """The latest picture; does not wait for the loop."""
-        return self._turning.state
+        return self._cycle.state
 
     def history(self) -> dict[str, NDArray[np.float64]]:
         """Rows of the last 10 s at 50 Hz, by signal: (n,) or (n, size) arrays, oldest first; a copy.
@@ -121,24 +121,27 @@ class Bench:
         ``t_s``, ``q_rad``, ``q_ref_rad``, ``error_rad``, ``torque_command_Nm``, ``torque_Nm``,
         ``disturbance_Nm``, ``current_command_A``, ``current_A``, ``allocation_scale``, and the rates.
         """
-        return (self._works.player or self._works).history.read()
+        return (self._bench_state.player or self._bench_state).history.read()
 
     def scenario_toml(self) -> str:
         """The present settings as a scenario file."""
-        return as_toml(self._works.desk.settings)
+        return as_toml(self._bench_state.driver.settings)
 
     def command_line(self) -> str:
         """The present settings as a command line."""
-        return as_command(self._works.desk.settings)
+        return as_command(self._bench_state.driver.settings)
 
     def fields(self) -> list[tuple[str, Any, str]]:
         """Every field of the scenario in force: dotted name, value, meaning.
 
         The trajectory is the one that is set, whatever the mode makes of it meanwhile.
         """
-        in_force, own = self._works.desk.session.scenario, self._works.desk.settings.trajectory
-        found = fields_of(in_force.model_copy(update={"trajectory": own}))
-        return [(name, value, field.description or "") for name, value, field in found]
+        in_force, own = (
+            self._bench_state.driver.session.scenario,
+            self._bench_state.driver.settings.trajectory,
+        )
+        rows = fields_of(in_force.model_copy(update={"trajectory": own}))
+        return [(name, value, field.description or "") for name, value, field in rows]
 
     def advance(self, ticks: int) -> int:
         """Take the commands that wait, then run control ticks, at once; returns how many were run.
@@ -150,28 +153,28 @@ class Bench:
         SpheretwinError
             The bench runs in a thread of its own, or is closed.
         """
-        if self._thread.begun or not self._taking.open:
+        if self._thread.started or not self._processor.open:
             raise SpheretwinError("bench: expected one that waits for advance, received one at work")
-        return self._turning.turn(ticks, waits=True)
+        return self._cycle.run_chunk(ticks, waits=True)
 
     def begin(self) -> None:
         """Run in a thread of its own from now on.
 
         Until `close`, the interpreter goes from thread to thread every millisecond.
         """
-        if not self._thread.begun and self._taking.open:
+        if not self._thread.started and self._processor.open:
             self._thread.begin()
 
     def close(self) -> None:
         """End the thread, and complete what is being recorded."""
-        works = self._works
-        self._taking.open = False
+        bench_state = self._bench_state
+        self._processor.open = False
         self._thread.end()
-        self._taking.close()
-        works.recording.end(works.desk.session, None)
-        works.recording.join()
-        self._turning.state = picture(works)  # what was kept is known
-        works.desk.session.close()
+        self._processor.close()
+        bench_state.recording.end(bench_state.driver.session, None)
+        bench_state.recording.join()
+        self._cycle.state = bench_status(bench_state)  # what was kept is known
+        bench_state.driver.session.close()
 
     def __enter__(self) -> Bench:
         return self
@@ -181,9 +184,9 @@ class Bench:
     ) -> None:
         self.close()
 
-    def _said(self, command: Command, client: str | None, given: dict[str, Any]) -> Ticket:
+    def _client_command(self, command: Command, client: str | None, values: dict[str, Any]) -> Ticket:
         """Take note at once of what a client says of itself."""
         if client is None:
             raise InputError(f"bench: expected {command.name} of a client, received none")
-        command.does(self._works.operators, client, **given)
-        return settled()
+        command.action(self._bench_state.operators, client, **values)
+        return settled_ticket()

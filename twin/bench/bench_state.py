@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from spheretwin.analysis import recorded_run as reviewed
 from spheretwin.bench.command_queue import Queue
-from spheretwin.bench.driver import Desk
+from spheretwin.bench.driver import Driver
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import Pace
 from spheretwin.bench.recording import Recording
@@ -39,16 +39,16 @@ class History:
     def __init__(self, groups: int, period_s: float) -> None:
         self._signals = common_signals(groups)
         self._width = width(self._signals)
-        self._each = max(1, round(1 / (RATE_Hz * period_s)))
+        self._stride = max(1, round(1 / (RATE_Hz * period_s)))
         self._rows: deque[NDArray[np.float64]] = deque(maxlen=round(LENGTH_s * RATE_Hz))
 
     def write(self, first_tick: int, rows: Table) -> None:
         """Take those of some rows that are due, whatever the chunks; they must not change any more."""
-        due = rows.values[-first_tick % self._each :: self._each]
+        due = rows.values[-first_tick % self._stride :: self._stride]
         # A run begins its rows with these signals; a recording may have them in another order.
         if rows.signals[: len(self._signals)] != self._signals:
             parts = [rows[signal.name].reshape(len(rows), -1) for signal in self._signals]
-            due = np.concatenate(parts, axis=1)[-first_tick % self._each :: self._each]
+            due = np.concatenate(parts, axis=1)[-first_tick % self._stride :: self._stride]
         self._rows.extend(due[-(self._rows.maxlen or 0) :, : self._width].copy())
 
     def read(self) -> dict[str, NDArray[np.float64]]:
@@ -99,7 +99,7 @@ class Player:
         self.history.write(0, self.row)
 
     @property
-    def over(self) -> bool:
+    def ended(self) -> bool:
         """Whether the last row is shown."""
         return self.place >= len(self.table)
 
@@ -116,7 +116,7 @@ class Player:
         return self.place - first
 
 
-class Works:
+class BenchState:
     """Parts of a bench that begins paused.
 
     Parameters
@@ -126,7 +126,7 @@ class Works:
 
     Attributes
     ----------
-    desk : Desk
+    driver : Driver
     operators : Operators
     pace : Pace
     queue : Queue
@@ -146,8 +146,8 @@ class Works:
     """
 
     def __init__(self, scenario: Scenario, operators: Operators) -> None:
-        self.desk, self.operators = Desk(scenario, Session(scenario)), operators
-        self.pace, self.queue, self.recording = Pace(), Queue(), Recording(self.take_note)
+        self.driver, self.operators = Driver(scenario, Session(scenario)), operators
+        self.pace, self.queue, self.recording = Pace(), Queue(), Recording(self.set_note)
         self.player: Player | None = None
         self.running, self.steps = False, 0
         self.note: str | None = None
@@ -156,21 +156,21 @@ class Works:
         self.history = self._new_history()
 
     @property
-    def moves(self) -> bool:
+    def is_active(self) -> bool:
         """Whether there are ticks to run."""
         return self.running or self.steps > 0
 
     @property
     def period_s(self) -> float:
         """From row to row of what is shown."""
-        return self.player.period_s if self.player else self.desk.session.scenario.controller.period_s
+        return self.player.period_s if self.player else self.driver.session.scenario.controller.period_s
 
     @property
     def t_s(self) -> float:
         """Simulated time of what is shown."""
-        return float(self.player.row["t_s"][0]) if self.player else self.desk.session.t_s
+        return float(self.player.row["t_s"][0]) if self.player else self.driver.session.t_s
 
-    def take_note(self, text: str | None) -> None:
+    def set_note(self, text: str | None) -> None:
         """Remember what happened last that nobody commanded."""
         self.note = text
 
@@ -178,7 +178,7 @@ class Works:
         """Let time stand still."""
         self.running, self.steps = False, 0
 
-    def check_going(self, name: str) -> None:
+    def check_can_run(self, name: str) -> None:
         """Find out whether what is shown can go on.
 
         Raises
@@ -186,25 +186,25 @@ class Works:
         InputError
             It cannot, and `name` asks for it.
         """
-        if self.player is None and self.desk.reason is not None:
+        if self.player is None and self.driver.reason is not None:
             raise InputError(f"bench: expected reset, as the run has ended, received {name}")
 
     def begin(self, settings: Scenario, session: Session) -> None:
         """Begin anew with a session at tick 0, paused."""
-        self.desk.begin(settings, session)
+        self.driver.begin(settings, session)
         self.player = None
         self.pause()
         self.history = self._new_history()
-        self.recording.begin_anew()
+        self.recording.reset()
         self.pace.clear()
 
-    def went_back(self, end: Callable[..., None] | None) -> None:
+    def resume_after_restore(self, end: Callable[..., None] | None) -> None:
         """Go on from where the session is now, after it went back; `end` completes what was recorded."""
-        session = self.desk.session
+        session = self.driver.session
         self.recording.end(session, "the recording has ended: time went back", end)
-        self.recording.go_on_from(session)
+        self.recording.resume_from(session)
         self.player, self.history = None, self._new_history()
 
     def _new_history(self) -> History:
-        session = self.desk.session
+        session = self.driver.session
         return History(len(session.actuator.groups), session.scenario.controller.period_s)

@@ -35,37 +35,37 @@ class Command(NamedTuple):
     """One command."""
 
     name: str
-    does: Callable[..., None]
+    action: Callable[..., None]
     """Takes the works, what was prepared, and the arguments by name; of a client's, operators and client."""
     arguments: type[BaseModel]
-    only_last: tuple[str, ...] | None
+    replace_equal: tuple[str, ...] | None
     """Where only the last one that waits matters: arguments that must be the same for it to be the same."""
     by: By
-    prepares: Callable[..., Callable[[], Any] | None] | None
+    prepare: Callable[..., Callable[[], Any] | None] | None
     """Takes the works and the arguments by name; gives what must be done beside the loop before, if any."""
-    before_all: bool
+    urgent: bool
     """Whether it waits for no other."""
-    undone: bool
+    cancelled_by_stop: bool
     """Whether one that goes before all others takes it back where it was said earlier."""
 
 
 def command(
     name: str,
-    does: Callable[..., None],
+    action: Callable[..., None],
     /,
-    only_last: tuple[str, ...] | None = None,
+    replace_equal: tuple[str, ...] | None = None,
     by: By = By.OPERATOR,
-    prepares: Callable[..., Callable[[], Any] | None] | None = None,
-    before_all: bool = False,
-    undone: bool = False,
+    prepare: Callable[..., Callable[[], Any] | None] | None = None,
+    urgent: bool = False,
+    cancelled_by_stop: bool = False,
     arguments: Mapping[str, Any] | None = None,
 ) -> Command:
     """Row of a command; each argument is a type and its default, or ``...`` where it must be given."""
-    taken = create_model("Arguments", __config__=_CONFIG, **(arguments or {}))
-    return Command(name, does, taken, only_last, by, prepares, before_all, undone)
+    model = create_model("Arguments", __config__=_CONFIG, **(arguments or {}))
+    return Command(name, action, model, replace_equal, by, prepare, urgent, cancelled_by_stop)
 
 
-def checked(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def check_arguments(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of a command, as it takes them.
 
     Raises
@@ -78,14 +78,14 @@ def checked(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
         known = ", ".join(kind.model_fields) or "no arguments"
         raise InputError(f"bench: {name}: expected {known}, received {unknown[0]}")
     try:
-        found = kind.model_validate_json(json.dumps(arguments, default=as_plain))
+        values = kind.model_validate_json(json.dumps(arguments, default=as_plain))
     except ValidationError as error:
         raise InputError(f"bench: {name}: {explain(error, kind)}") from None
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(
             f"bench: {name}: expected arguments as JSON has them, received {foreign(error)}"
         ) from None
-    return {field: getattr(found, field) for field in kind.model_fields}
+    return {field: getattr(values, field) for field in kind.model_fields}
 
 
 MOST_WAITING = 256
@@ -105,7 +105,7 @@ class Ticket:
 
     def __init__(self, refused: str | None = None) -> None:
         self.refused: str | None = None
-        self.begun_s = self.settled_s = time.monotonic()
+        self.created_s = self.settled_s = time.monotonic()
         self._done = threading.Event()
         if refused is not None:
             self.settle(refused)
@@ -126,14 +126,14 @@ class Ticket:
         self._done.set()
 
 
-def settled() -> Ticket:
+def settled_ticket() -> Ticket:
     """Ticket of what was done at once."""
     ticket = Ticket()
     ticket.settle()
     return ticket
 
 
-class Waiting:
+class QueuedCommand:
     """A command in the queue.
 
     Attributes
@@ -156,12 +156,12 @@ class Queue:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: OrderedDict[object, Waiting] = OrderedDict()
+        self._waiting: OrderedDict[object, QueuedCommand] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def put(self, waiting: Waiting) -> None:
+    def put(self, waiting: QueuedCommand) -> None:
         """Let a command wait for its turn.
 
         Raises
@@ -181,15 +181,15 @@ class Queue:
         if replaced:
             replaced.ticket.settle()
 
-    def next(self) -> Waiting | None:
+    def next(self) -> QueuedCommand | None:
         """The command whose turn it is, if one waits; it waits no more."""
         with self._lock:
             return self._waiting.popitem(last=False)[1] if self._waiting else None
 
 
-def _key(waiting: Waiting) -> object:
+def _key(waiting: QueuedCommand) -> object:
     """Equal for two commands of which only the last one matters."""
-    only_last = waiting.command.only_last
-    if only_last is None:
+    replace_equal = waiting.command.replace_equal
+    if replace_equal is None:
         return waiting
-    return waiting.command.name, *(waiting.arguments[name] for name in only_last)
+    return waiting.command.name, *(waiting.arguments[name] for name in replace_equal)

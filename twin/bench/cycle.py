@@ -11,56 +11,58 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
-from spheretwin.bench.bench_state import Player, Works
-from spheretwin.bench.command_queue import Command, Ticket, Waiting
-from spheretwin.bench.status import State, picture
+from spheretwin.bench.bench_state import BenchState, Player
+from spheretwin.bench.command_queue import Command, QueuedCommand, Ticket
+from spheretwin.bench.status import BenchStatus, bench_status
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, one_line
 from spheretwin.outputs import warm
 
 
-def run(works: Works, ticks: int) -> int:
+def run(bench_state: BenchState, ticks: int) -> int:
     """Run some ticks, no more than are asked for while paused; returns how many were run."""
-    if not works.running:
-        ticks = min(ticks, works.steps)
+    if not bench_state.running:
+        ticks = min(ticks, bench_state.steps)
     if ticks < 1:
         return 0
     began = time.monotonic()
-    done = _play(works, works.player, ticks) if works.player else _simulate(works, ticks)
-    works.steps -= min(done, works.steps)
-    works.pace.ran(done, works.period_s, works.t_s, time.monotonic() - began)
+    done = (
+        _play(bench_state, bench_state.player, ticks) if bench_state.player else _simulate(bench_state, ticks)
+    )
+    bench_state.steps -= min(done, bench_state.steps)
+    bench_state.pace.record_chunk(done, bench_state.period_s, bench_state.t_s, time.monotonic() - began)
     return done
 
 
-def _play(works: Works, player: Player, ticks: int) -> int:
+def _play(bench_state: BenchState, player: Player, ticks: int) -> int:
     done = player.advance(ticks)
-    if player.over:
-        works.pause()
+    if player.ended:
+        bench_state.pause()
     return done
 
 
-def _simulate(works: Works, ticks: int) -> int:
-    desk, recording, done = works.desk, works.recording, 0
-    recording.note_changes(desk.session)
-    while done < ticks and desk.reason is None:
-        first = desk.session.tick
-        rows = desk.advance(ticks - done)
+def _simulate(bench_state: BenchState, ticks: int) -> int:
+    driver, recording, done = bench_state.driver, bench_state.recording, 0
+    recording.note_changes(driver.session)
+    while done < ticks and driver.reason is None:
+        first = driver.session.tick
+        rows = driver.advance(ticks - done)
         if rows is not None and len(rows):
             done += len(rows)
-            works.history.write(first, rows)
+            bench_state.history.write(first, rows)
             recording.write(rows)
-        recording.note_changes(desk.session)
-    if desk.reason is not None:
-        works.pause()
-        recording.end(desk.session, "the recording has ended: so has the run")
+        recording.note_changes(driver.session)
+    if driver.reason is not None:
+        bench_state.pause()
+        recording.end(driver.session, "the recording has ended: so has the run")
     return done
 
 
-class Taking:
+class CommandProcessor:
     """Commands of one bench on their way from those who give them to what they act on.
 
     Parameters
     ----------
-    works : Works
+    bench_state : BenchState
 
     Attributes
     ----------
@@ -70,17 +72,17 @@ class Taking:
         Commands that were acted on, and why those that were refused were.
     """
 
-    def __init__(self, works: Works) -> None:
-        self._works = works
+    def __init__(self, bench_state: BenchState) -> None:
+        self._bench_state = bench_state
         self.wake = threading.Event()
         self.outcomes: list[tuple[Ticket, str | None]] = []
-        self._first: list[Waiting] = []
-        self._first_s = -math.inf
-        self._preparing: tuple[Waiting, Future[Any]] | None = None
+        self._urgent: list[QueuedCommand] = []
+        self._urgent_s = -math.inf
+        self._preparing: tuple[QueuedCommand, Future[Any]] | None = None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="bench")
         self.open = True
 
-    def ask(self, command: Command, arguments: dict[str, Any]) -> Ticket:
+    def submit(self, command: Command, arguments: dict[str, Any]) -> Ticket:
         """Let a command wait for its turn, from any thread; arguments are those that were checked.
 
         Raises
@@ -88,16 +90,16 @@ class Taking:
         InputError
             Too many do.
         """
-        waiting = Waiting(command, arguments)
-        if command.before_all:
-            self._first_s = waiting.ticket.begun_s
-            self._first.append(waiting)
+        waiting = QueuedCommand(command, arguments)
+        if command.urgent:
+            self._urgent_s = waiting.ticket.created_s
+            self._urgent.append(waiting)
             self.wake.set()
         else:
-            self._works.queue.put(waiting)
+            self._bench_state.queue.put(waiting)
         return waiting.ticket
 
-    def take(self, waits: bool) -> None:
+    def process(self, waits: bool) -> None:
         """Act on what waits, in its order; what is prepared beside the loop keeps the others waiting.
 
         Parameters
@@ -105,7 +107,7 @@ class Taking:
         waits : bool
             Whether to wait for what is prepared.
         """
-        self._take_first()
+        self._process_urgent()
         while self.open:
             if self._preparing:
                 waiting, future = self._preparing
@@ -114,7 +116,7 @@ class Taking:
                 self._preparing = None
                 self._act(waiting, future.result)
                 continue
-            following = self._works.queue.next()
+            following = self._bench_state.queue.next()
             if following is None:
                 return
             self._begin(following)
@@ -123,59 +125,59 @@ class Taking:
         """Take no more; wait for what is being prepared."""
         self._worker.shutdown()
 
-    def _take_first(self) -> None:
-        while self._first:
-            waiting = self._first[0]  # it stays until it is done: whatever goes wrong, it is tried again
-            waiting.command.does(self._works, None, **waiting.arguments)
-            self.outcomes.append((self._first.pop(0).ticket, None))
+    def _process_urgent(self) -> None:
+        while self._urgent:
+            waiting = self._urgent[0]  # it stays until it is done: whatever goes wrong, it is tried again
+            waiting.command.action(self._bench_state, None, **waiting.arguments)
+            self.outcomes.append((self._urgent.pop(0).ticket, None))
 
-    def _begin(self, waiting: Waiting) -> None:
+    def _begin(self, waiting: QueuedCommand) -> None:
         """Act on a command, or let what it needs be prepared."""
-        prepares = waiting.command.prepares
-        work = prepares(self._works, **waiting.arguments) if prepares else None
+        prepare = waiting.command.prepare
+        work = prepare(self._bench_state, **waiting.arguments) if prepare else None
         if work is None:
             self._act(waiting, lambda: None)
         else:
             self._preparing = waiting, self._worker.submit(work)
 
-    def _act(self, waiting: Waiting, prepared: Callable[[], Any]) -> None:
+    def _act(self, waiting: QueuedCommand, prepared: Callable[[], Any]) -> None:
         """Do what is commanded, or say why not."""
         command, refused = waiting.command, None
         try:
-            if command.undone and waiting.ticket.begun_s <= self._first_s:
+            if command.cancelled_by_stop and waiting.ticket.created_s <= self._urgent_s:
                 raise InputError(f"bench: expected {command.name} after STOP, received it before")
-            command.does(self._works, prepared(), **waiting.arguments)
+            command.action(self._bench_state, prepared(), **waiting.arguments)
         except Exception as error:  # files and laws of the user's may raise whatever they will
-            refused = f"{error}" if isinstance(error, SpheretwinError) else told(error)
-            self._works.refused = refused
+            refused = f"{error}" if isinstance(error, SpheretwinError) else error_text(error)
+            self._bench_state.refused = refused
         self.outcomes.append((waiting.ticket, refused))
 
 
-def told(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """What kind of error it is, and why, in one line."""
     return one_line(exception_text(error))
 
 
-class Turning:
+class Cycle:
     """Turns of one bench.
 
     Parameters
     ----------
-    works : Works
-    taking : Taking
+    bench_state : BenchState
+    processor : CommandProcessor
         Of its commands.
 
     Attributes
     ----------
-    state : State
+    state : BenchStatus
         The latest picture.
     """
 
-    def __init__(self, works: Works, taking: Taking) -> None:
-        self._works, self._taking = works, taking
-        self.state: State = picture(works)
+    def __init__(self, bench_state: BenchState, processor: CommandProcessor) -> None:
+        self._bench_state, self._processor = bench_state, processor
+        self.state: BenchStatus = bench_status(bench_state)
 
-    def turn(self, ticks: int, waits: bool) -> int:
+    def run_chunk(self, ticks: int, waits: bool) -> int:
         """Take what waits, then run some ticks; returns how many were run.
 
         Whatever goes wrong is the run's end, not the bench's.
@@ -188,13 +190,13 @@ class Turning:
         """
         done = 0
         try:
-            self._taking.take(waits)
+            self._processor.process(waits)
             self._settle()
-            done = run(self._works, ticks)
-            self._look_around()
+            done = run(self._bench_state, ticks)
+            self._hold_without_operator()
         except Exception as error:  # of whatever kind, else the thread would end and STOP with it
-            self._works.desk.fail(error)
-            self._works.pause()
+            self._bench_state.driver.fail(error)
+            self._bench_state.pause()
         self._settle()
         self._show()
         return done
@@ -202,29 +204,29 @@ class Turning:
     def _show(self) -> None:
         """Make the next picture; where it cannot be made, the last one says so."""
         try:
-            self.state = picture(self._works)
+            self.state = bench_status(self._bench_state)
         except Exception as error:  # a page must never show an old state as the present one
-            self.state = replace(self.state, mode="fault", reason=told(error))
+            self.state = replace(self.state, mode="fault", reason=error_text(error))
 
     def _settle(self) -> None:
         """Say what became of the commands, once it can be seen."""
-        taking = self._taking
-        if not taking.outcomes:
+        processor = self._processor
+        if not processor.outcomes:
             return
         self._show()
-        outcomes, taking.outcomes = taking.outcomes, []
+        outcomes, processor.outcomes = processor.outcomes, []
         for ticket, refused in outcomes:
             ticket.settle(refused)
 
-    def _look_around(self) -> None:
+    def _hold_without_operator(self) -> None:
         """Hold the rotor where its operator is gone."""
-        works = self._works
-        if not works.operators.look():
+        bench_state = self._bench_state
+        if not bench_state.operators.check_silence():
             return
-        works.note = "the operator is gone"
-        if works.player is None and works.desk.moves:
-            works.desk.hold()
-            works.note = "the operator is gone: the twin holds"
+        bench_state.note = "the operator is gone"
+        if bench_state.player is None and bench_state.driver.may_move_rotor:
+            bench_state.driver.hold()
+            bench_state.note = "the operator is gone: the twin holds"
 
 
 # How long a thread may keep the interpreter from the loop's: of Python's own 5 ms, three make a chunk late.
@@ -239,17 +241,17 @@ class Thread:
 
     Parameters
     ----------
-    works : Works
-    taking : Taking
-    turning : Turning
+    bench_state : BenchState
+    processor : CommandProcessor
+    cycle : Cycle
     """
 
-    def __init__(self, works: Works, taking: Taking, turning: Turning) -> None:
-        self._works, self._taking, self._turning = works, taking, turning
+    def __init__(self, bench_state: BenchState, processor: CommandProcessor, cycle: Cycle) -> None:
+        self._bench_state, self._processor, self._cycle = bench_state, processor, cycle
         self._thread: threading.Thread | None = None
 
     @property
-    def begun(self) -> bool:
+    def started(self) -> bool:
         """Whether it is at work, or was."""
         return self._thread is not None
 
@@ -263,21 +265,21 @@ class Thread:
 
     def end(self) -> None:
         """Wait until the last turn is done, as no more commands are taken."""
-        self._taking.wake.set()
+        self._processor.wake.set()
         if self._thread and self._thread.is_alive():
             self._thread.join()
             sys.setswitchinterval(self._switch_s)
 
     def _loop(self) -> None:
         """Chunk by chunk, each at its time; woken by STOP."""
-        works, pace, wake = self._works, self._works.pace, self._taking.wake
-        while self._taking.open:
-            moves = works.moves
+        bench_state, pace, wake = self._bench_state, self._bench_state.pace, self._processor.wake
+        while self._processor.open:
+            moves = bench_state.is_active
             wait_s = pace.wait_s() if moves else REST_s
             if wait_s > 0 and wake.wait(wait_s):
                 wake.clear()
-                self._turning.turn(0, waits=False)
+                self._cycle.run_chunk(0, waits=False)
                 continue
             if not moves:
                 pace.rest()
-            self._turning.turn(pace.ticks(works.period_s) if moves else 0, waits=False)
+            self._cycle.run_chunk(pace.ticks(bench_state.period_s) if moves else 0, waits=False)

@@ -17,7 +17,7 @@ from spheretwin.session import Session
 from spheretwin.snapshot import Snapshot
 from spheretwin.trajectories.trajectory import Shape
 
-MODES_OWN = ("trajectory.approach", "manual")
+FIELDS_OF_MODES = ("trajectory.approach", "manual")
 """Fields that modes set."""
 
 
@@ -32,7 +32,7 @@ def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
     InputError
         A field that is unknown, of the wrong type or out of range, or one that a mode sets.
     """
-    if any(name == own or name.startswith(f"{own}.") for own in MODES_OWN):
+    if any(name == own or name.startswith(f"{own}.") for own in FIELDS_OF_MODES):
         raise InputError(f"bench: expected a mode instead of {name}, as manual or hold")
     if name == "trajectory" and isinstance(value, dict) and value.get("approach") is not None:
         raise InputError("bench: expected a trajectory without approach, which the bench makes")
@@ -64,7 +64,7 @@ CURRENTS = "manual.currents_A"
 MOST_SNAPSHOTS = 16
 
 
-class Kept(NamedTuple):
+class DriverSnapshot(NamedTuple):
     """All that a desk goes on from."""
 
     session: Snapshot
@@ -74,7 +74,7 @@ class Kept(NamedTuple):
     row: Table | None
 
 
-class Desk:
+class Driver:
     """One twin, and what is done to it; every change of it is one of its session's journal.
 
     Parameters
@@ -105,13 +105,13 @@ class Desk:
 
     def __init__(self, settings: Scenario, session: Session) -> None:
         self.limits = Limits()
-        self.snapshots: dict[str, Kept] = {}
+        self.snapshots: dict[str, DriverSnapshot] = {}
         self.begin(settings, session)
 
     def begin(self, settings: Scenario, session: Session) -> None:
         """Begin with a session at tick 0."""
         self.settings, self.session = settings, session
-        self.begun = record_of(session)
+        self.start_record = record_of(session)
         self.pending: dict[str, Any] = {}
         self.stopped = False
         self.reason: str | None = None
@@ -145,46 +145,46 @@ class Desk:
         """Take the currents away until the next reset."""
         self.stopped = True
         if self.reason is None:
-            self._by_hand("off", [0.0] * len(self.session.actuator.groups))
+            self._set_currents("off", [0.0] * len(self.session.actuator.groups))
 
     def off(self) -> None:
         """No currents."""
-        self._check_free("off")
-        self._by_hand("off", [0.0] * len(self.session.actuator.groups))
+        self._check_available("off")
+        self._set_currents("off", [0.0] * len(self.session.actuator.groups))
 
     def manual(self, currents_A: tuple[float, ...] | None, group: int | None, current_A: float) -> None:
         """Stated currents, or one group alone."""
-        self._check_free("manual")
+        self._check_available("manual")
         groups = len(self.session.actuator.groups)
         if (currents_A is None) == (group is None):
             raise InputError("bench: manual: expected either currents_A or group, received both or none")
         if group is not None and group >= groups:
             raise InputError(f"bench: manual: expected a group from 0 to {groups - 1}, received {group}")
         alone = [current_A if each == group else 0.0 for each in range(groups)]
-        self._by_hand("manual", alone if currents_A is None else list(currents_A))
+        self._set_currents("manual", alone if currents_A is None else list(currents_A))
 
     def hold(self) -> None:
         """Come to rest here."""
-        self._check_free("hold")
-        begun = modes.motion_of(self.session)
-        self._fly("hold", modes.held(begun, self.limits, self._range))
+        self._check_available("hold")
+        initial_motion = modes.current_motion(self.session)
+        self._approach("hold", modes.hold_shape(initial_motion, self.limits, self._range))
 
     def point(self, pose_rad: tuple[float, float, float]) -> None:
         """Go to a pose."""
-        self._check_free("point")
-        self._fly("point", modes.pointed(pose_rad, self._range))
+        self._check_available("point")
+        self._approach("point", modes.point_shape(pose_rad, self._range))
 
     def jog(self, rates_rad_s: tuple[float, float, float]) -> None:
         """Turn at steady rates."""
-        self._check_free("jog")
-        begun = modes.motion_of(self.session)
-        self._fly("jog", modes.jogged(begun, rates_rad_s, self.limits, self._range))
+        self._check_available("jog")
+        initial_motion = modes.current_motion(self.session)
+        self._approach("jog", modes.jog_shape(initial_motion, rates_rad_s, self.limits, self._range))
 
     def trajectory(self, fields: dict[str, Any] | None) -> None:
         """Follow a shape from its beginning; the last one unless given."""
-        self._check_free("trajectory")
+        self._check_available("trajectory")
         after = self.settings if fields is None else with_field(self.settings, "trajectory", fields)
-        self._fly("trajectory", after.trajectory)
+        self._approach("trajectory", after.trajectory)
         self.settings = after
 
     def set(self, name: str, value: Any) -> None:
@@ -199,7 +199,7 @@ class Desk:
         if self.reason is not None or is_fixed(name):
             self.pending[name] = value
         elif name.split(".")[0] == "trajectory":
-            self._reshape(name, after.trajectory)
+            self._change_shape(name, after.trajectory)
         else:
             self.session.set(name, value)
         self.settings = after
@@ -221,7 +221,7 @@ class Desk:
         if self.reason is not None:
             raise InputError("bench: expected a run that goes on, received one that has ended")
         state = self.session.snapshot()
-        self.snapshots[name] = Kept(state, self.settings, dict(self.pending), self.mode, self.row)
+        self.snapshots[name] = DriverSnapshot(state, self.settings, dict(self.pending), self.mode, self.row)
 
     def restore(self, name: str) -> None:
         """Go back to a snapshot.
@@ -232,23 +232,23 @@ class Desk:
             There is none of this name, it is of another model, or STOP is latched.
         """
         if self.stopped:
-            self._check_free("restore")
+            self._check_available("restore")
         if name not in self.snapshots:
             raise InputError(
                 f"bench: expected one of {', '.join(self.snapshots) or 'no snapshots'}, received {name}"
             )
-        kept = self.snapshots[name]
-        self.session.restore(kept.session)
-        self.begun = record_of(self.session)
-        self.settings, self.pending, self.mode = kept.settings, dict(kept.pending), kept.mode
-        self.row, self.reason = kept.row, None
+        snapshot = self.snapshots[name]
+        self.session.restore(snapshot.session)
+        self.start_record = record_of(self.session)
+        self.settings, self.pending, self.mode = snapshot.settings, dict(snapshot.pending), snapshot.mode
+        self.row, self.reason = snapshot.row, None
 
     @property
-    def moves(self) -> bool:
+    def may_move_rotor(self) -> bool:
         """Whether the coils may move the rotor, other than to hold it."""
         return not self.stopped and self.reason is None and self.mode not in ("off", "hold")
 
-    def pending_told(self) -> tuple[tuple[str, str], ...]:
+    def pending_as_json(self) -> tuple[tuple[str, str], ...]:
         """Fields that wait for a reset, and their values as JSON."""
         return tuple((name, json.dumps(value, ensure_ascii=False)) for name, value in self.pending.items())
 
@@ -256,26 +256,28 @@ class Desk:
     def _range(self) -> modes.Array:
         return self.session.actuator.hinge_range_rad
 
-    def _check_free(self, name: str) -> None:
+    def _check_available(self, name: str) -> None:
         if self.stopped:
             raise InputError(f"bench: expected reset after STOP, received {name}")
         if self.reason is not None:
             raise InputError(f"bench: expected reset, as the run has ended, received {name}")
 
-    def _by_hand(self, mode: str, currents_A: list[float]) -> None:
+    def _set_currents(self, mode: str, currents_A: list[float]) -> None:
         self.session.set(CURRENTS, currents_A)
         self.mode = mode
 
-    def _fly(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
+    def _approach(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
         """Go over to a shape, at a time of its own, from the motion that goes before."""
-        session, begun = self.session, modes.motion_of(self.session)
-        way = modes.approached(shape, begun, session.t_s, shape_s, self.limits, self._range)
-        session.set("trajectory", {**shape.model_dump(mode="json"), "approach": way})
+        session, initial_motion = self.session, modes.current_motion(self.session)
+        approach = modes.approach_fields(
+            shape, initial_motion, session.t_s, shape_s, self.limits, self._range
+        )
+        session.set("trajectory", {**shape.model_dump(mode="json"), "approach": approach})
         if session.scenario.manual.on:
             session.set(CURRENTS, None)
         self.mode = mode
 
-    def _reshape(self, name: str, shape: Shape) -> None:
+    def _change_shape(self, name: str, shape: Shape) -> None:
         """Follow a shape with another field from where it is; another shape from its beginning."""
         if self.mode != "trajectory":
             return
@@ -284,7 +286,7 @@ class Desk:
         if present.approach:
             own_s += present.approach.shape_s - present.approach.start_s
         same = type(shape) is type(present) and name != "trajectory"
-        self._fly("trajectory", shape, own_s if same else 0.0)
+        self._approach("trajectory", shape, own_s if same else 0.0)
 
 
 def _without(planned: list[Any], place: int | None) -> list[Any]:

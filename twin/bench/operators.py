@@ -43,7 +43,7 @@ class Operators:
     ) -> None:
         self._gone_s, self._silence_s, self._clock = gone_s, silence_s, clock
         self._lock = threading.RLock()
-        self._seen: dict[str, float] = {}
+        self._last_heard_s: dict[str, float] = {}
         self._asking: list[str] = []
         self._left_s: float | None = None
         self.operator: str | None = None
@@ -52,7 +52,7 @@ class Operators:
     def watching(self) -> tuple[str, ...]:
         """Clients that do not operate."""
         with self._lock:
-            return tuple(client for client in self._seen if client != self.operator)
+            return tuple(client for client in self._last_heard_s if client != self.operator)
 
     @property
     def asking(self) -> tuple[str, ...]:
@@ -60,7 +60,7 @@ class Operators:
         with self._lock:
             return tuple(self._asking)
 
-    def see(self, client: str) -> None:
+    def register(self, client: str) -> None:
         """Take note that a client is there.
 
         Raises
@@ -97,8 +97,10 @@ class Operators:
         with self._lock:
             self._note(client)
             self.check(client)
-            if to not in self._seen:
-                raise InputError(f"bench: expected one of {', '.join(self._seen)}, received {shown(to)}")
+            if to not in self._last_heard_s:
+                raise InputError(
+                    f"bench: expected one of {', '.join(self._last_heard_s)}, received {shown(to)}"
+                )
             self._operate(to)
             self._asking = [asking for asking in self._asking if asking != to]
 
@@ -121,11 +123,13 @@ class Operators:
                 f" received one of {shown(client)}"
             )
 
-    def look(self) -> bool:
+    def check_silence(self) -> bool:
         """Drop clients that are gone; True, once, where the twin is on its own from now on."""
         now = self._clock()
         with self._lock:
-            gone = [client for client, seen_s in self._seen.items() if now - seen_s > self._silence_s]
+            gone = [
+                client for client, heard_s in self._last_heard_s.items() if now - heard_s > self._silence_s
+            ]
             fell_silent = self.operator in gone
             for client in gone:
                 self._drop(client)
@@ -136,15 +140,15 @@ class Operators:
             return True
 
     def _note(self, client: str) -> None:
-        if client not in self._seen and len(self._seen) >= MOST_CLIENTS:
+        if client not in self._last_heard_s and len(self._last_heard_s) >= MOST_CLIENTS:
             raise InputError(f"bench: expected at most {MOST_CLIENTS} clients, received one more")
-        first = not self._seen
-        self._seen[client] = self._clock()
+        first = not self._last_heard_s
+        self._last_heard_s[client] = self._clock()
         if first:
             self._operate(client)
 
     def _drop(self, client: str) -> None:
-        self._seen.pop(client, None)
+        self._last_heard_s.pop(client, None)
         self._asking = [asking for asking in self._asking if asking != client]
         if client == self.operator:
             self.operator, self._left_s = None, self._clock()

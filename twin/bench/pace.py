@@ -45,7 +45,7 @@ class Pace:
         self._clock = clock
         self.speed = 1.0
         self.chunks = self.missed = 0
-        self._most = 20
+        self._most_ticks = 20
         self._due: float | None = None
         self._done: deque[tuple[float, float]] = deque()
 
@@ -59,7 +59,7 @@ class Pace:
         """Share of the chunks that were late."""
         return self.missed / self.chunks if self.chunks else 0.0
 
-    def reached(self) -> float:
+    def realtime_factor(self) -> float:
         """Simulated over wall time in the last second; 0 while time stands still."""
         now = self._clock()
         recent = [(at, t_s) for at, t_s in self._done if now - at <= WINDOW_s]
@@ -80,8 +80,8 @@ class Pace:
     def ticks(self, period_s: float) -> int:
         """Control ticks of the next chunk."""
         if self.fastest:
-            return self._most
-        return max(1, min(round(CHUNK_s * self.speed / period_s), self._most))
+            return self._most_ticks
+        return max(1, min(round(CHUNK_s * self.speed / period_s), self._most_ticks))
 
     def wait_s(self) -> float:
         """Time until the next chunk is due, s; 0 where it is."""
@@ -89,7 +89,7 @@ class Pace:
             self._due = self._clock()
         return 0.0 if self.fastest else max(0.0, self._due - self._clock())
 
-    def ran(self, ticks: int, period_s: float, t_s: float, took_s: float) -> None:
+    def record_chunk(self, ticks: int, period_s: float, t_s: float, took_s: float) -> None:
         """Take note of a chunk: its ticks, the time it reached, and the wall time that it took."""
         now = self._clock()
         if self._done and t_s < self._done[-1][1]:  # time went back
@@ -98,9 +98,9 @@ class Pace:
         while now - self._done[0][0] > WINDOW_s:
             self._done.popleft()
         if took_s > LONGEST_s:
-            self._most = max(1, self._most // 2)
-        elif took_s < SHORT_s and ticks == self._most:
-            self._most = min(2 * self._most, MOST_TICKS)
+            self._most_ticks = max(1, self._most_ticks // 2)
+        elif took_s < SHORT_s and ticks == self._most_ticks:
+            self._most_ticks = min(2 * self._most_ticks, MOST_TICKS)
         if self.fastest or self._due is None:
             self._due = now
             return

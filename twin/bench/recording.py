@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from spheretwin.bench.driver import Desk
+from spheretwin.bench.driver import Driver
 from spheretwin.faults.fault_injector import FaultLines
 from spheretwin.models.telemetry.table import Table
 from spheretwin.outputs import Files, Keeping
@@ -17,66 +17,66 @@ class Recording:
 
     Parameters
     ----------
-    tell : callable
+    report : callable
         Takes why a recording has ended, or what went wrong with it.
 
     Attributes
     ----------
-    kept : tuple of str
+    completed_files : tuple of str
         Files that were written last.
     """
 
-    def __init__(self, tell: Callable[[str | None], None]) -> None:
-        self._tell = tell
-        self.kept: tuple[str, ...] = ()
-        self._present: Keeping | None = None
+    def __init__(self, report: Callable[[str | None], None]) -> None:
+        self._report = report
+        self.completed_files: tuple[str, ...] = ()
+        self._active: Keeping | None = None
         self._completing: list[Keeping] = []
-        self.begin_anew()
+        self.reset()
 
     @property
     def on(self) -> bool:
         """Whether something is being recorded."""
-        return self._present is not None
+        return self._active is not None
 
     @property
     def paths(self) -> tuple[str, ...]:
         """Files that are being written."""
-        return tuple(str(path) for path in self._present.paths) if self._present else ()
+        return tuple(str(path) for path in self._active.paths) if self._active else ()
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """A run begins: nothing has happened in it."""
         self._faults, self._noted = FaultLines(), (0, 0)
 
-    def go_on_from(self, session: Session) -> None:
+    def resume_from(self, session: Session) -> None:
         """What was changed until now has been told."""
         self._noted = len(session.journal), len(session.events)
 
-    def begin(self, files: Files, desk: Desk) -> None:
+    def begin(self, files: Files, driver: Driver) -> None:
         """Write opened files from the next tick on."""
-        self.note_changes(desk.session)
-        self._present = Keeping(files, desk.session, desk.begun)
-        self._completing.append(self._present)
+        self.note_changes(driver.session)
+        self._active = Keeping(files, driver.session, driver.start_record)
+        self._completing.append(self._active)
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, which must not change any more."""
-        if self._present is None:
+        if self._active is None:
             return
-        self._present.write(rows)
+        self._active.write(rows)
         for t_s, text in self._faults.of(rows):
-            self._present.note(t_s, text)
+            self._active.note(t_s, text)
 
     def note_changes(self, session: Session) -> None:
         """Tell what was changed since it was last told."""
-        made, planned = self._noted
-        if self._present:
+        changes_done, events_done = self._noted
+        if self._active:
             period_s = session.scenario.controller.period_s
-            for change in (*session.journal[made:], *session.events[planned:]):
-                self._present.note(change.tick * period_s, change_text(change))
-        self.go_on_from(session)
+            for change in (*session.journal[changes_done:], *session.events[events_done:]):
+                self._active.note(change.tick * period_s, change_text(change))
+        self.resume_from(session)
 
     def ending(self, session: Session) -> Callable[..., None] | None:
         """What completes the files as the session is now, if there are any."""
-        return self._present.ending(session) if self._present else None
+        return self._active.ending(session) if self._active else None
 
     def end(self, session: Session, why: str | None, end: Callable[..., None] | None = None) -> None:
         """Complete what is being recorded, if anything is, beside the loop.
@@ -89,20 +89,20 @@ class Recording:
         end : callable, optional
             From `ending`, where the session is no longer what it was.
         """
-        if self._present is None:
+        if self._active is None:
             return
-        keeping, self._present = self._present, None
-        self._tell(why)
-        (end or keeping.ending(session))(self._completed)
+        files, self._active = self._active, None
+        self._report(why)
+        (end or files.ending(session))(self._completed)
 
     def join(self) -> None:
         """Wait until all files are complete."""
-        for keeping in list(self._completing):
-            keeping.join()
+        for files in list(self._completing):
+            files.join()
 
-    def _completed(self, keeping: Keeping) -> None:
-        self.kept = tuple(str(path) for path in keeping.paths)
-        if keeping.faults:
-            self.kept = ()
-            self._tell(keeping.faults[0])
-        self._completing.remove(keeping)
+    def _completed(self, files: Keeping) -> None:
+        self.completed_files = tuple(str(path) for path in files.paths)
+        if files.faults:
+            self.completed_files = ()
+            self._report(files.faults[0])
+        self._completing.remove(files)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spheretwin.bench.bench_state import Works
+from spheretwin.bench.bench_state import BenchState
 from spheretwin.faults.fault import Fault
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 from spheretwin.session import Session
@@ -16,7 +16,7 @@ Three = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class State:
+class BenchStatus:
     """A bench at one moment; the latest alone, and whole.
 
     Attributes
@@ -154,7 +154,7 @@ VECTORS = (
 )
 
 
-class Shown(NamedTuple):
+class ShownRow(NamedTuple):
     """The row that is shown."""
 
     row: Table | None
@@ -164,14 +164,16 @@ class Shown(NamedTuple):
     current_limit_A: float
 
 
-def pictured(shown: Shown, session: Session, **others: Any) -> State:
+def status_of_row(shown_row: ShownRow, session: Session, **others: Any) -> BenchStatus:
     """Picture of a row, and of what is told beside it; of a session before its first, where there is none."""
-    return State(
+    return BenchStatus(
         **others,
-        tick=shown.tick,
-        period_s=shown.period_s,
-        current_limit_A=shown.current_limit_A,
-        **(_at_start(session) if shown.row is None else _of_row(shown.row, shown.current_limit_A)),
+        tick=shown_row.tick,
+        period_s=shown_row.period_s,
+        current_limit_A=shown_row.current_limit_A,
+        **(
+            _at_start(session) if shown_row.row is None else _of_row(shown_row.row, shown_row.current_limit_A)
+        ),
     )
 
 
@@ -218,49 +220,54 @@ def _at_start(session: Session) -> dict[str, Any]:
     }
 
 
-def picture(works: Works) -> State:
+def bench_status(bench_state: BenchState) -> BenchStatus:
     """All that is shown, as it is now."""
-    desk, operators, pace, recording = works.desk, works.operators, works.pace, works.recording
-    session = desk.session
-    return pictured(
-        _shown(works),
+    driver, operators, pace, recording = (
+        bench_state.driver,
+        bench_state.operators,
+        bench_state.pace,
+        bench_state.recording,
+    )
+    session = driver.session
+    return status_of_row(
+        _shown_row(bench_state),
         session,
-        **_names(works),
-        running=works.moves,
-        stopped=desk.stopped,
+        **_names(bench_state),
+        running=bench_state.is_active,
+        stopped=driver.stopped,
         speed=pace.speed,
-        realtime_factor=pace.reached(),
+        realtime_factor=pace.realtime_factor(),
         chunks=pace.chunks,
         missed=pace.missed,
         missed_share=pace.missed_share,
         status=str(session.status),
-        reason=desk.reason,
-        faults=tuple(_fault_told(fault) for fault in session.scenario.fault),
-        pending=desk.pending_told(),
+        reason=driver.reason,
+        faults=tuple(_fault_text(fault) for fault in session.scenario.fault),
+        pending=driver.pending_as_json(),
         journal=len(session.journal),
-        snapshots=tuple(desk.snapshots),
+        snapshots=tuple(driver.snapshots),
         recording=recording.paths,
-        kept=recording.kept,
-        note=works.note,
+        kept=recording.completed_files,
+        note=bench_state.note,
         operator=operators.operator,
         watching=operators.watching,
         asking=operators.asking,
-        refused=works.refused,
-        waiting=len(works.queue),
+        refused=bench_state.refused,
+        waiting=len(bench_state.queue),
     )
 
 
-def _shown(works: Works) -> Shown:
-    player, desk = works.player, works.desk
+def _shown_row(bench_state: BenchState) -> ShownRow:
+    player, driver = bench_state.player, bench_state.driver
     if player:
-        return Shown(player.row, player.place, player.period_s, player.current_limit_A)
-    limit_A = desk.session.scenario.nominal.current_limit_A
-    return Shown(desk.row, desk.session.tick, works.period_s, limit_A)
+        return ShownRow(player.row, player.place, player.period_s, player.current_limit_A)
+    limit_A = driver.session.scenario.nominal.current_limit_A
+    return ShownRow(driver.row, driver.session.tick, bench_state.period_s, limit_A)
 
 
-def _names(works: Works) -> dict[str, Any]:
+def _names(bench_state: BenchState) -> dict[str, Any]:
     """The mode, and what is in force: of the recorded run while one is played back."""
-    player, desk, scenario = works.player, works.desk, works.desk.session.scenario
+    player, driver, scenario = bench_state.player, bench_state.driver, bench_state.driver.session.scenario
     if player:
         return {
             "mode": "replay",
@@ -270,7 +277,7 @@ def _names(works: Works) -> dict[str, Any]:
             "allocation": player.allocation,
         }
     return {
-        "mode": "fault" if desk.reason is not None else desk.mode,
+        "mode": "fault" if driver.reason is not None else driver.mode,
         "scenario": scenario.name,
         "law": scenario.controller.law,
         "shape": scenario.trajectory.shape,
@@ -278,6 +285,6 @@ def _names(works: Works) -> dict[str, Any]:
     }
 
 
-def _fault_told(fault: Fault) -> str:
+def _fault_text(fault: Fault) -> str:
     until = f" to {fault.end_s:g} s" if fault.end_s is not None else ""
     return f"{fault.target} {fault.mode} from {fault.start_s:g} s{until}"

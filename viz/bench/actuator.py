@@ -43,7 +43,7 @@ POLE_PROUD_M = 1e-4
 
 
 @dataclass(frozen=True)
-class Parts:
+class ActuatorSolids:
     """Solids in the frames that carry them."""
 
     stator: Solid
@@ -65,11 +65,11 @@ class Parts:
         return sum(len(solid.faces) for solid in once) + copies
 
 
-def parts_of(actuator: Actuator) -> Parts:
+def actuator_solids(actuator: Actuator) -> ActuatorSolids:
     """Make every solid of an actuator."""
     ball, coil = actuator.magnet.front_m, actuator.coil
     half = coil.length_m / 2
-    return Parts(
+    return ActuatorSolids(
         stator=_stator(actuator),
         outer_ring=_ring(ball, *OUTER_RING),
         inner_ring=_ring(ball, *INNER_RING),
@@ -83,9 +83,9 @@ def parts_of(actuator: Actuator) -> Parts:
 def quaternions_along(axes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotations that turn z to each of some unit vectors, (n, 3): (n, 4), scalar first."""
     # Half the way from z to the axis; a half turn about x where the axis is -z.
-    found = np.stack([1 + axes[:, 2], -axes[:, 1], axes[:, 0], np.zeros(len(axes))], axis=1)
-    found[axes[:, 2] < -1 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    quaternions = np.stack([1 + axes[:, 2], -axes[:, 1], axes[:, 0], np.zeros(len(axes))], axis=1)
+    quaternions[axes[:, 2] < -1 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
+    return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
 
 
 def _ball(radius: float) -> Solid:

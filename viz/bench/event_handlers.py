@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import viser
 
-from spheretwin.viz.bench.protocols import Bench, Ticket
+from spheretwin.viz.bench.protocols import BenchProtocol, TicketProtocol
 
 # How long a refusal that belongs to no field stays.
 SHOWN_S = 8.0
@@ -19,7 +19,7 @@ SHOWN_S = 8.0
 LONG_S = 0.5
 
 # A way to a pose takes the loop a fifth of a chunk to make: a slider that slides makes ten a second.
-STEERED_S = 0.1
+LATEST_INTERVAL_S = 0.1
 
 # Somebody who floods the bench sees no more than this of what becomes of it.
 MOST_TICKETS = 200
@@ -56,32 +56,32 @@ class Note:
 _REFUSED = "color:#ff8787;font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em;overflow-wrap:anywhere"
 
 
-class Asked(NamedTuple):
+class PendingCommand(NamedTuple):
     """A command that waits."""
 
     name: str
-    ticket: Ticket
-    beside: Note | None
+    ticket: TicketProtocol
+    note: Note | None
     since_s: float
 
 
-class Hand:
+class EventHandlers:
     """Passes commands on, and follows what becomes of them.
 
     Parameters
     ----------
-    bench : Bench
+    bench : BenchProtocol
         Whom it tells.
     """
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: BenchProtocol) -> None:
         self._bench = bench
         self._lock = threading.Lock()
-        self._open: list[Asked] = []
+        self._open: list[PendingCommand] = []
         self._refused, self._until_s = "", 0.0
         self._warned_s: dict[int, float] = {}
-        self._steered: dict[str, tuple[Event, Note | None, dict[str, Any]]] = {}
-        self._steered_s: dict[str, float] = {}
+        self._latest: dict[str, tuple[Event, Note | None, dict[str, Any]]] = {}
+        self._latest_sent_s: dict[str, float] = {}
 
     @property
     def refused(self) -> str:
@@ -89,71 +89,71 @@ class Hand:
         return self._refused if time.monotonic() < self._until_s else ""
 
     @property
-    def waits_for(self) -> str:
+    def waiting_command(self) -> str:
         """The command that has waited for longest, where that is long enough to be seen; else nothing."""
         since_s = time.monotonic() - LONG_S
-        return next((each.name for each in self._open if each.since_s < since_s), "")
+        return next((pending.name for pending in self._open if pending.since_s < since_s), "")
 
-    def tell(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
+    def send(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
         """Tell the bench one thing in the name of an event's page; False where that may not."""
         if name not in ANYONES and not self._operates(event):
             self._warn(event)
             return False
         self.flush(0.0)  # what was steered before it comes before it
-        self._send(event, name, beside, arguments)
+        self._submit(event, name, note, arguments)
         return True
 
-    def steer(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
+    def send_latest(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
         """Tell the bench something of which only the latest matters, as often as it can be of use."""
         if not self._operates(event):
             self._warn(event)
             return False
         with self._lock:
-            self._steered[name] = (event, beside, arguments)
+            self._latest[name] = (event, note, arguments)
         return True
 
-    def flush(self, apart_s: float = STEERED_S) -> None:
+    def flush(self, apart_s: float = LATEST_INTERVAL_S) -> None:
         """Tell the latest of what is steered, where the last one is long enough ago."""
         now = time.monotonic()
         with self._lock:
-            due = [name for name in self._steered if now - self._steered_s.get(name, 0.0) >= apart_s]
-            steered = {name: self._steered.pop(name) for name in due}
-            self._steered_s |= dict.fromkeys(due, now)
-        for name, (event, beside, arguments) in steered.items():
-            self._send(event, name, beside, arguments)
+            due = [name for name in self._latest if now - self._latest_sent_s.get(name, 0.0) >= apart_s]
+            latest = {name: self._latest.pop(name) for name in due}
+            self._latest_sent_s |= dict.fromkeys(due, now)
+        for name, (event, note, arguments) in latest.items():
+            self._submit(event, name, note, arguments)
 
-    def _send(self, event: Event, name: str, beside: Note | None, arguments: dict[str, Any]) -> None:
+    def _submit(self, event: Event, name: str, note: Note | None, arguments: dict[str, Any]) -> None:
         ticket = self._bench.command(name, client=client_name(event.client_id), **arguments)
         with self._lock:
-            self._open = [*self._open[-MOST_TICKETS:], Asked(name, ticket, beside, time.monotonic())]
+            self._open = [*self._open[-MOST_TICKETS:], PendingCommand(name, ticket, note, time.monotonic())]
 
-    def tell_chosen(self, event: Event) -> None:
+    def send_selected(self, event: Event) -> None:
         """Tell the bench what a group of buttons has as its value."""
         if event.target.value in event.target.options:
-            self.tell(event, event.target.value)
+            self.send(event, event.target.value)
 
-    def complain(self, text: str, beside: Note | None = None) -> None:
+    def show_refusal(self, text: str, note: Note | None = None) -> None:
         """Show why something never became a command."""
-        if beside:
-            beside.say(text)
+        if note:
+            note.say(text)
         else:
             self._refused, self._until_s = text, time.monotonic() + SHOWN_S
 
     def settle(self) -> None:
         """Show what became of commands since."""
         with self._lock:
-            settled = [each for each in self._open if each.ticket.done]
-            self._open = [each for each in self._open if not each.ticket.done]
-        for each in settled:
-            if each.ticket.refused:
-                self.complain(each.ticket.refused, each.beside)
-            elif each.beside:
-                each.beside.say(None)
+            settled = [pending for pending in self._open if pending.ticket.done]
+            self._open = [pending for pending in self._open if not pending.ticket.done]
+        for pending in settled:
+            if pending.ticket.refused:
+                self.show_refusal(pending.ticket.refused, pending.note)
+            elif pending.note:
+                pending.note.say(None)
 
     def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> Any:
         """Add a button that is one command without arguments."""
         button = gui.add_button(label, **more)
-        on_press(button, lambda event: self.tell(event, name))
+        on_press(button, lambda event: self.send(event, name))
         return button
 
     def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
@@ -189,10 +189,10 @@ class Hand:
         now = time.monotonic()
         if now - self._warned_s.get(event.client_id, -SHOWN_S) >= SHOWN_S:
             self._warned_s[event.client_id] = now
-            told = "Nobody operates; take over, above."
+            message = "Nobody operates; take over, above."
             if self._bench.state().operator is not None:
-                told = "Another one operates; ask it, above."
-            event.client.add_notification("This page watches", told, auto_close_seconds=SHOWN_S)
+                message = "Another one operates; ask it, above."
+            event.client.add_notification("This page watches", message, auto_close_seconds=SHOWN_S)
 
 
 ANYONES = ("stop", "ask", "hello", "leave", "beat")

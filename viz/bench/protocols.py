@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator
 
 
-class Ticket(Protocol):
+class TicketProtocol(Protocol):
     """What becomes of a command."""
 
     @property
@@ -22,14 +22,14 @@ class Ticket(Protocol):
     refused: str | None
 
 
-class Bench(Protocol):
+class BenchProtocol(Protocol):
     """The machine: no call of it waits."""
 
     @property
     def actuator(self) -> Actuator:
         """Of the present run."""
 
-    def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> Ticket:
+    def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> TicketProtocol:
         """Tell it something."""
 
     def state(self) -> Any:
@@ -43,7 +43,7 @@ class Bench(Protocol):
 
 
 @dataclass(frozen=True)
-class Setting:
+class FieldSetting:
     """One field that a person may change, all of it as the command line writes it."""
 
     name: str
@@ -77,8 +77,8 @@ class Choices:
         Of faults: what can happen to each, by its name.
     """
 
-    settings: Callable[[], list[Setting]]
-    shape: Callable[[str], list[Setting]]
+    settings: Callable[[], list[FieldSetting]]
+    shape: Callable[[str], list[FieldSetting]]
     read: Callable[[str, str], Any]
     scenarios: Sequence[str]
     shapes: Sequence[str]

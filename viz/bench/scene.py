@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import theme
-from spheretwin.viz.bench.actuator import parts_of, quaternions_along
+from spheretwin.viz.bench.actuator import actuator_solids, quaternions_along
 from spheretwin.viz.scene.solids import Solid
 
 LIGHT = 1.6
@@ -27,12 +27,12 @@ _OUT_OF = np.array(
 )
 
 
-def of_instances(colours: ArrayLike) -> NDArray[np.uint8]:
+def instance_colours(colours: ArrayLike) -> NDArray[np.uint8]:
     """Colours of many copies of a solid, (..., 3), which a page takes for shares of light."""
     return np.round(255 * _albedo(colours)).astype(np.uint8)
 
 
-def of_one(colour: ArrayLike) -> tuple[int, int, int]:
+def mesh_colour(colour: ArrayLike) -> tuple[int, int, int]:
     """Colour of one solid, which a page takes as a screen does."""
     red, green, blue = np.round(255 * _encoded(_albedo(colour))).astype(int).tolist()
     return red, green, blue
@@ -95,7 +95,7 @@ class Scene:
 
     def __init__(self, api: viser.SceneApi, actuator: Actuator) -> None:
         self._actuator = actuator
-        parts = parts_of(actuator)
+        parts = actuator_solids(actuator)
         _light(api)
         api.world_axes.visible = False
         _mesh(api, "/stator", parts.stator, FRAME)
@@ -112,7 +112,7 @@ class Scene:
             parts.pole.faces,
             batched_wxyzs=quaternions_along(actuator.pole_axes),
             batched_positions=np.zeros((len(actuator.pole_axes), 3)),
-            batched_colors=of_instances(np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH)),
+            batched_colors=instance_colours(np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH)),
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
@@ -134,7 +134,7 @@ class Scene:
             "/tip",
             radius=TIP_RADIUS * actuator.magnet.front_m,
             subdivisions=2,
-            color=of_one(theme.TRACE),
+            color=mesh_colour(theme.TRACE),
             cast_shadow=False,
             receive_shadow=False,
         )
@@ -176,11 +176,11 @@ class Scene:
         if desired_rad is not None:
             w = _pose(desired_rad)
             self._ghost.wxyz = w
-            self.handle.position = _turned(w, self._actuator.shaft_tip_m)
+            self.handle.position = _rotated(w, self._actuator.shaft_tip_m)
 
     def trail(self, q_rad: NDArray[np.float64]) -> None:
         """Draw the tip's way a little further."""
-        self._trail.append(_turned(_pose(q_rad), self._actuator.shaft_tip_m))
+        self._trail.append(_rotated(_pose(q_rad), self._actuator.shaft_tip_m))
         points = np.array(self._trail, dtype=np.float32)
         if len(points) > 1:
             self._line.points = np.stack([points[:-1], points[1:]], axis=1)
@@ -211,8 +211,8 @@ class Scene:
 
     def group_of(self, coil: int | None) -> int | None:
         """Group of a coil that was clicked, by its place; None where there is none."""
-        found = np.flatnonzero((self._actuator.groups == coil).any(axis=1))
-        return int(found[0]) if len(found) else None
+        groups = np.flatnonzero((self._actuator.groups == coil).any(axis=1))
+        return int(groups[0]) if len(groups) else None
 
     def forget(self) -> None:
         """Begin the tip's way anew."""
@@ -220,7 +220,7 @@ class Scene:
         self._line.points = np.zeros((1, 2, 3), dtype=np.float32)
 
     def _coil_colours(self, current_A: NDArray[np.float64], limit_A: float) -> NDArray[np.uint8]:
-        of_group = of_instances(theme.current_colours(current_A, limit_A))
+        of_group = instance_colours(theme.current_colours(current_A, limit_A))
         coloured = np.empty((len(self._actuator.coil_axes), 3), dtype=np.uint8)
         coloured[self._actuator.groups] = of_group[:, None, :]
         return coloured
@@ -257,7 +257,7 @@ def _mesh(
         name,
         solid.vertices,
         solid.faces,
-        color=of_one(colour),
+        color=mesh_colour(colour),
         wxyz=wxyz,
         opacity=opacity,
         cast_shadow=False,
@@ -288,7 +288,7 @@ def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float
     return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
 
 
-def _turned(quaternion: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotated(quaternion: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
     """A vector, turned."""
     w, axis = quaternion[0], quaternion[1:]
     across = 2 * np.cross(axis, vector)

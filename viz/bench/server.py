@@ -90,9 +90,9 @@ def serve(listening: socket.socket, title: str) -> viser.ViserServer:
     title : str
         Of the page.
     """
-    with _as_door(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser tells its address
+    with _with_guard(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser tells its address
         server = viser.ViserServer(host=HOST, port=listening.getsockname()[1], verbose=False)
-    server.get_event_loop().set_exception_handler(_unheard)
+    server.get_event_loop().set_exception_handler(_ignore_exception)
     return server
 
 
@@ -107,7 +107,7 @@ def address(server: viser.ViserServer) -> str:
     return f"http://{HOST}:{server.get_port()}"
 
 
-class _Door(servers.serve):
+class _ConnectionGuard(servers.serve):
     """What viser takes for the function that makes a server."""
 
     def __init__(
@@ -129,7 +129,7 @@ class _Door(servers.serve):
             process_request=self._answer,
             subprotocols=subprotocols,
             select_subprotocol=select_subprotocol,
-            create_connection=_Visitor,
+            create_connection=_PageConnection,
             max_size=LARGEST_MESSAGE,
             compression=None,
             # A browser opens sockets to be ready, and says nothing: these shall not hold up the end.
@@ -171,24 +171,24 @@ class _Door(servers.serve):
     def _file(self, connection: Any, request: Request, host: str) -> Response:
         plain = Request(request.path, Headers())
         try:
-            found = self._serve_file(connection, plain)
+            response = self._serve_file(connection, plain)
         except (ValueError, OSError):  # no file can have the name that was asked for
-            found = None
-        if found is None or found.status_code != http.HTTPStatus.OK:
+            response = None
+        if response is None or response.status_code != http.HTTPStatus.OK:
             return _refusal(http.HTTPStatus.NOT_FOUND)
-        if found.headers["Content-Type"].startswith("text/html"):
+        if response.headers["Content-Type"].startswith("text/html"):
             head = f"<head><title>{self._title}</title>{HEAD}".encode()
-            found.body = found.body.replace(b"<title>Viser</title>", b"").replace(b"<head>", head, 1)
-            del found.headers["Content-Length"]
-            found.headers["Content-Length"] = str(len(found.body))
-        found.headers["Content-Security-Policy"] = POLICY.format(host=host)
-        found.headers["X-Content-Type-Options"] = "nosniff"
-        found.headers["Referrer-Policy"] = "no-referrer"
-        found.headers["Cache-Control"] = "no-store"
-        return found
+            response.body = response.body.replace(b"<title>Viser</title>", b"").replace(b"<head>", head, 1)
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(response.body))
+        response.headers["Content-Security-Policy"] = POLICY.format(host=host)
+        response.headers["X-Content-Type-Options"] = "nosniff"
+        response.headers["Referrer-Policy"] = "no-referrer"
+        response.headers["Cache-Control"] = "no-store"
+        return response
 
 
-class _Visitor(servers.ServerConnection):
+class _PageConnection(servers.ServerConnection):
     """A page's socket, which hands over only messages of the forms below, and not too many at once."""
 
     _due = 0.0
@@ -200,7 +200,7 @@ class _Visitor(servers.ServerConnection):
             self._due = max(self._due + 1 / MOST_MESSAGES_PER_S, now - 1.0)
             if self._due > now:
                 await asyncio.sleep(self._due - now)
-            if isinstance(raw, bytes) and _is_a_pages(raw):
+            if isinstance(raw, bytes) and _is_page_message(raw):
                 return raw
 
 
@@ -282,7 +282,7 @@ _PAGES: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(
 )
 
 
-def _is_a_pages(raw: bytes) -> bool:
+def _is_page_message(raw: bytes) -> bool:
     try:
         _PAGES.decode(raw)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -300,15 +300,17 @@ _SILENT = logging.getLogger("spheretwin.bench")
 _SILENT.addHandler(logging.NullHandler())
 _SILENT.propagate = False
 
-_making = threading.Lock()
+_server_lock = threading.Lock()
 
 
 @contextlib.contextmanager
-def _as_door(listening: socket.socket, title: str) -> Iterator[None]:
+def _with_guard(listening: socket.socket, title: str) -> Iterator[None]:
     """Have viser make its server with our door: it asks the library for one, and cannot be told which."""
 
-    def door(handler: Any, host: str, port: int, *, process_request: Any, **options: Any) -> _Door:
-        return _Door(
+    def guard(
+        handler: Any, host: str, port: int, *, process_request: Any, **options: Any
+    ) -> _ConnectionGuard:
+        return _ConnectionGuard(
             listening,
             title,
             handler,
@@ -317,13 +319,13 @@ def _as_door(listening: socket.socket, title: str) -> Iterator[None]:
             options["select_subprotocol"],
         )
 
-    with _making:
-        plain, servers.serve = servers.serve, door  # type: ignore[misc, assignment]
+    with _server_lock:
+        plain, servers.serve = servers.serve, guard  # type: ignore[misc, assignment]
         try:
             yield
         finally:
             servers.serve = plain  # type: ignore[misc]
 
 
-def _unheard(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+def _ignore_exception(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     """What a page's message made viser stumble over ends with that message."""

@@ -23,7 +23,7 @@ _LARGE = "font-size:1.25em;font-weight:700;font-variant-numeric:tabular-nums"
 _TABLE = "display:grid;grid-template-columns:auto 1fr;column-gap:0.8em;font-variant-numeric:tabular-nums"
 
 
-def status_html(state: Any, refused: str, waits_for: str) -> str:
+def status_html(state: Any, refused: str, waiting_command: str) -> str:
     """The box on top.
 
     Parameters
@@ -35,10 +35,10 @@ def status_html(state: Any, refused: str, waits_for: str) -> str:
     waits_for : str
         The command that is being prepared; may be empty.
     """
-    wanted = "as fast as possible" if isinf(state.speed) or state.speed > 1e3 else f"{state.speed:g}×"
+    speed = "as fast as possible" if isinf(state.speed) or state.speed > 1e3 else f"{state.speed:g}×"
     rows = [
         ("time", f"<b>{state.t_s:.3f} s</b>"),
-        ("speed", f"{wanted}, reached <b>{state.realtime_factor:.2f}×</b>"),
+        ("speed", f"{speed}, reached <b>{state.realtime_factor:.2f}×</b>"),
         ("|e|", f"<b>{state.error_mrad:.2f} mrad</b> = {state.error_deg:.3f}°"),
         ("margin", _bar(state.torque_margin)),
         ("law", f"{escape(state.law)}, {escape(state.scenario)}"),
@@ -48,8 +48,8 @@ def status_html(state: Any, refused: str, waits_for: str) -> str:
     return (
         f'<div style="{_BOX}" data-bench="status">'
         f'<div style="{_LARGE}">{_badge(state.mode.upper(), _MODES.get(state.mode, _WORKING))}'
-        f"{_going(state)}{''.join(_alarms(state))}</div>{_nobody(state)}"
-        f'<div style="{_TABLE}">{table}</div>{_lines(state, refused, waits_for)}</div>'
+        f"{_run_badge(state)}{''.join(_alarms(state))}</div>{_operator_hint(state)}"
+        f'<div style="{_TABLE}">{table}</div>{_lines(state, refused, waiting_command)}</div>'
     )
 
 
@@ -102,11 +102,11 @@ def _badge(text: str, colour: str) -> str:
     )
 
 
-def _going(state: Any) -> str:
+def _run_badge(state: Any) -> str:
     return _badge("RUNS", GOOD) if state.running else _badge("PAUSED", QUIET)
 
 
-def _nobody(state: Any) -> str:
+def _operator_hint(state: Any) -> str:
     if state.operator is not None or not state.watching:
         return ""
     return f'<div style="color:{WARN}">Nobody operates: press “{TAKE_OVER}”.</div>'
@@ -127,9 +127,9 @@ def _alarms(state: Any) -> list[str]:
     return alarms
 
 
-def _lines(state: Any, refused: str, waits_for: str) -> str:
+def _lines(state: Any, refused: str, waiting_command: str) -> str:
     lines = [(BAD, state.reason), (BAD, refused), (WARN, state.note)]
-    lines += [(_WORKING, f"preparing {waits_for} …")] if waits_for else []
+    lines += [(_WORKING, f"preparing {waiting_command} …")] if waiting_command else []
     lines += [(WARN, f"at the next reset: {name} = {value}") for name, value in state.pending]
     lines += [(GOOD, f"recording {file}") for file in state.recording]
     return "".join(f'<div style="color:{colour}">{escape(str(text))}</div>' for colour, text in lines if text)

@@ -109,13 +109,13 @@ def test_clients_say_who_they_are(shared):
 def test_clients_are_not_without_end(clock):
     operators = Operators(clock=clock)
     for i in range(MOST_CLIENTS):
-        operators.see(f"{i}")
+        operators.register(f"{i}")
     with pytest.raises(InputError, match="at most"):
-        operators.see("one more")
+        operators.register("one more")
     clock.now = 2 * GONE_s
-    assert operators.look()
-    assert not operators.look()
-    operators.see("one more")
+    assert operators.check_silence()
+    assert not operators.check_silence()
+    operators.register("one more")
     assert operators.operator == "one more"
 
 

@@ -87,7 +87,7 @@ def run(pace, clock, chunks, took_s=0.001, period_s=1e-3):
         ticks = pace.ticks(period_s)
         t_s += ticks * period_s
         clock.now += took_s
-        pace.ran(ticks, period_s, t_s, took_s)
+        pace.record_chunk(ticks, period_s, t_s, took_s)
     return begins, t_s
 
 
@@ -99,7 +99,7 @@ def test_chunks_keep_the_pace(clock, speed):
     # The first chunks of a faster pace are short, until it is known what a chunk takes.
     assert np.diff(begins).max() == pytest.approx(CHUNK_s, abs=1e-12)
     assert (pace.chunks, pace.missed) == (101, 0)
-    assert pace.reached() == pytest.approx(speed, rel=0.02)  # of 50 chunks, the last one's end
+    assert pace.realtime_factor() == pytest.approx(speed, rel=0.02)  # of 50 chunks, the last one's end
 
 
 def test_late_chunks_are_counted_and_made_up_for_but_not_without_end(clock):
@@ -123,10 +123,10 @@ def test_a_machine_too_slow_for_the_pace_runs_shorter_chunks_so_that_stop_is_hea
         ticks = pace.ticks(1e-3)
         took_s = 1e-4 * ticks  # ten times real time is all that it can
         clock.now += pace.wait_s() + took_s
-        pace.ran(ticks, 1e-3, clock.now * 10, took_s)
+        pace.record_chunk(ticks, 1e-3, clock.now * 10, took_s)
     assert 1e-4 * pace.ticks(1e-3) <= CHUNK_s
     assert pace.missed_share > 0.9
-    assert pace.reached() == pytest.approx(10, rel=0.1)
+    assert pace.realtime_factor() == pytest.approx(10, rel=0.1)
 
 
 def test_as_fast_as_possible_waits_for_nothing_and_has_no_deadlines(clock):
@@ -136,7 +136,7 @@ def test_as_fast_as_possible_waits_for_nothing_and_has_no_deadlines(clock):
     assert pace.ticks(1e-3) == MOST_TICKS
     assert pace.chunks == 0
     assert clock.now == pytest.approx(0.01)
-    assert pace.reached() == pytest.approx(t_s / 0.01, rel=0.05)
+    assert pace.realtime_factor() == pytest.approx(t_s / 0.01, rel=0.05)
 
 
 def test_the_history_is_thinned_bounded_and_the_same_whatever_the_chunks():
@@ -167,6 +167,6 @@ def test_what_was_reached_is_counted_anew_when_time_goes_back():
         for chunk in range(1, 11):
             pace.wait_s()
             clock.now += 0.02
-            pace.ran(20, 1e-3, first_s + 0.02 * chunk, 1e-3)
-            assert pace.reached() >= 0.0
-    assert pace.reached() == pytest.approx(1.0, rel=1e-9)
+            pace.record_chunk(20, 1e-3, first_s + 0.02 * chunk, 1e-3)
+            assert pace.realtime_factor() >= 0.0
+    assert pace.realtime_factor() == pytest.approx(1.0, rel=1e-9)

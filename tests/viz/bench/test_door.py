@@ -15,7 +15,7 @@ from websockets.sync.client import connect
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
-from spheretwin.viz.bench.event_handlers import STEERED_S
+from spheretwin.viz.bench.event_handlers import LATEST_INTERVAL_S
 from tests.viz.bench import fake
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -260,8 +260,8 @@ def test_no_message_takes_stop_away(page, bench):
 
 def test_only_what_a_page_sends_passes():
     value = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": True}}
-    assert server._is_a_pages(msgspec.msgpack.encode(value))
-    assert server._is_a_pages(msgspec.msgpack.encode(CAMERA))
+    assert server._is_page_message(msgspec.msgpack.encode(value))
+    assert server._is_page_message(msgspec.msgpack.encode(CAMERA))
     for other in (
         {**value, "updates": {"removed": True}},
         {**value, "updates": {"value": True, "removed": True}},
@@ -271,7 +271,7 @@ def test_only_what_a_page_sends_passes():
         {"type": "ShareUrlRequest"},
         {"type": "GuiUpdateMessage"},
     ):
-        assert not server._is_a_pages(msgspec.msgpack.encode(other))
+        assert not server._is_page_message(msgspec.msgpack.encode(other))
 
 
 def test_fifty_pages_come_and_go(page):
@@ -308,7 +308,7 @@ def test_a_flood_waits_in_its_own_socket(page, bench):
         assert is_alive(page)
         waited_s = time.monotonic() - begun
         # Of what is steered, the bench is told ten times a second; of who is there, now and then.
-        assert len(bench.commands()) - before <= 2 + (waited_s + sending_s) / STEERED_S
+        assert len(bench.commands()) - before <= 2 + (waited_s + sending_s) / LATEST_INTERVAL_S
         # Of messages, a second's worth is taken at once and the rest at its rate: the moves count themselves.
         moves = page._server.gui._gui_input_handle_from_uuid[name].value / 0.01
         assert 0 < moves <= 1 + server.MOST_MESSAGES_PER_S * (1 + time.monotonic() - begun + sending_s)
@@ -327,5 +327,5 @@ def test_a_press_comes_after_what_was_moved_before_it(page, bench):
         assert last == ("hold", {})
         assert before == "point"
         assert given["pose_rad"][0] == pytest.approx(np.radians(30.0), rel=1e-12)
-        time.sleep(2 * STEERED_S)
+        time.sleep(2 * LATEST_INTERVAL_S)
         assert bench.commands()[-1] == last
