@@ -99,7 +99,7 @@ def extent(path: Path) -> Extent:
                     signature = _signature(file.read(min(length, _SIGNATURE_BYTES)))
                 place, ended = next_place, kind == _LAST_KIND
                 file.seek(place)
-            if _goes_on(file, place, size, ended=ended, signature=signature):
+            if _has_more_messages(file, place, size, ended=ended, signature=signature):
                 raise _damaged(path, place)
     except OSError as error:
         raise InputError(f"recording {path}: expected a readable file, {error.strerror or error}") from None
@@ -111,7 +111,7 @@ def _signature(payload: bytes) -> bytes:
     return payload[: 2 + payload[1]] if len(payload) > 1 else b""
 
 
-def _goes_on(file: BinaryIO, place: int, size: int, *, ended: bool, signature: bytes) -> bool:
+def _has_more_messages(file: BinaryIO, place: int, size: int, *, ended: bool, signature: bytes) -> bool:
     """Whether there are more messages behind a place at which the messages seem to end.
 
     A process that was killed leaves a part of one message at most, and behind the footer is its place alone.
@@ -145,19 +145,19 @@ def whole_messages(path: Path) -> Iterator[tuple[Path, Extent]]:
     InputError
         As `extent`, or a copy cannot be made.
     """
-    found = extent(path)
-    if not found.torn:
-        yield path, found
+    result = extent(path)
+    if not result.torn:
+        yield path, result
         return
     with tempfile.TemporaryDirectory(prefix="spheretwin-") as folder:
         copy = Path(folder) / "whole.rrd"
         try:
             shutil.copyfile(path, copy)
             with copy.open("r+b") as file:
-                file.truncate(found.whole_bytes)
+                file.truncate(result.whole_bytes)
         except OSError as error:
             raise InputError(f"recording {path}: expected room for a copy, {without_breaks(error)}") from None
-        yield copy, found
+        yield copy, result
 
 
 PIPE_PATHS = Path("/dev/fd")

@@ -22,7 +22,7 @@ PAYLOAD: Colour = (26, 168, 160)
 """Of the weight on the shaft, and of the torque that it has."""
 DESIRED_TRACE: Colour = (130, 136, 146)
 
-ASKED: Colour = (240, 240, 240)
+COMMAND: Colour = (240, 240, 240)
 """What was asked for, drawn thin over what came of it."""
 
 PLAIN: Colour = (200, 204, 212)
@@ -31,7 +31,7 @@ PLAIN: Colour = (200, 204, 212)
 GROUP: Colour = (160, 130, 110)
 """Each of many coil groups, where only their spread matters."""
 
-BELIEVED: Colour = (255, 190, 60)
+ESTIMATE: Colour = (255, 190, 60)
 """What the controller takes for true."""
 
 FINE: Colour = (48, 84, 70)
@@ -101,12 +101,12 @@ def law_colour(law: str) -> str:
 
 def law_colours(laws: Sequence[str]) -> dict[str, str]:
     """A colour for each of some laws: its own by its name, or one that is left where that is taken."""
-    found: dict[str, str] = {}
+    colours: dict[str, str] = {}
     for law in laws:
         own = law_colour(law.split(",")[0])
-        others = [each for each in (own, *SPARE) if each not in found.values()]
-        found[law] = others[0] if others else own
-    return found
+        others = [colour for colour in (own, *SPARE) if colour not in colours.values()]
+        colours[law] = others[0] if others else own
+    return colours
 
 
 def law_marks(laws: Sequence[str]) -> dict[str, tuple[str, Dash]]:

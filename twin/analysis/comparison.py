@@ -18,17 +18,17 @@ from spheretwin.models.base.errors import InputError, shortened, shown
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.viz.comparison.runs import Run, Spectrum, leaders
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, leaders
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.pages import markdown as folder
-from spheretwin.viz.quantities import ComparedQuantity, Rows, compared_quantities
+from spheretwin.viz.quantities import QuantityRows, ScalarQuantity, scalar_quantities
 from spheretwin.viz.terminal.runs import differences as table_rows
 
 # Numbers that count nothing.
-NAMES_ONLY = ("seed",)
+NOT_COMPARED = ("seed",)
 
 
-def differences(told: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def differences(figures: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Of each run but the first, every number that a review tells of both, less that of the first.
 
     Axis by axis where there is one for each; None where one of the two has none.
@@ -38,26 +38,26 @@ def differences(told: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     told : sequence of mapping
         What a review tells of each run.
     """
-    first, *others = told
+    first, *others = figures
     return [
         {
             "path": other["path"],
             **{
                 name: _difference(first[name], value)
                 for name, value in other.items()
-                if name in first and name not in NAMES_ONLY and _counts(first[name], value)
+                if name in first and name not in NOT_COMPARED and _are_numbers(first[name], value)
             },
         }
         for other in others
     ]
 
 
-def _counts(first: Any, value: Any) -> bool:
+def _are_numbers(first: Any, value: Any) -> bool:
     """Whether both are numbers, lists of numbers as long as each other, or one of these and nothing."""
     if isinstance(first, list) and isinstance(value, list):
-        return len(first) == len(value) and all(map(_counts, first, value))
-    numbers = [each for each in (first, value) if each is not None]
-    of_lists = all(isinstance(each, list) and all(_is_number(entry) for entry in each) for each in numbers)
+        return len(first) == len(value) and all(map(_are_numbers, first, value))
+    numbers = [item for item in (first, value) if item is not None]
+    of_lists = all(isinstance(item, list) and all(_is_number(entry) for entry in item) for item in numbers)
     return bool(numbers) and (all(map(_is_number, numbers)) or (len(numbers) == 1 and of_lists))
 
 
@@ -74,7 +74,7 @@ def _difference(first: Any, value: Any) -> Any:
 
 
 # What a reader of the paper looks for first, and as it writes it.
-FIRST = {
+FIRST_FIELDS = {
     "plant.modelling_error": "m",
     "disturbance.load": "L",
     "hardware": "hardware",
@@ -82,13 +82,13 @@ FIRST = {
     "name": "scenario",
     "seed": "seed",
 }
-MOST, LEGEND = 6, 48
+MOST_DIFFERENCES, LEGEND_LENGTH = 6, 48
 """Differences that are told, and characters of a legend's line."""
-LONGEST, LONGEST_STEM = 24, 40
+LONGEST_VALUE, LONGEST_STEM = 24, 40
 """Of a value that is told, and of a file's name."""
 
 # Fields that go with another one: where that differs, so do these, and say nothing more.
-GOES_WITH = {
+IMPLIED_FIELDS = {
     "name": ("description", "duration", "trajectory."),
     "controller.law": ("controller.",),
     "plant.modelling_error": ("plant.modelling_torque_Nm",),
@@ -107,18 +107,18 @@ def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
     longest : int
         Characters of a label, but for number, file and law, which are always told.
     """
-    told = differing([run.record.scenario for run in runs])
-    found = []
-    for place, (run, parts) in enumerate(zip(runs, told, strict=True), start=1):
-        stem, law = shortened(run.path.stem, LONGEST), _law_name(run)
+    parts_of_runs = differing_fields([run.record.scenario for run in runs])
+    run_labels = []
+    for place, (run, parts) in enumerate(zip(runs, parts_of_runs, strict=True), start=1):
+        stem, law = shortened(run.path.stem, LONGEST_VALUE), _law_name(run)
         label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
         for part in parts:
             if len(label) + len(part) + 2 > longest:
                 label += ", …"
                 break
             label += f", {part}"
-        found.append(label)
-    return found
+        run_labels.append(label)
+    return run_labels
 
 
 def names(runs: Sequence[Reviewed]) -> list[str]:
@@ -127,14 +127,22 @@ def names(runs: Sequence[Reviewed]) -> list[str]:
     return [f"run_{place}_{stem.replace('…', '_')}" for place, stem in enumerate(stems, start=1)]
 
 
-def differing(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+def differing_fields(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """Fields that are not the same in all scenarios, with their values in each, at most six."""
     flat = [dict(_fields(scenario)) for scenario in scenarios]
-    of_any = list(dict.fromkeys([*FIRST, *(name for each in flat for name in each)]))
-    different = [name for name in of_any if len({each.get(name, "none") for each in flat}) > 1]
-    beside = [part for name, parts in GOES_WITH.items() if name in different for part in parts]
-    told = [name for name in different if name in FIRST or not any(map(name.startswith, beside))]
-    return [[f"{FIRST.get(name, name)} {each.get(name, 'none')}" for name in told[:MOST]] for each in flat]
+    all_names = list(dict.fromkeys([*FIRST_FIELDS, *(name for fields in flat for name in fields)]))
+    different = [name for name in all_names if len({fields.get(name, "none") for fields in flat}) > 1]
+    implied = [part for name, parts in IMPLIED_FIELDS.items() if name in different for part in parts]
+    shown_fields = [
+        name for name in different if name in FIRST_FIELDS or not any(map(name.startswith, implied))
+    ]
+    return [
+        [
+            f"{FIRST_FIELDS.get(name, name)} {fields.get(name, 'none')}"
+            for name in shown_fields[:MOST_DIFFERENCES]
+        ]
+        for fields in flat
+    ]
 
 
 def _law_name(run: Reviewed) -> str:
@@ -147,15 +155,15 @@ def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, s
         if isinstance(inside, Mapping):
             yield from _fields(inside, f"{before}{name}.")
         else:
-            yield before + name, shortened(_text(inside), LONGEST)
+            yield before + name, shortened(_text(inside), LONGEST_VALUE)
 
 
 def _text(value: Any) -> str:
     """As a person writes it: a whole number without a point, of entries of a list what they name."""
     if isinstance(value, str):
         return value
-    if isinstance(value, list) and all(isinstance(each, Mapping) for each in value):
-        words = [" ".join(word for word in each.values() if isinstance(word, str)) for each in value]
+    if isinstance(value, list) and all(isinstance(item, Mapping) for item in value):
+        words = [" ".join(word for word in item.values() if isinstance(word, str)) for item in value]
         return " + ".join(words) or "none"
     return f"{value:g}" if isinstance(value, float) and value == float(f"{value:g}") else json.dumps(value)
 
@@ -191,9 +199,9 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
         The file cannot be written; what was there before is untouched.
     """
     from spheretwin.viz.comparison import merged_recording  # Rerun is slow to import
-    from spheretwin.viz.recording.part import Subject
+    from spheretwin.viz.recording.part import RecordingSubject
 
-    compared = beside(runs)
+    drawn_runs = compared_runs(runs)
     groups = [run.table["current_A"].shape[1] for run in runs]
     for run, count in zip(runs, groups, strict=True):
         if count != groups[0]:
@@ -202,14 +210,14 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
                 f" received one of {count}"
             )
     subjects = [
-        Subject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
+        RecordingSubject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
         for run, of in zip(runs, map(of_the_actuator, runs), strict=True)
     ]
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
-        merged_recording.write(path, compared, subjects, _told(runs))
+        merged_recording.write(path, drawn_runs, subjects, _runs_text(runs))
 
 
-def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
+def compared_runs(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[ComparedRun]:
     """Runs as they are drawn beside each other.
 
     Parameters
@@ -226,9 +234,9 @@ def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
     for run in runs:
         if not len(run.table):
             raise InputError(f"review {run.path}: expected a run of at least one tick to draw, received none")
-    told = zip(runs, names(runs), labels(runs, LEGEND), strict=True)
+    run_texts = zip(runs, names(runs), labels(runs, LEGEND_LENGTH), strict=True)
     return [
-        Run(
+        ComparedRun(
             name,
             label,
             _law(run),
@@ -237,13 +245,13 @@ def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
             run.metadata,
             tuple(events(run)),
         )
-        for run, name, label in told
+        for run, name, label in run_texts
     ]
 
 
-def _rows(run: Reviewed, table: Table) -> Rows:
+def _rows(run: Reviewed, table: Table) -> QuantityRows:
     scenario, files, *_ = of_the_actuator(run)
-    return Rows(table, table.rows(0, 1), files.actuator, scenario.drive.current_limit_A)
+    return QuantityRows(table, table.rows(0, 1), files.actuator, scenario.drive.current_limit_A)
 
 
 def _facts(scenario: ResolvedScenario, law: str) -> RunFacts:
@@ -264,7 +272,7 @@ def _law(run: Reviewed) -> str:
     return str(run.record.scenario["controller"]["law"])
 
 
-def _told(runs: Sequence[Reviewed]) -> str:
+def _runs_text(runs: Sequence[Reviewed]) -> str:
     """What each run is, in Markdown; one that is named here is named so in every plot."""
     status = (f"{run.record.status or 'not closed'} at {run.simulated_s:.3f} s" for run in runs)
     lines = [f"- **{label}**, {ended}" for label, ended in zip(labels(runs), status, strict=True)]
@@ -287,7 +295,7 @@ TITLES = {
 """Of the figure of each group of quantities."""
 
 
-def write_figures(runs: Sequence[Reviewed], told: Sequence[dict[str, Any]], into: Path) -> Path:
+def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], into: Path) -> Path:
     """Write figures and page into a folder; returns the page's path.
 
     Parameters
@@ -305,21 +313,21 @@ def write_figures(runs: Sequence[Reviewed], told: Sequence[dict[str, Any]], into
     """
     from spheretwin.viz.pages import interactive  # what draws is slow to import
 
-    compared = beside(runs, every_tick=True)
-    tables = [run.table for run in compared]
-    leading, quantities = leaders(tables), compared_quantities(tables)
+    drawn_runs = compared_runs(runs, every_tick=True)
+    tables = [run.table for run in drawn_runs]
+    leading, quantities = leaders(tables), scalar_quantities(tables)
     spectra = [_spectra(run) for run in runs]
-    title = compared[0].label if len(runs) == 1 else f"{len(runs)} runs"
+    title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs"
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
-        folder.save_drawings(into, _drawings(compared, leading, quantities, spectra), vector=True)
-        over_time = interactive.over_time(compared, leading, quantities)
+        folder.save_drawings(into, _drawings(drawn_runs, leading, quantities, spectra), vector=True)
+        over_time = interactive.over_time(drawn_runs, leading, quantities)
     content = interactive.page(
         title,
-        compared,
+        drawn_runs,
         over_time,
-        interactive.of_errors(compared, spectra),
-        _above(title, compared, interactive.points_each(compared, leading, quantities)),
-        _below(compared, told),
+        interactive.error_spectra(drawn_runs, spectra),
+        _above(title, drawn_runs, interactive.points_per_line(drawn_runs, leading, quantities)),
+        _below(drawn_runs, figures),
     )
     return folder.save_text(into / PAGE, content)
 
@@ -336,21 +344,21 @@ def check_figures(into: Path) -> None:
 
 
 def _drawings(
-    runs: Sequence[Run],
+    runs: Sequence[ComparedRun],
     leading: Sequence[int],
-    quantities: Sequence[ComparedQuantity],
+    quantities: Sequence[ScalarQuantity],
     spectra: Sequence[list[Spectrum]],
 ) -> Iterator[Drawing]:
-    from spheretwin.viz.figures.comparison import currents, happened, over_time
+    from spheretwin.viz.figures.comparison import currents, events_figure, over_time
     from spheretwin.viz.figures.comparison import spectra as of_errors
     from spheretwin.viz.figures.style import Drawing
 
-    for group, inside in groupby(quantities, key=lambda each: each.group):
+    for group, inside in groupby(quantities, key=lambda quantity: quantity.group):
         title = TITLES[group]
         yield Drawing(f"{group}.png", title, over_time(runs, leading, list(inside), title))
     yield Drawing("currents.png", title := "Currents of all groups", currents(runs, title))
     yield Drawing("spectra.png", title := "Spectra of the tracking errors", of_errors(runs, spectra, title))
-    yield Drawing("events.png", title := "What happened", happened(runs, title))
+    yield Drawing("events.png", title := "What happened", events_figure(runs, title))
 
 
 def _spectra(run: Reviewed) -> list[Spectrum]:
@@ -361,7 +369,7 @@ def _spectra(run: Reviewed) -> list[Spectrum]:
     ]  # fmt: skip
 
 
-def _above(title: str, runs: Sequence[Run], most: int) -> str:
+def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
     thin = any(len(run.table) > most for run in runs)
     lines = [
         f"# {_plain(title)}",
@@ -374,9 +382,9 @@ def _above(title: str, runs: Sequence[Run], most: int) -> str:
     return "\n".join(lines)
 
 
-def _below(runs: Sequence[Run], told: Sequence[dict[str, Any]]) -> str:
+def _below(runs: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
     head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in runs)]
-    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(told)]
+    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures)]
     return "\n".join(["## Figures", "", *markdown.table(head, rows, [False] + [True] * len(runs))])
 
 

@@ -18,7 +18,7 @@ from spheretwin.models.telemetry.partial_files import list_of, read_schema
 from spheretwin.models.telemetry.table import Table, read_parquet
 
 
-def held(table: Table, period_s: float) -> Table:
+def hold_rows(table: Table, period_s: float) -> Table:
     """Rows at every tick from the first to the last, each that of the latest that there is.
 
     Parameters
@@ -54,7 +54,7 @@ class Recovered(NamedTuple):
     """True if what was left has checksums; they were compared."""
 
 
-def found(path: Path) -> Path:
+def find_run_file(path: Path) -> Path:
     """The file of a name; where there is none, what a killed process left of it under a hidden one.
 
     Raises
@@ -66,7 +66,7 @@ def found(path: Path) -> Path:
         if path.exists():
             return path
         left = sorted(
-            each for kind in ("parts", "part") for each in path.parent.glob(f".{path.name}.*.{kind}")
+            file for kind in ("parts", "part") for file in path.parent.glob(f".{path.name}.*.{kind}")
         )
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
         raise InputError(f"review {path}: expected the file of a run, {without_breaks(error)}") from None
@@ -82,7 +82,7 @@ def is_recording(path: Path) -> bool:
 
 
 @contextmanager
-def joined(folder: Path) -> Iterator[Path]:
+def joined_telemetry(folder: Path) -> Iterator[Path]:
     """Give a telemetry file of the parts in a folder.
 
     Raises
@@ -91,7 +91,7 @@ def joined(folder: Path) -> Iterator[Path]:
         There are none, or not a row of them is whole.
     """
     with tempfile.TemporaryDirectory(prefix="spheretwin-") as temporary:
-        join(_parts(folder), path := Path(temporary) / "joined.parquet")
+        join(_part_files(folder), path := Path(temporary) / "joined.parquet")
         yield path
 
 
@@ -112,9 +112,9 @@ def recover(path: Path, out: Path) -> Recovered:
     SpheretwinError
         Writing failed; what was there before is untouched.
     """
-    left = found(path)
+    left = find_run_file(path)
     if left.is_dir():
-        parts = _parts(left)
+        parts = _part_files(left)
         period_s = _period_s(parts[0])
         rows = join(parts, out)
         return Recovered(rows, rows * period_s, are_checked(left))
@@ -128,7 +128,7 @@ def recover(path: Path, out: Path) -> Recovered:
             )
         recorded = reader.rewrite(left, out)
         period_s = recorded.facts["sections"]["controller"]["period_s"]
-        seconds = len(held(recorded.table, period_s)) * period_s
+        seconds = len(hold_rows(recorded.table, period_s)) * period_s
         return Recovered(len(recorded.table), seconds, recorded.checked)
     read_parquet(left, rows=False)  # what is no telemetry is told as such
     raise InputError(f"recover {left}: expected what a killed process left, received a whole telemetry file")
@@ -147,10 +147,10 @@ def _period_s(part: Path) -> float:
 
 def are_checked(folder: Path) -> bool:
     """Return whether all parts in a folder have checksums."""
-    return all(list_of(part).is_file() for part in _parts(folder))
+    return all(list_of(part).is_file() for part in _part_files(folder))
 
 
-def _parts(folder: Path) -> list[Path]:
+def _part_files(folder: Path) -> list[Path]:
     if parts := sorted(folder.glob("*.arrows")):
         return parts
     raise InputError(f"telemetry {folder}: expected a folder of parts, received one without any")

@@ -55,7 +55,7 @@ FEWEST_ROWS = 16
 _APART = 2
 
 
-class Peak(NamedTuple):
+class SpectralPeak(NamedTuple):
     """An oscillation."""
 
     frequency_Hz: float
@@ -63,7 +63,7 @@ class Peak(NamedTuple):
     """In the unit of the column."""
 
 
-def peaks(values: Array, period_s: float) -> list[Peak]:
+def peaks(values: Array, period_s: float) -> list[SpectralPeak]:
     """Strongest oscillations about the mean, the strongest first, at most three.
 
     Hann's window; frequency and amplitude between the lines of the spectrum from the two that a peak stands
@@ -83,7 +83,7 @@ def peaks(values: Array, period_s: float) -> list[Peak]:
     inner = np.arange(_APART, len(lines) - 1)
     tops = inner[(lines[inner] > lines[inner - 1]) & (lines[inner] >= lines[inner + 1])]
     strongest = tops[np.argsort(-lines[tops], kind="stable")][:PEAKS]
-    return [_between(lines, int(top), n, period_s) for top in strongest]
+    return [_interpolated_peak(lines, int(top), n, period_s) for top in strongest]
 
 
 def amplitudes(values: Array, period_s: float) -> tuple[Array, Array]:
@@ -110,13 +110,13 @@ def _lines(values: Array) -> Array:
     return np.abs(np.fft.rfft((values - values.mean()) * window))
 
 
-def _between(lines: Array, top: int, rows: int, period_s: float) -> Peak:
+def _interpolated_peak(lines: Array, top: int, rows: int, period_s: float) -> SpectralPeak:
     """The oscillation that has its highest line at `top`: under Hann's window neighbours tell how far off."""
     side = 1 if lines[top + 1] > lines[top - 1] else -1
     ratio = lines[top + side] / lines[top]
     off = (2 * ratio - 1) / (ratio + 1)  # of a line's distance, to that side
     left = np.sinc(off) / (1 - off * off)  # of the amplitude, at the line
-    return Peak(float((top + side * off) / (rows * period_s)), float(4 * lines[top] / (rows * left)))
+    return SpectralPeak(float((top + side * off) / (rows * period_s)), float(4 * lines[top] / (rows * left)))
 
 
 def figures(run: Reviewed) -> dict[str, Any]:

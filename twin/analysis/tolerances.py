@@ -75,10 +75,10 @@ def load(source: str) -> Tolerances:
     try:
         return Tolerances.model_validate_json(json.dumps(fields, default=str))
     except ValidationError as error:
-        raise InputError(f"tolerance {source}: {_complaint(error, fields)}") from None
+        raise InputError(f"tolerance {source}: {_error_text(error, fields)}") from None
 
 
-def _complaint(error: ValidationError, fields: dict[str, Any]) -> str:
+def _error_text(error: ValidationError, fields: dict[str, Any]) -> str:
     """First complaint; of a signal's own table it is that of the table by itself, which knows its fields."""
     match error.errors()[0]["loc"]:
         case ("signals", str() as name, _, *_):
@@ -124,18 +124,18 @@ def exceeded(reference: Reviewed, run: Reviewed, tolerances: Tolerances) -> list
             f"review {run.path}: expected a control period of {reference.period_s!r} s as the reference has,"
             f" received {run.period_s!r} s"
         )
-    found = []
+    violations = []
     for name, tolerance in tolerances.signals.items():
-        signal, other = _signal(reference, name), _signal(run, name)
+        signal, other = _find_signal(reference, name), _find_signal(run, name)
         if signal.size != other.size:
             raise InputError(
                 f"review {run.path}: expected {name} of {signal.size} numbers, received {other.size}"
             )
-        if place := _first(*_both(reference, run, name), tolerance, reference.period_s):
+        if place := _first_violation(*_columns_of_both(reference, run, name), tolerance, reference.period_s):
             tick, entry, by = place
             axis = signal.labels[entry] if signal.labels else ""
-            found.append(Exceeded(str(run.path), name, axis, tick * run.period_s, by))
-    return sorted(found, key=lambda each: each.t_s)
+            violations.append(Exceeded(str(run.path), name, axis, tick * run.period_s, by))
+    return sorted(violations, key=lambda violation: violation.t_s)
 
 
 def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: float) -> Array:
@@ -168,7 +168,7 @@ def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: floa
     return np.where(none & np.isnan(values), 0.0, np.where(np.isnan(over), np.inf, over))
 
 
-def _first(
+def _first_violation(
     reference: Array, values: Array, tolerance: Tolerance, period_s: float
 ) -> tuple[int, int, float] | None:
     """Tick, entry and amount of the first that is beyond, of those of its tick the farthest."""
@@ -180,14 +180,14 @@ def _first(
     return None if len(reference) == len(values) else (rows, 0, np.inf)
 
 
-def _both(reference: Reviewed, run: Reviewed, name: str) -> tuple[Array, Array]:
+def _columns_of_both(reference: Reviewed, run: Reviewed, name: str) -> tuple[Array, Array]:
     of_reference, of_run = (
-        each.every_tick[name].reshape(len(each.every_tick), -1) for each in (reference, run)
+        recorded.every_tick[name].reshape(len(recorded.every_tick), -1) for recorded in (reference, run)
     )
     return of_reference, of_run
 
 
-def _signal(run: Reviewed, name: str) -> Signal:
+def _find_signal(run: Reviewed, name: str) -> Signal:
     signals = {signal.name: signal for signal in run.table.signals}
     if name in signals:
         return signals[name]

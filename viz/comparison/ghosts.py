@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.recording.part import Part, Subject, scalars, strips, time_index
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.scene3d import Frames, MovingActuator
 from spheretwin.viz.scene.meshes import WORLD, read_meshes
@@ -83,16 +83,16 @@ GHOST_ALPHA = 90
 _TINT = rr.Asset3D.descriptor_albedo_factor()
 
 
-class Ghost(Part):
+class Ghost(RecordingPart):
     """A rotor alone, in one colour, that what is behind it is seen through.
 
     Parameters
     ----------
-    subject : Subject
+    subject : RecordingSubject
     colour : Colour
     """
 
-    def __init__(self, subject: Subject, colour: theme.Colour) -> None:
+    def __init__(self, subject: RecordingSubject, colour: theme.Colour) -> None:
         super().__init__(subject)
         self._colour, self._frames = colour, Frames()
 
@@ -103,7 +103,7 @@ class Ghost(Part):
                 asset, *places = piece.archetypes()
                 tint = rr.Asset3D.from_fields(albedo_factor=[*self._colour, GHOST_ALPHA])
                 shape = [
-                    each for each in asset.as_component_batches() if each.component_descriptor() != _TINT
+                    batch for batch in asset.as_component_batches() if batch.component_descriptor() != _TINT
                 ]
                 recording.log(entity, [*shape, *tint.as_component_batches()], *places, static=True)
 
@@ -115,12 +115,12 @@ class Ghost(Part):
             recording.send_columns(ROTOR, time_index(rows["t_s"][new]), pose)
 
 
-class Tip(Part):
+class Tip(RecordingPart):
     """The end of the shaft, or where it should be: the path behind it, and it itself where it has a label.
 
     Parameters
     ----------
-    subject : Subject
+    subject : RecordingSubject
     entity : str
     signal : str
         Hinge angles, rad.
@@ -129,7 +129,9 @@ class Tip(Part):
     colour : Colour
     """
 
-    def __init__(self, subject: Subject, entity: str, signal: str, label: str, colour: theme.Colour) -> None:
+    def __init__(
+        self, subject: RecordingSubject, entity: str, signal: str, label: str, colour: theme.Colour
+    ) -> None:
         super().__init__(subject)
         self._entity, self._signal, self._label, self._colour = entity, signal, label, colour
         self._frames, self._last = Frames(), np.empty((0, 3))
@@ -151,6 +153,6 @@ class Tip(Part):
             self._last = tips[-1:]
 
 
-def body(subject: Subject, colour: theme.Colour, *, ghost: bool) -> Part:
+def body(subject: RecordingSubject, colour: theme.Colour, *, ghost: bool) -> RecordingPart:
     """What of a run is drawn: the whole actuator, or its rotor as a ghost."""
     return Ghost(subject, colour) if ghost else MovingActuator(subject)

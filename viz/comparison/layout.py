@@ -18,7 +18,7 @@ from spheretwin.viz.scene.motion import TRAIL_S
 COMPARE, RUNS, TIP = "compare", "runs", "tip"
 """Parts of the paths of entities, behind the name of a run but for `RUNS`."""
 
-ASKED = "what_was_asked"
+REFERENCE = "what_was_asked"
 """Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
 
 # Plots that share a row are too narrow for names; the one that has a row of its own tells them.
@@ -36,7 +36,7 @@ class Plot(NamedTuple):
     limits: tuple[float, float]
 
 
-class View(NamedTuple):
+class ComparisonView(NamedTuple):
     """What a layout is made for."""
 
     runs: tuple[str, ...]
@@ -53,12 +53,12 @@ class View(NamedTuple):
     """Of the actuator of the first, which is drawn whole."""
 
 
-def application(view: View) -> str:
+def application(view: ComparisonView) -> str:
     """Application id of recordings with one layout: a viewer keeps one for each."""
     return f"spheretwin-runs-{hashlib.sha256(repr(view).encode()).hexdigest()[:12]}"
 
 
-def layout(view: View) -> rrb.Blueprint:
+def layout(view: ComparisonView) -> rrb.Blueprint:
     """Blueprint of a recording of several runs."""
     groups = dict.fromkeys(plot.group for plot in view.plots if plot.group != BESIDE_TEXTS)
     rows = [rrb.Horizontal(*_plots(view, group)) for group in groups]
@@ -97,15 +97,15 @@ def trail_behind() -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
 
 
-def _plots(view: View, group: str) -> list[rrb.TimeSeriesView]:
+def _plots(view: ComparisonView, group: str) -> list[rrb.TimeSeriesView]:
     return [_plot(view, plot, legend=group == NAMED) for plot in view.plots if plot.group == group]
 
 
-def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
-    wanted = [f"/{ASKED}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
+def _plot(view: ComparisonView, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
+    reference_lines = [f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
     return rrb.TimeSeriesView(
         origin="/",
-        contents=[*wanted, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
+        contents=[*reference_lines, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
         name=plot.title,
         axis_x=time_axis(view.duration_s),
         axis_y=rrb.ScalarAxis(range=plot.limits),
@@ -114,13 +114,13 @@ def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
     )
 
 
-def _bodies(view: View) -> rrb.Spatial3DView:
+def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
     first, *ghosts = view.runs
-    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{ASKED}/{run}/{TIP}" for run in view.leaders]
-    drawn = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
+    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{REFERENCE}/{run}/{TIP}" for run in view.leaders]
+    bodies = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
     return rrb.Spatial3DView(
         origin="/",
-        contents=[*drawn, *(f"{tip}/**" for tip in tips)],
+        contents=[*bodies, *(f"{tip}/**" for tip in tips)],
         name="run 1 in the actuator, the others as ghosts",
         background=list(theme.BACKGROUND),
         line_grid=False,
@@ -129,7 +129,7 @@ def _bodies(view: View) -> rrb.Spatial3DView:
     )
 
 
-def _states(view: View) -> rrb.StateTimelineView:
+def _states(view: ComparisonView) -> rrb.StateTimelineView:
     contents = [f"/{run}/{STATES}/**" for run in view.states]
     return rrb.StateTimelineView(
         origin="/", contents=contents, name="states", time_view=time_axis(view.duration_s)

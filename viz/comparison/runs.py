@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.quantities import Rows
+from spheretwin.viz.quantities import QuantityRows
 
 Event = tuple[float, Level, str]
 """Simulated time in s, level, text."""
 
 
-class Run(NamedTuple):
+class ComparedRun(NamedTuple):
     """One run."""
 
     name: str
@@ -29,7 +29,7 @@ class Run(NamedTuple):
     law: str
     period_s: float
     """Between two rows."""
-    rows: Rows
+    rows: QuantityRows
     """Its telemetry, with a row at least, and what is derived from it needs beside it."""
     record: Mapping[str, str]
     """What its telemetry file says of it beside the rows."""
@@ -63,14 +63,16 @@ def run_colours(laws: Sequence[str]) -> list[str]:
         Of each run.
     """
     own = [theme.law_colour(law) for law in laws]
-    found: list[str] = []
+    colours: list[str] = []
     for colour in own:
-        taken = {*found, *own}
-        spare = [each for each in theme.SPARE if _nearest(each, taken) > APART]
-        if colour in found and not spare:
+        taken = {*colours, *own}
+        spare = [candidate for candidate in theme.SPARE if _nearest(candidate, taken) > APART]
+        if colour in colours and not spare:
             return ["#{:02x}{:02x}{:02x}".format(*hue) for hue in theme.group_colours(len(laws))]
-        found.append(max(spare, key=lambda each: _nearest(each, taken)) if colour in found else colour)
-    return found
+        colours.append(
+            max(spare, key=lambda candidate: _nearest(candidate, taken)) if colour in colours else colour
+        )
+    return colours
 
 
 def on_dark(colour: str) -> theme.Colour:
@@ -111,16 +113,16 @@ def leaders(tables: Sequence[Table]) -> list[int]:
     tables : sequence of Table
         With a row each at least.
     """
-    found: list[int] = []
+    leading: list[int] = []
     for place in sorted(range(len(tables)), key=lambda place: -float(tables[place]["t_s"][-1])):
-        if not any(_same(tables[place], tables[leader]) for leader in found):
-            found.append(place)
-    return sorted(found)
+        if not any(_same(tables[place], tables[leader]) for leader in leading):
+            leading.append(place)
+    return sorted(leading)
 
 
 def _same(one: Table, other: Table) -> bool:
     """Whether two were asked for the same at all ticks that they have in common."""
-    t_ns, others_ns = (np.round(each["t_s"] * 1e9).astype(np.int64) for each in (one, other))
+    t_ns, others_ns = (np.round(table["t_s"] * 1e9).astype(np.int64) for table in (one, other))
     _, rows, others = np.intersect1d(t_ns, others_ns, assume_unique=True, return_indices=True)
     apart = np.abs(one["q_ref_rad"][rows] - other["q_ref_rad"][others])
     return bool(apart.max(initial=0.0) <= SAME_rad)

@@ -78,8 +78,8 @@ def margins(values: Mapping[str, float], title: str) -> Figure:
     axes = figure.subplots()
     rows = np.arange(len(values))
     shares = np.clip(list(values.values()), LEAST_SHARE, 1 / LEAST_SHARE)
-    for kept, colour, label in ((True, SERIES[0], "kept"), (False, BROKEN, "broken")):
-        chosen = (shares <= 1) == kept
+    for within, colour, label in ((True, SERIES[0], "kept"), (False, BROKEN, "broken")):
+        chosen = (shares <= 1) == within
         if np.any(chosen):
             axes.plot(shares[chosen], rows[chosen], "o", color=colour, markersize=6, label=label)
             axes.hlines(rows[chosen], LEAST_SHARE, shares[chosen], color=colour, linewidth=1, alpha=0.5)
@@ -338,9 +338,9 @@ def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -
 def _ramp(axes: Axes, ramped: Ramped) -> None:
     torque_mNm = 1e3 * ramped.torque_Nm
     for colour, way, rate in _ways(ramped.rates_rad_s):
-        axes.plot(torque_mNm, _drawn(rate), color=colour, label=way)
+        axes.plot(torque_mNm, _clipped(rate), color=colour, label=way)
         axes.plot(1e3 * ramped.push_Nm, ramped.creep_rad_s[way], "o", color=colour, markersize=5)
-    _ideal(axes, torque_mNm, _drawn(ramped.ideal_rad_s))
+    _ideal(axes, torque_mNm, _clipped(ramped.ideal_rad_s))
     axes.axvline(1e3 * ramped.level_Nm, color=FAINT, linewidth=1.2, label="Coulomb level")
     axes.plot([], [], "o", color=INK, markersize=5, label="settled at half the level")
     ideal, fastest = ramped.ideal_rad_s, int(np.argmax(ramped.ideal_rad_s))
@@ -362,8 +362,8 @@ def _stop(axes: Axes, resting: Resting) -> None:
     after_ms = 1e3 * (resting.t_s - resting.ideal_stop_s)
     shown = np.abs(after_ms) <= AROUND_STOP_ms
     for colour, _, rate in _ways(resting.rates_rad_s):
-        axes.plot(after_ms[shown], _drawn(rate[shown]), color=colour)
-    _ideal(axes, after_ms[shown], _drawn(resting.ideal_rad_s[shown]))
+        axes.plot(after_ms[shown], _clipped(rate[shown]), color=colour)
+    _ideal(axes, after_ms[shown], _clipped(resting.ideal_rad_s[shown]))
     _slow_rates(axes, FASTEST_AT_STOP_rad_s)
     _label_axes(axes, "time after the ideal stop, ms")
 
@@ -393,7 +393,7 @@ def _ideal(axes: Axes, x: Array, rate_rad_s: Array) -> None:
     axes.plot(x, rate_rad_s, color=INK, linewidth=1.1, linestyle=(0, (4, 4)), label="ideal friction")
 
 
-def _drawn(rate_rad_s: Array) -> Array:
+def _clipped(rate_rad_s: Array) -> Array:
     """Rates for a logarithmic axis: what is less than it shows lies on its edge, and rest below it."""
     return np.maximum(rate_rad_s, 0.1 * SLOWEST_rad_s)
 

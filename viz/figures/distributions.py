@@ -140,7 +140,7 @@ def _scatter(axes: Axes, x: Array, y: Array, colour: str, law: str) -> None:
     edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
     if len(edges) > 2:
         inside = [(x >= low) & (x <= high) for low, high in pairwise(edges)]
-        middles = [(np.median(x[each]), np.median(y[each])) for each in inside]
+        middles = [(np.median(x[rows]), np.median(y[rows])) for rows in inside]
         axes.plot(*zip(*middles, strict=True), color=colour, linewidth=2, label=f"{law}, median")
 
 

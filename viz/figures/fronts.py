@@ -12,7 +12,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.style import Style, styles
+from spheretwin.viz.figures.style import LawStyle, styles
 from spheretwin.viz.theme import law_colour
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ MOST = 40.0
 """Largest error that is drawn, over the least."""
 
 
-class Panel(NamedTuple):
+class FrontPanel(NamedTuple):
     """One condition."""
 
     title: str
@@ -35,12 +35,12 @@ class Panel(NamedTuple):
     floors: Sequence[float] = ()  # errors that no cost avoids
 
 
-def fronts(panels: Sequence[Panel], labels: Mapping[str, str], cost: str) -> Figure:
+def fronts(panels: Sequence[FrontPanel], labels: Mapping[str, str], cost: str) -> Figure:
     """Draw the panels side by side.
 
     Parameters
     ----------
-    panels : sequence of Panel
+    panels : sequence of FrontPanel
     labels : mapping of law to label
     cost : str
         Label of the axis.
@@ -59,7 +59,7 @@ def fronts(panels: Sequence[Panel], labels: Mapping[str, str], cost: str) -> Fig
     return figure
 
 
-def _panel(axes: Axes, panel: Panel, looks: Mapping[str, Style]) -> None:
+def _panel(axes: Axes, panel: FrontPanel, looks: Mapping[str, LawStyle]) -> None:
     for floor in panel.floors:
         axes.axhline(floor, color=FAINT, linewidth=1.0, zorder=1)
     for law, values in panel.by_law.items():
@@ -83,7 +83,7 @@ def _panel(axes: Axes, panel: Panel, looks: Mapping[str, Style]) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _set_limits(axes: Axes, panel: Panel) -> None:
+def _set_limits(axes: Axes, panel: FrontPanel) -> None:
     """Show everything within `MOST` times the least error."""
     marked = np.array([(x, y) for _, x, y in panel.marked.values()]).reshape(-1, 2)
     points = np.concatenate([marked, *panel.by_law.values()])
@@ -102,7 +102,7 @@ def _set_limits(axes: Axes, panel: Panel) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-def _size(style: Style) -> float:
+def _size(style: LawStyle) -> float:
     return SIZES.get(style.marker, 6.0)
 
 

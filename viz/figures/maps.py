@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 ROW_in = 0.3
 NEAR, FAR = 0.003, 0.1  # degrees: less change is hardly coloured, more has the full colour
 TICKS = (-0.1, -0.03, -0.01, 0, 0.01, 0.03, 0.1)
-MOST_BESIDE = 5  # columns of panels that have room side by side
+MOST_SIDE_BY_SIDE = 5  # columns of panels that have room side by side
 DARK = 0.36  # distance from the middle of the scale beyond which numbers are written in white
 
 
@@ -48,11 +48,11 @@ def heat(
         What the colours are, with its unit.
     """
     scale = SymLogNorm(linthresh=NEAR, vmin=-FAR, vmax=FAR)
-    beside = len(columns) <= MOST_BESIDE
-    down, across = (1, len(panels)) if beside else (len(panels), 1)
+    side_by_side = len(columns) <= MOST_SIDE_BY_SIDE
+    down, across = (1, len(panels)) if side_by_side else (len(panels), 1)
     height_in = 1.8 + ROW_in * len(rows) * down
     figure = Figure(figsize=(1.35 * WIDTH_in, height_in), layout="constrained")
-    sides = figure.subplots(down, across, sharex=not beside, sharey=beside, squeeze=False).ravel()
+    sides = figure.subplots(down, across, sharex=not side_by_side, sharey=side_by_side, squeeze=False).ravel()
     for axes, (name, panel) in zip(sides, panels.items(), strict=True):
         image = axes.imshow(np.clip(panel.changes, -FAR, FAR), norm=scale, cmap="RdBu_r", aspect="auto")
         _write_cells(axes, panel, scale)
@@ -125,7 +125,7 @@ def maps(
     """
     count, colours = len(panels), law_colours(list(panels))
     across, down = min(count, 3), -(-count // 3)
-    cells = [min(len(each), MOST_WRITTEN) * CELL_in for each in labels]
+    cells = [min(len(names), MOST_WRITTEN) * CELL_in for names in labels]
     figure = Figure(
         figsize=(max(WIDTH_in, across * (cells[1] + 0.5) + 1.6), 1.5 + down * (cells[0] + 0.9)),
         layout="constrained",

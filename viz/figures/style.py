@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from spheretwin.viz.comparison.runs import Run, run_colours
+from spheretwin.viz.comparison.runs import ComparedRun, run_colours
 from spheretwin.viz.figures.crosscheck import FAINT
 from spheretwin.viz.theme import law_colours, law_marks
 
@@ -34,7 +34,7 @@ DASHES: tuple[Any, ...] = ("-", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0,
 """By the place of a run: what tells them apart in grey print."""
 
 
-class Look(NamedTuple):
+class RunStyle(NamedTuple):
     """Of one run."""
 
     colour: str
@@ -45,10 +45,10 @@ class Look(NamedTuple):
         return {"color": self.colour, "linestyle": self.dash, "linewidth": 1.1}
 
 
-def looks(runs: Sequence[Run]) -> list[Look]:
+def run_styles(runs: Sequence[ComparedRun]) -> list[RunStyle]:
     """Look of each run."""
     colours = run_colours([run.law for run in runs])
-    return [Look(colour, DASHES[place % len(DASHES)]) for place, colour in enumerate(colours)]
+    return [RunStyle(colour, DASHES[place % len(DASHES)]) for place, colour in enumerate(colours)]
 
 
 def plain(axes: Axes, y: str) -> None:
@@ -74,7 +74,7 @@ MANY = 2000.0
 """Ratio of an axis from which on whole powers of ten are ticks enough."""
 
 
-class Style(NamedTuple):
+class LawStyle(NamedTuple):
     """Of one law."""
 
     colour: str
@@ -86,10 +86,10 @@ class Style(NamedTuple):
         return {"color": self.colour, "linestyle": self.dash}
 
 
-def styles(laws: Sequence[str]) -> dict[str, Style]:
+def styles(laws: Sequence[str]) -> dict[str, LawStyle]:
     """Colour, marker and dash of each law."""
     colours, marks = law_colours(laws), law_marks(laws)
-    return {law: Style(colours[law], *marks[law]) for law in laws}
+    return {law: LawStyle(colours[law], *marks[law]) for law in laws}
 
 
 def on_errors(panels: Sequence[Axes], lowest_mrad: float, highest_mrad: float) -> None:
@@ -112,8 +112,8 @@ def on_errors(panels: Sequence[Axes], lowest_mrad: float, highest_mrad: float) -
 def _ticks(axes: Axes, lowest: float, highest: float) -> None:
     steps = (1,) if highest > MANY * lowest else (1, 2, 5)
     ticks = [step * 10.0**power for power in range(-4, 5) for step in steps]
-    wanted = [tick for tick in ticks if lowest <= tick <= highest]
-    axes.yaxis.set_major_locator(FixedLocator(wanted))
+    shown = [tick for tick in ticks if lowest <= tick <= highest]
+    axes.yaxis.set_major_locator(FixedLocator(shown))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_minor_formatter(NullFormatter())

@@ -102,7 +102,7 @@ def _polar(
 ) -> None:
     azimuth = np.append(workspace.azimuth_rad, 2 * np.pi)
     closed = np.column_stack([values, values[:, :1]])  # (t, a + 1)
-    drawn = axes.pcolormesh(
+    mesh = axes.pcolormesh(
         azimuth,
         np.degrees(workspace.tilt_rad),
         closed,
@@ -111,7 +111,7 @@ def _polar(
         norm=scale,
         rasterized=True,
     )
-    figure.colorbar(drawn, ax=axes, shrink=0.8, pad=0.09)
+    figure.colorbar(mesh, ax=axes, shrink=0.8, pad=0.09)
     axes.set_title(title)
     axes.set_rlabel_position(15)
     axes.tick_params(axis="y", colors="white")

@@ -34,14 +34,14 @@ _NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
 ROOM = 0.06
 
 
-class Channel(NamedTuple):
+class PlotChannel(NamedTuple):
     """One entry of a signal or of a quantity, or all of them."""
 
     name: str
     place: int | None = None
 
 
-class Seen:
+class Extents:
     """Bounds of every channel over spans of a run.
 
     Parameters
@@ -59,7 +59,7 @@ class Seen:
     ) -> None:
         self.t_s, self._low, self._high, self.ended_s = t_s, low, high, ended_s
 
-    def limit(self, *channels: Channel, least: float, above_zero: bool = False) -> float:
+    def limit(self, *channels: PlotChannel, least: float, above_zero: bool = False) -> float:
         """Half of a range about 0, or its end, in which the run can be read once it has settled.
 
         It holds the whole second half and 85 % of all, or everything where that is not much more.
@@ -77,38 +77,38 @@ class Seen:
         second_half = size[self.t_s >= self.t_s[-1] / 2]
         usual = max(least, float(np.max(second_half)), float(np.quantile(size, USUAL)))
         whole = float(np.max(size))
-        drawn = whole if least < whole <= CLIPPED_FROM * usual else usual
-        return nice(MARGIN * drawn, _NICE_ABOVE_ZERO if above_zero else _NICE)
+        shown = whole if least < whole <= CLIPPED_FROM * usual else usual
+        return nice(MARGIN * shown, _NICE_ABOVE_ZERO if above_zero else _NICE)
 
-    def bounds(self, *channels: Channel) -> tuple[float, float]:
+    def bounds(self, *channels: PlotChannel) -> tuple[float, float]:
         """Least and greatest of all that some channels have shown."""
         low = min(_least(self._bounds(self._low, channel)) for channel in channels)
         high = max(-_least(-self._bounds(self._high, channel)) for channel in channels)
         return low, high
 
-    def band(self, *channels: Channel, least: float) -> tuple[float, float]:
+    def band(self, *channels: PlotChannel, least: float) -> tuple[float, float]:
         """Range of all that some channels have shown, at least twice `least` wide, with two labels."""
         return labelled(*self.bounds(*channels), least)
 
-    def largest(self, limit: float, *channels: Channel) -> str:
+    def largest(self, limit: float, *channels: PlotChannel) -> str:
         """What the title of a plot says of its largest magnitude, and when it lies outside of the range."""
         size = self._largest(*channels)
         outside = np.flatnonzero(size > limit)
-        told = f", largest {number(float(np.max(size)))}"
+        text = f", largest {number(float(np.max(size)))}"
         if not len(outside):
-            return told
+            return text
         until = self.t_s[min(outside[-1] + 1, len(self.t_s) - 1)]
-        return f"{told} in first {until:.2g} s"
+        return f"{text} in first {until:.2g} s"
 
-    def _largest(self, *channels: Channel) -> Array:
+    def _largest(self, *channels: PlotChannel) -> Array:
         """Largest magnitude among some channels in each span; 0 where there was no number."""
-        sizes = np.concatenate([self._size(each) for each in channels], axis=1)
+        sizes = np.concatenate([self._size(channel) for channel in channels], axis=1)
         return np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=1)
 
-    def _size(self, channel: Channel) -> Array:
+    def _size(self, channel: PlotChannel) -> Array:
         return np.maximum(np.abs(self._bounds(self._low, channel)), np.abs(self._bounds(self._high, channel)))
 
-    def _bounds(self, of: Mapping[str, Array], channel: Channel) -> Array:
+    def _bounds(self, of: Mapping[str, Array], channel: PlotChannel) -> Array:
         values = of[channel.name]
         return values if channel.place is None else values[:, channel.place : channel.place + 1]
 
@@ -116,7 +116,7 @@ class Seen:
 def nice(value: float, among: Sequence[float] = _NICE) -> float:
     """The least of some numbers of a decade, up to 10 of it, that is not below a positive value."""
     decade = 10.0 ** floor(log10(value))
-    return next(each for each in among if each * decade >= value * (1 - 1e-9)) * decade
+    return next(step for step in among if step * decade >= value * (1 - 1e-9)) * decade
 
 
 def number(value: float) -> str:
@@ -157,7 +157,7 @@ def _least(values: Array) -> float:
 SPANS = 512
 
 
-class Survey:
+class ExtentTracker:
     """Bounds of channels over spans of a run.
 
     Parameters
@@ -184,18 +184,18 @@ class Survey:
             self._low = np.fmin.reduceat(self._low, pairs, axis=0)
             self._high = np.fmax.reduceat(self._high, pairs, axis=0)
 
-    def seen(self, ended_s: float | None) -> Seen | None:
+    def extents(self, ended_s: float | None) -> Extents | None:
         """All of it, once there is some."""
         if not len(self._t_s):
             return None
-        return Seen(self._t_s, self._parted(self._low), self._parted(self._high), ended_s)
+        return Extents(self._t_s, self._split(self._low), self._split(self._high), ended_s)
 
-    def _parted(self, bounds: Array) -> dict[str, Array]:
+    def _split(self, bounds: Array) -> dict[str, Array]:
         ends = np.cumsum(list(self._sizes.values()))[:-1]
         return dict(zip(self._sizes, np.split(bounds, ends, axis=1), strict=True))
 
 
-def watched(signals: tuple[Signal, ...]) -> dict[str, int]:
+def plotted_signals(signals: tuple[Signal, ...]) -> dict[str, int]:
     """Signals that are plotted in ranges of the run's own, of which bounds are kept; with their sizes."""
     plotted = (signal for signal in signals if not signal.states)
     return {signal.name: signal.size for signal in plotted if signal.name not in _OF_FIXED_RANGE}
@@ -220,7 +220,7 @@ _OF_FIXED_RANGE = frozenset(
 """And those that are not plotted."""
 
 
-class Picked:
+class ColumnSelector:
     """Columns of the watched signals side by side.
 
     Parameters
@@ -247,5 +247,5 @@ class Picked:
         first, places = offsets(signals), []
         for name, size in self._sizes.items():
             places += list(range(first[name], first[name] + size)) if name in first else [-1] * size
-        found = np.array(places, dtype=np.int64)
-        self._places, self._missing = np.maximum(found, 0), np.flatnonzero(found < 0)
+        columns = np.array(places, dtype=np.int64)
+        self._places, self._missing = np.maximum(columns, 0), np.flatnonzero(columns < 0)

@@ -8,7 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spheretwin.viz.layout import views
-from spheretwin.viz.layout.extents import Seen
+from spheretwin.viz.layout.extents import Extents
 from spheretwin.viz.layout.plots import Plots
 from spheretwin.viz.layout.view import TIMELINE, View
 from spheretwin.viz.layout.views import VIEWS
@@ -17,18 +17,18 @@ from spheretwin.viz.layout.views import VIEWS
 ROW_SHARES = (1, 10)
 
 
-def layout(view: View, seen: Seen | None = None) -> rrb.Blueprint:
+def layout(view: View, extents: Extents | None = None) -> rrb.Blueprint:
     """Blueprint of a run's recording.
 
     Parameters
     ----------
     view : View
         What it is made for.
-    seen : Seen, optional
+    seen : Extents, optional
         What the run has shown; ranges and titles are made of it.
     """
-    plots = Plots(view, seen)
-    tabs = [made(plots) for made in VIEWS.values()]
+    plots = Plots(view, extents)
+    tabs = [view_function(plots) for view_function in VIEWS.values()]
     return _blueprint(rrb.Tabs(*tabs, active_tab=list(VIEWS).index(view.shown), name="views"), view)
 
 

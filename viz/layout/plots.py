@@ -10,7 +10,7 @@ from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMa
 
 from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
 from spheretwin.viz import theme
-from spheretwin.viz.layout.extents import ROOM, Channel, Seen, number
+from spheretwin.viz.layout.extents import ROOM, Extents, PlotChannel, number
 from spheretwin.viz.layout.view import (
     ENDED,
     STATES,
@@ -29,9 +29,9 @@ LOOKS = ("names", "colors", "widths", "aggregation_policy")
 
 WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
 
-_ASKED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
-_BELIEVED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
-_BESIDE = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
+_COMMANDED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
+_ESTIMATED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
+_SECONDARY = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
 
 # Lines are drawn in the order of their names: what the controller believes first, as a rim of what is true,
 # and what was asked for last and thin.
@@ -72,9 +72,9 @@ def _short(name: str) -> str:
 
 def _colours(signal: Signal) -> list[theme.Colour]:
     for names, colour in (
-        (_ASKED, theme.ASKED),
-        (_BELIEVED, theme.BELIEVED),
-        (_BESIDE, theme.DESIRED_TRACE),
+        (_COMMANDED, theme.COMMAND),
+        (_ESTIMATED, theme.ESTIMATE),
+        (_SECONDARY, theme.DESIRED_TRACE),
     ):
         if signal.name in names:
             return [colour] * signal.size
@@ -84,7 +84,7 @@ def _colours(signal: Signal) -> list[theme.Colour]:
 
 
 def _width(name: str) -> float:
-    for names, width in ((_BELIEVED, WIDEST), (_ACTUAL, THICK), (_ASKED, THIN)):
+    for names, width in ((_ESTIMATED, WIDEST), (_ACTUAL, THICK), (_COMMANDED, THIN)):
         if name in names:
             return width
     return MIDDLE
@@ -96,21 +96,21 @@ _NO_LEGEND = rrb.PlotLegend(visible=False)
 """It would lie over data, and titles and the colours of the axes tell what it says."""
 
 
-class Line(NamedTuple):
+class PlotLine(NamedTuple):
     """What is drawn: an entity, or a signal of the telemetry; its bounds are known under the name."""
 
     entity: str
     name: str
 
 
-def signal(name: str) -> Line:
+def signal(name: str) -> PlotLine:
     """A signal of the telemetry."""
-    return Line(TELEMETRY, name)
+    return PlotLine(TELEMETRY, name)
 
 
-def quantity(of: Quantity) -> Line:
+def quantity(of: Quantity) -> PlotLine:
     """A derived quantity."""
-    return Line(derived(of.name), of.name)
+    return PlotLine(derived(of.name), of.name)
 
 
 class Plots:
@@ -120,18 +120,18 @@ class Plots:
     ----------
     view : View
         What the layout is made for.
-    seen : Seen, optional
+    seen : Extents, optional
         What the run has shown; without it, ranges follow the data.
     """
 
-    def __init__(self, view: View, seen: Seen | None) -> None:
-        self.view, self.seen = view, seen
+    def __init__(self, view: View, extents: Extents | None) -> None:
+        self.view, self.extents = view, extents
 
     def about_zero(
         self,
         what: str,
         unit: str,
-        *lines: Line,
+        *lines: PlotLine,
         least: float,
         axis: int | None = None,
         key: str = "",
@@ -156,39 +156,39 @@ class Plots:
         Plots of the other hinges have the same range, so that what is small looks small. The title
         tells the range too: a low plot may have room for one number at its side.
         """
-        if self.seen is None:
+        if self.extents is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        limit = self.seen.limit(*(Channel(line.name) for line in lines), least=least)
-        told = self.seen.largest(limit, *(Channel(line.name, axis) for line in lines))
+        limit = self.extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
+        suffix = self.extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
         reach = (1 + ROOM) * limit
-        return self._plot(f"{what} ±{number(limit)} {unit}{told}{key}", lines, axis, (-reach, reach))
+        return self._plot(f"{what} ±{number(limit)} {unit}{suffix}{key}", lines, axis, (-reach, reach))
 
-    def above_zero(self, what: str, unit: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
+    def above_zero(self, what: str, unit: str, line: PlotLine, *, least: float) -> rrb.TimeSeriesView:
         """Plot of what is never negative, its range that of the settled run."""
-        if self.seen is None:
+        if self.extents is None:
             return self._plot(f"{what} [{unit}]", (line,), None, None)
-        limit = self.seen.limit(Channel(line.name), least=least, above_zero=True)
-        told = self.seen.largest(limit, Channel(line.name))
-        return self._plot(f"{what} [{unit}]{told}", (line,), None, (-ROOM * limit, (1 + ROOM) * limit))
+        limit = self.extents.limit(PlotChannel(line.name), least=least, above_zero=True)
+        suffix = self.extents.largest(limit, PlotChannel(line.name))
+        return self._plot(f"{what} [{unit}]{suffix}", (line,), None, (-ROOM * limit, (1 + ROOM) * limit))
 
     def whole(
         self,
         what: str,
         unit: str,
-        *lines: Line,
+        *lines: PlotLine,
         least: float,
         axis: int | None = None,
         key: str = "",
     ) -> rrb.TimeSeriesView:
         """Plot of all that some lines have shown, over a range of twice `least` at least."""
-        if self.seen is None:
+        if self.extents is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        channels = [Channel(line.name, axis) for line in lines]
-        low, high = self.seen.bounds(*channels)
-        told = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
-        return self._plot(told, lines, axis, self.seen.band(*channels, least=least))
+        channels = [PlotChannel(line.name, axis) for line in lines]
+        low, high = self.extents.bounds(*channels)
+        title = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
+        return self._plot(title, lines, axis, self.extents.band(*channels, least=least))
 
-    def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:
+    def fixed(self, title: str, *lines: PlotLine, low: float, high: float) -> rrb.TimeSeriesView:
         """Plot of a range that is known before the run."""
         return self._plot(title, lines, None, (low, high))
 
@@ -200,12 +200,12 @@ class Plots:
     def _plot(
         self,
         title: str,
-        lines: tuple[Line, ...],
+        lines: tuple[PlotLine, ...],
         axis: int | None,
         band: Range | None,
     ) -> rrb.TimeSeriesView:
         contents = list(dict.fromkeys(f"/{line.entity}" for line in lines))
-        if band and self.seen and self.seen.ended_s is not None:
+        if band and self.extents and self.extents.ended_s is not None:
             contents.append(f"/{ENDED}")
         # Drawn in this order, as entities are in that of their names.
         names = sorted(line.name for line in lines if line.entity == TELEMETRY)
@@ -227,8 +227,8 @@ class Plots:
 
         Else none: it is as long as the data, and takes no room in the file.
         """
-        if self.seen and self.seen.ended_s is not None:
-            last_s = shown_until_s(self.view.duration_s, self.seen.ended_s)
+        if self.extents and self.extents.ended_s is not None:
+            last_s = shown_until_s(self.view.duration_s, self.extents.ended_s)
         elif self.view.live:
             last_s = self.view.duration_s
         else:
@@ -241,12 +241,14 @@ class Plots:
 def _mappings(name: str) -> list[VisualizerComponentMapping]:
     """What the lines of a signal are drawn from: fields of the telemetry's components."""
     looks = [f"SeriesLines:{look}" for look in LOOKS]
-    mappings = [_taken(VALUES, name, "", "Scalars:scalars")]
-    mappings += [_taken(STYLES, name, f".{look}", target) for look, target in zip(LOOKS, looks, strict=True)]
+    mappings = [_mapping(VALUES, name, "", "Scalars:scalars")]
+    mappings += [
+        _mapping(STYLES, name, f".{look}", target) for look, target in zip(LOOKS, looks, strict=True)
+    ]
     return mappings
 
 
-def _taken(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:
+def _mapping(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:
     """Where a visualizer takes something from; plotted signals are there from the start."""
     source, selector = component(kind, 0), f".{name}{of}[]"
     return VisualizerComponentMapping(

@@ -10,10 +10,10 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.decimation import Firsts
+from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.layout.layout import opening_layout
 from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.part import Subject
+from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.recording.viewer_server import Broadcast, ViewerServer
 from spheretwin.viz.rerun_internals import HEADER_BYTES, messages
@@ -54,8 +54,8 @@ class LiveView(Stream):
     def __init__(
         self, actuator: Actuator, signals: tuple[Signal, ...], facts: RunFacts, *, shown: str = OVERVIEW
     ) -> None:
-        subject = Subject(actuator, signals, facts, True, shown, uuid4().hex, LIVE_RATE_Hz)
-        super().__init__(subject, Firsts(LIVE_RATE_Hz))
+        subject = RecordingSubject(actuator, signals, facts, True, shown, uuid4().hex, LIVE_RATE_Hz)
+        super().__init__(subject, FirstRows(LIVE_RATE_Hz))
         self._together = max(1, round(_TOGETHER_S / facts.sections["controller"]["period_s"]))
         self._bytes = rr.binary_stream(self.recording)
         self._broadcast = Broadcast()

@@ -20,16 +20,16 @@ from spheretwin.viz.layout.view import CHECKSUM, OVERVIEW, TIMELINE, TOTAL, View
 from spheretwin.viz.scene.static import size_of
 
 
-class Rows(Enum):
+class RowSet(Enum):
     """Which rows of a run a part is given."""
 
     ALL = "all"
     """Every row, at once: for what thins them itself, or must not miss any."""
-    KEPT = "kept"
+    SELECTED = "kept"
     """Those that the recording keeps, whole; known some seconds later where it is thinned."""
 
 
-class Subject(NamedTuple):
+class RecordingSubject(NamedTuple):
     """What is recorded."""
 
     actuator: Actuator
@@ -61,23 +61,23 @@ class Subject(NamedTuple):
         )
 
 
-class Part:
+class RecordingPart:
     """Logs nothing; a subclass says what it logs, and when.
 
     Parameters
     ----------
-    subject : Subject
+    subject : RecordingSubject
         What is recorded.
 
     Attributes
     ----------
-    rows : Rows
+    rows : RowSet
         Which rows `write` is given.
     """
 
-    rows: ClassVar[Rows] = Rows.ALL
+    rows: ClassVar[RowSet] = RowSet.ALL
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         self.subject = subject
 
     def begin(self, recording: rr.RecordingStream) -> None:
@@ -117,7 +117,7 @@ def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
     return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
 
 
-class Struct:
+class StructComponent:
     """Values with named fields, as a component.
 
     Rerun's own form for types that it does not know wants each name to have one type in a whole process,
@@ -132,7 +132,7 @@ class Struct:
         return self._array
 
 
-class Numbers:
+class IntegerComponent:
     """Whole numbers as a component."""
 
     def __init__(self, values: Sequence[int] | NDArray[np.uint64]) -> None:
@@ -145,17 +145,17 @@ class Numbers:
 
 def checksums(values: NDArray[np.uint64]) -> rr.ComponentColumn:
     """Return the component with number and checksum of each line."""
-    return rr.ComponentColumn(CHECKSUM, Numbers(values))
+    return rr.ComponentColumn(CHECKSUM, IntegerComponent(values))
 
 
 def range_checksum(first: int, count: int, checksum: int) -> rr.ComponentColumn:
     """Return the component with the checksum of some rows, by the number of the first and their count."""
-    return rr.ComponentColumn(CHECKSUM, Numbers([first, count, checksum]), lengths=[3])
+    return rr.ComponentColumn(CHECKSUM, IntegerComponent([first, count, checksum]), lengths=[3])
 
 
 def total(count: int) -> rr.DescribedComponentBatch:
     """Return the component with the number of rows or lines of a complete recording."""
-    return rr.DescribedComponentBatch(Numbers([count]), rr.ComponentDescriptor(TOTAL))
+    return rr.DescribedComponentBatch(IntegerComponent([count]), rr.ComponentDescriptor(TOTAL))
 
 
 def vectors(values: NDArray[np.float64], size: int) -> pa.Array:

@@ -117,16 +117,16 @@ class Contents:
         return bool(
             self._totals
             or self._ranges
-            or any(each.checksum for each in texts)
-            or any(each.checksums is not None for each in self._lines)
+            or any(text.checksum for text in texts)
+            or any(lines.checksums is not None for lines in self._lines)
         )
 
     @property
     def counts(self) -> dict[str, int]:
         """Rows of the telemetry and lines of the log, by entity."""
         return {
-            TELEMETRY: sum(len(each.t_ns) for each in self._rows),
-            EVENTS: sum(len(each.lines) for each in self._lines),
+            TELEMETRY: sum(len(rows.t_ns) for rows in self._rows),
+            EVENTS: sum(len(lines.lines) for lines in self._lines),
         }
 
     def facts(self) -> dict[str, Any]:
@@ -162,7 +162,7 @@ class Contents:
         signals = self._signals()
         if self.checked:
             self._check_ranges(signals, ended=ended)
-        ticks = np.unique(np.concatenate([each.t_ns for each in self._rows] or [np.empty(0, np.int64)]))
+        ticks = np.unique(np.concatenate([rows.t_ns for rows in self._rows] or [np.empty(0, np.int64)]))
         values = allocated(len(ticks), width(signals))
         values[:] = np.nan
         first = offsets(signals)
@@ -193,7 +193,7 @@ class Contents:
                 changed = np.flatnonzero(line_checksums(lines, first) != checksums)
                 if len(changed):
                     raise self._damaged(f"entity {EVENTS}, line {first + changed[0]}")
-        return [line for each in self._lines for line in each.lines]
+        return [line for lines in self._lines for line in lines.lines]
 
     # --- gathering
 
@@ -214,12 +214,12 @@ class Contents:
         if values:
             self._rows.append(_Rows(_times(batch), values))
         if CHECKSUM in batch.schema.names:
-            self._ranges += [_Range(*each) for each in batch.column(CHECKSUM).to_pylist() if each]
+            self._ranges += [_Range(*fields) for fields in batch.column(CHECKSUM).to_pylist() if fields]
 
     def _take_events(self, batch: pa.RecordBatch) -> None:
         self._take_total(EVENTS, batch)
         if TIMELINE in batch.schema.names:
-            levels, texts = (batch.column(f"TextLog:{each}").to_pylist() for each in ("level", "text"))
+            levels, texts = (batch.column(f"TextLog:{name}").to_pylist() for name in ("level", "text"))
             lines = [
                 (t_ns, level[0], text[0])
                 for t_ns, level, text in zip(_times(batch).tolist(), levels, texts, strict=True)
@@ -245,7 +245,7 @@ class Contents:
 
     def _check_line_numbers(self, *, ended: bool) -> None:
         """Refuse numbers with a gap, lines without numbers, and fewer than a closed recording states."""
-        present = [each.checksums for each in self._lines if each.checksums is not None]
+        present = [lines.checksums for lines in self._lines if lines.checksums is not None]
         if len(present) < len(self._lines):
             raise self._damaged(f"entity {EVENTS}, component {CHECKSUM}")
         numbers = np.sort(line_numbers(np.concatenate(present or [np.empty(0, np.uint64)])))
@@ -257,8 +257,8 @@ class Contents:
     def _check_ranges(self, signals: tuple[Signal, ...], *, ended: bool) -> None:
         """Refuse rows that are not those of their checksums, and fewer than a closed recording states."""
         ranges = sorted(self._ranges)
-        ends = list(accumulate(each.rows for each in ranges))
-        if [each.first for each in ranges] != [0, *ends][: len(ranges)]:
+        ends = list(accumulate(row_range.rows for row_range in ranges))
+        if [row_range.first for row_range in ranges] != [0, *ends][: len(ranges)]:
             raise self._damaged(f"entity {TELEMETRY}, component {CHECKSUM}")
         place = number = checksum = 0
         for rows in self._rows:
@@ -288,7 +288,7 @@ class Contents:
         present = tuple(signal for signal in signals if signal.name in rows.values)
         values = [rows.values[signal.name] for signal in present]
         known = len(present) == len(rows.values) and "t_s" in rows.values
-        if not known or [each.shape[1] for each in values] != [signal.size for signal in present]:
+        if not known or [columns.shape[1] for columns in values] != [signal.size for signal in present]:
             raise self._damaged(f"entity {TELEMETRY}, components {DESCRIBED}")
         with np.errstate(invalid="ignore"):  # a damaged time may be no number
             moved = np.flatnonzero(nanoseconds(rows.values["t_s"][:, 0]) != rows.t_ns)
@@ -309,7 +309,7 @@ def _text(batch: pa.RecordBatch, name: str) -> str:
 
 def _only(batch: pa.RecordBatch, name: str) -> Any:
     """The one value of a component; Rerun may put rows without it into the same chunk."""
-    (value,) = [each[0] for each in batch.column(name).to_pylist() if each]
+    (value,) = [entry[0] for entry in batch.column(name).to_pylist() if entry]
     return value
 
 
@@ -430,10 +430,10 @@ def _chunks(path: Path) -> Iterator[tuple[Iterable[Chunk], bool]]:
     except (SpheretwinError, KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # a panic inside Rerun is no `Exception`
-        told = shortened(without_breaks(error), LONGEST_WORD)
+        reason = shortened(without_breaks(error), LONGEST_WORD)
         place = f"chunk {done}" if done else "its footer or first chunk"
         raise InputError(
-            f"recording {path}: expected one of a run, received one that cannot be read in {place}: {told}"
+            f"recording {path}: expected one of a run, received one that cannot be read in {place}: {reason}"
         ) from None
 
 

@@ -12,9 +12,9 @@ from spheretwin.models.base.errors import InputError, SpheretwinError, without_b
 from spheretwin.models.base.files import OPEN_FILES, OutputFile, PartialFile
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.decimation import FirstsAndExtremes, Thinning
+from spheretwin.viz.decimation import FirstAndExtremeRows, RowSelection
 from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.part import Subject
+from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.rerun_internals import PIPE_PATHS, FilePipe
 
@@ -64,9 +64,9 @@ class Recorder(Stream):
         shown: str = OVERVIEW,
         rate_Hz: float | None = None,
     ) -> None:
-        thinning = FirstsAndExtremes(rate_Hz) if rate_Hz else Thinning()
-        subject = Subject(actuator, signals, facts, False, shown, uuid4().hex, rate_Hz)
-        super().__init__(subject, thinning)
+        row_selection = FirstAndExtremeRows(rate_Hz) if rate_Hz else RowSelection()
+        subject = RecordingSubject(actuator, signals, facts, False, shown, uuid4().hex, rate_Hz)
+        super().__init__(subject, row_selection)
         self._path = path
         self._output = OutputFile(path)
         self._pipe = _pipe_to(self._output) if PIPE_PATHS.is_dir() else None

@@ -18,10 +18,10 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.plots import LOOKS, signal_style
 from spheretwin.viz.layout.view import CHECKSUM, DESCRIBED, SCENARIO, STYLES, TELEMETRY, VALUES, component
 from spheretwin.viz.recording.part import (
-    Part,
-    Rows,
-    Struct,
-    Subject,
+    RecordingPart,
+    RecordingSubject,
+    RowSet,
+    StructComponent,
     no_vectors,
     range_checksum,
     time_index,
@@ -65,7 +65,7 @@ def signals_of(text: str) -> list[Signal]:
     ]
 
 
-class ScenarioText(Part):
+class ScenarioText(RecordingPart):
     """The resolved scenario."""
 
     def begin(self, recording: rr.RecordingStream) -> None:
@@ -91,12 +91,12 @@ def _as_markdown(facts: RunFacts) -> str:
 TIME = "t_s"
 
 
-class Signals(Part):
+class Signals(RecordingPart):
     """Every column of the telemetry, all of a row together: a killed process leaves whole rows."""
 
-    rows = Rows.KEPT
+    rows = RowSet.SELECTED
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._arrived: list[list[Signal]] = []
         self._rows = 0
@@ -133,7 +133,7 @@ class Signals(Part):
         order = [signal for arrived in self._arrived for signal in arrived if signal.name in names]
         if list(rows.signals) == order:
             return rows.values
-        return np.concatenate([rows[each.name].reshape(len(rows), -1) for each in order], axis=1)
+        return np.concatenate([rows[signal.name].reshape(len(rows), -1) for signal in order], axis=1)
 
     def _describe(self, recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
         """Say of signals that come for the first time what they are; a change of law may bring some."""
@@ -143,15 +143,15 @@ class Signals(Part):
             return
         arrival = len(self._arrived)
         self._arrived.append(new)
-        styles = Struct({signal.name: _style(signal) for signal in new if signal.name != TIME})
-        drawn = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
-        recording.log(TELEMETRY, [*signals_as_json(arrival, new), drawn], static=True)
+        styles = StructComponent({signal.name: _style(signal) for signal in new if signal.name != TIME})
+        style_batch = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
+        recording.log(TELEMETRY, [*signals_as_json(arrival, new), style_batch], static=True)
         recording.flush()  # before their rows: what a killed process leaves says what they are
 
 
-def _values(rows: Table, signals: list[Signal], names: set[str]) -> Struct:
+def _values(rows: Table, signals: list[Signal], names: set[str]) -> StructComponent:
     """Values of signals that came together; none of those that the rows do not have any more."""
-    return Struct(
+    return StructComponent(
         {
             signal.name: vectors(rows[signal.name], signal.size)
             if signal.name in names

@@ -16,24 +16,24 @@ import rerun as rr
 from spheretwin.models.base.errors import without_breaks
 from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.decimation import Thinning
+from spheretwin.viz.decimation import RowSelection
 from spheretwin.viz.layout.view import application
-from spheretwin.viz.recording.part import Part, Rows, Subject
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSet
 from spheretwin.viz.recording.plots import Currents, PhasePlane, Quantities
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
 from spheretwin.viz.recording.signals import ScenarioText, Signals
-from spheretwin.viz.recording.status import Limits, Log, States
+from spheretwin.viz.recording.status import LimitLanes, Log, StateLanes
 from spheretwin.viz.scene.meshes import read_meshes
 
-PARTS: tuple[type[Part], ...] = (
+PARTS: tuple[type[RecordingPart], ...] = (
     ScenarioText,
     Signals,
     MovingActuator,
     Traces,
     Torques,
     Ending,
-    States,
-    Limits,
+    StateLanes,
+    LimitLanes,
     Log,
     Currents,
     PhasePlane,
@@ -54,9 +54,9 @@ class Stream(ABC):
 
     Parameters
     ----------
-    subject : Subject
+    subject : RecordingSubject
         What is recorded.
-    thinning : Thinning
+    thinning : RowSelection
         Which rows are kept for the parts that do not need all.
 
     Attributes
@@ -76,7 +76,7 @@ class Stream(ABC):
         A mesh of the model cannot be read.
     """
 
-    def __init__(self, subject: Subject, thinning: Thinning) -> None:
+    def __init__(self, subject: RecordingSubject, row_selection: RowSelection) -> None:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
         read_meshes(
             subject.facts.mjcf
@@ -86,7 +86,7 @@ class Stream(ABC):
         self.recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.fault: str | None = None
         self.rows_handed_over = 0
-        self._parts, self._thinning = [part(subject) for part in PARTS], thinning
+        self._parts, self._row_selection = [part(subject) for part in PARTS], row_selection
         self._waiting: list[Table] = []
         self._closed = False
         self._handing_over = Lock()
@@ -202,9 +202,9 @@ class Stream(ABC):
         self.send()
 
     def _write(self, rows: Table) -> None:
-        self._write_kept(self._thinning.take(rows))
+        self._write_selected(self._row_selection.add(rows))
         for part in self._parts:
-            if part.rows == Rows.ALL:
+            if part.rows == RowSet.ALL:
                 part.write(self.recording, rows)
         self.send()
 
@@ -213,19 +213,19 @@ class Stream(ABC):
             part.note(self.recording, event)
 
     def _write_rest(self) -> None:
-        self._write_kept(self._thinning.rest())
+        self._write_selected(self._row_selection.flush())
         for part in self._parts:
             part.close(self.recording)
         self.send()
 
-    def _write_kept(self, kept: list[Table]) -> None:
-        for rows in kept:
+    def _write_selected(self, selected: list[Table]) -> None:
+        for rows in selected:
             for part in self._parts:
-                if part.rows == Rows.KEPT:
+                if part.rows == RowSet.SELECTED:
                     part.write(self.recording, rows)
 
     def _finish(self, ending: Status) -> None:
-        self._write_kept(self._thinning.rest())
+        self._write_selected(self._row_selection.flush())
         for part in self._parts:
             part.finish(self.recording, ending)
         self.send()

@@ -81,8 +81,8 @@ class Broadcast:
             first, place, late = self._first, self._dropped, self._count
         if first is not None:
             yield first
-        while (found := self._next(place, late)) is not None:
-            place, piece = found
+        while (result := self._next(place, late)) is not None:
+            place, piece = result
             yield piece
 
     @property
@@ -166,7 +166,7 @@ def read_assets() -> dict[str, Asset]:
         raise SpheretwinError(
             f"viewer: expected the files of Rerun's viewer, {without_breaks(error)}"
         ) from None
-    return {**assets, INDEX: _kept_here(assets[INDEX])}
+    return {**assets, INDEX: _without_requests(assets[INDEX])}
 
 
 def _read(port: int, path: str, process: subprocess.Popen[bytes]) -> Asset:
@@ -184,7 +184,7 @@ def _read(port: int, path: str, process: subprocess.Popen[bytes]) -> Asset:
             time.sleep(0.01)
 
 
-def _kept_here(index: Asset) -> Asset:
+def _without_requests(index: Asset) -> Asset:
     """The page without fonts of another host, and with its own requests kept on this one."""
     text = _OUTSIDE.sub("", index.content.decode())
     return index._replace(content=text.replace("<script>", f"{_GUARD}<script>", 1).encode())

@@ -103,9 +103,11 @@ def coil_mesh(coil: Coil, centres: Array, axes: Array, places: list[int], count:
         How many the actuator has.
     """
     one = revolved_surface(_outline(coil), SECTIONS)
-    drawn = [one.placed(_turned_to(axis), centre) for axis, centre in zip(axes, centres, strict=True)]
+    coil_surfaces = [
+        one.placed(_rotation_to(axis), centre) for axis, centre in zip(axes, centres, strict=True)
+    ]
     pixel = np.repeat((np.array(places) + 0.5) / count, len(one.positions))
-    whole = merged_surface(drawn)
+    whole = merged_surface(coil_surfaces)
     return rr.Mesh3D.from_fields(
         vertex_positions=whole.positions,
         vertex_normals=whole.normals,
@@ -127,7 +129,7 @@ def _outline(coil: Coil) -> list[tuple[float, float]]:
     return [*below, *above, below[0]]
 
 
-def _turned_to(axis: Array) -> Array:
+def _rotation_to(axis: Array) -> Array:
     """A rotation that takes z to a unit vector: its columns."""
     aside = np.eye(3)[np.argmin(np.abs(axis))]
     x = np.cross(aside, axis)
@@ -175,11 +177,11 @@ class Piece(NamedTuple):
         """In the form in which a recording takes it: without poses where its body carries one as it is."""
         contents = binary(self.positions, self.triangles)
         asset = rr.Asset3D(contents=contents, media_type=MEDIA_TYPE, albedo_factor=self.colour)
-        if self._lies_as_in_its_file():
+        if self._has_identity_pose():
             return [asset]
         return [asset, rr.InstancePoses3D(translations=self.translations, mat3x3=self.rotations)]
 
-    def _lies_as_in_its_file(self) -> bool:
+    def _has_identity_pose(self) -> bool:
         one = len(self.rotations) == 1 and np.allclose(self.rotations[0], np.eye(3), rtol=0, atol=ROUNDING)
         return one and np.allclose(self.translations, 0.0, rtol=0, atol=ROUNDING)
 
@@ -193,7 +195,7 @@ class Meshes(NamedTuple):
     """By entity."""
 
 
-class Look(NamedTuple):
+class MeshLook(NamedTuple):
     """What copies of one thing have in common."""
 
     body: int
@@ -231,7 +233,7 @@ def _meshes(mjcf: Path, _: str) -> Meshes:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     coils: list[int] = []
-    others: dict[Look, list[int]] = defaultdict(list)
+    others: dict[MeshLook, list[int]] = defaultdict(list)
     for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).tolist():
         if model.geom(geom).name.startswith("coil_"):
             coils.append(geom)
@@ -239,7 +241,7 @@ def _meshes(mjcf: Path, _: str) -> Meshes:
             others[_look(model, data, geom)].append(geom)
     pieces: dict[str, Piece] = {}
     for look, geoms in others.items():
-        pieces[_free(_entity(model, look), pieces)] = _piece(model, data, look, geoms)
+        pieces[_unused_name(_entity(model, look), pieces)] = _piece(model, data, look, geoms)
     return Meshes(_coils(model, data, coils, mjcf) if coils else None, pieces)
 
 
@@ -252,18 +254,18 @@ def _coils(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], mjcf: P
     return coil_mesh(coil, data.site_xpos[at], axes, places, len(sites))
 
 
-def _look(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Look:
+def _look(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> MeshLook:
     body, mesh = int(model.geom_bodyid[geom]), int(model.geom_dataid[geom])
     if model.geom(geom).name.startswith("pole_"):
         poles = _sites(model, "pole_")
         polarity = model.site_user[poles[_nearest(data, geom, poles)], 0]
-        return Look(body, mesh, *POLES[int(polarity)])
+        return MeshLook(body, mesh, *POLES[int(polarity)])
     name = model.mesh(mesh).name
     red, green, blue = (round(255 * share) for share in model.geom_rgba[geom, :3].tolist())
-    return Look(body, mesh, FRAME if name == model.body(body).name else name, (red, green, blue))
+    return MeshLook(body, mesh, FRAME if name == model.body(body).name else name, (red, green, blue))
 
 
-def _entity(model: mujoco.MjModel, look: Look) -> str:
+def _entity(model: mujoco.MjModel, look: MeshLook) -> str:
     """Below the body that carries it: what is fixed to a moving body moves with it."""
     own = model.body(look.body).name or f"body{look.body}"
     carrier = model.body(_carrier(model, look.body)).name
@@ -271,13 +273,13 @@ def _entity(model: mujoco.MjModel, look: Look) -> str:
     return "/".join([WORLD, *map(rr.escape_entity_path_part, [*folders, look.name])])
 
 
-def _free(entity: str, taken: dict[str, Piece]) -> str:
+def _unused_name(entity: str, taken: dict[str, Piece]) -> str:
     """The same name, or with a number where it is taken."""
     names = [entity, *(f"{entity}_{i}" for i in range(2, len(taken) + 2))]
     return next(name for name in names if name not in taken)
 
 
-def _piece(model: mujoco.MjModel, data: mujoco.MjData, look: Look, geoms: list[int]) -> Piece:
+def _piece(model: mujoco.MjModel, data: mujoco.MjData, look: MeshLook, geoms: list[int]) -> Piece:
     vertex, face = model.mesh_vertadr[look.mesh], model.mesh_faceadr[look.mesh]
     body = _carrier(model, look.body)
     R_SB, p_SB = data.xmat[body].reshape(3, 3), data.xpos[body]

@@ -28,13 +28,13 @@ class Surface:
         return Surface(positions.astype(np.float32), normals.astype(np.float32), self.triangles)
 
 
-def merged_surface(drawn: list[Surface]) -> Surface:
+def merged_surface(surfaces: list[Surface]) -> Surface:
     """Several as one, in their order."""
-    first = np.cumsum([0] + [len(part.positions) for part in drawn[:-1]])
+    first = np.cumsum([0] + [len(part.positions) for part in surfaces[:-1]])
     return Surface(
-        np.concatenate([part.positions for part in drawn]),
-        np.concatenate([part.normals for part in drawn]),
-        np.concatenate([part.triangles + start for part, start in zip(drawn, first, strict=True)]),
+        np.concatenate([part.positions for part in surfaces]),
+        np.concatenate([part.normals for part in surfaces]),
+        np.concatenate([part.triangles + start for part, start in zip(surfaces, first, strict=True)]),
     )
 
 

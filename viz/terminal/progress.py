@@ -47,13 +47,13 @@ def counted(label: str, what: str = "rows") -> Iterator[Callable[[int, int], Non
         task = bars.add_task(f"{label}: getting ready", total=None)
         before: list[int] = []  # done earlier, which is told first: what does the rest has yet to start
 
-        def told(done: int, of: int) -> None:
+        def update(done: int, of: int) -> None:
             if not before:
                 before.append(done)
             named = label if done > before[0] else f"{label}: getting ready"
             bars.update(task, description=named, completed=done, total=of)
 
-        yield told
+        yield update
 
 
 class _Rate(ProgressColumn):

@@ -21,9 +21,9 @@ LEAST = 1e-3
 
 def terminal_console() -> Console:
     """What is written to stdout: as wide as the terminal; in a pipe or a file as wide as one is read."""
-    told = Console()
-    if told.is_terminal or "COLUMNS" in os.environ:
-        return told
+    console = Console()
+    if console.is_terminal or "COLUMNS" in os.environ:
+        return console
     return Console(width=WIDTH_WITHOUT_TERMINAL)
 
 
@@ -39,19 +39,19 @@ def new_table(title: str, first: str, *others: str, lines: bool = False) -> Tabl
     lines : bool
         Whether to part the rows, where they have several lines each.
     """
-    told = terminal_console()
-    made = Table(
+    console = terminal_console()
+    table = Table(
         title=escape(title),
         title_justify="left",
-        box=box.HORIZONTALS if told.is_terminal else box.MARKDOWN,
-        pad_edge=not told.is_terminal,
-        show_lines=lines and told.is_terminal,
-        min_width=min(cell_len(title), told.width),  # a title is wrapped to its table
+        box=box.HORIZONTALS if console.is_terminal else box.MARKDOWN,
+        pad_edge=not console.is_terminal,
+        show_lines=lines and console.is_terminal,
+        min_width=min(cell_len(title), console.width),  # a title is wrapped to its table
     )
-    made.add_column(escape(first), overflow="fold")
+    table.add_column(escape(first), overflow="fold")
     for heading in others:
-        made.add_column(escape(heading), justify="right")
-    return made
+        table.add_column(escape(heading), justify="right")
+    return table
 
 
 def three_digits(value: float) -> str:

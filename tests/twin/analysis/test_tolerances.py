@@ -174,9 +174,9 @@ def test_people_see_one_run_whole_and_of_two_the_differences(runs, capsys):
     assert "hold under pd: completed" in alone
     assert "mrad (degrees)" in alone
     assert cli.main(["review", str(runs["first"][0]), str(runs["near"][1]), str(runs["far"][0])]) == 0
-    beside = capsys.readouterr().out
-    assert "the same" in beside
-    assert " %" in beside
+    compared_runs = capsys.readouterr().out
+    assert "the same" in compared_runs
+    assert " %" in compared_runs
 
 
 @pytest.mark.parametrize(

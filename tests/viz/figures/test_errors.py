@@ -23,10 +23,10 @@ def courses(windows=WINDOWS):
 
 
 def lines():
-    line = over_time.Line("as printed", SIZES, 0.5 * SIZES)
+    line = over_time.ErrorLine("as printed", SIZES, 0.5 * SIZES)
     groups = [
-        over_time.Group("afsm", "AFSM", [line, line], 0.12),
-        over_time.Group("pid", "PID", [line], None),
+        over_time.ErrorGroup("afsm", "AFSM", [line, line], 0.12),
+        over_time.ErrorGroup("pid", "PID", [line], None),
     ]
     return over_time.lines(groups, "largest |error|, degrees", "lines")
 

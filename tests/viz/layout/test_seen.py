@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.viz.layout.extents import CLIPPED_FROM, LABELLED, MARGIN, Channel, Seen, labelled, nice
+from spheretwin.viz.layout.extents import CLIPPED_FROM, LABELLED, MARGIN, Extents, PlotChannel, labelled, nice
 
 T_s = np.arange(100) * 0.1
-ERROR = Channel("error")
+ERROR = PlotChannel("error")
 
 
 def seen(values, ended_s=None):
     """A run whose only channel is within ± these values."""
     high = np.asarray(values, dtype=np.float64).reshape(len(T_s), -1)
-    return Seen(T_s, {"error": -high}, {"error": high}, ended_s)
+    return Extents(T_s, {"error": -high}, {"error": high}, ended_s)
 
 
 def with_transient(peak, settled, spans):
@@ -56,7 +56,7 @@ def test_noise_does_not_look_like_something():
 def test_plots_that_are_compared_have_one_range():
     of = seen(np.stack([np.full(len(T_s), 1.0), np.full(len(T_s), 9.0)], axis=1))
     assert of.limit(ERROR, least=0.1) > 9.0
-    assert of.limit(Channel("error", 0), least=0.1) < 2.0
+    assert of.limit(PlotChannel("error", 0), least=0.1) < 2.0
 
 
 def test_what_a_run_did_not_have_all_the_time_bounds_nothing():

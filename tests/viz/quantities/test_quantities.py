@@ -22,7 +22,7 @@ from spheretwin.viz.quantities import (
     MEASURED_ANGLE,
     QUANTITIES,
     TIP_DISTANCE,
-    Rows,
+    QuantityRows,
     quantities_of,
 )
 
@@ -43,7 +43,7 @@ def rows(actuator):
     table["q_rad"][:, 1] = generator.uniform(-1.2, 1.2, COUNT)
     table["t_s"][:] = 1e-3 * np.arange(COUNT)
     table["allocation_scale"][:] = 1.0
-    return Rows(table, table.rows(0, 1), actuator, LIMIT_A)
+    return QuantityRows(table, table.rows(0, 1), actuator, LIMIT_A)
 
 
 def test_the_error_angle_is_that_of_the_rotation_between_both_poses(rows):

@@ -19,7 +19,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.viz.comparison.ghosts import Ghost
 from spheretwin.viz.layout.view import TIMELINE
-from spheretwin.viz.quantities import COMPARED_QUANTITIES
+from spheretwin.viz.quantities import SCALAR_QUANTITIES
 
 # By its path: the tests are no package.
 written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
@@ -93,7 +93,7 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
     apart = {
         each.name: merged.values(f"/run_2_moved/compare/{each.name}")
         - merged.values(f"/run_1_first/compare/{each.name}")
-        for each in COMPARED_QUANTITIES
+        for each in SCALAR_QUANTITIES
         if f"/run_1_first/compare/{each.name}" in merged.entities
     }
     # Rounding of angles below 1 rad, in mrad.
