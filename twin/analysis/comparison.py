@@ -1,4 +1,4 @@
-"""How far the figures of runs are from those of the first."""
+"""Comparison of runs: differences of their figures, labels, merged recording and page of figures."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from spheretwin.viz.pages import markdown as folder
 from spheretwin.viz.quantities import QuantityRows, ScalarQuantity, scalar_quantities
 from spheretwin.viz.terminal.runs import differences as table_rows
 
-# Numbers that count nothing.
+# Numbers of which no difference is meaningful.
 NOT_COMPARED = ("seed",)
 
 
 def differences(figures: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Of each run but the first, every number that a review tells of both, less that of the first.
+    """Return, for each run but the first, every number of both reports minus that of the first.
 
-    Axis by axis where there is one for each; None where one of the two has none.
+    Entry by entry for lists; None if one of the two has no value.
 
     Parameters
     ----------
-    told : sequence of mapping
-        What a review tells of each run.
+    figures : sequence of mapping
+        Report of each run.
     """
     first, *others = figures
     return [
@@ -53,7 +53,7 @@ def differences(figures: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _are_numbers(first: Any, value: Any) -> bool:
-    """Whether both are numbers, lists of numbers as long as each other, or one of these and nothing."""
+    """True if both are numbers, lists of numbers of one length, or one of these and None."""
     if isinstance(first, list) and isinstance(value, list):
         return len(first) == len(value) and all(map(_are_numbers, first, value))
     numbers = [item for item in (first, value) if item is not None]
@@ -73,7 +73,7 @@ def _difference(first: Any, value: Any) -> Any:
     return value - first
 
 
-# What a reader of the paper looks for first, and as it writes it.
+# Fields listed first, in the notation of the paper.
 FIRST_FIELDS = {
     "plant.modelling_error": "m",
     "disturbance.load": "L",
@@ -83,11 +83,11 @@ FIRST_FIELDS = {
     "seed": "seed",
 }
 MOST_DIFFERENCES, LEGEND_LENGTH = 6, 48
-"""Differences that are told, and characters of a legend's line."""
+"""Differences in a label, and characters of a legend's line."""
 LONGEST_VALUE, LONGEST_STEM = 24, 40
-"""Of a value that is told, and of a file's name."""
+"""Characters of a value in a label, and of a file's name."""
 
-# Fields that go with another one: where that differs, so do these, and say nothing more.
+# Fields that follow from another one: if that one differs, they are not listed.
 IMPLIED_FIELDS = {
     "name": ("description", "duration", "trajectory."),
     "controller.law": ("controller.",),
@@ -97,15 +97,15 @@ IMPLIED_FIELDS = {
 
 
 def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
-    """What is said of each run: its number, file and law, and in what they differ, as far as there is room.
+    """Return a label for each run: number, file, law, and the differing fields that fit.
 
-    A file that has the name of its law is told once.
+    A file that has the name of its law is named once.
 
     Parameters
     ----------
     runs : sequence of Reviewed
     longest : int
-        Characters of a label, but for number, file and law, which are always told.
+        Characters of a label; number, file and law are always included.
     """
     parts_of_runs = differing_fields([run.record.scenario for run in runs])
     run_labels = []
@@ -122,13 +122,13 @@ def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
 
 
 def names(runs: Sequence[Reviewed]) -> list[str]:
-    """A word for each run that no other has, without a sign that means something in a path."""
+    """Return a unique word for each run, without characters that have a meaning in a path."""
     stems = [shortened(re.sub(r"[^\w-]+", "_", run.path.stem), LONGEST_STEM) for run in runs]
     return [f"run_{place}_{stem.replace('…', '_')}" for place, stem in enumerate(stems, start=1)]
 
 
 def differing_fields(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """Fields that are not the same in all scenarios, with their values in each, at most six."""
+    """Return the fields that differ among scenarios, with their values in each, at most six."""
     flat = [dict(_fields(scenario)) for scenario in scenarios]
     all_names = list(dict.fromkeys([*FIRST_FIELDS, *(name for fields in flat for name in fields)]))
     different = [name for name in all_names if len({fields.get(name, "none") for fields in flat}) > 1]
@@ -159,7 +159,7 @@ def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, s
 
 
 def _text(value: Any) -> str:
-    """As a person writes it: a whole number without a point, of entries of a list what they name."""
+    """Return a value as text: a whole number without a point, for entries of a list their names."""
     if isinstance(value, str):
         return value
     if isinstance(value, list) and all(isinstance(item, Mapping) for item in value):
@@ -172,18 +172,18 @@ SUFFIX = ".rrd"
 
 
 def check_merge(path: Path, runs: Sequence[Path]) -> None:
-    """Refuse a file of another kind, one that is there, and one of the runs.
+    """Refuse an output of another kind, an existing file, and a file of the runs.
 
     Raises
     ------
     InputError
-        Its name does not end as a recording's, it is there, or it is what a run of which only parts are left
-        was to become.
+        Its name does not end in ``.rrd``, it exists, or it is the name of a run of which only partial files
+        exist.
     """
     if path.suffix != SUFFIX:
         raise InputError(f"command line: expected --merge OUT{SUFFIX}, received {shown(str(path))}")
     if path.exists():
-        raise InputError(f"command line: expected a new file for --merge, received {path}, which is there")
+        raise InputError(f"command line: expected a new file for --merge, received {path}, which exists")
     if path in runs:
         raise InputError(f"command line: expected a new file for --merge, received {path}, which is a run")
 
@@ -196,7 +196,7 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
     InputError
         One has no rows, another number of coil groups than the first, or a model that cannot be drawn.
     SpheretwinError
-        The file cannot be written; what was there before is untouched.
+        The file cannot be written; the previous file is unchanged.
     """
     from spheretwin.viz.comparison import merged_recording  # Rerun is slow to import
     from spheretwin.viz.recording.part import RecordingSubject
@@ -213,18 +213,18 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
         RecordingSubject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
         for run, of in zip(runs, map(of_the_actuator, runs), strict=True)
     ]
-    with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
+    with np.errstate(all="ignore"):  # numbers in damaged files may have any size
         merged_recording.write(path, drawn_runs, subjects, _runs_text(runs))
 
 
 def compared_runs(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[ComparedRun]:
-    """Runs as they are drawn beside each other.
+    """Return the runs in the form in which they are drawn together.
 
     Parameters
     ----------
     runs : sequence of Reviewed
     every_tick : bool
-        With a row a tick, also where a file does not keep every one.
+        With a row for each tick, also if the file has fewer rows.
 
     Raises
     ------
@@ -273,10 +273,10 @@ def _law(run: Reviewed) -> str:
 
 
 def _runs_text(runs: Sequence[Reviewed]) -> str:
-    """What each run is, in Markdown; one that is named here is named so in every plot."""
+    """Return a description of each run in Markdown, with the label that it has in every plot."""
     status = (f"{run.record.status or 'not closed'} at {run.simulated_s:.3f} s" for run in runs)
     lines = [f"- **{label}**, {ended}" for label, ended in zip(labels(runs), status, strict=True)]
-    return "\n".join([*lines, "", "What was asked for is the thin white line."])
+    return "\n".join([*lines, "", "The thin white line is the reference."])
 
 
 if TYPE_CHECKING:
@@ -287,12 +287,12 @@ PAGE = "review.html"
 TITLES = {
     "whole": "Tracking error as one angle",
     "error": "Tracking error of each hinge",
-    "angle": "Hinge angles and what was asked for",
+    "angle": "Hinge angles and their references",
     "sliding": "Sliding variables",
     "effort": "Torque and current",
-    "more": "Torque that arrives",
+    "more": "Delivered torque",
 }
-"""Of the figure of each group of quantities."""
+"""Title of the figure of each group of quantities."""
 
 
 def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], into: Path) -> Path:
@@ -301,8 +301,8 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
     Parameters
     ----------
     runs : sequence of Reviewed
-    told : sequence of mapping
-        What a review tells of each.
+    figures : sequence of mapping
+        Report of each run.
     into : Path
         A folder that takes files.
 
@@ -333,12 +333,12 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
 
 
 def check_figures(into: Path) -> None:
-    """Find out whether all can be drawn and written, and leave an empty folder.
+    """Check that all figures can be drawn and written, and make an empty folder.
 
     Raises
     ------
     InputError
-        What draws is not installed, or the folder cannot be made or written to.
+        A library for figures is not installed, or the folder cannot be made or written to.
     """
     folder.prepare(into, "plotly")
 
@@ -358,7 +358,7 @@ def _drawings(
         yield Drawing(f"{group}.png", title, over_time(runs, leading, list(inside), title))
     yield Drawing("currents.png", title := "Currents of all groups", currents(runs, title))
     yield Drawing("spectra.png", title := "Spectra of the tracking errors", of_errors(runs, spectra, title))
-    yield Drawing("events.png", title := "What happened", events_figure(runs, title))
+    yield Drawing("events.png", title := "Events", events_figure(runs, title))
 
 
 def _spectra(run: Reviewed) -> list[Spectrum]:
@@ -374,11 +374,11 @@ def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
     lines = [
         f"# {_plain(title)}",
         "",
-        "Drag to zoom, double-click to see all again; what is at the cursor is told in every plot. The"
-        " buttons switch runs. The wide grey line is what was asked for.",
+        "Drag to zoom, double-click to reset the view; every plot shows the values at the cursor. The"
+        " buttons switch runs. The wide grey line is the reference.",
     ]
     if thin:
-        lines.append("Long runs are drawn by the lowest and the highest of every few ticks.")
+        lines.append("Long runs are drawn by the lowest and highest value of every few ticks.")
     return "\n".join(lines)
 
 
@@ -389,5 +389,5 @@ def _below(runs: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> st
 
 
 def _plain(text: str) -> str:
-    """Text in which no sign is markup."""
+    """Return the text with all markup escaped."""
     return "".join(f"\\{sign}" if sign in "\\`*_{}[]<>#|!" else sign for sign in text)

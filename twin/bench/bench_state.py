@@ -1,4 +1,4 @@
-"""The parts of one bench: what commands act on, what is run, and what is shown."""
+"""State of one bench: the twin, its clock, its commands, its recordings and what is shown."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ LENGTH_s = 10.0
 
 
 class History:
-    """Rows of the signals that every run has, the newest ones alone; whoever reads it delays no one.
+    """Newest rows of the signals that every run has; a reader never delays the writer.
 
     Parameters
     ----------
     groups : int
         Coil groups.
     period_s : float, s
-        From row to row of what is written.
+        Period of the rows that are written.
     """
 
     def __init__(self, groups: int, period_s: float) -> None:
@@ -43,7 +43,7 @@ class History:
         self._rows: deque[NDArray[np.float64]] = deque(maxlen=round(LENGTH_s * RATE_Hz))
 
     def write(self, first_tick: int, rows: Table) -> None:
-        """Take those of some rows that are due, whatever the chunks; they must not change any more."""
+        """Add the rows that are due, for any chunks; they must not change any more."""
         due = rows.values[-first_tick % self._stride :: self._stride]
         # A run begins its rows with these signals; a recording may have them in another order.
         if rows.signals[: len(self._signals)] != self._signals:
@@ -53,13 +53,13 @@ class History:
 
     def read(self) -> dict[str, NDArray[np.float64]]:
         """The rows by signal, oldest first; a copy."""
-        rows = list(self._rows)  # at once: the writer may be at work in another thread
+        rows = list(self._rows)  # in one step: another thread may write
         table = Table(self._signals, np.array(rows).reshape(len(rows), self._width))
         return {signal.name: table[signal.name] for signal in self._signals}
 
 
 class Player:
-    """One recorded run, at one of its rows.
+    """Player of one recorded run.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Player:
     Attributes
     ----------
     name, law, shape, allocation : str
-        Of the run, as its file says.
+        As the file of the run states.
     table : Table
     period_s : float
     place : int
@@ -79,7 +79,7 @@ class Player:
     Raises
     ------
     InputError
-        The file is none of a run, or holds no rows.
+        The file is not one of a run, or holds no rows.
     """
 
     def __init__(self, path: Path) -> None:
@@ -100,7 +100,7 @@ class Player:
 
     @property
     def ended(self) -> bool:
-        """Whether the last row is shown."""
+        """True if the last row is shown."""
         return self.place >= len(self.table)
 
     @property
@@ -117,7 +117,7 @@ class Player:
 
 
 class BenchState:
-    """Parts of a bench that begins paused.
+    """State of a bench, which begins paused.
 
     Parameters
     ----------
@@ -132,17 +132,17 @@ class BenchState:
     queue : Queue
     recording : Recording
     history : History
-        Of the twin; a player has its own.
+        History of the twin; a player has its own.
     player : Player or None
-        What is shown instead of the twin.
+        Run that is shown instead of the twin.
     running : bool
-        Whether time goes on.
+        Whether time runs.
     steps : int
         Ticks to be run while it does not.
     note, refused : str or None
-        What happened last that nobody commanded; the last command that was refused, and why.
+        Last event without a command; last command that was refused, and the reason.
     tried : set
-        Fields and values that were tried out beside the loop.
+        Fields and values that were tried outside the loop.
     """
 
     def __init__(self, scenario: Scenario, operators: Operators) -> None:
@@ -157,40 +157,40 @@ class BenchState:
 
     @property
     def is_active(self) -> bool:
-        """Whether there are ticks to run."""
+        """True if there are ticks to run."""
         return self.running or self.steps > 0
 
     @property
     def period_s(self) -> float:
-        """From row to row of what is shown."""
+        """Period of the rows that are shown."""
         return self.player.period_s if self.player else self.driver.session.scenario.controller.period_s
 
     @property
     def t_s(self) -> float:
-        """Simulated time of what is shown."""
+        """Simulated time of the row that is shown."""
         return float(self.player.row["t_s"][0]) if self.player else self.driver.session.t_s
 
     def set_note(self, text: str | None) -> None:
-        """Remember what happened last that nobody commanded."""
+        """Set the note: the last event without a command."""
         self.note = text
 
     def pause(self) -> None:
-        """Let time stand still."""
+        """Pause the time."""
         self.running, self.steps = False, 0
 
     def check_can_run(self, name: str) -> None:
-        """Find out whether what is shown can go on.
+        """Check that the run or replay that is shown can continue.
 
         Raises
         ------
         InputError
-            It cannot, and `name` asks for it.
+            It cannot continue; the message names the command `name`.
         """
         if self.player is None and self.driver.reason is not None:
             raise InputError(f"bench: expected reset, as the run has ended, received {name}")
 
     def begin(self, settings: Scenario, session: Session) -> None:
-        """Begin anew with a session at tick 0, paused."""
+        """Restart with a session at tick 0, paused."""
         self.driver.begin(settings, session)
         self.player = None
         self.pause()
@@ -199,7 +199,7 @@ class BenchState:
         self.pace.clear()
 
     def resume_after_restore(self, end: Callable[..., None] | None) -> None:
-        """Go on from where the session is now, after it went back; `end` completes what was recorded."""
+        """Continue from the restored session; `end` completes what was recorded."""
         session = self.driver.session
         self.recording.end(session, "the recording has ended: time went back", end)
         self.recording.resume_from(session)

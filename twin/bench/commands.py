@@ -1,4 +1,4 @@
-"""What clients say of themselves: who is there, and who operates."""
+"""All commands of a bench: clients, snapshots and files, modes, time, settings and faults."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _snapshot(bench_state: BenchState, _: None, name: str) -> None:
 
 
 def _restore(bench_state: BenchState, _: None, name: str) -> None:
-    end = bench_state.recording.ending(bench_state.driver.session)  # as it is before time goes back
+    end = bench_state.recording.ending(bench_state.driver.session)  # before time goes back
     bench_state.driver.restore(name)
     bench_state.resume_after_restore(end)
 
@@ -52,7 +52,7 @@ def _record(bench_state: BenchState, files: Files, recording: str | None, teleme
         raise InputError(
             "bench: expected keep before the next recording, received record"
             if bench_state.recording.on
-            else "bench: expected a run that goes on, received record after its end"
+            else "bench: expected a run in progress, received record after its end"
         )
     bench_state.recording.begin(files, bench_state.driver)
 
@@ -74,7 +74,7 @@ def _write_scenario(bench_state: BenchState, file: str) -> Callable[[], None]:
 
 
 def _save(bench_state: BenchState, _: None, file: str) -> None:
-    """What is prepared is all of it."""
+    """Do nothing more: the preparation writes the file."""
 
 
 SNAPSHOT = command("snapshot", _snapshot, arguments={"name": (Text, "last")})
@@ -93,7 +93,7 @@ Current = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
 def _mode(method: Callable[..., None]) -> Callable[..., None]:
-    """Go over to a mode of the desk's; a recorded run is shown no more."""
+    """Make the action of a mode: it calls the method of the driver and ends a replay."""
 
     def action(bench_state: BenchState, _: None, **given: Any) -> None:
         method(bench_state.driver, **given)
@@ -153,7 +153,7 @@ def _pause(bench_state: BenchState, _: None) -> None:
 def _step(bench_state: BenchState, _: None, ticks: int) -> None:
     bench_state.check_can_run("step")
     if bench_state.running:
-        raise InputError("bench: expected step while paused, received it while time goes on")
+        raise InputError("bench: expected step while paused, received it while time runs")
     bench_state.steps += ticks
 
 
@@ -163,7 +163,7 @@ def _speed(bench_state: BenchState, _: None, factor: float) -> None:
 
 
 def _stop(bench_state: BenchState, _: None) -> None:
-    bench_state.player, bench_state.note = None, "STOP: currents are taken away until reset"
+    bench_state.player, bench_state.note = None, "STOP: zero currents until reset"
     bench_state.driver.stop()
 
 
@@ -172,7 +172,7 @@ def _restart(bench_state: BenchState, new_run: NewRun, **arguments: Any) -> None
     bench_state.recording.end(bench_state.driver.session, None)
     bench_state.driver.session.close()
     bench_state.begin(*new_run)
-    bench_state.note = "the recording has ended: the run was begun anew" if recorded else None
+    bench_state.note = "the recording has ended: the run was restarted" if recorded else None
 
 
 def _present_scenario(bench_state: BenchState) -> Callable[[], NewRun]:
@@ -205,7 +205,7 @@ LOAD = command(
 
 PositiveLimit = Annotated[float, Field(ge=1e-3, le=1e6)]
 
-# Sections whose fields no machine is built from.
+# Sections from which nothing is built or compiled.
 CHEAP = ("trajectory", "disturbance")
 
 
@@ -227,7 +227,7 @@ def _clear_faults(bench_state: BenchState, _: None, place: int | None) -> None:
 
 
 def _trial(bench_state: BenchState, name: str, value: Any) -> Callable[[], None] | None:
-    """A session of the settings to be, the first time that a field is set so: it may be compiled."""
+    """Return a trial of the new settings, the first time that a field has such a value: it may compile."""
     key = (name, value if isinstance(value, str | bool) else type(value))
     settings = bench_state.driver.settings
     cheap = name.split(".")[0] in CHEAP or key in bench_state.tried
@@ -300,7 +300,7 @@ COMMANDS: dict[str, Command] = {
         GRANT,
     )
 }
-"""By name; see `Bench` for what each does."""
+"""All commands by name; `Bench` describes each."""
 
 
 def find_command(name: object) -> Command:
@@ -309,7 +309,7 @@ def find_command(name: object) -> Command:
     Raises
     ------
     InputError
-        There is none.
+        It is unknown.
     """
     if not isinstance(name, str) or name not in COMMANDS:
         raise InputError(

@@ -1,4 +1,4 @@
-"""One chunk of a bench: ticks are run, or rows of a recorded run shown, and handed on."""
+"""Cycle of a bench: commands are executed, then a chunk of ticks is run or of recorded rows is shown."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from spheretwin.outputs import warm
 
 
 def run(bench_state: BenchState, ticks: int) -> int:
-    """Run some ticks, no more than are asked for while paused; returns how many were run."""
+    """Run some ticks, while paused at most the requested steps; return how many were run."""
     if not bench_state.running:
         ticks = min(ticks, bench_state.steps)
     if ticks < 1:
@@ -58,7 +58,7 @@ def _simulate(bench_state: BenchState, ticks: int) -> int:
 
 
 class CommandProcessor:
-    """Commands of one bench on their way from those who give them to what they act on.
+    """Executes the commands of one bench in the loop's thread.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ class CommandProcessor:
     Attributes
     ----------
     wake : threading.Event
-        Set where one came that waits for no other.
+        Set when an urgent command arrives.
     outcomes : list of (Ticket, str or None)
-        Commands that were acted on, and why those that were refused were.
+        Executed commands, each with the reason if it was refused.
     """
 
     def __init__(self, bench_state: BenchState) -> None:
@@ -83,12 +83,12 @@ class CommandProcessor:
         self.open = True
 
     def submit(self, command: Command, arguments: dict[str, Any]) -> Ticket:
-        """Let a command wait for its turn, from any thread; arguments are those that were checked.
+        """Queue a command, from any thread; its arguments are checked already.
 
         Raises
         ------
         InputError
-            Too many do.
+            Too many are waiting.
         """
         waiting = QueuedCommand(command, arguments)
         if command.urgent:
@@ -100,12 +100,12 @@ class CommandProcessor:
         return waiting.ticket
 
     def process(self, waits: bool) -> None:
-        """Act on what waits, in its order; what is prepared beside the loop keeps the others waiting.
+        """Execute the waiting commands in order; one in preparation outside the loop delays the others.
 
         Parameters
         ----------
         waits : bool
-            Whether to wait for what is prepared.
+            Whether to wait for the preparation.
         """
         self._process_urgent()
         while self.open:
@@ -122,17 +122,17 @@ class CommandProcessor:
             self._begin(following)
 
     def close(self) -> None:
-        """Take no more; wait for what is being prepared."""
+        """Accept no more commands; wait for the one that is being prepared."""
         self._worker.shutdown()
 
     def _process_urgent(self) -> None:
         while self._urgent:
-            waiting = self._urgent[0]  # it stays until it is done: whatever goes wrong, it is tried again
+            waiting = self._urgent[0]  # it stays until it is executed: after an error it is tried again
             waiting.command.action(self._bench_state, None, **waiting.arguments)
             self.outcomes.append((self._urgent.pop(0).ticket, None))
 
     def _begin(self, waiting: QueuedCommand) -> None:
-        """Act on a command, or let what it needs be prepared."""
+        """Execute a command, or start its preparation."""
         prepare = waiting.command.prepare
         work = prepare(self._bench_state, **waiting.arguments) if prepare else None
         if work is None:
@@ -141,36 +141,36 @@ class CommandProcessor:
             self._preparing = waiting, self._worker.submit(work)
 
     def _act(self, waiting: QueuedCommand, prepared: Callable[[], Any]) -> None:
-        """Do what is commanded, or say why not."""
+        """Execute a command, or refuse it with the reason."""
         command, refused = waiting.command, None
         try:
             if command.cancelled_by_stop and waiting.ticket.created_s <= self._urgent_s:
                 raise InputError(f"bench: expected {command.name} after STOP, received it before")
             command.action(self._bench_state, prepared(), **waiting.arguments)
-        except Exception as error:  # files and laws of the user's may raise whatever they will
+        except Exception as error:  # files and laws of the user may raise any error
             refused = f"{error}" if isinstance(error, SpheretwinError) else error_text(error)
             self._bench_state.refused = refused
         self.outcomes.append((waiting.ticket, refused))
 
 
 def error_text(error: Exception) -> str:
-    """What kind of error it is, and why, in one line."""
+    """Return kind and reason of an error in one line."""
     return one_line(exception_text(error))
 
 
 class Cycle:
-    """Turns of one bench.
+    """Cycle of one bench.
 
     Parameters
     ----------
     bench_state : BenchState
     processor : CommandProcessor
-        Of its commands.
+        Executes the commands of the bench.
 
     Attributes
     ----------
     state : BenchStatus
-        The latest picture.
+        The latest status.
     """
 
     def __init__(self, bench_state: BenchState, processor: CommandProcessor) -> None:
@@ -178,15 +178,15 @@ class Cycle:
         self.state: BenchStatus = bench_status(bench_state)
 
     def run_chunk(self, ticks: int, waits: bool) -> int:
-        """Take what waits, then run some ticks; returns how many were run.
+        """Execute the waiting commands, then run some ticks; return how many were run.
 
-        Whatever goes wrong is the run's end, not the bench's.
+        Any error ends the run, but not the bench.
 
         Parameters
         ----------
         ticks : int
         waits : bool
-            Whether to wait for what commands need.
+            Whether to wait for the preparation of commands.
         """
         done = 0
         try:
@@ -194,7 +194,7 @@ class Cycle:
             self._settle()
             done = run(self._bench_state, ticks)
             self._hold_without_operator()
-        except Exception as error:  # of whatever kind, else the thread would end and STOP with it
+        except Exception as error:  # any kind, else the thread would end, and STOP with it
             self._bench_state.driver.fail(error)
             self._bench_state.pause()
         self._settle()
@@ -202,14 +202,14 @@ class Cycle:
         return done
 
     def _show(self) -> None:
-        """Make the next picture; where it cannot be made, the last one says so."""
+        """Update the status; if that fails, the last one reports the fault."""
         try:
             self.state = bench_status(self._bench_state)
         except Exception as error:  # a page must never show an old state as the present one
             self.state = replace(self.state, mode="fault", reason=error_text(error))
 
     def _settle(self) -> None:
-        """Say what became of the commands, once it can be seen."""
+        """Settle the tickets of executed commands, after the status shows their effect."""
         processor = self._processor
         if not processor.outcomes:
             return
@@ -219,7 +219,7 @@ class Cycle:
             ticket.settle(refused)
 
     def _hold_without_operator(self) -> None:
-        """Hold the rotor where its operator is gone."""
+        """Hold the rotor if its operator is gone."""
         bench_state = self._bench_state
         if not bench_state.operators.check_silence():
             return
@@ -229,15 +229,15 @@ class Cycle:
             bench_state.note = "the operator is gone: the twin holds"
 
 
-# How long a thread may keep the interpreter from the loop's: of Python's own 5 ms, three make a chunk late.
+# Longest time that a thread may keep the interpreter from the loop: three of Python's 5 ms make a chunk late.
 SWITCH_s = 1e-3
 
-# How often a bench at rest looks for clients that are gone.
+# Period at which an idle bench looks for silent clients.
 REST_s = 0.02
 
 
 class Thread:
-    """Thread of one bench, which begins once.
+    """Thread of one bench; it is started once.
 
     Parameters
     ----------
@@ -252,26 +252,26 @@ class Thread:
 
     @property
     def started(self) -> bool:
-        """Whether it is at work, or was."""
+        """True if it was started."""
         return self._thread is not None
 
     def begin(self) -> None:
-        """Be at work from now on; until `end`, the interpreter goes from thread to thread more often."""
-        warm()  # here: beside the loop it makes its first chunks late
+        """Start the thread; until `end`, the interpreter switches threads more often."""
+        warm()  # here: during the run it would make the first chunks late
         self._switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_s)
         self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)
         self._thread.start()
 
     def end(self) -> None:
-        """Wait until the last turn is done, as no more commands are taken."""
+        """Wait for the last chunk; no more commands are accepted."""
         self._processor.wake.set()
         if self._thread and self._thread.is_alive():
             self._thread.join()
             sys.setswitchinterval(self._switch_s)
 
     def _loop(self) -> None:
-        """Chunk by chunk, each at its time; woken by STOP."""
+        """Run chunk by chunk, each at its time; STOP wakes the thread."""
         bench_state, pace, wake = self._bench_state, self._bench_state.pace, self._processor.wake
         while self._processor.open:
             moves = bench_state.is_active

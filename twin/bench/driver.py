@@ -1,4 +1,4 @@
-"""The twin of a bench in one thread's hands: its session, its mode, and what is set."""
+"""Driver of a bench's twin: its session, its mode and its settings. One thread uses it."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ FIELDS_OF_MODES = ("trajectory.approach", "manual")
 
 
 def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
-    """Settings with another value of one field, checked as a whole.
+    """Return the settings with another value of one field, checked as a whole.
 
-    A named set of hardware gives its fields their values, as it does in a file that does not say them; those
+    A named set of hardware gives its fields their values, as in a file that does not state them; the fields
     of the set before get their defaults.
 
     Raises
@@ -65,7 +65,7 @@ MOST_SNAPSHOTS = 16
 
 
 class DriverSnapshot(NamedTuple):
-    """All that a desk goes on from."""
+    """Snapshot of a driver."""
 
     session: Snapshot
     settings: Scenario
@@ -75,32 +75,32 @@ class DriverSnapshot(NamedTuple):
 
 
 class Driver:
-    """One twin, and what is done to it; every change of it is one of its session's journal.
+    """Driver of one twin; every change stands in the journal of its session.
 
     Parameters
     ----------
     settings : Scenario
         To begin with.
     session : Session
-        Of these, at tick 0.
+        Session with these settings, at tick 0.
 
     Attributes
     ----------
     settings : Scenario
-        What the next reset begins with: the modes are no part of it.
+        Settings of the next reset; the modes are no part of them.
     pending : dict
         Fields of it that are not in force as yet.
     mode : str
     stopped : bool
         Whether STOP is latched.
     reason : str or None
-        Why the run can go on no further.
+        Reason why the run cannot continue.
     limits : Limits
-        Of the ways from mode to mode.
+        Limits of the approach from mode to mode.
     row : Table or None
         The last row.
     snapshots : dict
-        By name.
+        Snapshots by name.
     """
 
     def __init__(self, settings: Scenario, session: Session) -> None:
@@ -120,7 +120,7 @@ class Driver:
         self.mode = "trajectory" if by_hand is None else "manual" if any(by_hand) else "off"
 
     def advance(self, ticks: int) -> Table | None:
-        """Run some control ticks; fewer where the columns change, none once the run has ended."""
+        """Run some control ticks; fewer if the columns change, none once the run has ended."""
         if self.reason is not None:
             return None
         try:
@@ -153,7 +153,7 @@ class Driver:
         self._set_currents("off", [0.0] * len(self.session.actuator.groups))
 
     def manual(self, currents_A: tuple[float, ...] | None, group: int | None, current_A: float) -> None:
-        """Stated currents, or one group alone."""
+        """Apply stated currents, or the current of a single group."""
         self._check_available("manual")
         groups = len(self.session.actuator.groups)
         if (currents_A is None) == (group is None):
@@ -164,13 +164,13 @@ class Driver:
         self._set_currents("manual", alone if currents_A is None else list(currents_A))
 
     def hold(self) -> None:
-        """Come to rest here."""
+        """Come to rest at the present pose."""
         self._check_available("hold")
         initial_motion = modes.current_motion(self.session)
         self._approach("hold", modes.hold_shape(initial_motion, self.limits, self._range))
 
     def point(self, pose_rad: tuple[float, float, float]) -> None:
-        """Go to a pose."""
+        """Approach a pose and rest there."""
         self._check_available("point")
         self._approach("point", modes.point_shape(pose_rad, self._range))
 
@@ -181,7 +181,7 @@ class Driver:
         self._approach("jog", modes.jog_shape(initial_motion, rates_rad_s, self.limits, self._range))
 
     def trajectory(self, fields: dict[str, Any] | None) -> None:
-        """Follow a shape from its beginning; the last one unless given."""
+        """Follow a shape from its beginning; default: the last one."""
         self._check_available("trajectory")
         after = self.settings if fields is None else with_field(self.settings, "trajectory", fields)
         self._approach("trajectory", after.trajectory)
@@ -215,11 +215,11 @@ class Driver:
         self.settings = after
 
     def snapshot(self, name: str) -> None:
-        """Keep all that the twin goes on from."""
+        """Save the complete state of the twin."""
         if name not in self.snapshots and len(self.snapshots) >= MOST_SNAPSHOTS:
             raise InputError(f"bench: expected at most {MOST_SNAPSHOTS} snapshots, received one more")
         if self.reason is not None:
-            raise InputError("bench: expected a run that goes on, received one that has ended")
+            raise InputError("bench: expected a run in progress, received one that has ended")
         state = self.session.snapshot()
         self.snapshots[name] = DriverSnapshot(state, self.settings, dict(self.pending), self.mode, self.row)
 
@@ -229,7 +229,7 @@ class Driver:
         Raises
         ------
         InputError
-            There is none of this name, it is of another model, or STOP is latched.
+            The name is unknown, the snapshot is of another model, or STOP is latched.
         """
         if self.stopped:
             self._check_available("restore")
@@ -245,7 +245,7 @@ class Driver:
 
     @property
     def may_move_rotor(self) -> bool:
-        """Whether the coils may move the rotor, other than to hold it."""
+        """True if the coils may move the rotor, other than to hold it."""
         return not self.stopped and self.reason is None and self.mode not in ("off", "hold")
 
     def pending_as_json(self) -> tuple[tuple[str, str], ...]:
@@ -267,7 +267,7 @@ class Driver:
         self.mode = mode
 
     def _approach(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
-        """Go over to a shape, at a time of its own, from the motion that goes before."""
+        """Approach a shape, at a time of the shape, from the present motion."""
         session, initial_motion = self.session, modes.current_motion(self.session)
         approach = modes.approach_fields(
             shape, initial_motion, session.t_s, shape_s, self.limits, self._range

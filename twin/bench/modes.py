@@ -1,7 +1,7 @@
-"""Ways from one mode to another: what follows begins with the motion that goes before.
+"""Transitions between modes: the next motion begins with the present one.
 
-While the law has the actuator, that is the reference: its pose, rates and accelerations go on from where they
-are, and the error stays what it is. After currents by hand it is the rotor's own: the error begins at 0.
+While a law acts, the present motion is the reference: pose, rates and accelerations are continuous, and the
+error does not change. After manual currents it is the motion of the rotor: the error begins at 0.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from spheretwin.trajectories.trajectory import Shape
 
 Array = NDArray[np.float64]
 
-# What poses and jogging keep from the ends of a hinge's range; the prototype's watchdog keeps 0.02 of it.
+# Distance of poses and jogging from the ends of a hinge's range; the prototype's watchdog keeps 0.02 of it.
 EDGE_rad = 0.05
 
 # Candidates for how long a way takes, each 4 % longer than the one before: 20 ms to some hours.
 DURATIONS_s = 0.02 * 1.04 ** np.arange(340)
 SHARES = np.linspace(0.0, 1.0, 33)
 
-# Of a cubic course of the rates from some to none, the largest acceleration is this many rates over its time.
+# For a cubic course of the rates to zero, the largest acceleration is this factor times rate over duration.
 BRAKING = 1.5
 
 
 class Limits(NamedTuple):
-    """Of the way to a pose or to a shape, for each axis."""
+    """Limits of the approach to a pose or a shape, for each axis."""
 
     rate_rad_s: float = 1.0
     acceleration_rad_s2: float = 5.0
@@ -46,7 +46,7 @@ def current_motion(session: Session) -> Array:
 
 
 def hold_shape(initial_motion: Array, limits: Limits, hinge_range_rad: Array) -> Shape:
-    """Shape that comes to rest as soon as the limits allow."""
+    """Shape that comes to rest as soon as the limits permit."""
     duration_s = BRAKING * np.abs(initial_motion[1]).max() / limits.acceleration_rad_s2
     low, high = _allowed_range(hinge_range_rad)
     return Hold(angle_rad=_triple(np.clip(initial_motion[0] + initial_motion[1] * duration_s / 2, low, high)))
@@ -75,7 +75,7 @@ def jog_shape(
     rates = np.array(rates_rad_s)
     room = farthest - np.sign(rates) * initial_motion[0]
     rates[:2][room[:2] < rates[:2] ** 2 / push] = 0.0
-    # A way to it meets its rates by itself: only the stop at the edge is rounded.
+    # The approach meets its rates itself: only the stop at the edge is rounded.
     return Jog(
         start_rad=_triple(initial_motion[0]),
         rate_rad_s=_triple(rates),
@@ -100,7 +100,7 @@ def approach_fields(
         Now, and the shape's own time now.
     limits : Limits
     hinge_range_rad : (3, 2) array
-        Where the shape does not leave it, neither does the way to it, or it is left by as little as may be.
+        If the shape stays within, so does the approach, or it leaves the range by as little as possible.
     """
     initial_motion = np.clip(initial_motion, -LARGEST, LARGEST)
     difference = initial_motion - shape.led_to(np.array([shape_s]))[0]
@@ -120,7 +120,7 @@ def approach_fields(
 
 
 def approach_duration_s(difference: Array, limits: Limits) -> float:
-    """Least time in which a difference of two motions fades within limits; its own rates come on top."""
+    """Return the least time in which a difference of motions fades within limits, plus its own rates."""
     unit = np.zeros((2, 3, 3))
     unit[0, 0, 0] = unit[1, 1, 0] = 1.0
     by_angle, by_rate = (faded(each, SHARES, 1.0)[:, :, 0] for each in unit)  # (shares, 3) derivatives
@@ -136,7 +136,7 @@ def approach_duration_s(difference: Array, limits: Limits) -> float:
 def _leaves_range(
     shape: Shape, difference: Array, shape_s: float, duration_s: float, hinge_range_rad: Array
 ) -> bool:
-    """Whether the way to a shape leaves a hinge's range where the shape itself does not."""
+    """True if the approach to a shape leaves a hinge's range where the shape itself does not."""
     since = duration_s * SHARES
     alone = shape.led_to(shape_s + since)[:, 0]
     way = alone + faded(difference, since, duration_s)[:, 0]
@@ -150,6 +150,6 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 
 def _allowed_range(hinge_range_rad: Array) -> Array:
-    """Ends (2, 3) of the hinges' ranges, with what is kept from them."""
+    """Return the ends (2, 3) of the hinges' ranges less the margin."""
     low, high = hinge_range_rad.T
     return np.array([low + EDGE_rad, high - EDGE_rad])

@@ -1,4 +1,4 @@
-"""Who may command: one client operates, others watch, and may ask to take over."""
+"""Permission to command: one client operates, the others watch and may ask to operate."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from collections.abc import Callable
 from spheretwin.models.base.errors import InputError, shown
 
 GONE_s = 2.0
-"""How long a twin may be without its operator until it holds."""
+"""Time that the twin may run without its operator before it holds."""
 
 SILENCE_s = 2.0
-"""Silence after which a client is taken to be gone."""
+"""Silence after which a client counts as gone."""
 
 MOST_CLIENTS = 64
 
@@ -23,16 +23,16 @@ class Operators:
     Parameters
     ----------
     gone_s : float, s
-        How long after its operator left the twin is on its own, unless somebody takes over.
+        Time after its operator left until the twin holds, unless another client takes over.
     silence_s : float, s
-        Silence after which a client is gone, as if it had left.
+        Silence after which a client counts as gone, as if it had left.
     clock : callable
         Seconds that never go back.
 
     Notes
     -----
-    The first to come operates. Who asks while nobody does, operates from then on; else the first of those
-    who have asked does so when the operator leaves, is gone, or gives over to it.
+    The first client operates. A client that asks while none operates, operates from then on; else the first
+    that asked operates when the operator leaves, is gone, or grants it.
     """
 
     def __init__(
@@ -56,12 +56,12 @@ class Operators:
 
     @property
     def asking(self) -> tuple[str, ...]:
-        """Those of them that ask to operate, the first one first."""
+        """Clients that ask to operate, the first one first."""
         with self._lock:
             return tuple(self._asking)
 
     def register(self, client: str) -> None:
-        """Take note that a client is there.
+        """Register that a client is present.
 
         Raises
         ------
@@ -92,7 +92,7 @@ class Operators:
         Raises
         ------
         InputError
-            A client gives over what it has not, or to nobody, or there are too many.
+            A client that does not operate grants, the other client is unknown, or there are too many.
         """
         with self._lock:
             self._note(client)
@@ -105,17 +105,17 @@ class Operators:
             self._asking = [asking for asking in self._asking if asking != to]
 
     def leave(self, client: str) -> None:
-        """Take note that a client goes."""
+        """Remove a client that leaves."""
         with self._lock:
             self._drop(client)
 
     def check(self, client: str | None) -> None:
-        """Find out whether a client may command; whoever does not say who it is has the bench in hand.
+        """Check that a client may command; callers in the same process give no name and always may.
 
         Raises
         ------
         InputError
-            Another one operates, or nobody does.
+            Another client operates, or none does.
         """
         if client is not None and client != self.operator:
             raise InputError(
@@ -124,7 +124,7 @@ class Operators:
             )
 
     def check_silence(self) -> bool:
-        """Drop clients that are gone; True, once, where the twin is on its own from now on."""
+        """Remove silent clients; return True, once, if the twin is without an operator from now on."""
         now = self._clock()
         with self._lock:
             gone = [

@@ -1,4 +1,4 @@
-"""The clock of a bench: how many ticks are due, when the next are, and how many came late."""
+"""Clock of a bench: the ticks of a chunk, the time of the next one, and the number of late ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CHUNK_s = 0.02
 LONGEST_s, SHORT_s = 0.01, 0.004
 MOST_TICKS = 4096
 
-# Beyond it, time that was lost is not made up for.
+# Time lost beyond this is not made up.
 LATE_s = 5 * CHUNK_s
 
 WINDOW_s = 1.0
@@ -36,9 +36,9 @@ class Pace:
     Attributes
     ----------
     speed : float
-        Wanted, as a multiple of the clock's.
+        Commanded, as a multiple of the clock's.
     chunks, missed : int
-        Chunks that had a deadline, and those that were late: done after the next one was due.
+        Chunks that had a deadline, and the late ones: completed after the next one was due.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -51,7 +51,7 @@ class Pace:
 
     @property
     def fastest(self) -> bool:
-        """Whether it goes as fast as it can."""
+        """True if it runs as fast as possible."""
         return self.speed >= FASTEST
 
     @property
@@ -60,7 +60,7 @@ class Pace:
         return self.missed / self.chunks if self.chunks else 0.0
 
     def realtime_factor(self) -> float:
-        """Simulated over wall time in the last second; 0 while time stands still."""
+        """Return simulated over wall time in the last second; 0 while time is paused."""
         now = self._clock()
         recent = [(at, t_s) for at, t_s in self._done if now - at <= WINDOW_s]
         if len(recent) < 2:
@@ -68,12 +68,12 @@ class Pace:
         return (recent[-1][1] - recent[0][1]) / max(now - recent[0][0], 1e-9)
 
     def clear(self) -> None:
-        """Count anew."""
+        """Reset the counts."""
         self.chunks = self.missed = 0
         self.rest()
 
     def rest(self) -> None:
-        """Time stands still: nothing is due."""
+        """Clear the deadline: time is paused."""
         self._due = None
         self._done.clear()
 
@@ -90,7 +90,7 @@ class Pace:
         return 0.0 if self.fastest else max(0.0, self._due - self._clock())
 
     def record_chunk(self, ticks: int, period_s: float, t_s: float, took_s: float) -> None:
-        """Take note of a chunk: its ticks, the time it reached, and the wall time that it took."""
+        """Record a chunk: its ticks, the simulated time at its end, and the wall time that it took."""
         now = self._clock()
         if self._done and t_s < self._done[-1][1]:  # time went back
             self._done.clear()

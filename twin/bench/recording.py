@@ -1,4 +1,4 @@
-"""What a bench records: the files that are being written, one recording at a time, and those that were."""
+"""Recordings of a bench: the files in progress, one recording at a time, and the completed ones."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class Recording:
     Parameters
     ----------
     report : callable
-        Takes why a recording has ended, or what went wrong with it.
+        Takes the reason why a recording has ended, or its error.
 
     Attributes
     ----------
     completed_files : tuple of str
-        Files that were written last.
+        Files that were completed last.
     """
 
     def __init__(self, report: Callable[[str | None], None]) -> None:
@@ -35,7 +35,7 @@ class Recording:
 
     @property
     def on(self) -> bool:
-        """Whether something is being recorded."""
+        """True if a recording is being written."""
         return self._active is not None
 
     @property
@@ -44,11 +44,11 @@ class Recording:
         return tuple(str(path) for path in self._active.paths) if self._active else ()
 
     def reset(self) -> None:
-        """A run begins: nothing has happened in it."""
+        """Reset at the beginning of a run."""
         self._faults, self._noted = FaultLines(), (0, 0)
 
     def resume_from(self, session: Session) -> None:
-        """What was changed until now has been told."""
+        """Count the changes until now as written."""
         self._noted = len(session.journal), len(session.events)
 
     def begin(self, files: Files, driver: Driver) -> None:
@@ -66,7 +66,7 @@ class Recording:
             self._active.note(t_s, text)
 
     def note_changes(self, session: Session) -> None:
-        """Tell what was changed since it was last told."""
+        """Write the changes since the last call."""
         changes_done, events_done = self._noted
         if self._active:
             period_s = session.scenario.controller.period_s
@@ -75,17 +75,17 @@ class Recording:
         self.resume_from(session)
 
     def ending(self, session: Session) -> Callable[..., None] | None:
-        """What completes the files as the session is now, if there are any."""
+        """Return the function that completes the files with the session as it is now, if there are any."""
         return self._active.ending(session) if self._active else None
 
     def end(self, session: Session, why: str | None, end: Callable[..., None] | None = None) -> None:
-        """Complete what is being recorded, if anything is, beside the loop.
+        """Complete the recording in progress, if any, outside the loop.
 
         Parameters
         ----------
         session : Session
         why : str or None
-            To be told.
+            Reason, which is reported.
         end : callable, optional
             From `ending`, where the session is no longer what it was.
         """

@@ -1,4 +1,4 @@
-"""What a bench shows: one picture of now, which never changes."""
+"""Status of a bench: one immutable snapshot of all that is shown."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ Three = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class BenchStatus:
-    """A bench at one moment; the latest alone, and whole.
+    """Status of a bench at one moment.
 
     Attributes
     ----------
     mode : str
         ``off``, ``hold``, ``point``, ``trajectory``, ``jog``, ``manual``, ``replay`` or ``fault``.
     running : bool
-        Whether time goes on.
+        Whether time runs.
     stopped : bool
-        Whether STOP is latched; `reset` alone lets it go.
+        Whether STOP is latched; only `reset` releases it.
     scenario, law, shape, allocation : str
-        Names of what is in force.
+        Names in the active configuration.
     t_s : float
         Simulated time, s; of a replay, that of its row.
     tick : int
@@ -36,56 +36,56 @@ class BenchStatus:
     period_s : float
         Control period, s.
     speed : float
-        Wanted, as a multiple of the clock's; infinite for as fast as possible.
+        Commanded, as a multiple of the clock's; infinite for as fast as possible.
     realtime_factor : float
-        Reached over the last second or so; 0 while time stands still.
+        Reached over about the last second; 0 while time is paused.
     chunks, missed : int
-        Chunks that had a deadline since the last reset, and those that were late.
+        Chunks that had a deadline since the last reset, and the late ones.
     missed_share : float
         The latter over the former; 0 before the first.
     q_rad, qdot_rad_s, q_ref_rad, qdot_ref_rad_s, error_rad : tuple of float
-        Hinge angles and rates, those desired, and q - q_ref, (3,).
+        Hinge angles and rates, the desired ones, and q - q_ref, (3,).
     error_mrad, error_deg : float
         Length of the error.
     torque_command_Nm, torque_Nm, disturbance_Nm : tuple of float
-        Generalised torque that the law asked for, torque of the coils on the rotor (stator frame), and
+        Generalised torque that the law commands, torque of the coils on the rotor (stator frame), and
         generalised load, (3,).
     current_command_A, current_A : tuple of float
         One for each coil group.
     current_limit_A : float
-        Largest current that is asked of a group.
+        Largest current that a group can be commanded.
     temperature_C : tuple of float or None
-        Of the windings, one for each group, where the hardware has them.
+        Temperatures of the windings, one for each group, if the hardware has them.
     torque_margin : float
-        Share of the current limit that the group with the largest current asked for leaves, 0 to 1.
+        Share of the current limit that remains in the group with the largest commanded current, 0 to 1.
     saturated : bool
-        Whether the current limit left less than the commanded torque.
+        Whether the current limit reduced the commanded torque.
     rank_lost : bool
-        Whether the groups in use give no torque in one direction, so that no currents are commanded.
+        Whether the active groups give no torque in one direction, so that no currents are commanded.
     status : str
-        Of the session, as ``running`` or ``left_workspace``.
+        Status of the session, as ``running`` or ``left_workspace``.
     reason : str or None
         Why the mode is ``fault``, in one line.
     faults : tuple of str
-        Faults that are planned or at work, one line each, in the order of their places.
+        Planned and active faults, one line each, in the order of their places.
     pending : tuple of (str, str)
         Fields that the next reset will set, and their values as JSON.
     journal : int
         Changes so far in the present run.
     snapshots : tuple of str
-        Names of those kept.
+        Names of the snapshots.
     recording : tuple of str
         Files that are being written.
     kept : tuple of str
-        Files that were written last.
+        Files that were completed last.
     note : str or None
-        What happened last that nobody commanded, as why a recording ended.
+        Last event without a command, as the reason why a recording ended.
     operator : str or None
-        Client whose commands are taken; nobody unless one has come.
+        Client whose commands are accepted; None before the first client.
     watching : tuple of str
         The other clients.
     asking : tuple of str
-        Those of them that ask to take over.
+        Watching clients that ask to operate.
     refused : str or None
         The last command that was refused, and why, in one line.
     waiting : int
@@ -158,14 +158,14 @@ class ShownRow(NamedTuple):
     """The row that is shown."""
 
     row: Table | None
-    """None before the first."""
+    """None before the first row."""
     tick: int
     period_s: float
     current_limit_A: float
 
 
 def status_of_row(shown_row: ShownRow, session: Session, **others: Any) -> BenchStatus:
-    """Picture of a row, and of what is told beside it; of a session before its first, where there is none."""
+    """Return the status of a row and other fields; before the first row, that of the session."""
     return BenchStatus(
         **others,
         tick=shown_row.tick,
@@ -221,7 +221,7 @@ def _at_start(session: Session) -> dict[str, Any]:
 
 
 def bench_status(bench_state: BenchState) -> BenchStatus:
-    """All that is shown, as it is now."""
+    """Return the present status."""
     driver, operators, pace, recording = (
         bench_state.driver,
         bench_state.operators,
@@ -266,7 +266,7 @@ def _shown_row(bench_state: BenchState) -> ShownRow:
 
 
 def _names(bench_state: BenchState) -> dict[str, Any]:
-    """The mode, and what is in force: of the recorded run while one is played back."""
+    """Return the mode and the names in the active configuration; in a replay, those of the recorded run."""
     player, driver, scenario = bench_state.player, bench_state.driver, bench_state.driver.session.scenario
     if player:
         return {

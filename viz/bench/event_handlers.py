@@ -1,4 +1,4 @@
-"""What a person does to a page becomes one command each; a refusal is shown beside what was touched."""
+"""Event handlers of a page: each event becomes one command; a refusal is shown next to its control."""
 
 from __future__ import annotations
 
@@ -12,44 +12,44 @@ import viser
 
 from spheretwin.viz.bench.protocols import BenchProtocol, TicketProtocol
 
-# How long a refusal that belongs to no field stays.
+# Time that a refusal without a field is shown.
 SHOWN_S = 8.0
 
-# What waits for so long is said to: the first time, a law or a fault may have to be compiled.
+# Commands that wait longer are shown: the first time, a law or a fault may have to be compiled.
 LONG_S = 0.5
 
 # A way to a pose takes the loop a fifth of a chunk to make: a slider that slides makes ten a second.
 LATEST_INTERVAL_S = 0.1
 
-# Somebody who floods the bench sees no more than this of what becomes of it.
+# Pending commands that are followed; of a flood, earlier ones are dropped.
 MOST_TICKETS = 200
 
 Event = Any
-"""Of viser's: it has the number of the page that it comes from."""
+"""Event of viser: it has the number of the page that it comes from."""
 
 
 class Note:
-    """A line under a field that says why its value was refused; nothing unless there is something to say.
+    """Line under a field with the reason why its value was refused; empty otherwise.
 
     Parameters
     ----------
     gui : viser.GuiApi
         In the container of the field.
     order : float
-        Of the field.
+        Order of the field.
     """
 
     def __init__(self, gui: viser.GuiApi, order: float) -> None:
         self._html = gui.add_html("", order=order, visible=False)
 
     def say(self, text: str | None) -> None:
-        """Show a text, or take it away."""
+        """Show a text, or hide the line."""
         if text:
             self._html.content = f'<div style="{_REFUSED}">{escape(text)}</div>'
         self._html.visible = bool(text)
 
     def remove(self) -> None:
-        """Take its place away."""
+        """Remove the line."""
         self._html.remove()
 
 
@@ -57,7 +57,7 @@ _REFUSED = "color:#ff8787;font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em
 
 
 class PendingCommand(NamedTuple):
-    """A command that waits."""
+    """Command without an outcome."""
 
     name: str
     ticket: TicketProtocol
@@ -66,12 +66,12 @@ class PendingCommand(NamedTuple):
 
 
 class EventHandlers:
-    """Passes commands on, and follows what becomes of them.
+    """Sends the commands of events to the bench and shows their outcomes.
 
     Parameters
     ----------
     bench : BenchProtocol
-        Whom it tells.
+        Bench that receives the commands.
     """
 
     def __init__(self, bench: BenchProtocol) -> None:
@@ -85,26 +85,26 @@ class EventHandlers:
 
     @property
     def refused(self) -> str:
-        """What was refused last and belongs to no field; empty after a while."""
+        """Last refusal without a field; empty after a while."""
         return self._refused if time.monotonic() < self._until_s else ""
 
     @property
     def waiting_command(self) -> str:
-        """The command that has waited for longest, where that is long enough to be seen; else nothing."""
+        """Name of the command that has waited longest, if it has waited long enough to show; else empty."""
         since_s = time.monotonic() - LONG_S
         return next((pending.name for pending in self._open if pending.since_s < since_s), "")
 
     def send(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
-        """Tell the bench one thing in the name of an event's page; False where that may not."""
+        """Send a command in the name of an event's page; return False if the page may not command."""
         if name not in ANYONES and not self._operates(event):
             self._warn(event)
             return False
-        self.flush(0.0)  # what was steered before it comes before it
+        self.flush(0.0)  # earlier values of sliders come first
         self._submit(event, name, note, arguments)
         return True
 
     def send_latest(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
-        """Tell the bench something of which only the latest matters, as often as it can be of use."""
+        """Send the latest of a fast sequence of commands, at a limited rate."""
         if not self._operates(event):
             self._warn(event)
             return False
@@ -113,7 +113,7 @@ class EventHandlers:
         return True
 
     def flush(self, apart_s: float = LATEST_INTERVAL_S) -> None:
-        """Tell the latest of what is steered, where the last one is long enough ago."""
+        """Send the latest value of each slider, if the last one is long enough ago."""
         now = time.monotonic()
         with self._lock:
             due = [name for name in self._latest if now - self._latest_sent_s.get(name, 0.0) >= apart_s]
@@ -128,19 +128,19 @@ class EventHandlers:
             self._open = [*self._open[-MOST_TICKETS:], PendingCommand(name, ticket, note, time.monotonic())]
 
     def send_selected(self, event: Event) -> None:
-        """Tell the bench what a group of buttons has as its value."""
+        """Send the command that is the value of a group of buttons."""
         if event.target.value in event.target.options:
             self.send(event, event.target.value)
 
     def show_refusal(self, text: str, note: Note | None = None) -> None:
-        """Show why something never became a command."""
+        """Show a refusal at its field, or in the status panel."""
         if note:
             note.say(text)
         else:
             self._refused, self._until_s = text, time.monotonic() + SHOWN_S
 
     def settle(self) -> None:
-        """Show what became of commands since."""
+        """Show the outcomes of commands since the last call."""
         with self._lock:
             settled = [pending for pending in self._open if pending.ticket.done]
             self._open = [pending for pending in self._open if not pending.ticket.done]
@@ -151,18 +151,18 @@ class EventHandlers:
                 pending.note.say(None)
 
     def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> Any:
-        """Add a button that is one command without arguments."""
+        """Add a button for a command without arguments."""
         button = gui.add_button(label, **more)
         on_press(button, lambda event: self.send(event, name))
         return button
 
     def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
-        """Take what the operator writes or moves; give anybody else's page back what it was.
+        """Accept changes of the operator; restore the value on all other pages.
 
         Parameters
         ----------
         line : viser's handle
-            Of a field, a slider or a box, which all pages share.
+            Handle of a field, a slider or a box, which all pages share.
         act : callable, optional
             Called with the event of each change.
         """
@@ -181,22 +181,22 @@ class EventHandlers:
 
     def _operates(self, event: Event) -> bool:
         state, name = self._bench.state(), client_name(event.client_id)
-        # The picture may be older than the page: who is in none of it is let through, and the bench decides.
+        # The status may be older than the page: a client that is not in it passes, and the bench decides.
         return state.operator == name or (state.operator is None and name not in state.watching)
 
     def _warn(self, event: Event) -> None:
-        """Tell a page that only watches, and no other, why nothing happens; not at every key."""
+        """Notify a watching page, and no other, why nothing happens; not at every key."""
         now = time.monotonic()
         if now - self._warned_s.get(event.client_id, -SHOWN_S) >= SHOWN_S:
             self._warned_s[event.client_id] = now
-            message = "Nobody operates; take over, above."
+            message = "No client operates: press “Take over” above."
             if self._bench.state().operator is not None:
-                message = "Another one operates; ask it, above."
-            event.client.add_notification("This page watches", message, auto_close_seconds=SHOWN_S)
+                message = "Another client operates: press “Ask to operate” above."
+            event.client.add_notification("This page is read-only", message, auto_close_seconds=SHOWN_S)
 
 
 ANYONES = ("stop", "ask", "hello", "leave", "beat")
-"""Commands that the bench takes from pages that watch too."""
+"""Commands that the bench also accepts from watching pages."""
 
 
 def on_press(button: Any, act: Callable[[Event], object]) -> None:
@@ -209,5 +209,5 @@ def on_press(button: Any, act: Callable[[Event], object]) -> None:
 
 
 def client_name(number: int) -> str:
-    """What the bench calls a page."""
+    """Return the bench's name of a page."""
     return f"page {number}"

@@ -1,4 +1,4 @@
-"""What the twin is to do: stand, go to a pose, follow a shape, turn, or take currents by hand."""
+"""Tab of the modes: hold, approach a pose, follow a shape, jog, or apply manual currents."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from spheretwin.viz.bench.settings_tab import Form
 
 AXES = ("α", "β", "γ")
 
-# One press of an arrow key.
+# Step of one press of an arrow key.
 STEP_DEG = 1.0
 
 FASTEST_JOG_DEG_S = 60.0
 
 ONLY_THIS_A = 1.0
 
-# A slider that has just been moved, by a hand or by the twin, is left alone for so long.
+# Time that a slider which has just been moved, by a person or by the twin, is left unchanged.
 UNTOUCHED_S = 0.5
 
 
 class ModesTab:
-    """The tab of the modes, the keys, and what can be dragged and clicked in the picture.
+    """Tab of the modes, the keys, and the handles in the scene.
 
     Parameters
     ----------
     gui : viser.GuiApi
         In the tab.
     handlers : EventHandlers
-        Whom it tells.
+        Handlers that send the commands.
     bench : BenchProtocol
-        Whose state it starts from.
+        Bench with the initial state.
     choices : Choices
         Shapes.
     scene : Scene
@@ -63,7 +63,7 @@ class ModesTab:
         self._picture()
 
     def show(self, state: Any) -> None:
-        """Let the sliders follow the twin while it goes elsewhere than they say."""
+        """Update the sliders while the twin moves elsewhere."""
         if state.mode != "point" and time.monotonic() - self._commanded_s > UNTOUCHED_S:
             self._pose_rad = list(state.q_ref_rad)
         for slider, angle in zip(self._angles, self._pose_rad, strict=True):
@@ -84,7 +84,9 @@ class ModesTab:
             for place, slider in enumerate(self._angles):
                 self._handlers.on_change(slider, partial(self._on_slider, place, note))
             rate_rad_s, acceleration_rad_s2 = choices.limits
-            rate = gui.add_number("rate, rad/s", rate_rad_s, step=0.1, hint="largest, of the way to a pose")
+            rate = gui.add_number(
+                "rate, rad/s", rate_rad_s, step=0.1, hint="largest rate of the approach to a pose"
+            )
             acceleration = gui.add_number("acceleration, rad/s²", acceleration_rad_s2, step=1.0)
             limits = Note(gui, acceleration.order + 0.5)
             self._handlers.on_change(
@@ -102,7 +104,7 @@ class ModesTab:
         self._turn(event, axis, radians(event.target.value), note)
 
     def _turn(self, event: Event, axis: int, angle_rad: float, note: Note | None = None) -> None:
-        """Go to the pose that was asked for last, but for one angle."""
+        """Approach the pose commanded last, with one angle changed."""
         self._go(
             event, [angle_rad if index == axis else angle for index, angle in enumerate(self._pose_rad)], note
         )
@@ -116,7 +118,7 @@ class ModesTab:
             present = self._bench.state().shape
             shapes = list(dict.fromkeys([*choices.shapes, present]))
             shape = gui.add_dropdown("shape", shapes, initial_value=present)
-            form = Form(gui, self._handlers, "Follow this", whole=True)
+            form = Form(gui, self._handlers, "Follow this trajectory", whole=True)
 
             def follow(event: Event, fields: dict[str, str]) -> None:
                 try:
@@ -142,7 +144,7 @@ class ModesTab:
                         event, "jog", note, rates_rad_s=[radians(rate.value) for rate in self._rates]
                     ),
                 )
-            self._handlers.button(gui, "Stand", "hold")
+            self._handlers.button(gui, "Hold", "hold")
 
     def _manual(self, gui: viser.GuiApi, actuator: Actuator) -> None:
         groups, limit = len(actuator.groups), float(actuator.group.current_limit_A)
@@ -150,7 +152,7 @@ class ModesTab:
             gui.add_markdown("In this mode, click a coil for its group alone.")
             chosen = gui.add_slider("group", 0, groups - 1, 1, 0)
             self._handlers.on_change(chosen)
-            alone = gui.add_button(f"Only this one, at {ONLY_THIS_A:g} A")
+            alone = gui.add_button(f"Only this group, at {ONLY_THIS_A:g} A")
             note = Note(gui, alone.order + 0.5)
             on_press(
                 alone,
@@ -158,7 +160,7 @@ class ModesTab:
                     event, "manual", note, group=int(chosen.value), current_A=ONLY_THIS_A
                 ),
             )
-            with gui.add_folder("all of them", expand_by_default=False):
+            with gui.add_folder("all groups", expand_by_default=False):
                 sliders = [
                     gui.add_slider(f"{group:02}, A", -limit, limit, 0.05, 0.0) for group in range(groups)
                 ]
@@ -174,7 +176,7 @@ class ModesTab:
         with gui.add_folder("replay", expand_by_default=False):
             file = gui.add_text("file", "", hint="telemetry (.parquet) or recording (.rrd) on this machine")
             self._handlers.on_change(file)
-            play = gui.add_button("Show it")
+            play = gui.add_button("Replay")
             note = Note(gui, play.order + 0.5)
             on_press(play, lambda event: self._handlers.send(event, "replay", note, file=file.value))
 
@@ -201,7 +203,7 @@ class ModesTab:
 
 
 def _follow(slider: Any, value: float) -> None:
-    """Set a slider that nobody has just touched, where it moves visibly."""
+    """Update a slider that was not just moved, if the change is visible."""
     if time.time() - slider.update_timestamp < UNTOUCHED_S:
         return
     value = min(max(round(value, 1), slider.min), slider.max)

@@ -1,4 +1,4 @@
-"""The bench's page: every button is one command, everything shown is the bench's latest state."""
+"""Page of the bench: every button sends one command; everything shown is the latest status."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from spheretwin.viz.bench import server as front
+from spheretwin.viz.bench import server
 from spheretwin.viz.bench.event_handlers import Event, EventHandlers, client_name, on_press
 from spheretwin.viz.bench.modes_tab import ModesTab
 from spheretwin.viz.bench.protocols import BenchProtocol, Choices
@@ -21,7 +21,7 @@ from spheretwin.viz.bench.status_panel import TAKE_OVER, currents_html, scale_ht
 from spheretwin.viz.bench.tabs import CurvesPanel, FaultsTab, FilesTab
 
 FRAME_S = 1 / 30
-"""The picture moves this often; words and curves every so many frames, the fields' values rarely."""
+"""Period of the scene; text and curves follow every few frames, values of fields rarely."""
 
 FRAMES_A_STATUS = 3
 FRAMES_A_SETTING = 30
@@ -36,28 +36,29 @@ TITLE = "bench"
 
 ASK = "Ask to operate"
 
-# A page that is loaded anew may come before it is said that it went. It operates again; who watched does not.
+# A page that is reloaded may connect before the disconnection is known. It operates again; a watching page
+# does not.
 FRESH_S = 5.0
 
 
 class Page:
-    """A page of one bench, on this machine alone.
+    """Page of one bench, for this machine only.
 
-    ``with Page(bench, choices, front.listen(port)) as page: page.show(until)``
+    ``with Page(bench, choices, server.listen(port)) as page: page.show(until)``
 
     Parameters
     ----------
     bench : BenchProtocol
-        What it drives and shows.
+        Bench that is shown and driven.
     choices : Choices
-        What there is to choose from.
+        Choices of the controls.
     listening : socket.socket
-        Where it is served, from `front.listen`.
+        Socket of the server, from `server.listen`.
     """
 
     def __init__(self, bench: BenchProtocol, choices: Choices, listening: socket.socket) -> None:
         self._bench, self._choices, self._handlers = bench, choices, EventHandlers(bench)
-        self._server = front.serve(listening, TITLE)
+        self._server = server.serve(listening, TITLE)
         self._watching: dict[int, Any] = {}
         self._frame, self._shown_s = 0, -1.0
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
@@ -68,11 +69,11 @@ class Page:
 
     @property
     def address(self) -> str:
-        """To open in a browser."""
-        return front.address(self._server)
+        """Address to open in a browser."""
+        return server.address(self._server)
 
     def show(self, ended: Callable[[], bool]) -> None:
-        """Follow the bench until it is told to end."""
+        """Follow the bench until `ended` is true."""
         due = time.monotonic()
         while not ended():
             self.draw()
@@ -80,7 +81,7 @@ class Page:
             time.sleep(max(0.0, due - time.monotonic()))
 
     def draw(self) -> None:
-        """Show the latest state, once."""
+        """Show the latest status once."""
         if self._bench.actuator is not self._actuator:  # another model was loaded
             self._server.scene.reset()
             self._server.gui.reset()
@@ -100,7 +101,7 @@ class Page:
 
     def close(self) -> None:
         """End the server."""
-        front.stop(self._server)
+        server.stop(self._server)
 
     def __enter__(self) -> Page:
         return self
@@ -109,7 +110,7 @@ class Page:
         self.close()
 
     def _build(self) -> None:
-        """Make all that the pages share."""
+        """Make all controls that the pages share."""
         gui = self._server.gui
         self._actuator = self._bench.actuator
         self._scene = Scene(self._server.scene, self._actuator)
@@ -120,7 +121,7 @@ class Page:
     def _twin_panel(self, gui: viser.GuiApi) -> None:
         panel = gui.add_panel()
         with panel.add_tab("status"):
-            # On top: whatever is scrolled, it stays in view.
+            # On top: it stays in view at any scroll position.
             self._handlers.button(gui, "STOP (space)", "stop", color="red")
             self._status = gui.add_html("")
             running = gui.add_button_group("run", ("start", "pause", "step", "reset"))
@@ -162,7 +163,7 @@ class Page:
         gui.main_panel.set_width(RIGHT_WIDTH)
 
     def _pages(self) -> None:
-        """Say who comes and who goes; a page that watches gets a button of its own."""
+        """Register clients that connect or disconnect; add to each page its own buttons."""
 
         @self._server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
@@ -205,7 +206,7 @@ class Page:
             fresh = time.monotonic() - came_s < FRESH_S
             if state.operator is None and fresh and len(self._watching) == 1:
                 self._bench.command("ask", client=name)
-            with contextlib.suppress(RuntimeError):  # the page has gone meanwhile
+            with contextlib.suppress(RuntimeError):  # the page may be closed meanwhile
                 ask.visible = state.operator != name and name not in state.asking
                 ask.label = ASK if state.operator else TAKE_OVER
                 give.visible = state.operator == name and bool(state.asking)
@@ -223,6 +224,6 @@ def _renewed(html: Any, content: str) -> None:
 
 
 def _set_camera(server: viser.ViserServer) -> None:
-    """From where the shaft, all rows of coils and the ball between them are seen."""
+    """Place the camera so that the shaft, all rows of coils and the ball between them are visible."""
     camera = server.initial_camera
     camera.position, camera.look_at, camera.near = (0.15, -0.22, 0.15), (0.0, 0.0, 0.02), 0.01

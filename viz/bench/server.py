@@ -1,9 +1,9 @@
-"""The page's server, which lets in nothing but the page: this machine alone, and only what a page sends.
+"""Server of the page. It accepts connections of this machine only, and only messages of the page.
 
-viser serves to whoever asks and believes what it is told, and a message may have it open a tunnel elsewhere.
-So its server is made with a door of ours: hosts and origins that are not this machine are refused (a foreign
+viser accepts every client and every message, and a message may open a tunnel to another host. Its server is
+therefore made with a connection guard: hosts and origins other than this machine are refused (a foreign
 page cannot reach it, nor by a name that it has turned to 127.0.0.1), so is every message that is not a page's
-in form, and the page may load nothing from elsewhere.
+in form, and the page may load nothing from other hosts.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HOST = "127.0.0.1"
 
 MOST_PAGES = 64
 
-# What a person does to a page is far less; a flood waits in its own socket.
+# A person sends far less; a flood waits in its own socket.
 MOST_MESSAGES_PER_S = 300.0
 
 LARGEST_MESSAGE = 16_384
@@ -41,8 +41,8 @@ POLICY = (
 )
 
 # A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
-# viser's camera listens to keys too, at the document, after its commands: an arrow steers the twin alone.
-# Notices stand below, where they hide nothing.
+# viser's camera listens to keys too, at the document, after its commands: an arrow moves the twin only.
+# Notifications are at the bottom, where they hide nothing.
 HEAD = """<style>.mantine-Notifications-root { top: auto !important; bottom: 8px !important; }</style>
 <script>
 for (const kind of ["keydown", "keyup"]) addEventListener(kind, (event) => {
@@ -55,60 +55,58 @@ document.documentElement.addEventListener("keydown", (event) => {
 
 
 def listen(port: int) -> socket.socket:
-    """Take a port of this machine, for itself alone.
+    """Bind a port of this machine exclusively.
 
     Parameters
     ----------
     port : int
-        Where; 0 for any that is free.
+        Port; 0 for any free port.
 
     Raises
     ------
     InputError
-        The port is taken, or is none.
+        The port is in use or invalid.
     """
     listening = socket.socket()
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((HOST, port))
-        listening.listen()  # now, not by the server: until then another may take a port that is bound alone
+        listening.listen()  # now: another process may take a bound port until it listens
     except (OSError, OverflowError) as error:
         listening.close()
-        raise InputError(
-            f"bench: expected a port that is free, received {port}: {without_breaks(error)}"
-        ) from None
+        raise InputError(f"bench: expected a free port, received {port}: {without_breaks(error)}") from None
     return listening
 
 
 def serve(listening: socket.socket, title: str) -> viser.ViserServer:
-    """Start the server.
+    """Start the server of the page.
 
     Parameters
     ----------
     listening : socket.socket
-        Where, from `listen`; it is the server's from now on.
+        Socket from `listen`; the server owns it from now on.
     title : str
-        Of the page.
+        Title of the page.
     """
-    with _with_guard(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser tells its address
+    with _with_guard(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
         server = viser.ViserServer(host=HOST, port=listening.getsockname()[1], verbose=False)
     server.get_event_loop().set_exception_handler(_ignore_exception)
     return server
 
 
 def stop(server: viser.ViserServer) -> None:
-    """End it."""
+    """Stop the server."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
 def address(server: viser.ViserServer) -> str:
-    """Where its page is."""
+    """Return the address of the page."""
     return f"http://{HOST}:{server.get_port()}"
 
 
 class _ConnectionGuard(servers.serve):
-    """What viser takes for the function that makes a server."""
+    """Connection guard: replaces the function with which viser makes its server."""
 
     def __init__(
         self,
@@ -132,7 +130,7 @@ class _ConnectionGuard(servers.serve):
             create_connection=_PageConnection,
             max_size=LARGEST_MESSAGE,
             compression=None,
-            # A browser opens sockets to be ready, and says nothing: these shall not hold up the end.
+            # A browser opens spare sockets that send nothing: they must not delay the end.
             open_timeout=1.0,
             close_timeout=1.0,
             logger=_SILENT,
@@ -163,7 +161,7 @@ class _ConnectionGuard(servers.serve):
         return {f"http://{host}" for host in self._hosts}
 
     def _admission(self, request: Request) -> Response | None:
-        """None where a socket is let in: for a page that is as old as its server."""
+        """Return a refusal, or None if a socket is admitted: its page must have the version of the server."""
         if request.headers.get_all("Sec-WebSocket-Protocol") != [f"viser-v{viser.__version__}"]:
             return _refusal(http.HTTPStatus.BAD_REQUEST)
         return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE) if self._pages >= MOST_PAGES else None
@@ -172,7 +170,7 @@ class _ConnectionGuard(servers.serve):
         plain = Request(request.path, Headers())
         try:
             response = self._serve_file(connection, plain)
-        except (ValueError, OSError):  # no file can have the name that was asked for
+        except (ValueError, OSError):  # no file can have the requested name
             response = None
         if response is None or response.status_code != http.HTTPStatus.OK:
             return _refusal(http.HTTPStatus.NOT_FOUND)
@@ -189,7 +187,7 @@ class _ConnectionGuard(servers.serve):
 
 
 class _PageConnection(servers.ServerConnection):
-    """A page's socket, which hands over only messages of the forms below, and not too many at once."""
+    """Socket of a page: it passes only messages of the forms below, at a limited rate."""
 
     _due = 0.0
 
@@ -205,7 +203,7 @@ class _PageConnection(servers.ServerConnection):
 
 
 Name = Annotated[str, msgspec.Meta(max_length=256)]
-# No number of a page's is without end, and none is not a number.
+# Numbers of a page are finite.
 Number = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 Two = tuple[Number, Number]
 Three = tuple[Number, Number, Number]
@@ -305,7 +303,7 @@ _server_lock = threading.Lock()
 
 @contextlib.contextmanager
 def _with_guard(listening: socket.socket, title: str) -> Iterator[None]:
-    """Have viser make its server with our door: it asks the library for one, and cannot be told which."""
+    """Make viser create its server with the connection guard: viser has no option for it."""
 
     def guard(
         handler: Any, host: str, port: int, *, process_request: Any, **options: Any
@@ -328,4 +326,4 @@ def _with_guard(listening: socket.socket, title: str) -> Iterator[None]:
 
 
 def _ignore_exception(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """What a page's message made viser stumble over ends with that message."""
+    """Ignore an exception that a message of a page raised in viser; only that message is lost."""

@@ -1,4 +1,4 @@
-"""Forms of settings: a line for each field, taken when a person says so, refused beside the field."""
+"""Forms of settings: a line for each field, applied by a button, refused next to the field."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ ApplyFields = Callable[[Event, dict[str, str]], None]
 
 
 class Form:
-    """Lines of text, one for each setting.
+    """Form with a line for each setting.
 
     Parameters
     ----------
     gui : viser.GuiApi
-        In the container it is to be in.
+        GUI of the container.
     handlers : EventHandlers
-        Who takes what is written.
+        Handlers that send the values.
     apply : str
-        What its button says.
+        Label of its button.
     whole : bool
-        Whether all of the fields are handed over, or those that a person has changed.
+        Whether all of the fields are sent, or only the changed ones.
 
     Attributes
     ----------
@@ -57,15 +57,15 @@ class Form:
             self._form.submit()  # no line is marked as changed any more
 
     def on_apply(self, act: ApplyFields) -> None:
-        """Say what is done with the fields: texts by name."""
+        """Set the function that receives the fields: texts by name."""
         self._act = act
 
     def note_of(self, name: str) -> Note:
-        """The line under a field."""
+        """Return the line under a field."""
         return self._notes.get(name, self.note)
 
     def show(self, settings: list[FieldSetting]) -> None:
-        """Show these fields; what a person is about to change in one of them stays."""
+        """Show these fields; a change in progress remains."""
         names = [(setting.name, setting.choices) for setting in settings]
         if names == [(setting.name, setting.choices) for setting in self._settings]:
             self._refresh(settings)
@@ -113,14 +113,14 @@ class Form:
 
 
 class SettingsTab:
-    """The tabs of the law and of all other sections of the scenario.
+    """Tabs of the law and of all other sections of the scenario.
 
     Parameters
     ----------
     gui : viser.GuiApi
-        Of the server.
+        GUI of the server.
     handlers : EventHandlers
-        Whom it tells.
+        Handlers that send the commands.
     choices : Choices
         Fields and laws.
     law, twin : viser.GuiTabHandle
@@ -147,7 +147,7 @@ class SettingsTab:
         self.show()
 
     def show(self) -> None:
-        """Show what is in force now; called by the page, and by a person's choice of a section."""
+        """Show the active values; called by the page, and when a section is chosen."""
         with self._showing:
             self._show(self._choices.settings())
 
@@ -172,14 +172,14 @@ class SettingsTab:
 
     def _law(self, gui: viser.GuiApi) -> None:
         self._laws = gui.add_dropdown("law", self._choices.laws)
-        own = gui.add_text("or your own", "", hint="FILE.py:NAME, on this machine")
+        own = gui.add_text("user law", "", hint="FILE.py:NAME, on this machine")
         self._handlers.on_change(own)
-        take = gui.add_button("Take your own")
+        take = gui.add_button("Load user law")
         note = Note(gui, take.order + 0.5)
         self._handlers.on_change(self._laws, lambda event: self._set(event, LAW, event.target.value, note))
         on_press(take, lambda event: self._set(event, LAW, own.value, note))
         self._gains = self._form(gui, "Set gains")
-        defaults = gui.add_button("Gains as they come")
+        defaults = gui.add_button("Reset gains to defaults")
         on_press(defaults, self._reset_gains)
 
     def _twin(self, gui: viser.GuiApi) -> None:
@@ -226,7 +226,7 @@ OFTEN = ("allocation", "disturbance.load", "plant.payload_kg", "plant.modelling_
 
 FIRST_SECTION = "plant"
 
-# The law and its gains, the shape and the faults have tabs of their own; the rest is no setting.
+# The law and its gains, the shape and the faults have their own tabs; the others are not settings.
 ELSEWHERE = ("controller", "trajectory", "fault", "event", "manual", "name", "description")
 
 

@@ -1,4 +1,4 @@
-"""What is always in view: how the twin is, in words, figures and colours."""
+"""Status panel, which is always in view: text, figures and colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from spheretwin.viz import theme
 GOOD, WARN, BAD, QUIET = "#40c057", "#fab005", "#fa5252", "#868e96"
 
 TAKE_OVER = "Take over"
-"""What a page that watches presses where nobody operates."""
+"""Label of the button of a watching page while no client operates."""
 
 _MODES = {"off": QUIET, "hold": GOOD, "fault": BAD, "replay": "#4dabf7"}
 _WORKING = "#4dabf7"
@@ -24,14 +24,14 @@ _TABLE = "display:grid;grid-template-columns:auto 1fr;column-gap:0.8em;font-vari
 
 
 def status_html(state: Any, refused: str, waiting_command: str) -> str:
-    """The box on top.
+    """Return the status box as HTML.
 
     Parameters
     ----------
     state : State
-        Of the bench.
+        Status of the bench.
     refused : str
-        What was refused last; may be empty.
+        Last refusal; may be empty.
     waits_for : str
         The command that is being prepared; may be empty.
     """
@@ -54,7 +54,7 @@ def status_html(state: Any, refused: str, waiting_command: str) -> str:
 
 
 def scale_html(limit_A: float) -> str:
-    """Colours of the currents, from least to greatest."""
+    """Return the colour scale of the currents, from least to greatest."""
     at = np.linspace(-1.0, 1.0, 17)
     stops = ",".join("rgb({},{},{})".format(*colour) for colour in theme.current_colours(at, 1.0).tolist())
     return (
@@ -68,7 +68,7 @@ def scale_html(limit_A: float) -> str:
 def currents_html(
     current_A: tuple[float, ...], limit_A: float, temperature_C: tuple[float, ...] | None
 ) -> str:
-    """A bar for each group, up for positive currents, and the warmest winding."""
+    """Return a bar for each group, up for positive currents, and the warmest winding."""
     limit = limit_A or max(map(abs, current_A)) or 1.0
     colours = theme.current_colours(np.array(current_A), limit).tolist()
     bars = "".join(
@@ -109,7 +109,7 @@ def _run_badge(state: Any) -> str:
 def _operator_hint(state: Any) -> str:
     if state.operator is not None or not state.watching:
         return ""
-    return f'<div style="color:{WARN}">Nobody operates: press “{TAKE_OVER}”.</div>'
+    return f'<div style="color:{WARN}">No client operates: press “{TAKE_OVER}”.</div>'
 
 
 def _alarms(state: Any) -> list[str]:

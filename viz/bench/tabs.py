@@ -1,4 +1,4 @@
-"""The tab of the faults: add one, see them, take them back."""
+"""Tabs of the bench's page for faults and files, and its curves."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from spheretwin.viz.bench.protocols import BenchProtocol, Choices
 
 
 class FaultsTab:
-    """What fails, from now on.
+    """Tab of the faults: add, list and clear them.
 
     Parameters
     ----------
     gui : viser.GuiApi
         In the tab.
     handlers : EventHandlers
-        Whom it tells.
+        Handlers that send the commands.
     choices : Choices
         Targets and modes.
     """
@@ -34,9 +34,11 @@ class FaultsTab:
         first = next(iter(targets))
         target = gui.add_dropdown("target", list(targets), initial_value=first)
         mode: Any = gui.add_dropdown("mode", list(targets[first]), initial_value=targets[first][0])
-        value = gui.add_text("value", "", hint="where the mode has one")
-        detect = gui.add_checkbox("look for it", False, hint="the controller looks for it by itself")
-        known = gui.add_checkbox("told of it", False, hint="the controller is told")
+        value = gui.add_text("value", "", hint="if the mode has one")
+        detect = gui.add_checkbox("detect", False, hint="the controller detects the fault itself")
+        known = gui.add_checkbox(
+            "report to controller", False, hint="the controller is informed of the fault"
+        )
         add = gui.add_button("Add from now on", color="orange")
         note = Note(gui, add.order + 0.5)
 
@@ -63,12 +65,12 @@ class FaultsTab:
         self._shown: tuple[str, ...] | None = None
         place = gui.add_number("place", 0, min=0, step=1)
         handlers.on_change(place)
-        one = gui.add_button("Clear the one at this place")
+        one = gui.add_button("Clear the fault at this place")
         on_press(one, lambda event: handlers.send(event, "clear_faults", note, place=int(place.value)))
         handlers.button(gui, "Clear all", "clear_faults")
 
     def show(self, state: Any) -> None:
-        """List what is planned or at work."""
+        """List the planned and active faults."""
         if state.faults != self._shown:
             self._shown = state.faults
             lines = "".join(f"<li>{escape(fault)}</li>" for fault in state.faults)
@@ -79,16 +81,16 @@ class FaultsTab:
 
 
 class FilesTab:
-    """Files and snapshots.
+    """Tab of files and snapshots.
 
     Parameters
     ----------
     gui : viser.GuiApi
         In the tab.
     handlers : EventHandlers
-        Whom it tells.
+        Handlers that send the commands.
     bench : BenchProtocol
-        Whose command line is shown.
+        Bench whose command line is shown.
     choices : Choices
         Scenarios.
     """
@@ -98,7 +100,7 @@ class FilesTab:
     ) -> None:
         with gui.add_folder("record"):
             recording = gui.add_text("recording", "bench.rrd", hint="for Rerun; empty for none")
-            telemetry = gui.add_text("telemetry", "bench.parquet", hint="runs again from it; empty for none")
+            telemetry = gui.add_text("telemetry", "bench.parquet", hint="can be replayed; empty for none")
             record = gui.add_button("Record from now on", color="red")
             for line in (recording, telemetry):
                 handlers.on_change(line)
@@ -109,10 +111,10 @@ class FilesTab:
                 handlers.send(event, "record", note, **{kind: file for kind, file in files.items() if file})
 
             on_press(record, begin)
-            handlers.button(gui, "End it, and complete the files", "keep")
+            handlers.button(gui, "Stop and complete the files", "keep")
         with gui.add_folder("scenario"):
-            source = gui.add_dropdown("begin anew with", choices.scenarios)
-            load = gui.add_button("Load it")
+            source = gui.add_dropdown("restart with", choices.scenarios)
+            load = gui.add_button("Load")
             file = gui.add_text("save as", "bench.toml")
             save = gui.add_button("Save the present settings")
             handlers.on_change(source)
@@ -126,12 +128,12 @@ class FilesTab:
             def show_command_line(event: Event) -> None:
                 shown.value = bench.command_line()
 
-            on_press(gui.add_button("Show it as it is now"), show_command_line)
+            on_press(gui.add_button("Show the present command line"), show_command_line)
         with gui.add_folder("snapshot"):
             name = gui.add_text("name", "last")
             handlers.on_change(name)
-            keep = gui.add_button("Take one")
-            self._snapshots: Any = gui.add_button_group("back to", NONE_YET, visible=False)
+            keep = gui.add_button("Save a snapshot")
+            self._snapshots: Any = gui.add_button_group("restore", NONE_YET, visible=False)
             note = Note(gui, self._snapshots.order + 0.5)
             on_press(keep, lambda event: handlers.send(event, "snapshot", note, name=name.value))
 
@@ -149,7 +151,7 @@ class FilesTab:
             self._snapshots.visible = bool(state.snapshots)
 
 
-# A group of buttons has to have one.
+# A group of buttons needs at least one button.
 NONE_YET = ("",)
 
 
@@ -162,7 +164,7 @@ _INK, _LINES = "#adb5bd", "#343a40"
 
 
 class CurvesPanel:
-    """Curves that follow the bench.
+    """Curves over the last seconds.
 
     Parameters
     ----------
@@ -172,13 +174,13 @@ class CurvesPanel:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._error = _plot(gui, "error, mrad", ("α", "β", "γ"))
-        self._torque = _plot(gui, "torque asked for, N·m", ("α", "β", "γ"))
+        self._torque = _plot(gui, "commanded torque, N·m", ("α", "β", "γ"))
         self._temperature = _plot(gui, "warmest winding, °C", ("T",))
         self._temperature.visible = False
         self._warmest: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)
 
     def warm(self, t_s: float, temperature_C: tuple[float, ...] | None) -> None:
-        """Draw the warmest winding, where the hardware has any that warm."""
+        """Draw the temperature of the warmest winding, if the hardware models it."""
         if temperature_C is None:
             self._temperature.visible = False
             return

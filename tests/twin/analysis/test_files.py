@@ -256,7 +256,7 @@ def test_a_whole_file_is_not_recovered(files, tmp_path):
 def test_what_several_processes_left_is_not_guessed(tmp_path):
     for number in "01":
         (tmp_path / f".run.rrd.{number}.part").touch()
-    with pytest.raises(InputError, match="what 2 processes left"):
+    with pytest.raises(InputError, match="partial files of 2 processes"):
         read(tmp_path / "run.rrd")
 
 

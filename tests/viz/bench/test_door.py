@@ -112,7 +112,7 @@ def test_a_path_gives_the_page_or_nothing(page, path):
 
 
 def test_a_port_in_use_is_refused(page):
-    with pytest.raises(InputError, match=f"expected a port that is free, received {port(page)}"):
+    with pytest.raises(InputError, match=f"expected a free port, received {port(page)}"):
         server.listen(port(page))
 
 

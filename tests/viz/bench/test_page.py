@@ -147,7 +147,7 @@ def test_one_page_operates_and_gives_over(browser):
         first, second = opened(browser, page), opened(browser, page)
         second.wait_for("document.body.innerText.includes('Ask to operate')")
         second.click("text=start")
-        second.wait_for("document.body.innerText.includes('This page watches')")
+        second.wait_for("document.body.innerText.includes('This page is read-only')")
         assert bench.commands() == []
         second.click("text=STOP (space)")
         assert told(bench, 1) == [("stop", {})]
@@ -167,14 +167,14 @@ def test_where_nobody_operates_it_is_said_how_to_take_over(browser):
         third = opened(browser, page)
         bench.now.watching = ("page 1", "page 2")
         first.close()
-        third.wait_for(f"{STATUS}.innerText.includes('Nobody operates: press “Take over”.')")
+        third.wait_for(f"{STATUS}.innerText.includes('No client operates: press “Take over”.')")
         third.click("text=start")
-        third.wait_for("document.body.innerText.includes('Nobody operates; take over, above.')")
+        third.wait_for("document.body.innerText.includes('No client operates: press “Take over” above.')")
         assert bench.commands() == []
         third.click("text=Take over")
         assert told(bench, 1) == [("ask", {})]
         bench.now.watching = ("page 1",)
-        third.wait_for(f"!{STATUS}.innerText.includes('Nobody operates')")
+        third.wait_for(f"!{STATUS}.innerText.includes('No client operates')")
         third.click("text=start")
         assert told(bench, 2)[1:] == [("start", {})]
         second.close()

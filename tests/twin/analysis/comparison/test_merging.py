@@ -157,7 +157,7 @@ def test_nothing_but_the_file_is_left(merged):
         (["first"], "out.rrd", "expected two runs or more for --merge, received one"),
         (["first", "slow"], "out.parquet", "expected --merge OUT.rrd"),
         (["first", "slow"], "no folder/out.rrd", "expected a writable path"),
-        (["first", "slow"], "first.rrd", "which is there"),
+        (["first", "slow"], "first.rrd", "which exists"),
         (["first", "missing"], "out.rrd", "expected the file of a run"),
     ],
 )
