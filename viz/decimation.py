@@ -1,4 +1,4 @@
-"""Columns of many rows as few numbers, in which nothing that stands out is lost."""
+"""Decimation: many rows as few numbers that keep the extremes."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ Array = NDArray[np.float64]
 
 
 class DecimatedSeries(NamedTuple):
-    """Numbers at equal distances."""
+    """Values at equal distances."""
 
     values: Array  # (m,)
     stride: float
-    """Rows that one of them stands for; 1 where none was left out."""
+    """Rows for each of the numbers; 1 if none was omitted."""
 
 
 def decimate_extremes(values: Array, most: int) -> DecimatedSeries:
-    """A column as it is, or of every so many rows the lowest and the highest, the earlier first.
+    """Return a column unchanged, or the lowest and highest value of each block of rows, the earlier first.
 
     Parameters
     ----------
     values : (n,) array
         A NaN is no value.
     most : int
-        Numbers that are wanted, at least 2.
+        Largest number of values, at least 2.
     """
     if len(values) <= most:
         return DecimatedSeries(values, 1.0)
@@ -43,7 +43,7 @@ def decimate_extremes(values: Array, most: int) -> DecimatedSeries:
 
 
 def decimate_largest(values: Array, most: int) -> DecimatedSeries:
-    """Columns (n, k) as at most so many rows (m, k): of every so many rows the value farthest from zero."""
+    """Reduce columns (n, k) to at most `most` rows (m, k): of each block, the value farthest from zero."""
     if len(values) <= most:
         return DecimatedSeries(values, 1.0)
     blocks, size = _blocks(values, most)
@@ -52,7 +52,7 @@ def decimate_largest(values: Array, most: int) -> DecimatedSeries:
 
 
 def octave_maxima(frequency: Array, values: Array, lines_per_octave: int) -> tuple[Array, Array]:
-    """Lines of a spectrum, of which each so many-th part of an octave keeps its highest.
+    """Reduce a spectrum to the highest line of each part of an octave.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def octave_maxima(frequency: Array, values: Array, lines_per_octave: int) -> tup
         Above zero, rising.
     values : (n,) array
     each : int
-        Lines of an octave that are kept.
+        Lines for each octave.
     """
     if not len(frequency):
         return frequency, values
@@ -72,7 +72,7 @@ def octave_maxima(frequency: Array, values: Array, lines_per_octave: int) -> tup
 
 
 def _blocks(values: Array, most: int) -> tuple[Array, int]:
-    """Rows (n, k) in blocks (b, size, k) of one size; the last is filled up with its own last row."""
+    """Return rows (n, k) in blocks (b, size, k) of one size; the last is filled up with its own last row."""
     size = -(-len(values) // most)
     missing = -len(values) % size
     filled = np.concatenate([values, np.repeat(values[-1:], missing, axis=0)])
@@ -81,31 +81,31 @@ def _blocks(values: Array, most: int) -> tuple[Array, int]:
 
 Places = NDArray[np.intp]
 
-# Rows of so long a time are looked at together for what stands out in them.
+# Time of the windows of which the extremes are kept.
 WINDOW_S = 20.0
 
-# Rows whose bounds are found before the place of the bound is looked for in one such block: a bound takes a
-# fourth of the time of its place.
+# Rows of a block: first the bounds of all blocks are found, then the place of the bound within one block. A
+# bound takes a fourth of the time of its place.
 _BLOCK = 64
 
-# Of a bin or a window: times are products of whole numbers, right to some 1e-16 of themselves.
+# Tolerance at the edges of bins and windows: times are products of whole numbers, with errors of some 1e-16.
 _ROUNDING = 1e-6
 
 
 class RowSelection:
-    """Keeps every row."""
+    """Selects every row."""
 
     def add(self, rows: Table) -> list[Table]:
-        """Rows to keep, as far as that is known after these."""
+        """Add rows; return the selected rows that are decided now."""
         return [rows]
 
     def flush(self) -> list[Table]:
-        """Rows to keep of those that nothing was known of yet."""
+        """Return the selected rows among those that were not decided yet."""
         return []
 
 
 class FirstRows(RowSelection):
-    """Keeps the first row of each bin of time.
+    """Selects the first row of each bin of time.
 
     Parameters
     ----------
@@ -118,12 +118,12 @@ class FirstRows(RowSelection):
         self._bin = -1
 
     def add(self, rows: Table) -> list[Table]:
-        """Rows to keep."""
+        """Add rows; return the selected ones."""
         selected = rows.values[self.first_places(rows["t_s"])]
         return [Table(rows.signals, selected)] if len(selected) else []
 
     def first_places(self, t_s: Array) -> Places:
-        """Places of the next rows that are the first of their bins."""
+        """Return the places of the next rows that are the first of their bins."""
         bins = np.floor(t_s * self._rate_Hz + _ROUNDING)
         new = np.flatnonzero(np.diff(bins, prepend=self._bin) > 0)
         self._bin = bins[-1]
@@ -131,11 +131,11 @@ class FirstRows(RowSelection):
 
 
 class FirstAndExtremeRows(RowSelection):
-    """Keeps whole rows, bit for bit: the first of each bin of time, and all that stand out.
+    """Selects whole rows, bit for bit: the first of each bin of time, and all extremes.
 
-    Those are, of every window of 20 s, the rows in which an entry of a signal is at its largest or smallest;
+    Extremes are, in each window of 20 s, rows in which an entry of a signal is at its largest or smallest;
     where a state changes; where the current limit begins and ceases to cut the torque; and the last row.
-    Windows go by time, and end besides where the columns change: how the rows come in chunks does not show.
+    Windows depend on time, and also end where the columns change: the result does not depend on the chunks.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class FirstAndExtremeRows(RowSelection):
         self._last_saturated_s = -np.inf
 
     def add(self, rows: Table) -> list[Table]:
-        """Rows to keep of the windows that are over."""
+        """Add rows; return the selected rows of the windows that have ended."""
         windows = np.floor(rows["t_s"] / WINDOW_S + _ROUNDING)
         begins = np.flatnonzero(np.diff(windows, prepend=self._window) > 0)
         selected = []
@@ -166,7 +166,7 @@ class FirstAndExtremeRows(RowSelection):
         return selected
 
     def flush(self) -> list[Table]:
-        """Rows to keep of the window at hand, which ends here."""
+        """Return the selected rows of the present window, which ends here."""
         if not self._waiting:
             return []
         rows = Table(self._waiting[0].signals, np.concatenate([waiting.values for waiting in self._waiting]))
@@ -184,7 +184,7 @@ class FirstAndExtremeRows(RowSelection):
         return [Table(rows.signals, rows.values[np.unique(places.astype(np.intp))])]
 
     def _state_changes(self, rows: Table) -> Places:
-        """Places of the first rows in which a part has another state."""
+        """Return the places of the first rows in which a part has another state."""
         changed = [np.empty(0, np.intp)]
         for signal in rows.signals:
             if signal.states:
@@ -197,7 +197,7 @@ class FirstAndExtremeRows(RowSelection):
         return np.concatenate(changed)
 
     def _saturation_ends(self, rows: Table) -> Places:
-        """Places of the first and the last row of each saturation; short pauses are part of one."""
+        """Return the places of the first and last row of each saturation; short pauses belong to it."""
         places = np.flatnonzero(rows["allocation_scale"] < 1)
         if not len(places):
             return places
@@ -209,7 +209,7 @@ class FirstAndExtremeRows(RowSelection):
 
 
 def _first_bounds(bound: Callable[..., Array], place: Callable[..., Places], values: Array) -> Places:
-    """Place of the first bound of each column, as ``place(values, axis=0)`` finds it."""
+    """Return the place of the first bound of each column: that of ``place(values, axis=0)``."""
     ends = len(values) // _BLOCK * _BLOCK
     bounds = bound(values[:ends].reshape(-1, _BLOCK, values.shape[1]), axis=1)
     if ends < len(values):
@@ -223,11 +223,11 @@ FIRST_CHUNK_S = 2.0
 """Time of the bins in the first chunk."""
 
 MOST_BINS = 4096
-"""Bins that a chunk need not exceed."""
+"""Bins after which a chunk is always sent."""
 
 
 class CompletedBins(NamedTuple):
-    """Bins that are complete."""
+    """Completed bins."""
 
     t_s: Array
     """Time of the first row of each."""
@@ -244,13 +244,13 @@ class CompletedBins(NamedTuple):
     """Time of the last row of each."""
 
     def extremes(self) -> Array:
-        """Value of the largest magnitude of each column: what is seldom must not be lost."""
+        """Return the value of the largest magnitude of each column: rare values are kept."""
         return np.where(self.high >= -self.low, self.high, self.low)
 
     def pairs(self) -> tuple[Array, Array]:
-        """Times and values of two rows a bin: its bounds, in the order in which the bin rises or falls.
+        """Return times and values of two rows for each bin: its bounds, in the order of its rise or fall.
 
-        They stand at its ends, so that what rises or falls steadily is drawn as it is.
+        They are at the ends of the bin, so that a steady rise or fall keeps its form.
         """
         rises = self.last >= self.first
         values = np.stack(
@@ -260,17 +260,17 @@ class CompletedBins(NamedTuple):
 
 
 class TimeBins:
-    """Gathers rows into bins of one width, and bins into chunks.
+    """Accumulates rows in bins of one width, and bins in chunks.
 
-    A file has some bytes for every chunk of every entity. Chunks therefore grow with what was handed over
-    before them; what a killed process has not handed over is less than half of that, or two seconds.
+    A file needs some bytes for every chunk of every entity. Chunks therefore grow with what was sent
+    before them; a killed process loses less than half of that, or two seconds.
 
     Parameters
     ----------
     rate_Hz : float
         Bins a second.
     at_once : bool
-        Hand over every bin once it is complete.
+        Send every bin once it is complete.
     """
 
     def __init__(self, rate_Hz: float, *, immediate: bool = False) -> None:
@@ -281,10 +281,10 @@ class TimeBins:
         self._sent_count = 0
 
     def add(self, t_s: Array, values: Array) -> CompletedBins | None:
-        """Add rows (n, columns); returns complete bins, once there are enough."""
+        """Add rows (n, columns); return completed bins, once there are enough."""
         if len(self._t_s):
             t_s, values = np.concatenate([self._t_s, t_s]), np.concatenate([self._values, values])
-        # A tick that falls on the edge of a bin is in it, whatever its last bit.
+        # A tick on the edge of a bin is in that bin, for any rounding.
         starts = np.flatnonzero(np.diff(np.floor(t_s * self._rate_Hz + 1e-6), prepend=-1.0))
         last = int(starts[-1])
         self._t_s, self._values = t_s[last:].copy(), values[last:].copy()
@@ -296,7 +296,7 @@ class TimeBins:
         return self._send() if sum(len(bins.t_s) for bins in self._completed) >= due else None
 
     def flush(self) -> CompletedBins | None:
-        """All that is left, with the last bin, which no row is added to any more."""
+        """Return the remaining bins with the last one, which receives no more rows."""
         if len(self._t_s):
             self._completed.append(_reduce_bins(self._t_s, self._values, np.zeros(1, dtype=np.int64)))
             self._t_s = np.empty(0)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class QuantityRows(NamedTuple):
-    """What a quantity is computed from."""
+    """Rows and parameters from which a quantity is computed."""
 
     table: Table
     """Rows of one chunk."""
@@ -30,31 +30,31 @@ class QuantityRows(NamedTuple):
 
 
 class Aggregation(Enum):
-    """What of many rows is drawn: nothing that matters is lost between those that are."""
+    """Aggregation of the rows of a bin to what is drawn."""
 
-    BOTH = "both bounds: a line as wide as the values were far apart"
+    BOTH = "both bounds: the line is as wide as the spread of the values"
     LEAST = "the least value"
     GREATEST = "the greatest value"
     MEAN = "the mean, where single rows say nothing"
 
 
 class Quantity(NamedTuple):
-    """What is derived from telemetry to be looked at."""
+    """Quantity that a recording derives from telemetry."""
 
     name: str
     """Ends in its unit."""
     unit: str
     meaning: str
     values: Callable[[QuantityRows], Array]
-    """One row for each of the chunk's: (n, size)."""
+    """One row for each row of the chunk: (n, size)."""
     floor: float
-    """Half of the least range that its plot shows: what is less does not look like something."""
+    """Half of the least range of its plot: smaller values must not look large."""
     labels: tuple[str, ...] = ("",)
     """A name for each entry."""
     colours: tuple[theme.Colour, ...] = (theme.PLAIN,)
     """A colour for each entry."""
     needs: str = ""
-    """Signal that a run must have for it; none unless given."""
+    """Signal that it needs; empty if none."""
     aggregation: Aggregation = Aggregation.GREATEST
 
     @property
@@ -77,7 +77,7 @@ def by_axis(
 
 
 def copper_loss(rows: QuantityRows) -> Array:
-    """Copper loss, (n, 1) in W: as the amplifiers tell it, else by the resistance of cold coils."""
+    """Return the copper loss, (n, 1) in W: that of the amplifiers, else from the resistance of cold coils."""
     table = rows.table
     if any(signal.name == "copper_loss_W" for signal in table.signals):
         return np.sum(table["copper_loss_W"], axis=1, keepdims=True)
@@ -88,9 +88,9 @@ COPPER_LOSS = Quantity("copper_loss_total_W", "W", "heat of all coils", copper_l
 
 
 def coupling_torque(rows: QuantityRows) -> Array:
-    """What of ``M qddot + C qdot`` is not an axis's own inertia, (n, 3) in N·m.
+    """Return the part of ``M qddot + C qdot`` that is not an axis's own inertia, (n, 3) in N·m.
 
-    The accelerations are those of the rates from tick to tick; the inertia is that of the rotor alone.
+    The accelerations are differences of the rates from tick to tick; the inertia is that of the rotor only.
     """
     q, rate, t_s = rows.table["q_rad"], rows.table["qdot_rad_s"], rows.table["t_s"]
     step_s = np.diff(t_s, prepend=rows.before["t_s"])
@@ -172,7 +172,7 @@ def angle_between(q: Array, desired: Array) -> Array:
     """Angle of the one rotation between two orientations, (n,) in rad, of hinge angles (n, 3) in rad.
 
     It is that of ``Ry(-β_ref) Rx(α - α_ref) Ry(β) Rz(γ - γ_ref)``, of which this is the quaternion. Its
-    vector part counts as well as its scalar: near 1 the scalar alone would lose half of the digits.
+    vector part is used as well as its scalar: near 1 the scalar by itself would lose half of the digits.
     """
     difference, sum_beta = (q - desired) / 2, (q[:, 1] + desired[:, 1]) / 2
     (ca, cb, cg), (sa, sb, sg) = np.cos(difference).T, np.sin(difference).T
@@ -203,7 +203,7 @@ ESTIMATED_RATE = by_axis(
 
 
 MOST = 3.0
-"""What is more is drawn as this: it matters to no one, and has no bound where hardly any torque is asked."""
+"""Larger margins are drawn as this: they do not matter, and are unbounded for a torque command near zero."""
 
 
 def torque_margin(rows: QuantityRows) -> Array:
@@ -265,28 +265,28 @@ QUANTITIES: tuple[Quantity, ...] = (
 
 
 def quantities_of(names: Collection[str]) -> tuple[Quantity, ...]:
-    """Those that a run with signals of these names has."""
+    """Return the quantities of a run with signals of these names."""
     return tuple(quantity for quantity in QUANTITIES if not quantity.needs or quantity.needs in names)
 
 
 class ScalarQuantity(NamedTuple):
-    """One that is drawn."""
+    """Quantity with one number for each row, drawn for several runs."""
 
     name: str
-    """What stands for it in a path."""
+    """Name in paths."""
     title: str
-    """Short: beside two others it has the room of a sixth of a screen."""
+    """Short: next to two others it has the width of a sixth of a screen."""
     unit: str
     group: str
-    """Of quantities that are drawn in one row."""
+    """Group of quantities that are drawn in one row."""
     needs: tuple[str, ...]
     """Signals that it is made of."""
     values: Callable[[QuantityRows], Array]
     """Its values, (n,)."""
     desired: Callable[[QuantityRows], Array] | None = None
-    """What was asked for, (n,)."""
+    """Reference, (n,)."""
     limits: tuple[float, float] | None = None
-    """Of its axis; what its values need unless given."""
+    """Limits of the axis; those of the values unless given."""
 
     @property
     def heading(self) -> str:
@@ -309,7 +309,7 @@ def _entry(signal: str, axis: int) -> Callable[[QuantityRows], Array]:
 
 
 def _column(values: Callable[[QuantityRows], Array], place: int = 0) -> Callable[[QuantityRows], Array]:
-    """One entry of what is derived for a recording of one run."""
+    """Return one entry of a quantity of recordings."""
     return lambda rows: values(rows)[:, place]
 
 
@@ -335,7 +335,7 @@ SCALAR_QUANTITIES = (
     *(ScalarQuantity(f"sliding_{axis}_rad_s", f"sliding of {axis}", "rad/s", "sliding", ("sliding_s",),
                _entry("sliding_s", i)) for i, axis in enumerate(ANGLES)),
     ScalarQuantity(
-        "torque_asked_Nm", "torque asked", "N·m", "effort", ("torque_command_Nm",), _commanded_Nm
+        "torque_asked_Nm", "commanded torque", "N·m", "effort", ("torque_command_Nm",), _commanded_Nm
     ),
     ScalarQuantity(
         "largest_current_A", "top current", "A", "effort", ("current_A",), _largest("current_A")
@@ -346,4 +346,4 @@ SCALAR_QUANTITIES = (
     ScalarQuantity("torque_delivered_Nm", "torque delivered on the hinges", "N·m", "more",
              ("q_rad", "torque_Nm"), _delivered_Nm),
 )  # fmt: skip
-"""All, in the order in which they are drawn; a group of them beside each other."""
+"""All, in the order in which they are drawn; groups are contiguous."""

@@ -1,4 +1,4 @@
-"""How a recording is laid out: one view a question about the run, each in a tab."""
+"""Layout of a run's recording: one view for each question about the run, each in a tab."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def layout(view: View, extents: Extents | None = None) -> rrb.Blueprint:
     Parameters
     ----------
     view : View
-        What it is made for.
-    seen : Extents, optional
-        What the run has shown; ranges and titles are made of it.
+        Properties of the run.
+    extents : Extents, optional
+        Extents of the run; ranges and titles follow from them.
     """
     plots = Plots(view, extents)
     tabs = [view_function(plots) for view_function in VIEWS.values()]
@@ -37,7 +37,7 @@ def opening_layout(view: View) -> rrb.Blueprint:
     """Blueprint of a recording that is still written.
 
     One that is watched has every view. A file has the one that is shown: a layout takes room, and when the
-    run has ended, the whole one with its ranges takes this one's place.
+    run has ended, the complete one with its ranges replaces it.
     """
     return layout(view) if view.live else _blueprint(VIEWS[view.shown](Plots(view, None)), view)
 

@@ -1,4 +1,4 @@
-"""Which coils work how hard, and how near to their limit."""
+"""Views of a recording, each a tab."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ RATE_SIGNALS = (
 
 
 def compare(plots: Plots) -> rrb.Container:
-    """Angles and rates of each axis, white as asked; below, how far apart the shaft's tips are."""
+    """Angles and rates of each axis with their references; below, the distance between the shaft's tips."""
     angles, rates = _lines(plots, ANGLE_SIGNALS), _lines(plots, RATE_SIGNALS)
     angles_of_each = [
         plots.whole(name, "rad", *angles, least=LEAST_rad, axis=axis) for axis, name in enumerate(ANGLES)
@@ -75,7 +75,7 @@ PHASE_TRAIL_S = 1.0
 
 
 def run_line() -> rrb.TextDocumentView:
-    """What the run is and how it stands."""
+    """Name and state of the run in a line."""
     return rrb.TextDocumentView(origin=f"/{SUMMARY}", name="run", titlebar=False)
 
 
@@ -116,13 +116,13 @@ def phase_plane(plots: Plots) -> rrb.Spatial2DView:
 
 
 def log() -> rrb.TextLogView:
-    """What is worth a line."""
+    """Log of events."""
     columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])  # all have one path
     return rrb.TextLogView(origin=f"/{EVENTS}", name="events", columns=columns)
 
 
 def coils(plots: Plots) -> rrb.Container:
-    """Currents over time; below, those at the cursor, and the heat of all."""
+    """Currents over time; below, those at the cursor, and the copper loss of all coils."""
     heat = plots.above_zero("heat of all coils", "W", quantity(COPPER_LOSS), least=COPPER_LOSS.floor)
     below = rrb.Horizontal(current_bars(plots), heat)
     return rrb.Vertical(current_map(plots), below, row_shares=[3, 2], name="coils")
@@ -135,7 +135,7 @@ LEAST = {"N·m": 0.01, "rad/s": 0.05, "rad": 0.02, "rad/s²": 0.5}
 
 
 def control(plots: Plots) -> rrb.Container:
-    """Errors and torques of each axis; below, what the law says of itself, and the coupling of the axes."""
+    """Errors and torques of each axis; below, the signals of the law and the coupling of the axes."""
     errors = [
         plots.about_zero(f"error {name}", "mrad", quantity(ERROR), least=ERROR.floor, axis=axis)
         for axis, name in enumerate(ANGLES)
@@ -177,7 +177,7 @@ def _plot(plots: Plots, unit: str, own: dict[str, Signal]) -> rrb.TimeSeriesView
 
 
 def _is_law_signal(of: Signal) -> bool:
-    """Whether a signal is one of those that laws log, and not of a stage around them."""
+    """True if a signal is one that laws log, and not one of a stage around them."""
     return of.size <= len(ANGLES) and not of.states and of.name not in _OTHER_VIEWS
 
 
@@ -193,10 +193,10 @@ _OTHER_VIEWS = frozenset(
         "supply_power_W",
     }
 )
-"""Signals that stand in other views."""
+"""Signals that other views show."""
 
 
-# Half of a range of temperatures: what a coil warms by in a short run is nothing yet.
+# Half of the least range of temperatures: the warming of a coil in a short run is negligible.
 LEAST_degC = 5.0
 
 # Half of a range of powers.
@@ -204,7 +204,7 @@ LEAST_W = 1.0
 
 
 def hardware(plots: Plots) -> rrb.Container:
-    """States and events beside what the chain of sensors, amplifiers and coils shows of itself."""
+    """States and events next to the signals of sensors, amplifiers and coils."""
     names = plots.view.names
     shown = []
     if "coil_temperature_degC" in names:
@@ -236,7 +236,7 @@ EYE_m, LOOKED_AT_m = (0.16, -0.16, 0.22), (0.0, 0.0, 0.02)
 
 
 def eye(size: float) -> rrb.EyeControls3D:
-    """Where all of an actuator of a size is seen from, and of what is drawn beside it."""
+    """Return the camera from which an actuator of a size, and its surroundings, are visible."""
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         position=[size * coordinate for coordinate in EYE_m],
@@ -266,7 +266,7 @@ def _ages(trace: TipTrace) -> rrb.VisibleTimeRanges:
 
 
 def overview(plots: Plots) -> rrb.Container:
-    """Actuator and currents beside the errors, what is left of the torque, states and events."""
+    """Actuator and currents; next to them errors, torque margin, states and events."""
     left = rrb.Vertical(actuator_view(plots.view.size), current_map(plots), row_shares=[3, 2])
     right = rrb.Vertical(
         plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),

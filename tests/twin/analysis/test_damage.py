@@ -29,7 +29,7 @@ PLANT, WITH_EVENTS, written = shared["PLANT"], shared["WITH_EVENTS"], shared["wr
 LONGEST_LINE = 600
 
 # What a user is told of damage names the place.
-PLACES = ("row group 0", "footer", "entity ", "at byte ", "chunk ", "so damaged that Rerun ends at it")
+PLACES = ("row group 0", "footer", "entity ", "at byte ", "chunk ", "so damaged that Rerun crashes")
 
 
 @pytest.fixture(scope="module")
