@@ -24,11 +24,12 @@ import rerun_cli
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 
 # Rerun's file format 2: magic, version and options, then messages, each with its kind and its length before
-# it; the one that ends a file says where all others are.
+# it. The last message of a file is the footer, with the places of all others.
 HEADER_BYTES = 12
-_MAGIC = b"RRF2"
-_BEFORE_A_MESSAGE = struct.Struct("<QQ")
-_END = 0
+_FILE_MAGIC = b"RRF2"
+_MESSAGE_HEADER = struct.Struct("<QQ")
+_FOOTER, _CHUNK = 0, 2
+_KINDS = range(4)
 
 
 def messages(encoded: bytes) -> bytes:
@@ -39,21 +40,14 @@ def messages(encoded: bytes) -> bytes:
     encoded : bytes
         A complete recording, or a later part of one.
     """
-    first = place = HEADER_BYTES if encoded.startswith(_MAGIC) else 0
-    while place + _BEFORE_A_MESSAGE.size <= len(encoded):
-        kind, length = _BEFORE_A_MESSAGE.unpack_from(encoded, place)
-        if kind == _END:
+    first = place = HEADER_BYTES if encoded.startswith(_FILE_MAGIC) else 0
+    while place + _MESSAGE_HEADER.size <= len(encoded):
+        kind, length = _MESSAGE_HEADER.unpack_from(encoded, place)
+        if kind == _FOOTER:
             break
-        place += _BEFORE_A_MESSAGE.size + length
+        place += _MESSAGE_HEADER.size + length
     return encoded[first:place]
 
-
-# Rerun's file format 2: magic, version and options, then messages, each with its kind and its length before
-# it. The one that ends a file is the footer, by which a reader finds the others.
-_FILE_MAGIC, _HEADER_BYTES = b"RRF2", 12
-
-_LAST_KIND, _CHUNK = 0, 2
-_KINDS = range(4)
 
 # Bytes of a chunk's message that are enough for the identity of its recording.
 _SIGNATURE_BYTES = 256
@@ -86,18 +80,18 @@ def extent(path: Path) -> Extent:
     try:
         with path.open("rb") as file:
             size = path.stat().st_size
-            if file.read(_HEADER_BYTES)[: len(_FILE_MAGIC)] != _FILE_MAGIC or size < _HEADER_BYTES:
+            if file.read(HEADER_BYTES)[: len(_FILE_MAGIC)] != _FILE_MAGIC or size < HEADER_BYTES:
                 raise InputError(f"recording {path}: expected a Rerun recording, received another file")
-            place, ended, signature = _HEADER_BYTES, False, b""
-            while not ended and len(before := file.read(_BEFORE_A_MESSAGE.size)) == _BEFORE_A_MESSAGE.size:
-                kind, length = _BEFORE_A_MESSAGE.unpack(before)
+            place, ended, signature = HEADER_BYTES, False, b""
+            while not ended and len(before := file.read(_MESSAGE_HEADER.size)) == _MESSAGE_HEADER.size:
+                kind, length = _MESSAGE_HEADER.unpack(before)
                 if kind not in _KINDS:
                     raise _damaged(path, place)
                 if (next_place := place + len(before) + length) > size:
                     break
                 if kind == _CHUNK and not signature:
                     signature = _signature(file.read(min(length, _SIGNATURE_BYTES)))
-                place, ended = next_place, kind == _LAST_KIND
+                place, ended = next_place, kind == _FOOTER
                 file.seek(place)
             if _has_more_messages(file, place, size, ended=ended, signature=signature):
                 raise _damaged(path, place)
@@ -118,7 +112,7 @@ def _has_more_messages(file: BinaryIO, place: int, size: int, *, ended: bool, si
     """
     if ended:
         return size - place > _AFTER_FOOTER_BYTES
-    if size - place <= _BEFORE_A_MESSAGE.size or not signature:
+    if size - place <= _MESSAGE_HEADER.size or not signature:
         return False
     file.seek(-_FOOTER_MAGIC_BYTES, os.SEEK_END)
     if file.read().startswith(_FOOTER_MAGIC):
