@@ -1,4 +1,4 @@
-"""The actuator once, the rotor of every run in it: the first's as it is, the others' as tinted ghosts."""
+"""Bodies of several runs in one scene: the first run's actuator, the others' rotors as tinted ghosts."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def send_line(
 
 
 def style_point(recording: rr.RecordingStream, entity: str, label: str, colour: theme.Colour) -> None:
-    """Say how a point looks that is sent later."""
+    """Log the style of a point that is sent later."""
     thick = rr.Radius.ui_points(6.0)
     recording.log(entity, rr.Points3D.from_fields(labels=[label], colors=[colour], radii=thick), static=True)
 
@@ -51,7 +51,7 @@ def send_point(recording: rr.RecordingStream, entity: str, t_s: Array, positions
 
 
 def style_path(recording: rr.RecordingStream, entity: str, colour: theme.Colour) -> None:
-    """Say how a path looks that is sent later."""
+    """Log the style of a path that is sent later."""
     style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.5))
     recording.log(entity, style, static=True)
 
@@ -68,7 +68,7 @@ def send_path(
     t_s : (n,) array, s
     positions : (n, 3) array, m
     before : (1, 3) or (0, 3) array, m
-        Where it was before, if it was.
+        Its position before, if there is one.
     """
     starts = np.concatenate([before if len(before) else positions[:1], positions[:-1]])
     segments = strips(np.stack([starts, positions], axis=1))
@@ -77,14 +77,14 @@ def send_path(
 
 ROTOR = f"{WORLD}/rotor"
 
-# Of 255: through a ghost the rotor within it is seen, and its colour still.
+# Of 255: the rotor within a ghost is visible, and so is the ghost's colour.
 GHOST_ALPHA = 90
 
 _TINT = rr.Asset3D.descriptor_albedo_factor()
 
 
 class Ghost(RecordingPart):
-    """A rotor alone, in one colour, that what is behind it is seen through.
+    """Transparent rotor in one colour.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class Ghost(RecordingPart):
 
 
 class Tip(RecordingPart):
-    """The end of the shaft, or where it should be: the path behind it, and it itself where it has a label.
+    """Tip of the shaft, actual or desired: its path, and a point if it has a label.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Tip(RecordingPart):
         self._frames, self._last = Frames(), np.empty((0, 3))
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log how both look."""
+        """Log the styles of point and path."""
         if self._label:
             style_point(recording, f"{self._entity}/point", self._label, self._colour)
         style_path(recording, f"{self._entity}/path", self._colour)
@@ -154,5 +154,5 @@ class Tip(RecordingPart):
 
 
 def body(subject: RecordingSubject, colour: theme.Colour, *, ghost: bool) -> RecordingPart:
-    """What of a run is drawn: the whole actuator, or its rotor as a ghost."""
+    """Return the bodies of a run: the whole actuator, or its rotor as a ghost."""
     return Ghost(subject, colour) if ghost else MovingActuator(subject)

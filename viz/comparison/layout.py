@@ -1,4 +1,4 @@
-"""How a recording of several runs is laid out: all in one actuator, and each quantity of all in one plot."""
+"""Layout of a recording of several runs: all in one actuator, and each quantity of all in one plot."""
 
 from __future__ import annotations
 
@@ -16,45 +16,45 @@ from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import TRAIL_S
 
 COMPARE, RUNS, TIP = "compare", "runs", "tip"
-"""Parts of the paths of entities, behind the name of a run but for `RUNS`."""
+"""Parts of the paths of entities, after the name of a run, except `RUNS`."""
 
 REFERENCE = "what_was_asked"
 """Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
 
-# Plots that share a row are too narrow for names; the one that has a row of its own tells them.
+# Plots that share a row are too narrow for names; the plot with its own row shows them.
 NAMED, BESIDE_TEXTS = "whole", "more"
 
 
 class Plot(NamedTuple):
-    """One quantity of all runs."""
+    """Plot of one quantity of all runs."""
 
     name: str
     title: str
     group: str
     desired: bool
-    """Whether what was asked for is drawn with it."""
+    """True if the reference is drawn with it."""
     limits: tuple[float, float]
 
 
 class ComparisonView(NamedTuple):
-    """What a layout is made for."""
+    """Properties of the runs on which the layout depends."""
 
     runs: tuple[str, ...]
     """Names."""
     leaders: tuple[str, ...]
-    """Names of those that show what was asked for."""
+    """Names of the runs that show the reference."""
     plots: tuple[Plot, ...]
     duration_s: float
     states: tuple[str, ...]
-    """Names of those that have parts whose states change."""
+    """Names of the runs with changes of state."""
     logs: tuple[str, ...]
-    """Names of those in which something happens."""
+    """Names of the runs with events."""
     size: float
-    """Of the actuator of the first, which is drawn whole."""
+    """Size of the first run's actuator, which is drawn completely."""
 
 
 def application(view: ComparisonView) -> str:
-    """Application id of recordings with one layout: a viewer keeps one for each."""
+    """Return the application id of recordings with one layout: a viewer keeps one layout for each."""
     return f"spheretwin-runs-{hashlib.sha256(repr(view).encode()).hexdigest()[:12]}"
 
 
@@ -91,7 +91,7 @@ def time_axis(duration_s: float) -> rrb.TimeAxis:
 
 
 def trail_behind() -> rrb.VisibleTimeRanges:
-    """What of a path is seen: the last seconds of it."""
+    """Return the time range of a path that is visible: its last seconds."""
     boundary = rrb.TimeRangeBoundary
     start, end = boundary.cursor_relative(seconds=-TRAIL_S), boundary.cursor_relative()
     return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)

@@ -41,7 +41,7 @@ from spheretwin.viz.scene.static import size_of
 
 
 class SubtreeStream:
-    """A recording in which all that is logged stands below one path.
+    """Stream that logs everything below one path of a recording.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class SubtreeStream:
         self._recording.send_columns(f"{self._path}/{entity}", indexes, columns)
 
     def flush(self) -> None:
-        """Send what is not yet sent."""
+        """Send pending data."""
         self._recording.flush()
 
 
@@ -74,7 +74,7 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
     ----------
     path : Path
     application : str
-        A viewer keeps one layout for each.
+        Application id: a viewer keeps one layout for each.
     layout : Blueprint
 
     Raises
@@ -82,7 +82,7 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
     InputError
         No file can be made there.
     SpheretwinError
-        Writing failed; what was at `path` before is untouched.
+        Writing failed; the previous file is unchanged.
     """
     rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
     with whole_file(path) as temporary:
@@ -101,31 +101,31 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
             raise pipe.error
 
 
-# Of a range of what hardly differs from zero; and steps for which the lowest of the plots is high enough.
+# Least half range, for values near zero; and steps that fit in the lowest of the plots.
 LEAST, STEPS = 1e-3, 6
 
 
 def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingSubject], text: str) -> Path:
     """Write a recording of several runs; returns its path.
 
-    Below the name of each stands what its own recording holds, and what is drawn beside the others'.
+    Below the name of each run is the content of its own recording, and its lines in the common plots.
 
     Parameters
     ----------
     path : Path
     runs : sequence of ComparedRun
-        Two at least, of names that tell them apart.
+        At least two, with unique names.
     subjects : sequence of RecordingSubject
-        Of each run.
+        Subject of each run.
     text : str
-        What the runs are, in Markdown.
+        Description of the runs, in Markdown.
 
     Raises
     ------
     InputError
         No file can be made there, or a mesh of a model cannot be read.
     SpheretwinError
-        Writing failed; what was there before is untouched.
+        Writing failed; the previous file is unchanged.
     """
     for subject in subjects:
         read_meshes(subject.facts.mjcf)  # found missing before there is a file
@@ -168,7 +168,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
                     run.table["t_s"],
                     quantity.values(run.rows),
                 )
-                width = THICK if quantity.desired else MIDDLE  # what was asked for lies over it
+                width = THICK if quantity.desired else MIDDLE  # the reference is drawn over it
                 send_line(below, entity, run.label, t_s, values, colour, width)
         for place in leading:
             run, reference = runs[place], SubtreeStream(recording, f"{REFERENCE}/{runs[place].name}")
@@ -179,7 +179,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
 
 
 def _write_run(recording: rr.RecordingStream, run: ComparedRun, parts: Sequence[RecordingPart]) -> None:
-    """What a recording of the run alone has, but for the text of its scenario."""
+    """Write the content of the run's own recording, except the text of its scenario."""
     recording.log(SCENARIO, rr.AnyValues(record=json.dumps(dict(run.record))), static=True)
     log_lines(recording, list(run.events))
     for part in parts:
@@ -194,7 +194,7 @@ def _write_reference(
     *,
     alone: bool,
 ) -> None:
-    """What was asked for: lines, and the path of the tip."""
+    """Write the reference: lines, and the path of the tip."""
     colour, label = theme.DESIRED_TRACE, "asked for" if alone else f"asked for in {run.label}"
     _write_part(recording, run, Tip(subject, TIP, "q_ref_rad", "", colour))
     for quantity in quantities:

@@ -1,4 +1,4 @@
-"""A run among others, as those who draw it need it."""
+"""Runs of a comparison: their data, colours, references and spectra."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ Event = tuple[float, Level, str]
 
 
 class ComparedRun(NamedTuple):
-    """One run."""
+    """Run of a comparison."""
 
     name: str
-    """What tells it from the others where there is room for a word: ``run_1_nutation``."""
+    """Unique short name: ``run_1_nutation``."""
     label: str
-    """What a legend says: file, law, what else is not the same in all."""
+    """Text of a legend: file, law, and the differing fields."""
     law: str
     period_s: float
-    """Between two rows."""
+    """Period of the rows."""
     rows: QuantityRows
-    """Its telemetry, with a row at least, and what is derived from it needs beside it."""
+    """Telemetry with at least one row, and the parameters of derived quantities."""
     record: Mapping[str, str]
-    """What its telemetry file says of it beside the rows."""
+    """Metadata of its telemetry file."""
     events: Sequence[Event]
 
     @property
@@ -41,11 +41,11 @@ class ComparedRun(NamedTuple):
         return self.rows.table
 
 
-# Of what the eye makes of white: a line of less is lost on a dark ground.
+# Share of white's luminance: darker lines are invisible on a dark ground.
 DARKEST = 0.15
-# What has no hue becomes almost white there: grey is what was asked for.
+# Colours without a hue become almost white there: grey is the reference.
 HUELESS, WHITE = 0.15, 0.92
-# Of 441 from black to white: colours nearer to each other are taken for one.
+# Of 441 from black to white: nearer colours cannot be distinguished.
 APART = 25.0
 
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -60,7 +60,7 @@ def run_colours(laws: Sequence[str]) -> list[str]:
     Parameters
     ----------
     laws : sequence of str
-        Of each run.
+        Law of each run.
     """
     own = [theme.law_colour(law) for law in laws]
     colours: list[str] = []
@@ -76,7 +76,7 @@ def run_colours(laws: Sequence[str]) -> list[str]:
 
 
 def on_dark(colour: str) -> theme.Colour:
-    """A page's colour for a dark ground: as it is, or no lighter than is seen there."""
+    """Return a page's colour for a dark ground: unchanged, or lightened until it is visible."""
     red, green, blue = (value / 255 for value in bytes.fromhex(colour.removeprefix("#")))
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
     if saturation < HUELESS:
@@ -121,7 +121,7 @@ def leaders(tables: Sequence[Table]) -> list[int]:
 
 
 def _same(one: Table, other: Table) -> bool:
-    """Whether two were asked for the same at all ticks that they have in common."""
+    """True if two runs have the same reference at all common ticks."""
     t_ns, others_ns = (np.round(table["t_s"] * 1e9).astype(np.int64) for table in (one, other))
     _, rows, others = np.intersect1d(t_ns, others_ns, assume_unique=True, return_indices=True)
     apart = np.abs(one["q_ref_rad"][rows] - other["q_ref_rad"][others])
@@ -132,7 +132,7 @@ Array = NDArray[np.float64]
 
 
 class Spectrum(NamedTuple):
-    """Of one run's tracking error about one hinge."""
+    """Spectrum of one run's tracking error about one hinge."""
 
     frequency_Hz: Array  # (n,) above zero
     amplitude_mrad: Array  # (n,)

@@ -29,7 +29,7 @@ DESIRED = "desired"
 
 
 class LawTrajectory(NamedTuple):
-    """One run."""
+    """Trajectory of one run under a law."""
 
     law: str
     t_s: Array  # (n,)
@@ -47,9 +47,9 @@ def write(path: Path, trajectories: Mapping[str, LawTrajectory], actuator: Actua
     flights : mapping of label to LawTrajectory
         At least one.
     actuator : Actuator
-        Whose shaft tip is drawn.
+        Actuator whose shaft tip is drawn.
     name : str
-        Of the recording.
+        Name of the recording.
 
     Raises
     ------

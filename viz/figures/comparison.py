@@ -92,7 +92,7 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
     ----------
     runs : sequence of ComparedRun
     of_runs : sequence of sequence of Spectrum
-        Of each run, of each hinge.
+        Spectra of each run and each hinge.
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 7.0), layout="constrained")
@@ -116,13 +116,13 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
 def over_time(
     runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[ScalarQuantity], title: str
 ) -> Figure:
-    """Draw them; what was asked for is a thin dark line on the others.
+    """Draw quantities over time; the reference is a thin dark line over the others.
 
     Parameters
     ----------
     runs : sequence of ComparedRun
     leading : sequence of int
-        Places of the runs that show what was asked for.
+        Places of the runs that show the reference.
     quantities : sequence of Quantity
     title : str
     """

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 MARGIN = 1.25
 SHIFT = 0.035
-"""Of the steps of x, between the laws: their ranges do not lie upon each other."""
+"""Shift between the laws, as a share of the steps of x: their ranges do not overlap."""
 
 
 class ErrorsByCondition(NamedTuple):
@@ -26,14 +26,14 @@ class ErrorsByCondition(NamedTuple):
     law: str
     values: Array  # (n,)
     error_rad: Array  # (3, n, hinges) lowest, median and highest over the seeds
-    whole: NDArray[np.bool_]  # (n,) whether every run came to its end
+    whole: NDArray[np.bool_]  # (n,) True if every run was completed
     paper_rad: Mapping[float, Sequence[float]]  # printed, by the value of the condition
 
 
 def by_condition(
     by_label: Mapping[str, ErrorsByCondition], hinges: Sequence[str], x: str, quantity: str, title: str
 ) -> Figure:
-    """Draw it; hollow where a run did not come to its end, bars where the paper prints a number.
+    """Draw the errors; hollow if a run was not completed, bars for the numbers printed in the paper.
 
     Parameters
     ----------
@@ -105,10 +105,10 @@ WIDE = 9.0
 
 
 class MarginPanel(NamedTuple):
-    """One thing that is made worse."""
+    """Panel of one condition that is varied."""
 
     name: str
-    by_law: Mapping[str, Array]  # (n, 3) step, error in rad, whether the law holds
+    by_law: Mapping[str, Array]  # (n, 3) step, error in rad, 1 if the law holds
 
 
 def margins(
@@ -121,7 +121,7 @@ def margins(
     panels : sequence of MarginPanel
     labels : mapping of law to label
     bound_rad : float, rad
-        Below which a law holds.
+        Bound below which a law holds.
     quantity, title : str
     """
     across = min(3, len(panels))
@@ -165,7 +165,7 @@ ROW_in = 0.5
 
 
 class RatioRow(NamedTuple):
-    """One reading."""
+    """One reading of the paper."""
 
     label: str
     by_law: Mapping[str, Array]  # (n,) ratios of each law
@@ -209,11 +209,11 @@ def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, t
 __all__ = ["Curve", "estimators", "save"]
 
 
-LEAST_LAG_s = 1e-5  # less is drawn as this much: beside a period of 1 ms it is none
+LEAST_LAG_s = 1e-5  # lower bound of the axis: negligible compared with a period of 1 ms
 
 
 class Curve(NamedTuple):
-    """One estimator over the bandwidths."""
+    """Errors and lags of one estimator over the bandwidths."""
 
     rms_error_rad_s: Array  # (b,)
     lag_s: Array  # (b,) below zero where it is ahead
@@ -226,8 +226,8 @@ class Curve(NamedTuple):
 def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str) -> Figure:
     """RMS error of the rate above, lag below: a colour an estimator, dots measured, lines derived.
 
-    Each estimator's default is a dashed line of its colour. A lag that the noise does not let be told from
-    none is drawn hollow, at the largest that it may be.
+    Each estimator's default is a dashed line of its colour. A lag that the noise hides is drawn hollow, at
+    its largest possible value.
 
     Parameters
     ----------

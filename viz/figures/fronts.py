@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 MARGIN = 1.15
 SIZES = {"*": 9.0}
-"""Of markers that look smaller than others."""
+"""Sizes of markers that look smaller than others."""
 
 MOST = 40.0
 """Largest error that is drawn, over the least."""
 
 
 class FrontPanel(NamedTuple):
-    """One condition."""
+    """Panel of one condition."""
 
     title: str
     error: str
@@ -106,7 +106,7 @@ def _size(style: LawStyle) -> float:
     return SIZES.get(style.marker, 6.0)
 
 
-# Beyond this many times the best a figure of a bad trial would leave no room for the good ones.
+# Larger multiples of the best are cut: bad trials would leave no room for the good ones.
 DECADES_ON = 30.0
 
 
@@ -115,18 +115,18 @@ class Trials(NamedTuple):
 
     law: str
     numbers: Array  # (n,)
-    values: Array  # (n, objectives); of a pruned trial what is certain, NaN of one that lost
+    values: Array  # (n, objectives); of a pruned trial a lower bound, NaN of one that was lost
     completed: NDArray[np.bool_]  # (n,)
     best: NDArray[np.bool_]  # (n,)
     signs: Array  # (objectives,) −1 where large is good
-    has_start: bool  # whether trial 0 is what the others are held against
-    fresh: Array  # (b, objectives) of the best under fresh seeds; empty where there are none
+    has_start: bool  # True if trial 0 is the reference of the others
+    fresh: Array  # (b, objectives) of the best under fresh seeds; empty if there are none
 
 
 def progress(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str) -> Figure:
     """Each objective over the trials: a dot a completed one, a ring a pruned one, a line the best so far.
 
-    What lost, or is off the scale, is a tick at the edge.
+    Trials that were lost, or are off the scale, are ticks at the edge.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def progress(by_label: Mapping[str, Trials], objectives: Sequence[str], title: s
 
 
 def front(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str) -> Figure:
-    """Two objectives of all completed trials, and the front of those that none is better than in both.
+    """Draw two objectives of all completed trials, and their Pareto front.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _progress(panel: Axes, label: str, trials: Trials, place: int) -> None:
 
 
 def _finish(panel: Axes, values: Sequence[Array], which: str) -> None:
-    """A logarithmic axis where all is above zero, cut where only what is far from the best lies."""
+    """Make an axis logarithmic if all values are positive, and cut values far from the best."""
     of_all = np.concatenate(values)
     if len(of_all) and np.all(of_all > 0):
         (panel.set_xscale if which == "x" else panel.set_yscale)("log")

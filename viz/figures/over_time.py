@@ -28,7 +28,7 @@ class ErrorCourse(NamedTuple):
     law: str
     errors_deg: Array  # (seeds, windows, axes)
     paper_deg: float
-    paper_axes: tuple[int, ...]  # for which the paper prints it; none where it has not the law
+    paper_axes: tuple[int, ...]  # axes for which the paper prints it; empty if it does not have the law
 
 
 class ErrorLine(NamedTuple):
@@ -81,7 +81,7 @@ def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
     ----------
     groups : sequence of ErrorGroup
     quantity : str
-        What the axis is, with its unit.
+        Label of the axis, with its unit.
     title : str
     """
     rows = [len(group.lines) for group in groups]
@@ -125,7 +125,7 @@ def _spread(panel: Axes, y: float, values: Array, colour: str, inside: str) -> N
 
 
 def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
-    """A logarithmic axis in plain numbers, a faint grid behind, no box."""
+    """Make a logarithmic axis in plain numbers, with a faint grid and no box."""
     axis = panel.yaxis if which == "y" else panel.xaxis
     (panel.set_yscale if which == "y" else panel.set_xscale)("log")
     axis.set_major_formatter("{x:g}")
@@ -137,7 +137,7 @@ def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
 
 LEAST_mrad = 0.2  # less is drawn as this much, on a logarithmic axis
 MARKS = 9  # markers along a line
-OUTLINED = [withStroke(linewidth=1.6, foreground="white")]  # seen on a dark line too
+OUTLINED = [withStroke(linewidth=1.6, foreground="white")]  # visible on a dark line too
 
 
 class ErrorBand(NamedTuple):
@@ -154,8 +154,8 @@ class AngleTraces(NamedTuple):
     t_s: Array  # (n,)
     q_rad: Array  # (n, hinges)
     desired_t_s: Array  # (m,)
-    desired_rad: Array  # (m, hinges) of the whole motion, however long the run
-    whole: bool  # whether it came to its end
+    desired_rad: Array  # (m, hinges) of the whole motion, for any length of the run
+    whole: bool  # True if it was completed
 
 
 def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[str], title: str) -> Figure:
@@ -203,7 +203,7 @@ def _ends_early(course: ErrorBand, longest: int) -> bool:
 
 
 def angles(by_label: Mapping[str, AngleTraces], hinges: Sequence[str], title: str) -> Figure:
-    """Angles and what was asked of them: a column a law, a row a hinge.
+    """Draw angles and their references: a column for each law, a row for each hinge.
 
     Parameters
     ----------

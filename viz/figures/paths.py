@@ -18,12 +18,12 @@ Array = NDArray[np.float64]
 
 
 class TipPath(NamedTuple):
-    """Of one run."""
+    """Path of the tip in one run."""
 
     law: str
     tip_mm: Array  # (n, 3)
     desired_mm: Array  # (n, 3)
-    whole: bool  # whether it came to its end
+    whole: bool  # True if it was completed
 
 
 def paths(by_label: Mapping[str, TipPath], title: str) -> Figure:
@@ -97,7 +97,7 @@ def _plan(axes: Axes, path: TipPath, colour: str, sides: tuple[float, float]) ->
 
 
 def _ends(axes: Axes, path: TipPath, colour: str, which: slice) -> None:
-    """Where a path starts, and where it ends too early."""
+    """Mark the start of a path, and an early end."""
     axes.plot(*path.tip_mm[:1, which].T, "o", color=INK, markersize=5)
     if not path.whole:
         axes.plot(*path.tip_mm[-1:, which].T, "x", color=colour, markersize=9, markeredgewidth=2)

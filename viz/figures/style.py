@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Drawing(NamedTuple):
-    """A figure, the file it goes to, and what it shows."""
+    """Figure of a page, with its file and its caption."""
 
     file: str
     caption: str
@@ -28,20 +28,20 @@ class Drawing(NamedTuple):
 
 
 MOST_POINTS = 3000
-"""Of a line: a print of 20 cm has fewer dots."""
+"""Points of a line: a print of 20 cm has fewer dots."""
 
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2)), (0, (2, 1)))
-"""By the place of a run: what tells them apart in grey print."""
+"""Dashes by the place of a run: runs are distinct in grey print."""
 
 
 class RunStyle(NamedTuple):
-    """Of one run."""
+    """Colour and dash of one run."""
 
     colour: str
     dash: Any
 
     def line(self) -> dict[str, Any]:
-        """For a line of the run."""
+        """Return the properties of a line of the run."""
         return {"color": self.colour, "linestyle": self.dash, "linewidth": 1.1}
 
 
@@ -52,7 +52,7 @@ def run_styles(runs: Sequence[ComparedRun]) -> list[RunStyle]:
 
 
 def plain(axes: Axes, y: str) -> None:
-    """A quantity with its unit at the side, a faint grid behind, no box."""
+    """Set a quantity with its unit as the label, a faint grid, and no box."""
     axes.set_ylabel(y, fontsize="small")
     axes.tick_params(labelsize="small")
     axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
@@ -71,18 +71,18 @@ Array = NDArray[np.float64]
 
 mrad_per_degree = 1e3 * np.pi / 180
 MANY = 2000.0
-"""Ratio of an axis from which on whole powers of ten are ticks enough."""
+"""Ratio of an axis beyond which ticks at whole powers of ten are enough."""
 
 
 class LawStyle(NamedTuple):
-    """Of one law."""
+    """Colour, marker and dash of one law."""
 
     colour: str
     marker: str
     dash: Any
 
     def line(self) -> dict[str, Any]:
-        """For a line without markers."""
+        """Return the properties of a line without markers."""
         return {"color": self.colour, "linestyle": self.dash}
 
 

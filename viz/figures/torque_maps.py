@@ -25,7 +25,7 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
     workspace : Workspace
         The grid.
     on_grid : Capability
-        Of its poses, in the grid's shape.
+        Capability of its poses, in the grid's shape.
     limit_A : float, A
         Current limit, for the titles.
     """
@@ -126,7 +126,7 @@ def _at_all_tilts(workspace: Workspace, values: Array) -> Array:
 
 
 def _over_spin(workspace: Workspace, values: Array, worst: Callable[..., Array]) -> Array:
-    """(t, a) worst finite value over the reachable spins; NaN where there is none."""
+    """Return (t, a) worst finite values over the reachable spins; NaN if there are none."""
     usable = workspace.reachable & np.isfinite(values)
     start = np.inf if worst is np.min else -np.inf
     result = worst(values, axis=2, where=usable, initial=start)

@@ -16,7 +16,7 @@ from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octav
 from spheretwin.viz.pages import html
 from spheretwin.viz.quantities import Array, ScalarQuantity
 
-# The browser itself is told to ask no host for anything.
+# The browser is told to contact no host.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:;"
     " font-src data:; form-action 'none'; base-uri 'none'"
@@ -70,7 +70,7 @@ def page(
     runs : sequence of ComparedRun
     over_time, spectra : Figure
     above, below : str
-        What stands above and below the figures, in Markdown.
+        Markdown above and below the figures.
     """
     figures = {"over-time": over_time, "spectra": spectra}
     content = ", ".join(f'"{name}": {figure.to_json()}' for name, figure in figures.items())
@@ -103,15 +103,15 @@ HEIGHT_px, GAP_px, MARGIN_px = 150, 26, 46
 
 
 class PlotPanel(NamedTuple):
-    """One of them."""
+    """Panel of a figure."""
 
     title: str
-    """With its unit."""
+    """Title with its unit."""
     traces: Sequence[Any]
     axis: dict[str, Any]
-    """What its vertical axis has beside the looks of all."""
+    """Properties of its vertical axis besides those of all panels."""
     height: float = 1.0
-    """Of that of an ordinary one."""
+    """Height relative to an ordinary panel."""
 
 
 def stacked(panels: Sequence[PlotPanel], x: str, **axis: Any) -> plotly.Figure:
@@ -121,9 +121,9 @@ def stacked(panels: Sequence[PlotPanel], x: str, **axis: Any) -> plotly.Figure:
     ----------
     panels : sequence of PlotPanel
     x : str
-        What the common axis is, with its unit.
+        Label of the common axis, with its unit.
     **axis
-        What it has beside the looks of all.
+        Properties of the axis besides the common ones.
     """
     inner_px = sum(panel.height * HEIGHT_px + GAP_px for panel in panels)
     figure, top = plotly.Figure(), 1.0
@@ -156,7 +156,7 @@ def stacked(panels: Sequence[PlotPanel], x: str, **axis: Any) -> plotly.Figure:
 
 
 MOST_NUMBERS = 130_000
-"""In all lines; each takes five to six bytes of the page, beside the library's 4.8 MB."""
+"""Numbers in all lines; each takes five to six bytes of the page, in addition to the library's 4.8 MB."""
 
 MOST_POINTS, FEWEST_POINTS = 20_000, 300
 MOST_COLUMNS, MOST_CURRENTS = 500, 30_000
@@ -175,7 +175,7 @@ def over_time(
     ----------
     runs : sequence of ComparedRun
     leading : sequence of int
-        Places of the runs that show what was asked for.
+        Places of the runs that show the reference.
     quantities : sequence of Quantity
     """
     most = int(np.clip(points_per_line(runs, leading, quantities), FEWEST_POINTS, MOST_POINTS))
@@ -215,7 +215,7 @@ def error_spectra(runs: Sequence[ComparedRun], spectra: Sequence[Sequence[Spectr
     ----------
     runs : sequence of ComparedRun
     spectra : sequence of sequence of Spectrum
-        Of each run, of each hinge.
+        Spectra of each run and each hinge.
     """
     colours, panels = run_colours([run.law for run in runs]), []
     lines_per_octave = int(
@@ -256,7 +256,7 @@ def _line(
 
 
 def _currents(runs: Sequence[ComparedRun]) -> list[PlotPanel]:
-    """Of each run a panel: a row a group, blue negative, red positive, on one scale."""
+    """Return a panel for each run: a row for each group, blue negative, red positive, on one scale."""
     largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs)
     panels = []
     for place, run in enumerate(runs):
@@ -288,10 +288,10 @@ def _events(runs: Sequence[ComparedRun], colours: Sequence[str]) -> PlotPanel:
 
 
 def _small(values: Array) -> np.ndarray:
-    """In half the bytes: seven digits are more than a plot shows."""
+    """Halve the bytes: seven digits are more than a plot shows."""
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
 def _text(text: str) -> str:
-    """Text in which no tag is obeyed; quotes stay, which the library would show as they are written."""
+    """Escape all tags; quotes stay, because the library would show their escapes."""
     return escape(text, quote=False)

@@ -39,7 +39,7 @@ _FAR = 1e3
 
 
 class PhasePlane(RecordingPart):
-    """Points (s - ė, ė) of the axes, both in rad/s: with s = λe + ė (30) the first is λe, whatever λ is."""
+    """Points (s - ė, ė) of the axes, both in rad/s: with s = λe + ė (30) the first is λe, for any λ."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
@@ -108,12 +108,12 @@ QUANTITY_RATE_Hz = 25.0
 # A file has a layout before the one of its end from then on, in s of the clock: it takes some 100 kB.
 OPENED_AFTER_s = 2.0
 
-# After these ends there is nothing that was planned and did not come.
+# After these statuses the planned time has been run.
 _AS_PLANNED = (Status.COMPLETED, Status.RUNNING)
 
 
 class Quantities(RecordingPart):
-    """Of each bin of time what the quantity says of itself that matters."""
+    """Derived quantities, aggregated in bins of time."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
@@ -132,11 +132,11 @@ class Quantities(RecordingPart):
         self._bins = TimeBins(QUANTITY_RATE_Hz, immediate=subject.live)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
-        self._begun_s: float | None = None  # of the clock, when the first rows came: all is compiled then
+        self._begun_s: float | None = None  # clock at the first rows: all is compiled then
         self._opened = False
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log how the quantities look, and for whoever watches what is known of the run from its start."""
+        """Log the styles of the quantities and, in a live view, the facts of the run."""
         for quantity in self._quantities:
             recording.log(derived(quantity.name), quantity_style(quantity), static=True)
         if self.subject.live:
@@ -167,7 +167,7 @@ class Quantities(RecordingPart):
         recording.send_blueprint(layout(self.subject.view, self._extent_tracker.extents(ended_s)))
 
     def _open(self, recording: rr.RecordingStream) -> None:
-        """Lay a file out for whoever finds it without its end; most runs end before it could be killed."""
+        """Send a layout in case the process is killed; most runs end before that is necessary."""
         self._begun_s = self._begun_s or monotonic()
         if self._opened or self.subject.live or monotonic() - self._begun_s < OPENED_AFTER_s:
             return
@@ -203,7 +203,7 @@ Array = NDArray[np.float64]
 
 CURRENT_MAP_RATE_Hz = 12.5
 
-# Of a row of the map, in points of the screen: rows of 18 groups touch in a panel of some 230 of them.
+# Height of a row of the map, in points of the screen: rows of 18 groups touch in a panel of some 230 of them.
 ROW_HEIGHT = 12.0
 
 # The bars' panel: as wide as this, as high as 1 between the limits.
@@ -211,7 +211,7 @@ WIDTH = 2.0
 
 
 class Currents(RecordingPart):
-    """Of each bin of time each group's current of the largest magnitude."""
+    """Current of the largest magnitude of each group in each bin of time."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)

@@ -1,4 +1,4 @@
-"""A recording read back: facts, telemetry bit for bit, events; of one that was not closed, what is whole."""
+"""Reader of recordings: facts, telemetry bit for bit, events; of an unclosed one all complete data."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class _Lines(NamedTuple):
 
 
 class Contents:
-    """What the chunks of a recording hold of its run; poses and colours are not read.
+    """Run data in the chunks of a recording; poses and colours are not read.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Contents:
         self._totals: dict[str, int] = {}
 
     def take(self, chunk: Chunk) -> None:
-        """Take what a chunk holds.
+        """Read the content of a chunk.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class Contents:
         Raises
         ------
         InputError
-            There are none, or they are not what was written.
+            There are none, or they are damaged.
         """
         if self._facts is None:
             raise InputError(
@@ -147,17 +147,17 @@ class Contents:
         return facts
 
     def table(self, *, ended: bool) -> Table:
-        """Return all rows by tick, NaN where a run had no such column.
+        """Return all rows by tick, NaN if a run had no such column then.
 
         Parameters
         ----------
         ended : bool
-            Whether the recording was closed: it has to state how many rows it has.
+            Whether the recording was closed: it must state its number of rows.
 
         Raises
         ------
         InputError
-            A row is not what was written, or is missing.
+            A row is damaged or missing.
         """
         signals = self._signals()
         if self.checked:
@@ -178,12 +178,12 @@ class Contents:
         Parameters
         ----------
         ended : bool
-            Whether the recording was closed: it has to state how many lines it has.
+            Whether the recording was closed: it must state its number of lines.
 
         Raises
         ------
         InputError
-            A line is not what was written, or is missing.
+            A line is damaged or missing.
         """
         if self.checked:
             self._check_line_numbers(ended=ended)
@@ -255,7 +255,7 @@ class Contents:
         self._check_total(EVENTS, len(numbers), ended=ended)
 
     def _check_ranges(self, signals: tuple[Signal, ...], *, ended: bool) -> None:
-        """Refuse rows that are not those of their checksums, and fewer than a closed recording states."""
+        """Refuse rows that do not match their checksums, and fewer rows than a closed recording states."""
         ranges = sorted(self._ranges)
         ends = list(accumulate(row_range.rows for row_range in ranges))
         if [row_range.first for row_range in ranges] != [0, *ends][: len(ranges)]:
@@ -284,7 +284,7 @@ class Contents:
             raise self._damaged(f"entity {entity}, behind number {count - 1}")
 
     def _values(self, rows: _Rows, signals: tuple[Signal, ...]) -> NDArray[np.float64]:
-        """Values of a chunk, signals in the order in which they came, as they were summed up."""
+        """Return the values of a chunk, signals in the order of arrival, as for the checksum."""
         present = tuple(signal for signal in signals if signal.name in rows.values)
         values = [rows.values[signal.name] for signal in present]
         known = len(present) == len(rows.values) and "t_s" in rows.values
@@ -339,12 +339,12 @@ def _times(batch: pa.RecordBatch) -> NDArray[np.int64]:
     return np.asarray(batch.column(TIMELINE).cast(pa.int64()))
 
 
-# A recording has its times in whole nanoseconds.
+# Recordings have times in whole nanoseconds.
 _NS = 1e-9
 
 
 class Recorded(NamedTuple):
-    """What a recording says of its run."""
+    """Run data of a recording."""
 
     facts: dict[str, Any]
     """`RunFacts` as JSON has them, and versions."""
@@ -353,7 +353,7 @@ class Recorded(NamedTuple):
     events: list[Event]
     """Its log, in the order of time."""
     whole: bool
-    """Whether it was closed; else the process was killed, or its end cut off."""
+    """True if it was closed; otherwise the process was killed, or the end is missing."""
     checked: bool
     """True if it has checksums; they were compared."""
 
@@ -364,7 +364,7 @@ def read(path: Path) -> Recorded:
     Raises
     ------
     InputError
-        It is no recording of a run of this package, is damaged, or not one tick of it is whole.
+        It is no recording of a run of this package, is damaged, or has no complete tick.
     """
     return _read(path)[0]
 
@@ -386,7 +386,7 @@ def _read(path: Path) -> tuple[Recorded, Contents]:
 
 
 def rewrite(path: Path, target: Path) -> Recorded:
-    """Write what is whole of a recording as one that is closed, with its layout; returns what it says.
+    """Write the complete data of a recording as a closed one, with its layout; return its run data.
 
     Raises
     ------
@@ -403,7 +403,7 @@ def rewrite(path: Path, target: Path) -> Recorded:
         recording.set_log_time_enabled(False)
         recording.set_sinks(rr.FileSink(temporary), default_blueprint=layout(view))
         recording.send_chunks(chunks)
-        if recorded.checked:  # a recording that is closed states how much it holds
+        if recorded.checked:  # a closed recording states its numbers of rows and lines
             for entity, count in contents.counts.items():
                 recording.log(entity, [total(count)], static=True)
         recording.flush()
@@ -424,7 +424,7 @@ def _chunks(path: Path) -> Iterator[tuple[Iterable[Chunk], bool]]:
 
     try:
         with whole_messages(path) as (readable, extent), warnings.catch_warnings():
-            warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # that it has no footer is told here
+            warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # a missing footer is reported here
             check_readable(readable, path)
             yield counted(RrdReader(readable).stream()), extent.ended
     except (SpheretwinError, KeyboardInterrupt, SystemExit):
@@ -438,5 +438,5 @@ def _chunks(path: Path) -> Iterator[tuple[Iterable[Chunk], bool]]:
 
 
 def _exact(t_ns: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
-    """Times of ticks from whole nanoseconds, to the last bit: sessions make them as products."""
+    """Return times of ticks from whole nanoseconds, exact to the last bit: sessions make them as products."""
     return np.round(t_ns * _NS / period_s) * period_s

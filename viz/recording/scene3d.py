@@ -29,7 +29,7 @@ from spheretwin.viz.scene.static import labels, log_static, size_of
 FRAME_RATE_Hz = 60.0
 
 LARGEST_rad = 1e6
-"""Beyond it a pose is none any more, and its sine has no digits left."""
+"""Beyond it a pose is meaningless, and its sine has no correct digits."""
 
 
 class Frames:
@@ -38,7 +38,7 @@ class Frames:
     Parameters
     ----------
     rate_Hz : float
-        Of the frames.
+        Rate of the frames.
     """
 
     def __init__(self, rate_Hz: float = FRAME_RATE_Hz) -> None:
@@ -46,7 +46,7 @@ class Frames:
         self._next = 0
 
     def of(self, rows: Table) -> NDArray[np.bool_]:
-        """Whether each row of a chunk is drawn."""
+        """Return True for each row of a chunk that is drawn."""
         frame = np.floor(rows["t_s"] * self._rate_Hz + 1e-6).astype(np.int64)
         new = frame >= np.concatenate([[self._next], frame[:-1] + 1])
         self._next = max(self._next, int(frame[-1]) + 1)
@@ -54,7 +54,7 @@ class Frames:
 
 
 def posed(rows: Table) -> NDArray[np.bool_]:
-    """Whether each row has a pose; the last of a run that diverged may have none."""
+    """Return True for each row that has a pose; the last of a run that diverged may have none."""
     small: NDArray[np.bool_] = np.all(np.abs(rows["q_rad"]) < LARGEST_rad, axis=1)
     return small
 
@@ -67,7 +67,7 @@ class MovingActuator(RecordingPart):
         self._frames = Frames()
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log what keeps its shape."""
+        """Log the static parts."""
         log_static(recording, self.subject.actuator, self.subject.facts)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
@@ -134,7 +134,7 @@ RATE_Hz = 20.0
 
 
 class Torques(RecordingPart):
-    """Of the coils, of a payload's weight, and of the load where there is one."""
+    """Torques of the coils, of a payload's weight, and of the load if there is one."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
@@ -184,7 +184,7 @@ def _gravity(facts: RunFacts) -> NDArray[np.float64]:
 
 
 class Traces(RecordingPart):
-    """One short segment a frame; the view shows those of each trace's ages."""
+    """Traces of the tip: one short segment for each frame; the view shows those of each trace's ages."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
@@ -192,7 +192,7 @@ class Traces(RecordingPart):
         self._last: dict[TipTrace, NDArray[np.float64]] = {}
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log what each trace looks like."""
+        """Log the style of each trace."""
         for trace in TRACES:
             width = rr.Radius.ui_points(trace.width)
             style = rr.LineStrips3D.from_fields(colors=[trace.colour], radii=width)

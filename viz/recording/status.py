@@ -94,7 +94,7 @@ class Log(RecordingPart):
         self._lines = 0
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
-        """Log what is worth a line in a chunk."""
+        """Log the events of a chunk."""
         self._log(recording, self._events.of(rows))
 
     def note(self, recording: rr.RecordingStream, event: Event) -> None:
@@ -141,14 +141,14 @@ WITHIN, VOLTAGE, CURRENT, RANK = LEVELS = (
     "saturated",
     "rank lost",
 )
-"""From what holds nothing back to what holds back most."""
+"""From no limit to the most severe one."""
 
 Change = tuple[float, str]
 """Time in s, and the state from then on."""
 
 
 class LimitSpells:
-    """Finds when a run is at a limit, chunk by chunk: pauses shorter than `QUIET_S` are none."""
+    """Finds the times at a limit, chunk by chunk; pauses shorter than `QUIET_S` are ignored."""
 
     def __init__(self) -> None:
         self._level = 0
@@ -156,7 +156,7 @@ class LimitSpells:
         self._free_s = 0.0  # of the first tick after the last one at a limit
 
     def of(self, rows: Table) -> list[Change]:
-        """Changes that the rows of a chunk make sure of."""
+        """Return the changes that are certain after the rows of a chunk."""
         t_s, levels, changes = rows["t_s"], _levels(rows), []
         if self._free_s < self._last_s:  # the last row of the chunk before was at a limit
             self._free_s = float(t_s[0])
@@ -177,7 +177,7 @@ class LimitSpells:
 
 
 def _levels(rows: Table) -> NDArray[np.int64]:
-    """What holds back most at each tick, as a place among `LEVELS`."""
+    """Return the most severe limit at each tick, as a place among `LEVELS`."""
     levels = np.zeros(len(rows), dtype=np.int64)
     if any(signal.name == "voltage_limited" for signal in rows.signals):
         levels[np.any(rows["voltage_limited"] > 0, axis=1)] = LEVELS.index(VOLTAGE)
@@ -226,7 +226,7 @@ def _log(recording: rr.RecordingStream, lane: str, changes: list[Change]) -> Non
         recording.send_columns(lane, time_index(np.array(t_s)), rr.StateChange.columns(state=list(states)))
 
 
-# Axes, what was asked and what the controller believes have the same colours in every plot.
+# Axes, commands and estimates have the same colours in every plot.
 KEY = "α red, β green, γ blue; white what was asked, amber what the controller takes for true"
 
 
@@ -236,7 +236,7 @@ class Summary:
     Parameters
     ----------
     facts : RunFacts
-        What is known from the start.
+        Facts of the run.
 
     Attributes
     ----------
@@ -265,7 +265,7 @@ class Summary:
         self._squares += float(np.sum(finite_deg**2))
 
     def running(self) -> str:
-        """The line while the run goes on."""
+        """Return the line of a run in progress."""
         return _with_colour_key(f"{self._run_text()} — running")
 
     def ended(self, status: Status) -> str:

@@ -1,4 +1,4 @@
-"""Where the moving parts of the actuator are, from its hinge angles."""
+"""Motion of the actuator's parts as a function of the hinge angles, torque arrows and traces."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ Array = NDArray[np.float64]
 
 
 class TorqueStyle(NamedTuple):
-    """How a torque is shown."""
+    """Label and colour of a torque."""
 
     label: str
     colour: theme.Colour
@@ -69,16 +69,16 @@ TORQUE_STYLES = {
     "gravity": TorqueStyle("gravity", theme.PAYLOAD),
     "load": TorqueStyle("load", theme.LOAD),
 }
-"""By name."""
+"""Styles by the name of the torque."""
 
 METRES_PER_Nm = 0.1
-"""Beside an actuator as large as the shipped one; like the axes, longer beside a larger one."""
+"""Length of an arrow for an actuator of the shipped size; like the axes, it grows with the actuator."""
 
 SCALE = f"torque arrows: the length of x, y, z is {AXES_LENGTH_m / METRES_PER_Nm:g} N·m"
-"""What the arrows' lengths mean, for people."""
+"""Scale of the arrows, for the name of the view."""
 
 LONGEST_m = 1e3
-"""Of an arrow along each axis: torques of a run that diverges are beyond single precision."""
+"""Largest component of an arrow: torques of a run that diverges are beyond single precision."""
 
 
 def load_torque(q: Array, disturbance_Nm: Array) -> Array:
@@ -112,7 +112,7 @@ def gravity_torque(q: Array, payload_kg: float, mount_m: Array, gravity_m_s2: Ar
     payload_kg : float, kg
         Point mass.
     mount_m : (3,) array, m
-        Where it is, rotor frame.
+        Its position, rotor frame.
     gravity_m_s2 : (3,) array, m/s²
         Stator frame.
 
@@ -125,7 +125,7 @@ def gravity_torque(q: Array, payload_kg: float, mount_m: Array, gravity_m_s2: Ar
 
 
 TRAIL_S = 2.0
-"""What is older is not shown."""
+"""Older parts are not shown."""
 
 
 class TipTrace(NamedTuple):
@@ -150,4 +150,4 @@ TRACES: tuple[TipTrace, ...] = (
     TipTrace(f"{WORLD}/tip/oldest", "q_rad", 1.2, TRAIL_S, 15.0, _FADED[2], 1.2),
     TipTrace(f"{WORLD}/tip_desired", "q_ref_rad", 0.0, TRAIL_S, 15.0, theme.DESIRED_TRACE, 0.7),
 )
-"""The older, the thinner and greyer, which is fainter on any ground; each age has segments of its own."""
+"""Older parts are thinner and greyer, which is fainter on any ground; each age has its own segments."""

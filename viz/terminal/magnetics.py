@@ -21,12 +21,12 @@ FIGURE_NAMES = {
 
 
 def print_computed_curve(computed: ComputedCurve) -> None:
-    """Print what is known of a curve that was computed."""
+    """Print the results for a computed curve."""
     _print_curve("torque curve computed from the geometry", [("peak", _peak(computed.peak))])
 
 
 def print_judged_curve(path: Path, judged: JudgedCurve) -> None:
-    """Print what is known of a user's curve."""
+    """Print the results for a user's curve."""
     geometry = judged.geometry
     rows = [
         ("samples", str(judged.rows)),
@@ -41,7 +41,7 @@ def print_judged_curve(path: Path, judged: JudgedCurve) -> None:
 
 
 def print_field(verdict: FieldVerdict) -> None:
-    """Print the errors of the torque matrix by tilt, and where they come from."""
+    """Print the errors of the torque matrix by tilt, and their sources."""
     console = tables.terminal_console()
     title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
     table = tables.new_table(

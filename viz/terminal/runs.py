@@ -1,4 +1,4 @@
-"""For people, on stdout: what a run found, where files are, and what a scenario's fields are."""
+"""Tables of runs, studies, tunings, files and scenario fields, on stdout."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COLOURS = {Level.INFO: "italic", Level.WARN: "bold yellow", Level.ERROR: "bold r
 
 
 def print_run(law: str, planned_s: float, summary: dict[str, Any], own: Sequence[str] = ()) -> None:
-    """Print the figures of one run: errors per axis, currents and speed, then those of the user's own."""
+    """Print the figures of one run: errors per axis, currents and speed, then the user's own metrics."""
     console, status = tables.terminal_console(), named(summary["status"])
     title = f"{summary['scenario']['name']} under {law}: {_ending(status, planned_s, summary)}"
     errors = tables.new_table(title, "tracking error, mrad (degrees)", *ANGLES)
@@ -59,7 +59,7 @@ def print_run(law: str, planned_s: float, summary: dict[str, Any], own: Sequence
 
 
 def _ending(status: Status, planned_s: float, summary: dict[str, Any]) -> str:
-    """How a run ended; where it did not complete, also when, and why."""
+    """Return the status of a run; if it did not complete, also time and reason."""
     if status == Status.COMPLETED:
         return status
     why = f", {summary['reason']}" if summary["reason"] else ""
@@ -67,7 +67,7 @@ def _ending(status: Status, planned_s: float, summary: dict[str, Any]) -> str:
 
 
 def angle(value_rad: float) -> str:
-    """An angle in mrad, and in degrees behind it."""
+    """Return an angle in mrad, followed by degrees."""
     return f"{three_digits(1e3 * value_rad)} ({three_digits(math.degrees(value_rad))}°)"
 
 
@@ -169,7 +169,7 @@ ROWS = (
 
 
 def print_runs(runs: Sequence[dict[str, Any]]) -> None:
-    """Print what was found of runs."""
+    """Print the reports of runs."""
     if len(runs) == 1:
         _print_one(runs[0])
     else:
@@ -250,11 +250,11 @@ def _with_difference(first: float | None, value: float | None, unit: str) -> str
 
 NONE = "–"
 MOST = 15
-"""Of a front that are printed, evenly along it; its table has all."""
+"""Trials of a front that are printed, evenly along it; the table has all."""
 
 
 def print_tuning(name: str, result: dict[str, Any]) -> None:
-    """Print the best trial of each law, or its front, beside the gains that it started with."""
+    """Print the best trial of each law, or its front, with the gains at the start."""
     console = tables.terminal_console()
     for law, of_law in result["laws"].items():
         _print_law(f"{name}, {law}: {_counted(of_law)}", of_law)

@@ -1,4 +1,4 @@
-"""How every table looks, and how wide it may be."""
+"""Style and width of all tables."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from spheretwin.models.base.checks import Check, broken
 
 WIDTH_WITHOUT_TERMINAL = 100
 LEAST = 1e-3
-"""Smaller figures are written as less than this: all that they say is that they do not matter."""
+"""Smaller figures are written as less than this: they are negligible."""
 
 
 def terminal_console() -> Console:
-    """What is written to stdout: as wide as the terminal; in a pipe or a file as wide as one is read."""
+    """Return a console for stdout: as wide as the terminal; in a pipe or a file of a readable width."""
     console = Console()
     if console.is_terminal or "COLUMNS" in os.environ:
         return console
@@ -30,14 +30,14 @@ def terminal_console() -> Console:
 def new_table(title: str, first: str, *others: str, lines: bool = False) -> Table:
     """A table under its title: what a row is about at the left, figures at the right.
 
-    Where no terminal is, it is Markdown.
+    Without a terminal it is Markdown.
 
     Parameters
     ----------
     title, first, others : str
         As they are, without markup; headings of the columns.
     lines : bool
-        Whether to part the rows, where they have several lines each.
+        Whether to separate the rows, if they have several lines each.
     """
     console = terminal_console()
     table = Table(
@@ -65,7 +65,7 @@ def three_digits(value: float) -> str:
 
 
 def print_checks(title: str, checks: Sequence[Check], verbose: bool = False) -> None:
-    """Print a line a check: whether it holds, figure and bound; at length also what each means."""
+    """Print a line for each check: result, figure and bound; with `verbose` also its meaning."""
     console = terminal_console()
     table = new_table(title, "", "value", "bound")
     table.add_column("check")
