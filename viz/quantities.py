@@ -182,9 +182,7 @@ def angle_between(q: Array, desired: Array) -> Array:
     return np.asarray(2 * np.arctan2(np.sqrt(across), np.abs(along)))
 
 
-ERROR_ANGLE = Quantity(
-    "error_angle_deg", "°", "angle between the rotor and where it should be", error_angle, 0.01
-)
+ERROR_ANGLE = Quantity("error_angle_deg", "°", "angle between the rotor and its reference", error_angle, 0.01)
 
 
 def estimated_rate(rows: QuantityRows) -> Array:
@@ -217,7 +215,7 @@ def torque_margin(rows: QuantityRows) -> Array:
 MARGIN = Quantity(
     "torque_margin",
     "1",
-    "share of the commanded torque that the current limit would let be added",
+    "share of the commanded torque that the current limit permits in addition",
     torque_margin,
     floor=MOST / 2,
     aggregation=Aggregation.LEAST,
@@ -247,7 +245,7 @@ def tip_distance(rows: QuantityRows) -> Array:
 
 
 TIP_DISTANCE = Quantity(
-    "tip_distance_mm", "mm", "distance of the shaft's tip from where it should be", tip_distance, 0.01
+    "tip_distance_mm", "mm", "distance of the shaft's tip from its reference", tip_distance, 0.01
 )
 
 

@@ -88,7 +88,9 @@ class Player:
         groups = run.table["current_A"].shape[1] if len(run.table) else 0
         known = {signal.name for signal in run.table.signals}
         if not {signal.name for signal in common_signals(max(groups, 1))} <= known:
-            raise InputError(f"bench: expected rows of a whole run in {path}, received {len(run.table)} rows")
+            raise InputError(
+                f"bench: expected rows of a complete run in {path}, received {len(run.table)} rows"
+            )
         scenario = run.record.scenario
         self.period_s = run.period_s
         self.name, self.law = str(scenario["name"]), str(scenario["controller"]["law"])

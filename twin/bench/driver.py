@@ -160,8 +160,8 @@ class Driver:
             raise InputError("bench: manual: expected either currents_A or group, received both or none")
         if group is not None and group >= groups:
             raise InputError(f"bench: manual: expected a group from 0 to {groups - 1}, received {group}")
-        alone = [current_A if each == group else 0.0 for each in range(groups)]
-        self._set_currents("manual", alone if currents_A is None else list(currents_A))
+        one_group = [current_A if other == group else 0.0 for other in range(groups)]
+        self._set_currents("manual", one_group if currents_A is None else list(currents_A))
 
     def hold(self) -> None:
         """Come to rest at the present pose."""
@@ -290,4 +290,4 @@ class Driver:
 
 
 def _without(planned: list[Any], place: int | None) -> list[Any]:
-    return [] if place is None else [each for i, each in enumerate(planned) if i != place]
+    return [] if place is None else [fault for i, fault in enumerate(planned) if i != place]

@@ -123,7 +123,7 @@ def approach_duration_s(difference: Array, limits: Limits) -> float:
     """Return the least time in which a difference of motions fades within limits, plus its own rates."""
     unit = np.zeros((2, 3, 3))
     unit[0, 0, 0] = unit[1, 1, 0] = 1.0
-    by_angle, by_rate = (faded(each, SHARES, 1.0)[:, :, 0] for each in unit)  # (shares, 3) derivatives
+    by_angle, by_rate = (faded(motion, SHARES, 1.0)[:, :, 0] for motion in unit)  # (shares, 3) derivatives
     rate = np.abs(difference[1])
     T = DURATIONS_s[:, None, None]
     rates = difference[0] * by_angle[:, 1, None] / T + difference[1] * by_rate[:, 1, None]

@@ -149,7 +149,7 @@ class ModesTab:
     def _manual(self, gui: viser.GuiApi, actuator: Actuator) -> None:
         groups, limit = len(actuator.groups), float(actuator.group.current_limit_A)
         with gui.add_folder("manual currents", expand_by_default=False):
-            gui.add_markdown("In this mode, click a coil for its group alone.")
+            gui.add_markdown("In this mode, click a coil to apply a current to its group only.")
             chosen = gui.add_slider("group", 0, groups - 1, 1, 0)
             self._handlers.on_change(chosen)
             alone = gui.add_button(f"Only this group, at {ONLY_THIS_A:g} A")

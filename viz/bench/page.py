@@ -211,7 +211,7 @@ class Page:
                 ask.label = ASK if state.operator else TAKE_OVER
                 give.visible = state.operator == name and bool(state.asking)
                 if give.visible:
-                    give.label = f"Let {state.asking[0]} operate"
+                    give.label = f"Grant control to {state.asking[0]}"
 
 
 def _desired(state: Any) -> Any:

@@ -195,7 +195,7 @@ def _write_reference(
     alone: bool,
 ) -> None:
     """Write the reference: lines, and the path of the tip."""
-    colour, label = theme.DESIRED_TRACE, "asked for" if alone else f"asked for in {run.label}"
+    colour, label = theme.DESIRED_TRACE, "reference" if alone else f"reference of {run.label}"
     _write_part(recording, run, Tip(subject, TIP, "q_ref_rad", "", colour))
     for quantity in quantities:
         if quantity.desired:

@@ -133,7 +133,7 @@ def over_time(
             _draw(panel, run, quantity.values(run.rows), label=run.label, **of_run.line())
         for place in leading:
             if quantity.desired:
-                name = "asked for" if len(leading) == 1 else f"asked for in {runs[place].label}"
+                name = "reference" if len(leading) == 1 else f"reference of {runs[place].label}"
                 look = {"label": name, "color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
                 _draw(panel, runs[place], quantity.desired(runs[place].rows), **look)
         if quantity.limits:

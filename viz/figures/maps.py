@@ -154,7 +154,7 @@ def maps(
         _in_plain_numbers(bar.ax.yaxis, float(np.nanmax(values) / np.nanmin(values)))
     bar.ax.tick_params(labelsize="small")
     lost = any(np.any(panel.lost) for panel in panels.values())
-    figure.suptitle(f"{title}\n× not all rows came to their end" if lost else title, fontsize="medium")
+    figure.suptitle(f"{title}\n× not all runs completed" if lost else title, fontsize="medium")
     return figure
 
 
@@ -179,7 +179,7 @@ def lines(
         axes.plot(places, line.median, "o-", color=colour, markersize=4, linewidth=1.3, label=law)
         axes.plot(places[line.lost], line.median[line.lost], "x", color=INK, markersize=9)
     if any(np.any(line.lost) for line in by_law.values()):
-        axes.plot([], [], "x", color=INK, label="not all runs came to their end")
+        axes.plot([], [], "x", color=INK, label="not all runs completed")
     if named:
         axes.set_xticks(places, list(x), rotation=20, ha="right")
     values = np.concatenate([line.median for line in by_law.values()])

@@ -56,7 +56,7 @@ def compare(plots: Plots) -> rrb.Container:
         for axis, name in enumerate(ANGLES)
     ]
     apart = plots.above_zero(
-        "shaft's tip from where it should be", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
+        "tip's distance from its reference", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
     )
     above = rrb.Horizontal(*angles_of_each), rrb.Horizontal(*rates_of_each)
     return rrb.Vertical(*above, apart, row_shares=[4, 4, 3], name="compare")
@@ -223,7 +223,7 @@ def hardware(plots: Plots) -> rrb.Container:
         shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
     if "friction_Nm" in names:
         shown.append(plots.whole("friction", "N·m", signal("friction_Nm"), least=0.002))
-    state_views = [plots.states("states of what can fail"), log()]
+    state_views = [plots.states("states of the components"), log()]
     if not shown:
         return rrb.Vertical(*state_views, name="hardware")
     chain = rrb.Grid(*shown, grid_columns=2)

@@ -281,7 +281,7 @@ class Contents:
 
     def _check_total(self, entity: str, count: int, *, ended: bool) -> None:
         if (ended or entity in self._totals) and self._totals.get(entity) != count:
-            raise self._damaged(f"entity {entity}, behind number {count - 1}")
+            raise self._damaged(f"entity {entity}, after number {count - 1}")
 
     def _values(self, rows: _Rows, signals: tuple[Signal, ...]) -> NDArray[np.float64]:
         """Return the values of a chunk, signals in the order of arrival, as for the checksum."""
@@ -298,7 +298,7 @@ class Contents:
 
     def _damaged(self, place: str) -> InputError:
         return InputError(
-            f"recording {self._path}: expected what was written, received something else in {place}:"
+            f"recording {self._path}: expected intact data, received other data in {place}:"
             " the file is damaged, or was changed by another program"
         )
 
@@ -378,7 +378,7 @@ def _read(path: Path) -> tuple[Recorded, Contents]:
         log = contents.log(ended=whole)
     period_s = float(facts["sections"]["controller"]["period_s"])
     if not len(table) and not whole:
-        raise InputError(f"recording {path}: expected a whole tick, received one that ends before its first")
+        raise InputError(f"recording {path}: expected at least one complete tick, received none")
     t_s = _exact(np.array([line[0] for line in log], dtype=np.float64), period_s)
     events = [(float(t), Level(level), text) for t, (_, level, text) in zip(t_s, log, strict=True)]
     events.sort(key=lambda event: event[0])

@@ -117,7 +117,7 @@ class Recorder(Stream):
         if self.fault:
             raise SpheretwinError(
                 f"recording: {self._path} could not be completed, {self.fault};"
-                f" what there is of it is in {self._output.path}"
+                f" the incomplete recording is in {self._output.path}"
             )
         try:
             self._output.keep()

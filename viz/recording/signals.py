@@ -51,9 +51,9 @@ def signals_as_json(arrival: int, signals: Sequence[Signal]) -> list[rr.Describe
     texts = {DESCRIBED: text, DESCRIBED_CHECKSUM: text_checksum(text)}
     return [
         rr.DescribedComponentBatch(
-            rr.components.TextBatch(each), rr.ComponentDescriptor(component(kind, arrival))
+            rr.components.TextBatch(content), rr.ComponentDescriptor(component(kind, arrival))
         )
-        for kind, each in texts.items()
+        for kind, content in texts.items()
     ]
 
 

@@ -227,7 +227,7 @@ def _log(recording: rr.RecordingStream, lane: str, changes: list[Change]) -> Non
 
 
 # Axes, commands and estimates have the same colours in every plot.
-KEY = "α red, β green, γ blue; white what was asked, amber what the controller takes for true"
+KEY = "α red, β green, γ blue; white commands and references, amber measurements and estimates"
 
 
 class Summary:

@@ -82,7 +82,7 @@ def print_checks(title: str, checks: Sequence[Check], verbose: bool = False) -> 
             console.print(f"bound {check.bound_text()}: {escape(check.why)}")
     console.print(f"{len(checks) - len(broken(checks))} of {len(checks)} checks hold")
     if not verbose:
-        console.print("What each compares, and why its bound: --verbose.")
+        console.print("--verbose explains each comparison and its bound.")
 
 
 def _verdict(check: Check) -> str:

@@ -147,7 +147,7 @@ def test_check_prints_a_table(capsys, coarse):
     code, out, err = here(capsys, "check", "--poses", 1)
     assert (code, err) == (0, "")
     assert "0° to 12°" in out
-    assert "Where it comes from" in out
+    assert "Sources of the error" in out
     assert "2 of 2 checks hold" in out
 
 

@@ -154,7 +154,7 @@ def test_one_page_operates_and_gives_over(browser):
         second.click("text=Ask to operate")
         assert told(bench, 2)[1:] == [("ask", {})]
         bench.now.asking = ("page 1",)
-        first.click("text=Let page 1 operate")
+        first.click("text=Grant control to page 1")
         assert told(bench, 3)[2:] == [("grant", {"to": "page 1"})]
         first.close()
         second.close()
