@@ -122,7 +122,7 @@ def test_every_bit_of_the_footer_counts(files, tmp_path):
         assert not (tmp_path / "out.parquet").exists(), f"bit {bit}"
 
 
-def test_damage_is_told_with_its_row_group_and_column(files, tmp_path):
+def test_damage_is_reported_with_row_group_and_column(files, tmp_path):
     import pyarrow.parquet
 
     content, path = files[0].read_bytes(), tmp_path / "run.parquet"

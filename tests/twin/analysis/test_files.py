@@ -1,4 +1,4 @@
-"""A run is the same from either of its files, to the last bit; of a killed one, what is whole is told."""
+"""A run is the same from either of its files, to the last bit; of a killed one, complete rows are read."""
 
 import csv
 import json
@@ -61,7 +61,7 @@ def test_ticks_of_any_period_keep_their_bits(tmp_path, period_s):
     assert recording.table.values.tobytes() == telemetry.table.values.tobytes()
 
 
-def test_a_review_tells_the_figures_of_the_run_itself(files):
+def test_a_review_reports_the_figures_of_the_run(files):
     run = simulate(scenarios.load("hold", WITH_EVENTS))
     told = figures(read(files[0]))
     expected = figures_of(run)
@@ -70,7 +70,7 @@ def test_a_review_tells_the_figures_of_the_run_itself(files):
     assert told["energy_J"] == told["copper_loss_J"] + told["mechanical_work_J"]
 
 
-def test_a_run_whose_law_is_gone_is_still_reviewed(tmp_path):
+def test_a_run_without_its_law_file_is_reviewed(tmp_path):
     law = tmp_path / "mine.py"
     law.write_text(
         "from spheretwin.control.laws.pd import PD\n\nclass Mine(PD):\n    law: str = 'x'\n", encoding="utf-8"
@@ -107,7 +107,7 @@ def killed_telemetry(folder, rows):
     return file
 
 
-def test_telemetry_of_a_killed_process_is_read_and_made_whole(tmp_path, capsys):
+def test_telemetry_of_a_killed_process_is_read_and_recovered(tmp_path, capsys):
     file = killed_telemetry(tmp_path, 5000)
     path, out = tmp_path / "run.parquet", tmp_path / "whole.parquet"
     run = read(path)
@@ -253,7 +253,7 @@ def test_a_whole_file_is_not_recovered(files, tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-def test_what_several_processes_left_is_not_guessed(tmp_path):
+def test_partial_files_of_several_processes_are_refused(tmp_path):
     for number in "01":
         (tmp_path / f".run.rrd.{number}.part").touch()
     with pytest.raises(InputError, match="partial files of 2 processes"):

@@ -1,4 +1,4 @@
-"""From any mode to any other without a jump: of the reference, of the error, of the torque."""
+"""Changes between any modes are without a jump of reference, error and torque."""
 
 from itertools import product
 

@@ -1,4 +1,4 @@
-"""The loop's own time: STOP, pace, and what it counts; by a clock of the test's where there is one."""
+"""Time of the bench: STOP, pace, and its counts; with a clock of the test if possible."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from tests.twin.bench.test_operators import Clock
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_stop_takes_the_currents_away_with_the_next_tick_until_reset(tmp_path, mode):
+def test_stop_sets_zero_currents_from_the_next_tick_until_reset(tmp_path, mode):
     path = tmp_path / "run.parquet"
     with begun() as made:
         done(made, "record", telemetry=str(path))
@@ -45,7 +45,7 @@ def test_stop_does_not_wait_for_what_is_being_prepared():
         assert made.state().stopped
 
 
-def test_what_was_asked_before_stop_does_not_undo_it():
+def test_commands_before_stop_do_not_undo_it():
     with begun() as made:
         before = [made.command(name) for name in ("pause", "reset", "start")]
         made.command("stop")
@@ -56,7 +56,7 @@ def test_what_was_asked_before_stop_does_not_undo_it():
         assert not made.state().stopped
 
 
-def test_stop_wakes_a_bench_at_work():
+def test_stop_wakes_the_thread():
     """In slow motion, where a chunk is 20 ms of the clock's, and while nothing runs at all."""
     with bench() as made:
         made.begin()
@@ -102,7 +102,7 @@ def test_chunks_keep_the_pace(clock, speed):
     assert pace.realtime_factor() == pytest.approx(speed, rel=0.02)  # of 50 chunks, the last one's end
 
 
-def test_late_chunks_are_counted_and_made_up_for_but_not_without_end(clock):
+def test_late_chunks_are_counted_and_made_up_within_a_bound(clock):
     pace = Pace(clock)
     run(pace, clock, 11)
     clock.now += 2.5 * CHUNK_s
@@ -116,7 +116,7 @@ def test_late_chunks_are_counted_and_made_up_for_but_not_without_end(clock):
     assert 0 < made_up_for <= LATE_s / CHUNK_s + 1
 
 
-def test_a_machine_too_slow_for_the_pace_runs_shorter_chunks_so_that_stop_is_heard(clock):
+def test_a_slow_machine_runs_shorter_chunks_so_that_stop_acts(clock):
     pace = Pace(clock)
     pace.speed = 1000.0
     for _ in range(100):
@@ -139,7 +139,7 @@ def test_as_fast_as_possible_waits_for_nothing_and_has_no_deadlines(clock):
     assert pace.realtime_factor() == pytest.approx(t_s / 0.01, rel=0.05)
 
 
-def test_the_history_is_thinned_bounded_and_the_same_whatever_the_chunks():
+def test_the_history_is_decimated_bounded_and_independent_of_chunks():
     found = []
     for chunk in (1, 7, 600):
         with begun() as made:
@@ -160,7 +160,7 @@ def test_the_history_is_thinned_bounded_and_the_same_whatever_the_chunks():
         np.testing.assert_allclose(history["t_s"][[0, -1]], [5.0, 14.98], rtol=1e-12)
 
 
-def test_what_was_reached_is_counted_anew_when_time_goes_back():
+def test_the_realtime_factor_restarts_when_time_goes_back():
     clock = Clock()
     pace = Pace(clock)
     for first_s in (5.0, 1.0):

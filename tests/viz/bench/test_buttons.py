@@ -1,9 +1,9 @@
-"""Every button is one command with what its fields say, and nothing that is shared moves by itself."""
+"""Every button sends one command with the values of its fields; shared controls do not move by themselves."""
 
 import msgspec
 import pytest
 
-from tests.viz.bench.test_door import CAMERA, changed, handle_of, socket_to, wait_for
+from tests.viz.bench.test_server import CAMERA, changed, handle_of, socket_to, wait_for
 
 BUTTONS = {
     "STOP (space)": ("stop", {}),

@@ -1,4 +1,4 @@
-"""What is drawn of a run against the definitions of a rotation and of virtual power."""
+"""Quantities of compared runs against the definitions of a rotation and of virtual power."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Runs merged into one recording: every number of each as it was, and a layout that names what is there."""
+"""Runs merged into one recording: every number of each run, and a layout of existing entities only."""
 
 import os
 import runpy
@@ -104,7 +104,7 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
     assert apart["error_angle_deg"].any()
 
 
-def test_what_was_asked_for_is_there_once(merged):
+def test_the_reference_is_recorded_once(merged):
     leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/what_was_asked/")}
     assert leading == {"run_3_slow"}  # the longest of runs that were asked for the same
     wanted = merged.values("/what_was_asked/run_3_slow/angle_α_rad")

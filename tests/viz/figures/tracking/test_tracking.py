@@ -24,7 +24,7 @@ def drawn():
     return conditions.by_condition(by_label, HINGES, "load L", "largest |error|", "title")
 
 
-def test_laws_are_told_apart_without_colour():
+def test_laws_are_distinct_without_colour():
     looks = styles(LAWS)
     assert len({look.colour for look in looks.values()}) == len(LAWS)
     assert len({(look.marker, look.dash) for look in looks.values()}) == len(LAWS)
@@ -61,7 +61,7 @@ def test_what_ended_early_is_hollow():
     assert any(text.get_text() == "ended early" for text in drawn().legends[0].get_texts())
 
 
-def test_a_course_ends_in_a_cross_where_its_run_did():
+def test_a_line_of_an_early_end_has_a_cross():
     by_label = {
         "PD": over_time.ErrorBand("pd", np.full((2, 3, 3), 0.5)),
         "AFSM": over_time.ErrorBand("afsm", np.full((2, 8, 3), 0.01)),

@@ -1,4 +1,4 @@
-"""What a thinned recording keeps: whole rows, all that stands out, however the rows come in chunks."""
+"""Rows of a decimated recording: complete rows and all extremes, for any chunks."""
 
 import numpy as np
 import pytest
@@ -138,7 +138,7 @@ def both(tmp_path_factory):
     return recorded(folder / "all.rrd"), recorded(folder / "some.rrd", RATE_Hz)
 
 
-def test_a_thinned_recording_has_whole_rows_of_the_run_and_all_of_its_events(both):
+def test_a_decimated_recording_has_complete_rows_and_all_events(both):
     every, some = both
     assert (every.facts["record_rate_Hz"], some.facts["record_rate_Hz"]) == (None, RATE_Hz)
     assert some.events == every.events

@@ -1,4 +1,4 @@
-"""What is recorded to be looked at: equal to what it is made of, peaks and all, whatever the chunks."""
+"""Plotted data of a recording: equal to their source with all peaks, for any chunks."""
 
 import numpy as np
 import pytest
@@ -144,7 +144,7 @@ def rising(rows):
     return [np.concatenate(each) for each in zip(first.pairs(), last.pairs(), strict=True)]
 
 
-def test_what_rises_or_falls_steadily_is_drawn_as_it_is():
+def test_a_steady_rise_or_fall_keeps_its_form():
     values = np.stack([np.arange(ROWS), -np.arange(ROWS)], axis=1).astype(np.float64)
     t_s, drawn = rising(values)
     np.testing.assert_allclose(drawn[:, 0], t_s / TICK_s, atol=1e-9)
@@ -177,7 +177,7 @@ def slow_spells(t_s, levels):
 
 
 @given(st.lists(st.tuples(st.integers(1, 290), st.integers(1, 2)), max_size=5), st.sets(st.integers(1, 299)))
-def test_spells_at_a_limit_are_told_once_whatever_the_chunks(limited, cuts):
+def test_times_at_a_limit_are_logged_once_for_any_chunks(limited, cuts):
     table = Table(LIMIT_SIGNALS, np.zeros((300, width(LIMIT_SIGNALS))))
     table["t_s"][:], table["allocation_scale"][:] = TICK_s * np.arange(300), 1.0
     levels = np.zeros(300, dtype=int)
@@ -191,7 +191,7 @@ def test_spells_at_a_limit_are_told_once_whatever_the_chunks(limited, cuts):
     assert found == slow_spells(table["t_s"], levels)
 
 
-def test_a_survey_keeps_all_bounds_in_little_memory():
+def test_the_tracker_keeps_all_bounds_in_bounded_memory():
     survey, generator = ExtentTracker({"a": 1, "b": 2}), np.random.default_rng(0)
     values = generator.normal(size=(20 * SPANS, 3))
     for first in range(0, len(values), 100):

@@ -1,4 +1,4 @@
-"""Fewer numbers in which no lowest, highest or strongest is lost, against loops over every block."""
+"""Decimation keeps lowest, highest and largest values, compared with loops over every block."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Ranges and titles made of what a run has shown."""
+"""Ranges and titles from the extents of a run."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def with_transient(peak, settled, spans):
     return np.where(np.arange(len(T_s)) < spans, peak, settled)
 
 
-def test_a_settled_error_is_legible_beside_its_transient():
+def test_a_settled_error_is_legible_after_its_transient():
     of = seen(with_transient(31.0, 0.5, 4))
     limit = of.limit(ERROR, least=0.1)
     assert 0.5 < limit <= 1.0
@@ -46,7 +46,7 @@ def test_an_error_of_the_second_half_is_always_drawn():
     assert seen(values).limit(ERROR, least=0.1) > 40.0
 
 
-def test_noise_does_not_look_like_something():
+def test_noise_looks_small():
     of = seen(np.full(len(T_s), 1e-6))
     assert of.limit(ERROR, least=0.1) >= 0.1
     low, high = of.band(ERROR, least=0.1)

@@ -178,7 +178,7 @@ def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize("library", ["matplotlib", "plotly"])
-def test_what_is_not_installed_is_told_on_one_line(files, tmp_path, monkeypatch, library, capsys):
+def test_a_missing_library_is_reported_on_one_line(files, tmp_path, monkeypatch, library, capsys):
     from spheretwin.viz.pages import markdown
 
     present = markdown.find_spec

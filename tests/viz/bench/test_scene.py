@@ -140,7 +140,7 @@ def test_each_hinge_turns_about_its_own_axis(scene, actuator):
     assert not scene.handle.visible
 
 
-def test_what_is_under_the_pointer_is_where_the_tip_goes(scene, actuator):
+def test_the_tip_goes_under_the_pointer(scene, actuator):
     """The inverse of the tip's place, from any eye that sees it."""
     for q in ([0.3, 0.2, 0.5], [-0.4, 0.6, -1.0], [0.0, 0.0, 0.0]):
         tip = rotation(np.array(q)) @ actuator.shaft_tip_m
