@@ -20,7 +20,6 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, leaders
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages import markdown as folder
 from spheretwin.viz.quantities import QuantityRows, ScalarQuantity, scalar_quantities
 from spheretwin.viz.terminal.runs import differences as table_rows
 
@@ -110,7 +109,7 @@ def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
     parts_of_runs = differing_fields([run.record.scenario for run in runs])
     run_labels = []
     for place, (run, parts) in enumerate(zip(runs, parts_of_runs, strict=True), start=1):
-        stem, law = shortened(run.path.stem, LONGEST_VALUE), _law_name(run)
+        stem, law = shortened(run.path.stem, LONGEST_VALUE), _law(run)
         label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
         for part in parts:
             if len(label) + len(part) + 2 > longest:
@@ -143,10 +142,6 @@ def differing_fields(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
         ]
         for fields in flat
     ]
-
-
-def _law_name(run: Reviewed) -> str:
-    return str(run.record.scenario["controller"]["law"])
 
 
 def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
@@ -319,7 +314,7 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
     spectra = [_spectra(run) for run in runs]
     title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs"
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
-        folder.save_drawings(into, _drawings(drawn_runs, leading, quantities, spectra), vector=True)
+        markdown.save_drawings(into, _drawings(drawn_runs, leading, quantities, spectra), vector=True)
         over_time = interactive.over_time(drawn_runs, leading, quantities)
     content = interactive.page(
         title,
@@ -329,7 +324,7 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
         _above(title, drawn_runs, interactive.points_per_line(drawn_runs, leading, quantities)),
         _below(drawn_runs, figures),
     )
-    return folder.save_text(into / PAGE, content)
+    return markdown.save_text(into / PAGE, content)
 
 
 def check_figures(into: Path) -> None:
@@ -340,7 +335,7 @@ def check_figures(into: Path) -> None:
     InputError
         A library for figures is not installed, or the folder cannot be made or written to.
     """
-    folder.prepare(into, "plotly")
+    markdown.prepare(into, "plotly")
 
 
 def _drawings(

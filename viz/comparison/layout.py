@@ -68,13 +68,20 @@ def layout(view: ComparisonView) -> rrb.Blueprint:
         *([_states(view)] if view.states else []),
         *_plots(view, BESIDE_TEXTS),
     )
-    return rrb.Blueprint(
+    return blueprint(
         rrb.Horizontal(
             rrb.Vertical(_bodies(view), texts, row_shares=[3, 1]),
             rrb.Vertical(*rows, row_shares=[4 if group == NAMED else 3 for group in groups]),
             column_shares=[2, 3],
             name="compare",
-        ),
+        )
+    )
+
+
+def blueprint(contents: rrb.Container) -> rrb.Blueprint:
+    """Return the blueprint of a recording of several runs, which plays in a loop."""
+    return rrb.Blueprint(
+        contents,
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),

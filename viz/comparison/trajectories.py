@@ -16,10 +16,9 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import send_line, send_path, send_point, style_path, style_point
-from spheretwin.viz.comparison.layout import time_axis, trail_behind
+from spheretwin.viz.comparison.layout import blueprint, time_axis, trail_behind
 from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.comparison.runs import on_dark
-from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import shaft_tip
 
@@ -108,14 +107,7 @@ def _layout(trajectories: Mapping[str, LawTrajectory]) -> rrb.Blueprint:
             ("torque", "torque of the coils, norm [N·m]"),
         )
     ]
-    return rrb.Blueprint(
-        rrb.Horizontal(tips, rrb.Vertical(*plots), column_shares=[4, 5]),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return blueprint(rrb.Horizontal(tips, rrb.Vertical(*plots), column_shares=[4, 5]))
 
 
 def _part(label: str) -> str:
