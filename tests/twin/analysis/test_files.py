@@ -246,9 +246,9 @@ def test_a_recording_of_something_else_is_refused(tmp_path):
         read(path)
 
 
-def test_a_whole_file_is_not_recovered(files, tmp_path):
+def test_a_complete_file_is_not_recovered(files, tmp_path):
     for path in files:
-        with pytest.raises(InputError, match="received a whole"):
+        with pytest.raises(InputError, match="received a complete"):
             recovery.recover(path, tmp_path / "out")
     assert os.listdir(tmp_path) == []
 

@@ -170,7 +170,7 @@ def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypat
     assert cli.main(["review", str(files[0]), "--figures", str(tmp_path)]) == 0
     assert len(os.listdir(tmp_path)) == 2 * len(NAMES) + 1
     text = (tmp_path / comparison.PAGE).read_text(encoding="utf-8")
-    assert "drawn by the lowest and the highest" in text
+    assert "drawn by the lowest and highest value" in text
     traces = [each for each in figures_of(Sources(text))["over-time"]["data"] if each["type"] == "scatter"]
     (largest,) = {float(decoded(each["y"]).max()) for each in traces[:1]}
     quantity = scalar_quantities([read(files[0]).table])[0]
