@@ -16,7 +16,7 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recovery
-from spheretwin.analysis.recorded_run import export, headings, read
+from spheretwin.analysis.recorded_run import export, read
 from spheretwin.analysis.run_summary import figures
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
@@ -91,7 +91,7 @@ def test_columns_come_back_bit_for_bit(files, tmp_path, kind):
     assert read(path).table.values.tobytes() == run.table.values.tobytes()
     export(run, path := tmp_path / "columns.csv")
     header, *rows = csv.reader(path.read_text(encoding="utf-8").splitlines())
-    assert header == [name for signal in run.table.signals for name in headings(signal)]
+    assert header == [name for signal in run.table.signals for name in signal.headings()]
     assert np.array(rows, dtype=float).tobytes() == run.table.values.tobytes()
     assert header[:2] == ["t_s", "q_rad[α]"]
 
