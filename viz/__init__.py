@@ -1,1 +1,1 @@
-"""What a person looks at: recordings, live views, tables of figures."""
+"""Visualisation: recordings, live views, figures, pages and tables."""

@@ -1,4 +1,4 @@
-"""Columns of many rows as few numbers, in which nothing that stands out is lost."""
+"""Decimation: many rows as few numbers that keep the extremes."""
 
 from __future__ import annotations
 
@@ -14,45 +14,45 @@ from spheretwin.models.telemetry.table import Table
 Array = NDArray[np.float64]
 
 
-class Thinned(NamedTuple):
-    """Numbers at equal distances."""
+class DecimatedSeries(NamedTuple):
+    """Values at equal distances."""
 
     values: Array  # (m,)
-    rows_each: float
-    """Rows that one of them stands for; 1 where none was left out."""
+    stride: float
+    """Rows for each of the numbers; 1 if none was omitted."""
 
 
-def thinned(values: Array, most: int) -> Thinned:
-    """A column as it is, or of every so many rows the lowest and the highest, the earlier first.
+def decimate_extremes(values: Array, most: int) -> DecimatedSeries:
+    """Return a column unchanged, or the lowest and highest value of each block of rows, the earlier first.
 
     Parameters
     ----------
     values : (n,) array
         A NaN is no value.
     most : int
-        Numbers that are wanted, at least 2.
+        Largest number of values, at least 2.
     """
     if len(values) <= most:
-        return Thinned(values, 1.0)
+        return DecimatedSeries(values, 1.0)
     blocks, size = _blocks(values[:, None], most // 2)
     block = blocks[:, :, 0]
     none = np.isnan(block)
     low, high = np.argmin(np.where(none, np.inf, block), 1), np.argmax(np.where(none, -np.inf, block), 1)
     places = np.sort(np.stack([low, high], axis=1), axis=1)
-    return Thinned(np.take_along_axis(block, places, axis=1).ravel(), size / 2)
+    return DecimatedSeries(np.take_along_axis(block, places, axis=1).ravel(), size / 2)
 
 
-def strongest(values: Array, most: int) -> Thinned:
-    """Columns (n, k) as at most so many rows (m, k): of every so many rows the value farthest from zero."""
+def decimate_largest(values: Array, most: int) -> DecimatedSeries:
+    """Reduce columns (n, k) to at most `most` rows (m, k): of each block, the value farthest from zero."""
     if len(values) <= most:
-        return Thinned(values, 1.0)
+        return DecimatedSeries(values, 1.0)
     blocks, size = _blocks(values, most)
     places = np.argmax(np.where(np.isnan(blocks), -1.0, np.abs(blocks)), axis=1)
-    return Thinned(np.take_along_axis(blocks, places[:, None], axis=1)[:, 0], float(size))
+    return DecimatedSeries(np.take_along_axis(blocks, places[:, None], axis=1)[:, 0], float(size))
 
 
-def highest_by_octave(frequency: Array, values: Array, each: int) -> tuple[Array, Array]:
-    """Lines of a spectrum, of which each so many-th part of an octave keeps its highest.
+def octave_maxima(frequency: Array, values: Array, lines_per_octave: int) -> tuple[Array, Array]:
+    """Reduce a spectrum to the highest line of each part of an octave.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ def highest_by_octave(frequency: Array, values: Array, each: int) -> tuple[Array
         Above zero, rising.
     values : (n,) array
     each : int
-        Lines of an octave that are kept.
+        Lines for each octave.
     """
     if not len(frequency):
         return frequency, values
-    part = np.floor(each * np.log2(frequency / frequency[0])).astype(np.int64)
+    part = np.floor(lines_per_octave * np.log2(frequency / frequency[0])).astype(np.int64)
     starts = np.flatnonzero(np.diff(part, prepend=part[0] - 1))
     ends = np.append(starts[1:], len(values))
     rows = [first + int(np.argmax(values[first:last])) for first, last in zip(starts, ends, strict=True)]
@@ -72,7 +72,7 @@ def highest_by_octave(frequency: Array, values: Array, each: int) -> tuple[Array
 
 
 def _blocks(values: Array, most: int) -> tuple[Array, int]:
-    """Rows (n, k) in blocks (b, size, k) of one size; the last is filled up with its own last row."""
+    """Return rows (n, k) in blocks (b, size, k) of one size; the last is filled up with its own last row."""
     size = -(-len(values) // most)
     missing = -len(values) % size
     filled = np.concatenate([values, np.repeat(values[-1:], missing, axis=0)])
@@ -81,31 +81,31 @@ def _blocks(values: Array, most: int) -> tuple[Array, int]:
 
 Places = NDArray[np.intp]
 
-# Rows of so long a time are looked at together for what stands out in them.
+# Time of the windows of which the extremes are kept.
 WINDOW_S = 20.0
 
-# Rows whose bounds are found before the place of the bound is looked for in one such block: a bound takes a
-# fourth of the time of its place.
+# Rows of a block: first the bounds of all blocks are found, then the place of the bound within one block. A
+# bound takes a fourth of the time of its place.
 _BLOCK = 64
 
-# Of a bin or a window: times are products of whole numbers, right to some 1e-16 of themselves.
+# Tolerance at the edges of bins and windows: times are products of whole numbers, with errors of some 1e-16.
 _ROUNDING = 1e-6
 
 
-class Thinning:
-    """Keeps every row."""
+class RowSelection:
+    """Selects every row."""
 
-    def take(self, rows: Table) -> list[Table]:
-        """Rows to keep, as far as that is known after these."""
+    def add(self, rows: Table) -> list[Table]:
+        """Add rows; return the selected rows that are decided now."""
         return [rows]
 
-    def rest(self) -> list[Table]:
-        """Rows to keep of those that nothing was known of yet."""
+    def flush(self) -> list[Table]:
+        """Return the selected rows among those that were not decided yet."""
         return []
 
 
-class Firsts(Thinning):
-    """Keeps the first row of each bin of time.
+class FirstRows(RowSelection):
+    """Selects the first row of each bin of time.
 
     Parameters
     ----------
@@ -117,25 +117,25 @@ class Firsts(Thinning):
         self._rate_Hz = rate_Hz
         self._bin = -1
 
-    def take(self, rows: Table) -> list[Table]:
-        """Rows to keep."""
-        kept = rows.values[self.firsts(rows["t_s"])]
-        return [Table(rows.signals, kept)] if len(kept) else []
+    def add(self, rows: Table) -> list[Table]:
+        """Add rows; return the selected ones."""
+        selected = rows.values[self.first_places(rows["t_s"])]
+        return [Table(rows.signals, selected)] if len(selected) else []
 
-    def firsts(self, t_s: Array) -> Places:
-        """Places of the next rows that are the first of their bins."""
+    def first_places(self, t_s: Array) -> Places:
+        """Return the places of the next rows that are the first of their bins."""
         bins = np.floor(t_s * self._rate_Hz + _ROUNDING)
         new = np.flatnonzero(np.diff(bins, prepend=self._bin) > 0)
         self._bin = bins[-1]
         return new
 
 
-class FirstsAndExtremes(Thinning):
-    """Keeps whole rows, bit for bit: the first of each bin of time, and all that stand out.
+class FirstAndExtremeRows(RowSelection):
+    """Selects whole rows, bit for bit: the first of each bin of time, and all extremes.
 
-    Those are, of every window of 20 s, the rows in which an entry of a signal is at its largest or smallest;
+    Extremes are, in each window of 20 s, rows in which an entry of a signal is at its largest or smallest;
     where a state changes; where the current limit begins and ceases to cut the torque; and the last row.
-    Windows go by time, and end besides where the columns change: how the rows come in chunks does not show.
+    Windows depend on time, and also end where the columns change: the result does not depend on the chunks.
 
     Parameters
     ----------
@@ -144,47 +144,47 @@ class FirstsAndExtremes(Thinning):
     """
 
     def __init__(self, rate_Hz: float) -> None:
-        self._firsts = Firsts(rate_Hz)
+        self._firsts = FirstRows(rate_Hz)
         self._window = -1.0
         self._waiting: list[Table] = []
         self._states: dict[str, Array] = {}
         self._last_saturated_s = -np.inf
 
-    def take(self, rows: Table) -> list[Table]:
-        """Rows to keep of the windows that are over."""
+    def add(self, rows: Table) -> list[Table]:
+        """Add rows; return the selected rows of the windows that have ended."""
         windows = np.floor(rows["t_s"] / WINDOW_S + _ROUNDING)
         begins = np.flatnonzero(np.diff(windows, prepend=self._window) > 0)
-        kept = []
+        selected = []
         if self._waiting and rows.signals != self._waiting[0].signals:
-            kept += self.rest()
+            selected += self.flush()
         for first, last in zip([0, *begins], [*begins, len(rows)], strict=True):
             if last > first:
                 self._waiting.append(rows.rows(first, last))
             if last < len(rows):
-                kept += self.rest()
+                selected += self.flush()
         self._window = windows[-1]
-        return kept
+        return selected
 
-    def rest(self) -> list[Table]:
-        """Rows to keep of the window at hand, which ends here."""
+    def flush(self) -> list[Table]:
+        """Return the selected rows of the present window, which ends here."""
         if not self._waiting:
             return []
         rows = Table(self._waiting[0].signals, np.concatenate([waiting.values for waiting in self._waiting]))
         self._waiting = []
         places = np.concatenate(
             [
-                self._firsts.firsts(rows["t_s"]),
-                _places_of(np.max, np.argmax, rows.values),
-                _places_of(np.min, np.argmin, rows.values),
-                self._changes_of_state(rows),
-                self._saturation(rows),
+                self._firsts.first_places(rows["t_s"]),
+                _first_bounds(np.max, np.argmax, rows.values),
+                _first_bounds(np.min, np.argmin, rows.values),
+                self._state_changes(rows),
+                self._saturation_ends(rows),
                 [len(rows) - 1],
             ]
         )
         return [Table(rows.signals, rows.values[np.unique(places.astype(np.intp))])]
 
-    def _changes_of_state(self, rows: Table) -> Places:
-        """Places of the first rows in which a part has another state."""
+    def _state_changes(self, rows: Table) -> Places:
+        """Return the places of the first rows in which a part has another state."""
         changed = [np.empty(0, np.intp)]
         for signal in rows.signals:
             if signal.states:
@@ -196,8 +196,8 @@ class FirstsAndExtremes(Thinning):
                 self._states[signal.name] = values[-1].copy()
         return np.concatenate(changed)
 
-    def _saturation(self, rows: Table) -> Places:
-        """Places of the first and the last row of each saturation; short pauses are part of one."""
+    def _saturation_ends(self, rows: Table) -> Places:
+        """Return the places of the first and last row of each saturation; short pauses belong to it."""
         places = np.flatnonzero(rows["allocation_scale"] < 1)
         if not len(places):
             return places
@@ -208,8 +208,8 @@ class FirstsAndExtremes(Thinning):
         return places[begins | ends]
 
 
-def _places_of(bound: Callable[..., Array], place: Callable[..., Places], values: Array) -> Places:
-    """Place of the first bound of each column, as ``place(values, axis=0)`` finds it."""
+def _first_bounds(bound: Callable[..., Array], place: Callable[..., Places], values: Array) -> Places:
+    """Return the place of the first bound of each column: that of ``place(values, axis=0)``."""
     ends = len(values) // _BLOCK * _BLOCK
     bounds = bound(values[:ends].reshape(-1, _BLOCK, values.shape[1]), axis=1)
     if ends < len(values):
@@ -219,15 +219,15 @@ def _places_of(bound: Callable[..., Array], place: Callable[..., Places], values
     return np.asarray(starts + within)
 
 
-FIRST_S = 2.0
+FIRST_CHUNK_S = 2.0
 """Time of the bins in the first chunk."""
 
-MOST = 4096
-"""Bins that a chunk need not exceed."""
+MOST_BINS = 4096
+"""Bins after which a chunk is always sent."""
 
 
-class Binned(NamedTuple):
-    """Bins that are complete."""
+class CompletedBins(NamedTuple):
+    """Completed bins."""
 
     t_s: Array
     """Time of the first row of each."""
@@ -244,13 +244,13 @@ class Binned(NamedTuple):
     """Time of the last row of each."""
 
     def extremes(self) -> Array:
-        """Value of the largest magnitude of each column: what is seldom must not be lost."""
+        """Return the value of the largest magnitude of each column: rare values are kept."""
         return np.where(self.high >= -self.low, self.high, self.low)
 
     def pairs(self) -> tuple[Array, Array]:
-        """Times and values of two rows a bin: its bounds, in the order in which the bin rises or falls.
+        """Return times and values of two rows for each bin: its bounds, in the order of its rise or fall.
 
-        They stand at its ends, so that what rises or falls steadily is drawn as it is.
+        They are at the ends of the bin, so that a steady rise or fall keeps its form.
         """
         rises = self.last >= self.first
         values = np.stack(
@@ -259,57 +259,59 @@ class Binned(NamedTuple):
         return np.stack([self.t_s, self.last_s], axis=1).ravel(), values.reshape(-1, values.shape[2])
 
 
-class Bins:
-    """Gathers rows into bins of one width, and bins into chunks.
+class TimeBins:
+    """Accumulates rows in bins of one width, and bins in chunks.
 
-    A file has some bytes for every chunk of every entity. Chunks therefore grow with what was handed over
-    before them; what a killed process has not handed over is less than half of that, or two seconds.
+    A file needs some bytes for every chunk of every entity. Chunks therefore grow with what was sent
+    before them; a killed process loses less than half of that, or two seconds.
 
     Parameters
     ----------
     rate_Hz : float
         Bins a second.
     at_once : bool
-        Hand over every bin once it is complete.
+        Send every bin once it is complete.
     """
 
-    def __init__(self, rate_Hz: float, *, at_once: bool = False) -> None:
-        self._rate_Hz, self._at_once = rate_Hz, at_once
+    def __init__(self, rate_Hz: float, *, immediate: bool = False) -> None:
+        self._rate_Hz, self._at_once = rate_Hz, immediate
         self._t_s: Array = np.empty(0)
         self._values: Array = np.empty((0, 0))
-        self._held: list[Binned] = []
-        self._handed_over = 0
+        self._completed: list[CompletedBins] = []
+        self._sent_count = 0
 
-    def add(self, t_s: Array, values: Array) -> Binned | None:
-        """Add rows (n, columns); returns complete bins, once there are enough."""
+    def add(self, t_s: Array, values: Array) -> CompletedBins | None:
+        """Add rows (n, columns); return completed bins, once there are enough."""
         if len(self._t_s):
             t_s, values = np.concatenate([self._t_s, t_s]), np.concatenate([self._values, values])
-        # A tick that falls on the edge of a bin is in it, whatever its last bit.
+        # A tick on the edge of a bin is in that bin, for any rounding.
         starts = np.flatnonzero(np.diff(np.floor(t_s * self._rate_Hz + 1e-6), prepend=-1.0))
         last = int(starts[-1])
         self._t_s, self._values = t_s[last:].copy(), values[last:].copy()
         if last:
-            self._held.append(_binned(t_s[:last], values[:last], starts[:-1]))
-        due = 1 if self._at_once else max(FIRST_S * self._rate_Hz, min(self._handed_over // 2, MOST))
-        return self._hand_over() if sum(len(each.t_s) for each in self._held) >= due else None
+            self._completed.append(_reduce_bins(t_s[:last], values[:last], starts[:-1]))
+        due = (
+            1 if self._at_once else max(FIRST_CHUNK_S * self._rate_Hz, min(self._sent_count // 2, MOST_BINS))
+        )
+        return self._send() if sum(len(bins.t_s) for bins in self._completed) >= due else None
 
-    def rest(self) -> Binned | None:
-        """All that is left, with the last bin, which no row is added to any more."""
+    def flush(self) -> CompletedBins | None:
+        """Return the remaining bins with the last one, which receives no more rows."""
         if len(self._t_s):
-            self._held.append(_binned(self._t_s, self._values, np.zeros(1, dtype=np.int64)))
+            self._completed.append(_reduce_bins(self._t_s, self._values, np.zeros(1, dtype=np.int64)))
             self._t_s = np.empty(0)
-        return self._hand_over() if self._held else None
+        return self._send() if self._completed else None
 
-    def _hand_over(self) -> Binned:
-        whole = Binned(*(np.concatenate(parts) for parts in zip(*self._held, strict=True)))
-        self._held = []
-        self._handed_over += len(whole.t_s)
-        return whole
+    def _send(self) -> CompletedBins:
+        bins = CompletedBins(*(np.concatenate(parts) for parts in zip(*self._completed, strict=True)))
+        self._completed = []
+        self._sent_count += len(bins.t_s)
+        return bins
 
 
-def _binned(t_s: Array, values: Array, starts: NDArray[np.int64]) -> Binned:
+def _reduce_bins(t_s: Array, values: Array, starts: NDArray[np.int64]) -> CompletedBins:
     ends = np.append(starts[1:], len(t_s))
-    return Binned(
+    return CompletedBins(
         t_s[starts],
         np.minimum.reduceat(values, starts, axis=0),
         np.maximum.reduceat(values, starts, axis=0),

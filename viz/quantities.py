@@ -18,8 +18,8 @@ from spheretwin.viz.scene.motion import shaft_tip
 Array = NDArray[np.float64]
 
 
-class Rows(NamedTuple):
-    """What a quantity is computed from."""
+class QuantityRows(NamedTuple):
+    """Rows and parameters from which a quantity is computed."""
 
     table: Table
     """Rows of one chunk."""
@@ -29,33 +29,33 @@ class Rows(NamedTuple):
     current_limit_A: float
 
 
-class Kept(Enum):
-    """What of many rows is drawn: nothing that matters is lost between those that are."""
+class Aggregation(Enum):
+    """Aggregation of the rows of a bin to what is drawn."""
 
-    BOTH = "both bounds: a line as wide as the values were far apart"
+    BOTH = "both bounds: the line is as wide as the spread of the values"
     LEAST = "the least value"
     GREATEST = "the greatest value"
     MEAN = "the mean, where single rows say nothing"
 
 
 class Quantity(NamedTuple):
-    """What is derived from telemetry to be looked at."""
+    """Quantity that a recording derives from telemetry."""
 
     name: str
     """Ends in its unit."""
     unit: str
     meaning: str
-    values: Callable[[Rows], Array]
-    """One row for each of the chunk's: (n, size)."""
+    values: Callable[[QuantityRows], Array]
+    """One row for each row of the chunk: (n, size)."""
     floor: float
-    """Half of the least range that its plot shows: what is less does not look like something."""
+    """Half of the least range of its plot: smaller values must not look large."""
     labels: tuple[str, ...] = ("",)
     """A name for each entry."""
     colours: tuple[theme.Colour, ...] = (theme.PLAIN,)
     """A colour for each entry."""
     needs: str = ""
-    """Signal that a run must have for it; none unless given."""
-    kept: Kept = Kept.GREATEST
+    """Signal that it needs; empty if none."""
+    aggregation: Aggregation = Aggregation.GREATEST
 
     @property
     def size(self) -> int:
@@ -67,17 +67,17 @@ def by_axis(
     name: str,
     unit: str,
     meaning: str,
-    values: Callable[[Rows], Array],
+    values: Callable[[QuantityRows], Array],
     floor: float,
     needs: str = "",
-    kept: Kept = Kept.BOTH,
+    aggregation: Aggregation = Aggregation.BOTH,
 ) -> Quantity:
     """Quantity with an entry for each hinge, in the colours of the axes."""
-    return Quantity(name, unit, meaning, values, floor, ANGLES, theme.AXIS_COLOURS, needs, kept)
+    return Quantity(name, unit, meaning, values, floor, ANGLES, theme.AXIS_COLOURS, needs, aggregation)
 
 
-def copper_loss(rows: Rows) -> Array:
-    """Copper loss, (n, 1) in W: as the amplifiers tell it, else by the resistance of cold coils."""
+def copper_loss(rows: QuantityRows) -> Array:
+    """Return the copper loss, (n, 1) in W: that of the amplifiers, else from the resistance of cold coils."""
     table = rows.table
     if any(signal.name == "copper_loss_W" for signal in table.signals):
         return np.sum(table["copper_loss_W"], axis=1, keepdims=True)
@@ -87,10 +87,10 @@ def copper_loss(rows: Rows) -> Array:
 COPPER_LOSS = Quantity("copper_loss_total_W", "W", "heat of all coils", copper_loss, floor=0.5)
 
 
-def coupling_torque(rows: Rows) -> Array:
-    """What of ``M qddot + C qdot`` is not an axis's own inertia, (n, 3) in N·m.
+def coupling_torque(rows: QuantityRows) -> Array:
+    """Return the part of ``M qddot + C qdot`` that is not an axis's own inertia, (n, 3) in N·m.
 
-    The accelerations are those of the rates from tick to tick; the inertia is that of the rotor alone.
+    The accelerations are differences of the rates from tick to tick; the inertia is that of the rotor only.
     """
     q, rate, t_s = rows.table["q_rad"], rows.table["qdot_rad_s"], rows.table["t_s"]
     step_s = np.diff(t_s, prepend=rows.before["t_s"])
@@ -133,11 +133,11 @@ COUPLING = by_axis(
     "torques of the hinges on each other (6)-(10)",
     coupling_torque,
     floor=0.005,
-    kept=Kept.MEAN,  # accelerations from tick to tick are mostly the chatter of the command
+    aggregation=Aggregation.MEAN,  # accelerations from tick to tick are mostly the chatter of the command
 )
 
 
-def delivered_torque(rows: Rows) -> Array:
+def delivered_torque(rows: QuantityRows) -> Array:
     """Generalised torque ``E^T torque_S`` at the pose of the tick, (n, 3) in N·m."""
     return on_the_hinges(rows.table["q_rad"], rows.table["torque_Nm"])
 
@@ -155,7 +155,7 @@ DELIVERED = by_axis(
 )
 
 
-def tracking_error(rows: Rows) -> Array:
+def tracking_error(rows: QuantityRows) -> Array:
     """Error (28), (n, 3) in mrad."""
     return 1e3 * rows.table["error_rad"]
 
@@ -163,7 +163,7 @@ def tracking_error(rows: Rows) -> Array:
 ERROR = by_axis("error_mrad", "mrad", "tracking error q - q_ref (28)", tracking_error, floor=0.1)
 
 
-def error_angle(rows: Rows) -> Array:
+def error_angle(rows: QuantityRows) -> Array:
     """Angle of ``R_ref^T R``, (n, 1) in degrees."""
     return np.degrees(angle_between(rows.table["q_rad"], rows.table["q_ref_rad"]))[:, None]
 
@@ -172,7 +172,7 @@ def angle_between(q: Array, desired: Array) -> Array:
     """Angle of the one rotation between two orientations, (n,) in rad, of hinge angles (n, 3) in rad.
 
     It is that of ``Ry(-β_ref) Rx(α - α_ref) Ry(β) Rz(γ - γ_ref)``, of which this is the quaternion. Its
-    vector part counts as well as its scalar: near 1 the scalar alone would lose half of the digits.
+    vector part is used as well as its scalar: near 1 the scalar by itself would lose half of the digits.
     """
     difference, sum_beta = (q - desired) / 2, (q[:, 1] + desired[:, 1]) / 2
     (ca, cb, cg), (sa, sb, sg) = np.cos(difference).T, np.sin(difference).T
@@ -182,12 +182,10 @@ def angle_between(q: Array, desired: Array) -> Array:
     return np.asarray(2 * np.arctan2(np.sqrt(across), np.abs(along)))
 
 
-ERROR_ANGLE = Quantity(
-    "error_angle_deg", "°", "angle between the rotor and where it should be", error_angle, 0.01
-)
+ERROR_ANGLE = Quantity("error_angle_deg", "°", "angle between the rotor and its reference", error_angle, 0.01)
 
 
-def estimated_rate(rows: Rows) -> Array:
+def estimated_rate(rows: QuantityRows) -> Array:
     """Estimated minus true rates, (n, 3) in rad/s."""
     return rows.table["qdot_estimated_rad_s"] - rows.table["qdot_rad_s"]
 
@@ -203,10 +201,10 @@ ESTIMATED_RATE = by_axis(
 
 
 MOST = 3.0
-"""What is more is drawn as this: it matters to no one, and has no bound where hardly any torque is asked."""
+"""Larger margins are drawn as this: they do not matter, and are unbounded for a torque command near zero."""
 
 
-def torque_margin(rows: Rows) -> Array:
+def torque_margin(rows: QuantityRows) -> Array:
     """Share of the commanded torque that could be added along itself, (n, 1); 0 where the limit acts."""
     largest_A = np.max(np.abs(rows.table["current_command_A"]), axis=1)
     factor = rows.current_limit_A / np.maximum(largest_A, rows.current_limit_A / (1 + MOST))
@@ -217,14 +215,14 @@ def torque_margin(rows: Rows) -> Array:
 MARGIN = Quantity(
     "torque_margin",
     "1",
-    "share of the commanded torque that the current limit would let be added",
+    "share of the commanded torque that the current limit permits in addition",
     torque_margin,
     floor=MOST / 2,
-    kept=Kept.LEAST,
+    aggregation=Aggregation.LEAST,
 )
 
 
-def measured_angle(rows: Rows) -> Array:
+def measured_angle(rows: QuantityRows) -> Array:
     """Measured minus true angles, (n, 3) in mrad."""
     return 1e3 * (rows.table["q_measured_rad"] - rows.table["q_rad"])
 
@@ -239,7 +237,7 @@ MEASURED_ANGLE = by_axis(
 )
 
 
-def tip_distance(rows: Rows) -> Array:
+def tip_distance(rows: QuantityRows) -> Array:
     """Distance between the tip and the desired tip, (n, 1) in mm."""
     actual = shaft_tip(rows.table["q_rad"], rows.actuator)
     desired = shaft_tip(rows.table["q_ref_rad"], rows.actuator)
@@ -247,7 +245,7 @@ def tip_distance(rows: Rows) -> Array:
 
 
 TIP_DISTANCE = Quantity(
-    "tip_distance_mm", "mm", "distance of the shaft's tip from where it should be", tip_distance, 0.01
+    "tip_distance_mm", "mm", "distance of the shaft's tip from its reference", tip_distance, 0.01
 )
 
 
@@ -265,28 +263,28 @@ QUANTITIES: tuple[Quantity, ...] = (
 
 
 def quantities_of(names: Collection[str]) -> tuple[Quantity, ...]:
-    """Those that a run with signals of these names has."""
+    """Return the quantities of a run with signals of these names."""
     return tuple(quantity for quantity in QUANTITIES if not quantity.needs or quantity.needs in names)
 
 
-class ComparedQuantity(NamedTuple):
-    """One that is drawn."""
+class ScalarQuantity(NamedTuple):
+    """Quantity with one number for each row, drawn for several runs."""
 
     name: str
-    """What stands for it in a path."""
+    """Name in paths."""
     title: str
-    """Short: beside two others it has the room of a sixth of a screen."""
+    """Short: next to two others it has the width of a sixth of a screen."""
     unit: str
     group: str
-    """Of quantities that are drawn in one row."""
+    """Group of quantities that are drawn in one row."""
     needs: tuple[str, ...]
     """Signals that it is made of."""
-    of: Callable[[Rows], Array]
+    values: Callable[[QuantityRows], Array]
     """Its values, (n,)."""
-    desired: Callable[[Rows], Array] | None = None
-    """What was asked for, (n,)."""
+    desired: Callable[[QuantityRows], Array] | None = None
+    """Reference, (n,)."""
     limits: tuple[float, float] | None = None
-    """Of its axis; what its values need unless given."""
+    """Limits of the axis; those of the values unless given."""
 
     @property
     def heading(self) -> str:
@@ -294,52 +292,56 @@ class ComparedQuantity(NamedTuple):
         return f"{self.title} [{self.unit}]"
 
 
-def compared_quantities(tables: Sequence[Table]) -> list[ComparedQuantity]:
+def scalar_quantities(tables: Sequence[Table]) -> list[ScalarQuantity]:
     """Quantities that all of some runs have."""
     names = [{signal.name for signal in table.signals} for table in tables]
-    return [each for each in COMPARED_QUANTITIES if all(set(each.needs) <= having for having in names)]
+    return [
+        quantity
+        for quantity in SCALAR_QUANTITIES
+        if all(set(quantity.needs) <= available for available in names)
+    ]
 
 
-def _entry(signal: str, axis: int) -> Callable[[Rows], Array]:
+def _entry(signal: str, axis: int) -> Callable[[QuantityRows], Array]:
     return lambda rows: rows.table[signal][:, axis]
 
 
-def _column(values: Callable[[Rows], Array], place: int = 0) -> Callable[[Rows], Array]:
-    """One entry of what is derived for a recording of one run."""
+def _column(values: Callable[[QuantityRows], Array], place: int = 0) -> Callable[[QuantityRows], Array]:
+    """Return one entry of a quantity of recordings."""
     return lambda rows: values(rows)[:, place]
 
 
-def _largest(signal: str) -> Callable[[Rows], Array]:
+def _largest(signal: str) -> Callable[[QuantityRows], Array]:
     return lambda rows: np.abs(rows.table[signal]).max(axis=1)
 
 
-def _asked_Nm(rows: Rows) -> Array:
+def _commanded_Nm(rows: QuantityRows) -> Array:
     return np.linalg.norm(rows.table["torque_command_Nm"], axis=1)
 
 
-def _delivered_Nm(rows: Rows) -> Array:
+def _delivered_Nm(rows: QuantityRows) -> Array:
     return np.linalg.norm(DELIVERED.values(rows), axis=1)
 
 
-COMPARED_QUANTITIES = (
-    ComparedQuantity("error_angle_deg", "error as one angle", "°", "whole", ("q_rad", "q_ref_rad"),
+SCALAR_QUANTITIES = (
+    ScalarQuantity("error_angle_deg", "error as one angle", "°", "whole", ("q_rad", "q_ref_rad"),
              _column(ERROR_ANGLE.values)),
-    *(ComparedQuantity(f"error_{axis}_mrad", f"error of {axis}", "mrad", "error", ("error_rad",),
+    *(ScalarQuantity(f"error_{axis}_mrad", f"error of {axis}", "mrad", "error", ("error_rad",),
                _column(ERROR.values, i)) for i, axis in enumerate(ANGLES)),
-    *(ComparedQuantity(f"angle_{axis}_rad", f"angle {axis}", "rad", "angle", ("q_rad", "q_ref_rad"),
+    *(ScalarQuantity(f"angle_{axis}_rad", f"angle {axis}", "rad", "angle", ("q_rad", "q_ref_rad"),
                _entry("q_rad", i), _entry("q_ref_rad", i)) for i, axis in enumerate(ANGLES)),
-    *(ComparedQuantity(f"sliding_{axis}_rad_s", f"sliding of {axis}", "rad/s", "sliding", ("sliding_s",),
+    *(ScalarQuantity(f"sliding_{axis}_rad_s", f"sliding of {axis}", "rad/s", "sliding", ("sliding_s",),
                _entry("sliding_s", i)) for i, axis in enumerate(ANGLES)),
-    ComparedQuantity(
-        "torque_asked_Nm", "torque asked", "N·m", "effort", ("torque_command_Nm",), _asked_Nm
+    ScalarQuantity(
+        "torque_asked_Nm", "commanded torque", "N·m", "effort", ("torque_command_Nm",), _commanded_Nm
     ),
-    ComparedQuantity(
+    ScalarQuantity(
         "largest_current_A", "top current", "A", "effort", ("current_A",), _largest("current_A")
     ),
-    ComparedQuantity("torque_margin", "torque margin", "1", "effort",
+    ScalarQuantity("torque_margin", "torque margin", "1", "effort",
              ("current_command_A", "allocation_scale"),
              _column(MARGIN.values), limits=(-0.05 * MOST, 1.05 * MOST)),
-    ComparedQuantity("torque_delivered_Nm", "torque delivered on the hinges", "N·m", "more",
+    ScalarQuantity("torque_delivered_Nm", "torque delivered on the hinges", "N·m", "more",
              ("q_rad", "torque_Nm"), _delivered_Nm),
 )  # fmt: skip
-"""All, in the order in which they are drawn; a group of them beside each other."""
+"""All, in the order in which they are drawn; groups are contiguous."""

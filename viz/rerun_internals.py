@@ -1,4 +1,4 @@
-"""The messages of what Rerun's encoder gives at each reading, which is a whole recording every time."""
+"""Internals of Rerun: the framing of its files (RRF2), the pipe that writes them, and its program."""
 
 from __future__ import annotations
 
@@ -24,82 +24,76 @@ import rerun_cli
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 
 # Rerun's file format 2: magic, version and options, then messages, each with its kind and its length before
-# it; the one that ends a file says where all others are.
+# it. The last message of a file is the footer, with the places of all others.
 HEADER_BYTES = 12
-_MAGIC = b"RRF2"
-_BEFORE_A_MESSAGE = struct.Struct("<QQ")
-_END = 0
+_FILE_MAGIC = b"RRF2"
+_MESSAGE_HEADER = struct.Struct("<QQ")
+_FOOTER, _CHUNK = 0, 2
+_KINDS = range(4)
 
 
 def messages(encoded: bytes) -> bytes:
-    """The messages of what is encoded, without what is before the first and behind the last.
+    """Return the messages of an encoded recording, without header and footer.
 
     Parameters
     ----------
     encoded : bytes
-        A whole recording, or what comes behind the beginning of one.
+        A complete recording, or a later part of one.
     """
-    first = place = HEADER_BYTES if encoded.startswith(_MAGIC) else 0
-    while place + _BEFORE_A_MESSAGE.size <= len(encoded):
-        kind, length = _BEFORE_A_MESSAGE.unpack_from(encoded, place)
-        if kind == _END:
+    first = place = HEADER_BYTES if encoded.startswith(_FILE_MAGIC) else 0
+    while place + _MESSAGE_HEADER.size <= len(encoded):
+        kind, length = _MESSAGE_HEADER.unpack_from(encoded, place)
+        if kind == _FOOTER:
             break
-        place += _BEFORE_A_MESSAGE.size + length
+        place += _MESSAGE_HEADER.size + length
     return encoded[first:place]
 
-
-# Rerun's file format 2: magic, version and options, then messages, each with its kind and its length before
-# it. The one that ends a file is the footer, by which a reader finds the others.
-_FILE_MAGIC, _HEADER_BYTES = b"RRF2", 12
-
-_LAST_KIND, _CHUNK = 0, 2
-_KINDS = range(4)
 
 # Bytes of a chunk's message that are enough for the identity of its recording.
 _SIGNATURE_BYTES = 256
 
-# Behind the footer stands where it is, which ends so, with a version.
+# The end of a file holds the position of the footer and this magic, with a version.
 _AFTER_FOOTER_BYTES = 32
 _FOOTER_MAGIC, _FOOTER_MAGIC_BYTES = b"RRF2FOOT", 12
 
 
 class Extent(NamedTuple):
-    """How much of a file is whole."""
+    """Extent of the complete messages of a file."""
 
     whole_bytes: int
-    """Up to the end of the last whole message."""
+    """Bytes to the end of the last complete message."""
     ended: bool
-    """Whether the footer is among them."""
+    """True if the footer is among them."""
     torn: bool
-    """Whether something is behind them."""
+    """True if an incomplete message follows."""
 
 
 def extent(path: Path) -> Extent:
-    """Find out how far a recording's messages are whole; only their lengths are read.
+    """Return the extent of the complete messages of a recording; only their lengths are read.
 
     Raises
     ------
     InputError
-        It cannot be read, has not even the beginning of a recording, or a message is damaged: its kind or
-        length is not what was written.
+        It cannot be read, does not begin as a recording, or a message is damaged: its kind or
+        length is not a valid one.
     """
     try:
         with path.open("rb") as file:
             size = path.stat().st_size
-            if file.read(_HEADER_BYTES)[: len(_FILE_MAGIC)] != _FILE_MAGIC or size < _HEADER_BYTES:
+            if file.read(HEADER_BYTES)[: len(_FILE_MAGIC)] != _FILE_MAGIC or size < HEADER_BYTES:
                 raise InputError(f"recording {path}: expected a Rerun recording, received another file")
-            place, ended, signature = _HEADER_BYTES, False, b""
-            while not ended and len(before := file.read(_BEFORE_A_MESSAGE.size)) == _BEFORE_A_MESSAGE.size:
-                kind, length = _BEFORE_A_MESSAGE.unpack(before)
+            place, ended, signature = HEADER_BYTES, False, b""
+            while not ended and len(before := file.read(_MESSAGE_HEADER.size)) == _MESSAGE_HEADER.size:
+                kind, length = _MESSAGE_HEADER.unpack(before)
                 if kind not in _KINDS:
                     raise _damaged(path, place)
                 if (next_place := place + len(before) + length) > size:
                     break
                 if kind == _CHUNK and not signature:
                     signature = _signature(file.read(min(length, _SIGNATURE_BYTES)))
-                place, ended = next_place, kind == _LAST_KIND
+                place, ended = next_place, kind == _FOOTER
                 file.seek(place)
-            if _goes_on(file, place, size, ended=ended, signature=signature):
+            if _has_more_messages(file, place, size, ended=ended, signature=signature):
                 raise _damaged(path, place)
     except OSError as error:
         raise InputError(f"recording {path}: expected a readable file, {error.strerror or error}") from None
@@ -107,18 +101,18 @@ def extent(path: Path) -> Extent:
 
 
 def _signature(payload: bytes) -> bytes:
-    """What every chunk of one recording begins with: its identity, with the length of that before it."""
+    """Return the first bytes of every chunk of one recording: its identity, with the length before it."""
     return payload[: 2 + payload[1]] if len(payload) > 1 else b""
 
 
-def _goes_on(file: BinaryIO, place: int, size: int, *, ended: bool, signature: bytes) -> bool:
-    """Whether there are more messages behind a place at which the messages seem to end.
+def _has_more_messages(file: BinaryIO, place: int, size: int, *, ended: bool, signature: bytes) -> bool:
+    """True if more messages follow a place at which the messages seem to end.
 
-    A process that was killed leaves a part of one message at most, and behind the footer is its place alone.
+    A killed process leaves a part of one message at most; after the footer there is only its position.
     """
     if ended:
         return size - place > _AFTER_FOOTER_BYTES
-    if size - place <= _BEFORE_A_MESSAGE.size or not signature:
+    if size - place <= _MESSAGE_HEADER.size or not signature:
         return False
     file.seek(-_FOOTER_MAGIC_BYTES, os.SEEK_END)
     if file.read().startswith(_FOOTER_MAGIC):
@@ -131,46 +125,46 @@ def _goes_on(file: BinaryIO, place: int, size: int, *, ended: bool, signature: b
 
 def _damaged(path: Path, place: int) -> InputError:
     return InputError(
-        f"recording {path}: expected the messages that were written, received something else at byte {place}:"
+        f"recording {path}: expected an intact message, received other content at byte {place}:"
         " the file is damaged, or was changed by another program"
     )
 
 
 @contextmanager
 def whole_messages(path: Path) -> Iterator[tuple[Path, Extent]]:
-    """Give a path that has the whole messages of a recording alone; a copy, where it is torn behind them.
+    """Yield the path of a file with only the complete messages of a recording: a copy if it is incomplete.
 
     Raises
     ------
     InputError
         As `extent`, or a copy cannot be made.
     """
-    found = extent(path)
-    if not found.torn:
-        yield path, found
+    result = extent(path)
+    if not result.torn:
+        yield path, result
         return
     with tempfile.TemporaryDirectory(prefix="spheretwin-") as folder:
         copy = Path(folder) / "whole.rrd"
         try:
             shutil.copyfile(path, copy)
             with copy.open("r+b") as file:
-                file.truncate(found.whole_bytes)
+                file.truncate(result.whole_bytes)
         except OSError as error:
             raise InputError(f"recording {path}: expected room for a copy, {without_breaks(error)}") from None
-        yield copy, found
+        yield copy, result
 
 
 PIPE_PATHS = Path("/dev/fd")
-"""Where a pipe has a path, by its number; there is none on Windows, where Rerun must write files itself."""
+"""Folder in which a pipe has a path, by its number; Windows has none, and Rerun writes files itself."""
 
 _BLOCK_BYTES = 1 << 20
 
 
 class FilePipe:
-    """A pipe whose far end is written to a file.
+    """Pipe whose content a thread writes to a file.
 
-    Rerun writes files itself, but once a full disk has ended its writer, it waits for it forever at the
-    next flush, and tells the cause to its own log alone. It never learns of a disk at the end of a pipe.
+    Rerun can write files itself, but after a full disk has ended its writer, it waits forever at the
+    next flush, and reports the cause to its own log only. With a pipe it is independent of the disk.
 
     Parameters
     ----------
@@ -180,9 +174,9 @@ class FilePipe:
     Attributes
     ----------
     path : Path
-        Where to write to the pipe.
+        Path at which Rerun writes to the pipe.
     error : OSError or None
-        Why the file could not be written or closed; from then on what comes is dropped.
+        Error of writing or closing the file; later content is dropped.
 
     Raises
     ------
@@ -204,8 +198,8 @@ class FilePipe:
         self._thread.start()
 
     def drain(self, timeout_s: float) -> None:
-        """Wait until what was written to the pipe by now is in the file, but no longer than a time."""
-        import fcntl  # not on Windows, where there is no such pipe
+        """Wait until the present content of the pipe is in the file, or the time is over."""
+        import fcntl  # not on Windows, which has no such pipe
         import termios
 
         end = time.monotonic() + timeout_s
@@ -235,7 +229,7 @@ class FilePipe:
     def _copy_block(self, pipe: FileIO, file: FileIO) -> bool:
         """Copy a block; False at the end of the pipe."""
         select.select([pipe], [], [])
-        with self._block:  # what is no longer in the pipe is in the file when this is released
+        with self._block:  # content that is no longer in the pipe is in the file when this lock is released
             block = pipe.read(_BLOCK_BYTES)
             _write_all(file, block)
         return bool(block)
@@ -249,24 +243,24 @@ def _write_all(file: FileIO, block: bytes) -> None:
 
 PROGRAM = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
 
-# With less it has found something that the reader finds again, and says on one line.
+# Lower codes are errors that the reader finds too and reports in one line.
 _PANICS = 100
 
 
 def check_readable(path: Path, named: Path) -> None:
-    """Let a process of its own read a recording first; of 10 MB that takes 30 ms.
+    """Let a separate process read a recording first; 10 MB take 30 ms.
 
     Parameters
     ----------
     path : Path
-        What is read.
+        File to read.
     named : Path
-        What a complaint names.
+        File that a message names.
 
     Raises
     ------
     InputError
-        The process did not live through it.
+        The process did not survive it.
     SpheretwinError
         Rerun's program cannot be started.
     """
@@ -285,5 +279,5 @@ def check_readable(path: Path, named: Path) -> None:
         ) from None
     if ended < 0 or ended >= _PANICS:
         raise InputError(
-            f"recording {named}: expected one of a run, received one so damaged that Rerun ends at it"
+            f"recording {named}: expected one of a run, received one so damaged that Rerun crashes"
         )

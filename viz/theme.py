@@ -19,20 +19,20 @@ SOUTH: Colour = (44, 47, 54)
 COIL_TORQUE: Colour = (224, 92, 178)
 LOAD: Colour = (26, 168, 160)
 PAYLOAD: Colour = (26, 168, 160)
-"""Of the weight on the shaft, and of the torque that it has."""
+"""Weight on the shaft, and its torque."""
 DESIRED_TRACE: Colour = (130, 136, 146)
 
-ASKED: Colour = (240, 240, 240)
-"""What was asked for, drawn thin over what came of it."""
+COMMAND: Colour = (240, 240, 240)
+"""Commands and references, drawn thin over the actual values."""
 
 PLAIN: Colour = (200, 204, 212)
-"""What belongs to no axis and to no current."""
+"""Lines of no axis and no current."""
 
 GROUP: Colour = (160, 130, 110)
 """Each of many coil groups, where only their spread matters."""
 
-BELIEVED: Colour = (255, 190, 60)
-"""What the controller takes for true."""
+ESTIMATE: Colour = (255, 190, 60)
+"""Measurements, estimates and predictions of the controller."""
 
 FINE: Colour = (48, 84, 70)
 WARNING: Colour = (214, 140, 30)
@@ -51,7 +51,7 @@ LAW_COLOURS: dict[str, str] = {
     "afsm": "#d55e00",
     "afsm_eso": "#000000",
 }
-"""Of the shipped laws, by name, told apart by the colour-blind too, and by their lightness in grey.
+"""Colours of the shipped laws by name, distinct for the colour-blind and by their lightness in grey.
 
 Okabe and Ito's for the paper's laws and PID; the others are where these leave most room.
 """
@@ -68,12 +68,12 @@ LAW_MARKS: dict[str, tuple[str, Dash]] = {
     "afsm": ("^", "-"),
     "afsm_eso": ("*", (0, (9, 1))),
 }
-"""Marker and dash of the same laws, as Matplotlib writes them: what tells them apart in grey print."""
+"""Marker and dash of the same laws, in Matplotlib's notation: they are distinct in grey print."""
 
 OTHER_LAW = "#8a5a9e"
 
 SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
-"""Where a law's own colour is taken."""
+"""Colours for laws whose own colour is in use."""
 
 _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
     ("p", (0, (2, 1))),
@@ -95,22 +95,22 @@ def mixed(colour: Colour, other: Colour, share: float) -> Colour:
 
 
 def law_colour(law: str) -> str:
-    """Colour of a law, as a page writes it; one for all that have none of their own."""
+    """Return the colour of a law for a page; one colour for all laws without their own."""
     return LAW_COLOURS.get(law, OTHER_LAW)
 
 
 def law_colours(laws: Sequence[str]) -> dict[str, str]:
     """A colour for each of some laws: its own by its name, or one that is left where that is taken."""
-    found: dict[str, str] = {}
+    colours: dict[str, str] = {}
     for law in laws:
         own = law_colour(law.split(",")[0])
-        others = [each for each in (own, *SPARE) if each not in found.values()]
-        found[law] = others[0] if others else own
-    return found
+        others = [colour for colour in (own, *SPARE) if colour not in colours.values()]
+        colours[law] = others[0] if others else own
+    return colours
 
 
 def law_marks(laws: Sequence[str]) -> dict[str, tuple[str, Dash]]:
-    """Marker and dash for each of some laws: its own by its name, or what is left where it has none."""
+    """Return marker and dash for each law: those of its name, or spare ones."""
     spare = iter(_SPARE_MARKS)
     return {law: LAW_MARKS.get(law) or next(spare, _SPARE_MARKS[-1]) for law in laws}
 

@@ -48,7 +48,7 @@ def flown(overrides: dict, looked: bool, seconds: float) -> tuple[float, float, 
             time.sleep(0.1 + 0.003 * stop)  # at every place of a chunk
             ticket = bench.command("stop")
             ticket.wait()
-            latencies.append(1e3 * (ticket.settled_s - ticket.begun_s))
+            latencies.append(1e3 * (ticket.settled_s - ticket.created_s))
             bench.command("reset").wait()
             bench.command("start").wait()
         ended.set()

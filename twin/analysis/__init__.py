@@ -1,1 +1,1 @@
-"""Runs looked at again from their files alone: facts, figures, events, differences, tolerances, columns."""
+"""Analysis of runs from their files: reports, events, differences, tolerances, columns."""

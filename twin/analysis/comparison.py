@@ -1,4 +1,4 @@
-"""How far the figures of runs are from those of the first."""
+"""Comparison of runs: differences of their figures, labels, merged recording and page of figures."""
 
 from __future__ import annotations
 
@@ -18,46 +18,45 @@ from spheretwin.models.base.errors import InputError, shortened, shown
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.viz.comparison.runs import Run, Spectrum, leaders
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, leaders
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.pages import markdown as folder
-from spheretwin.viz.quantities import ComparedQuantity, Rows, compared_quantities
+from spheretwin.viz.quantities import QuantityRows, ScalarQuantity, scalar_quantities
 from spheretwin.viz.terminal.runs import differences as table_rows
 
-# Numbers that count nothing.
-NAMES_ONLY = ("seed",)
+# Numbers of which no difference is meaningful.
+NOT_COMPARED = ("seed",)
 
 
-def differences(told: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Of each run but the first, every number that a review tells of both, less that of the first.
+def differences(figures: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return, for each run but the first, every number of both reports minus that of the first.
 
-    Axis by axis where there is one for each; None where one of the two has none.
+    Entry by entry for lists; None if one of the two has no value.
 
     Parameters
     ----------
-    told : sequence of mapping
-        What a review tells of each run.
+    figures : sequence of mapping
+        Report of each run.
     """
-    first, *others = told
+    first, *others = figures
     return [
         {
             "path": other["path"],
             **{
                 name: _difference(first[name], value)
                 for name, value in other.items()
-                if name in first and name not in NAMES_ONLY and _counts(first[name], value)
+                if name in first and name not in NOT_COMPARED and _are_numbers(first[name], value)
             },
         }
         for other in others
     ]
 
 
-def _counts(first: Any, value: Any) -> bool:
-    """Whether both are numbers, lists of numbers as long as each other, or one of these and nothing."""
+def _are_numbers(first: Any, value: Any) -> bool:
+    """True if both are numbers, lists of numbers of one length, or one of these and None."""
     if isinstance(first, list) and isinstance(value, list):
-        return len(first) == len(value) and all(map(_counts, first, value))
-    numbers = [each for each in (first, value) if each is not None]
-    of_lists = all(isinstance(each, list) and all(_is_number(entry) for entry in each) for each in numbers)
+        return len(first) == len(value) and all(map(_are_numbers, first, value))
+    numbers = [item for item in (first, value) if item is not None]
+    of_lists = all(isinstance(item, list) and all(_is_number(entry) for entry in item) for item in numbers)
     return bool(numbers) and (all(map(_is_number, numbers)) or (len(numbers) == 1 and of_lists))
 
 
@@ -73,8 +72,8 @@ def _difference(first: Any, value: Any) -> Any:
     return value - first
 
 
-# What a reader of the paper looks for first, and as it writes it.
-FIRST = {
+# Fields listed first, in the notation of the paper.
+FIRST_FIELDS = {
     "plant.modelling_error": "m",
     "disturbance.load": "L",
     "hardware": "hardware",
@@ -82,13 +81,13 @@ FIRST = {
     "name": "scenario",
     "seed": "seed",
 }
-MOST, LEGEND = 6, 48
-"""Differences that are told, and characters of a legend's line."""
-LONGEST, LONGEST_STEM = 24, 40
-"""Of a value that is told, and of a file's name."""
+MOST_DIFFERENCES, LEGEND_LENGTH = 6, 48
+"""Differences in a label, and characters of a legend's line."""
+LONGEST_VALUE, LONGEST_STEM = 24, 40
+"""Characters of a value in a label, and of a file's name."""
 
-# Fields that go with another one: where that differs, so do these, and say nothing more.
-GOES_WITH = {
+# Fields that follow from another one: if that one differs, they are not listed.
+IMPLIED_FIELDS = {
     "name": ("description", "duration", "trajectory."),
     "controller.law": ("controller.",),
     "plant.modelling_error": ("plant.modelling_torque_Nm",),
@@ -97,48 +96,52 @@ GOES_WITH = {
 
 
 def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
-    """What is said of each run: its number, file and law, and in what they differ, as far as there is room.
+    """Return a label for each run: number, file, law, and the differing fields that fit.
 
-    A file that has the name of its law is told once.
+    A file that has the name of its law is named once.
 
     Parameters
     ----------
     runs : sequence of Reviewed
     longest : int
-        Characters of a label, but for number, file and law, which are always told.
+        Characters of a label; number, file and law are always included.
     """
-    told = differing([run.record.scenario for run in runs])
-    found = []
-    for place, (run, parts) in enumerate(zip(runs, told, strict=True), start=1):
-        stem, law = shortened(run.path.stem, LONGEST), _law_name(run)
+    parts_of_runs = differing_fields([run.record.scenario for run in runs])
+    run_labels = []
+    for place, (run, parts) in enumerate(zip(runs, parts_of_runs, strict=True), start=1):
+        stem, law = shortened(run.path.stem, LONGEST_VALUE), _law(run)
         label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
         for part in parts:
             if len(label) + len(part) + 2 > longest:
                 label += ", …"
                 break
             label += f", {part}"
-        found.append(label)
-    return found
+        run_labels.append(label)
+    return run_labels
 
 
 def names(runs: Sequence[Reviewed]) -> list[str]:
-    """A word for each run that no other has, without a sign that means something in a path."""
+    """Return a unique word for each run, without characters that have a meaning in a path."""
     stems = [shortened(re.sub(r"[^\w-]+", "_", run.path.stem), LONGEST_STEM) for run in runs]
     return [f"run_{place}_{stem.replace('…', '_')}" for place, stem in enumerate(stems, start=1)]
 
 
-def differing(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """Fields that are not the same in all scenarios, with their values in each, at most six."""
+def differing_fields(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Return the fields that differ among scenarios, with their values in each, at most six."""
     flat = [dict(_fields(scenario)) for scenario in scenarios]
-    of_any = list(dict.fromkeys([*FIRST, *(name for each in flat for name in each)]))
-    different = [name for name in of_any if len({each.get(name, "none") for each in flat}) > 1]
-    beside = [part for name, parts in GOES_WITH.items() if name in different for part in parts]
-    told = [name for name in different if name in FIRST or not any(map(name.startswith, beside))]
-    return [[f"{FIRST.get(name, name)} {each.get(name, 'none')}" for name in told[:MOST]] for each in flat]
-
-
-def _law_name(run: Reviewed) -> str:
-    return str(run.record.scenario["controller"]["law"])
+    all_names = list(dict.fromkeys([*FIRST_FIELDS, *(name for fields in flat for name in fields)]))
+    different = [name for name in all_names if len({fields.get(name, "none") for fields in flat}) > 1]
+    implied = [part for name, parts in IMPLIED_FIELDS.items() if name in different for part in parts]
+    shown_fields = [
+        name for name in different if name in FIRST_FIELDS or not any(map(name.startswith, implied))
+    ]
+    return [
+        [
+            f"{FIRST_FIELDS.get(name, name)} {fields.get(name, 'none')}"
+            for name in shown_fields[:MOST_DIFFERENCES]
+        ]
+        for fields in flat
+    ]
 
 
 def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
@@ -147,15 +150,15 @@ def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, s
         if isinstance(inside, Mapping):
             yield from _fields(inside, f"{before}{name}.")
         else:
-            yield before + name, shortened(_text(inside), LONGEST)
+            yield before + name, shortened(_text(inside), LONGEST_VALUE)
 
 
 def _text(value: Any) -> str:
-    """As a person writes it: a whole number without a point, of entries of a list what they name."""
+    """Return a value as text: a whole number without a point, for entries of a list their names."""
     if isinstance(value, str):
         return value
-    if isinstance(value, list) and all(isinstance(each, Mapping) for each in value):
-        words = [" ".join(word for word in each.values() if isinstance(word, str)) for each in value]
+    if isinstance(value, list) and all(isinstance(item, Mapping) for item in value):
+        words = [" ".join(word for word in item.values() if isinstance(word, str)) for item in value]
         return " + ".join(words) or "none"
     return f"{value:g}" if isinstance(value, float) and value == float(f"{value:g}") else json.dumps(value)
 
@@ -164,18 +167,18 @@ SUFFIX = ".rrd"
 
 
 def check_merge(path: Path, runs: Sequence[Path]) -> None:
-    """Refuse a file of another kind, one that is there, and one of the runs.
+    """Refuse an output of another kind, an existing file, and a file of the runs.
 
     Raises
     ------
     InputError
-        Its name does not end as a recording's, it is there, or it is what a run of which only parts are left
-        was to become.
+        Its name does not end in ``.rrd``, it exists, or it is the name of a run of which only partial files
+        exist.
     """
     if path.suffix != SUFFIX:
         raise InputError(f"command line: expected --merge OUT{SUFFIX}, received {shown(str(path))}")
     if path.exists():
-        raise InputError(f"command line: expected a new file for --merge, received {path}, which is there")
+        raise InputError(f"command line: expected a new file for --merge, received {path}, which exists")
     if path in runs:
         raise InputError(f"command line: expected a new file for --merge, received {path}, which is a run")
 
@@ -188,12 +191,12 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
     InputError
         One has no rows, another number of coil groups than the first, or a model that cannot be drawn.
     SpheretwinError
-        The file cannot be written; what was there before is untouched.
+        The file cannot be written; the previous file is unchanged.
     """
     from spheretwin.viz.comparison import merged_recording  # Rerun is slow to import
-    from spheretwin.viz.recording.part import Subject
+    from spheretwin.viz.recording.part import RecordingSubject
 
-    compared = beside(runs)
+    drawn_runs = compared_runs(runs)
     groups = [run.table["current_A"].shape[1] for run in runs]
     for run, count in zip(runs, groups, strict=True):
         if count != groups[0]:
@@ -202,21 +205,21 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
                 f" received one of {count}"
             )
     subjects = [
-        Subject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
+        RecordingSubject(of.files.actuator, run.table.signals, _facts(of.scenario, _law(run)))
         for run, of in zip(runs, map(of_the_actuator, runs), strict=True)
     ]
-    with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
-        merged_recording.write(path, compared, subjects, _told(runs))
+    with np.errstate(all="ignore"):  # numbers in damaged files may have any size
+        merged_recording.write(path, drawn_runs, subjects, _runs_text(runs))
 
 
-def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
-    """Runs as they are drawn beside each other.
+def compared_runs(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[ComparedRun]:
+    """Return the runs in the form in which they are drawn together.
 
     Parameters
     ----------
     runs : sequence of Reviewed
     every_tick : bool
-        With a row a tick, also where a file does not keep every one.
+        With a row for each tick, also if the file has fewer rows.
 
     Raises
     ------
@@ -226,9 +229,9 @@ def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
     for run in runs:
         if not len(run.table):
             raise InputError(f"review {run.path}: expected a run of at least one tick to draw, received none")
-    told = zip(runs, names(runs), labels(runs, LEGEND), strict=True)
+    run_texts = zip(runs, names(runs), labels(runs, LEGEND_LENGTH), strict=True)
     return [
-        Run(
+        ComparedRun(
             name,
             label,
             _law(run),
@@ -237,13 +240,13 @@ def beside(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[Run]:
             run.metadata,
             tuple(events(run)),
         )
-        for run, name, label in told
+        for run, name, label in run_texts
     ]
 
 
-def _rows(run: Reviewed, table: Table) -> Rows:
+def _rows(run: Reviewed, table: Table) -> QuantityRows:
     scenario, files, *_ = of_the_actuator(run)
-    return Rows(table, table.rows(0, 1), files.actuator, scenario.drive.current_limit_A)
+    return QuantityRows(table, table.rows(0, 1), files.actuator, scenario.drive.current_limit_A)
 
 
 def _facts(scenario: ResolvedScenario, law: str) -> RunFacts:
@@ -264,11 +267,11 @@ def _law(run: Reviewed) -> str:
     return str(run.record.scenario["controller"]["law"])
 
 
-def _told(runs: Sequence[Reviewed]) -> str:
-    """What each run is, in Markdown; one that is named here is named so in every plot."""
+def _runs_text(runs: Sequence[Reviewed]) -> str:
+    """Return a description of each run in Markdown, with the label that it has in every plot."""
     status = (f"{run.record.status or 'not closed'} at {run.simulated_s:.3f} s" for run in runs)
     lines = [f"- **{label}**, {ended}" for label, ended in zip(labels(runs), status, strict=True)]
-    return "\n".join([*lines, "", "What was asked for is the thin white line."])
+    return "\n".join([*lines, "", "The thin white line is the reference."])
 
 
 if TYPE_CHECKING:
@@ -279,22 +282,22 @@ PAGE = "review.html"
 TITLES = {
     "whole": "Tracking error as one angle",
     "error": "Tracking error of each hinge",
-    "angle": "Hinge angles and what was asked for",
+    "angle": "Hinge angles and their references",
     "sliding": "Sliding variables",
     "effort": "Torque and current",
-    "more": "Torque that arrives",
+    "more": "Delivered torque",
 }
-"""Of the figure of each group of quantities."""
+"""Title of the figure of each group of quantities."""
 
 
-def write_figures(runs: Sequence[Reviewed], told: Sequence[dict[str, Any]], into: Path) -> Path:
+def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], into: Path) -> Path:
     """Write figures and page into a folder; returns the page's path.
 
     Parameters
     ----------
     runs : sequence of Reviewed
-    told : sequence of mapping
-        What a review tells of each.
+    figures : sequence of mapping
+        Report of each run.
     into : Path
         A folder that takes files.
 
@@ -305,52 +308,52 @@ def write_figures(runs: Sequence[Reviewed], told: Sequence[dict[str, Any]], into
     """
     from spheretwin.viz.pages import interactive  # what draws is slow to import
 
-    compared = beside(runs, every_tick=True)
-    tables = [run.table for run in compared]
-    leading, quantities = leaders(tables), compared_quantities(tables)
+    drawn_runs = compared_runs(runs, every_tick=True)
+    tables = [run.table for run in drawn_runs]
+    leading, quantities = leaders(tables), scalar_quantities(tables)
     spectra = [_spectra(run) for run in runs]
-    title = compared[0].label if len(runs) == 1 else f"{len(runs)} runs"
+    title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs"
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
-        folder.save_drawings(into, _drawings(compared, leading, quantities, spectra), vector=True)
-        over_time = interactive.over_time(compared, leading, quantities)
+        markdown.save_drawings(into, _drawings(drawn_runs, leading, quantities, spectra), vector=True)
+        over_time = interactive.over_time(drawn_runs, leading, quantities)
     content = interactive.page(
         title,
-        compared,
+        drawn_runs,
         over_time,
-        interactive.of_errors(compared, spectra),
-        _above(title, compared, interactive.points_each(compared, leading, quantities)),
-        _below(compared, told),
+        interactive.error_spectra(drawn_runs, spectra),
+        _above(title, drawn_runs, interactive.points_per_line(drawn_runs, leading, quantities)),
+        _below(drawn_runs, figures),
     )
-    return folder.save_text(into / PAGE, content)
+    return markdown.save_text(into / PAGE, content)
 
 
 def check_figures(into: Path) -> None:
-    """Find out whether all can be drawn and written, and leave an empty folder.
+    """Check that all figures can be drawn and written, and make an empty folder.
 
     Raises
     ------
     InputError
-        What draws is not installed, or the folder cannot be made or written to.
+        A library for figures is not installed, or the folder cannot be made or written to.
     """
-    folder.prepare(into, "plotly")
+    markdown.prepare(into, "plotly")
 
 
 def _drawings(
-    runs: Sequence[Run],
+    runs: Sequence[ComparedRun],
     leading: Sequence[int],
-    quantities: Sequence[ComparedQuantity],
+    quantities: Sequence[ScalarQuantity],
     spectra: Sequence[list[Spectrum]],
 ) -> Iterator[Drawing]:
-    from spheretwin.viz.figures.comparison import currents, happened, over_time
+    from spheretwin.viz.figures.comparison import currents, events_figure, over_time
     from spheretwin.viz.figures.comparison import spectra as of_errors
     from spheretwin.viz.figures.style import Drawing
 
-    for group, inside in groupby(quantities, key=lambda each: each.group):
+    for group, inside in groupby(quantities, key=lambda quantity: quantity.group):
         title = TITLES[group]
         yield Drawing(f"{group}.png", title, over_time(runs, leading, list(inside), title))
     yield Drawing("currents.png", title := "Currents of all groups", currents(runs, title))
     yield Drawing("spectra.png", title := "Spectra of the tracking errors", of_errors(runs, spectra, title))
-    yield Drawing("events.png", title := "What happened", happened(runs, title))
+    yield Drawing("events.png", title := "Events", events_figure(runs, title))
 
 
 def _spectra(run: Reviewed) -> list[Spectrum]:
@@ -361,25 +364,25 @@ def _spectra(run: Reviewed) -> list[Spectrum]:
     ]  # fmt: skip
 
 
-def _above(title: str, runs: Sequence[Run], most: int) -> str:
+def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
     thin = any(len(run.table) > most for run in runs)
     lines = [
         f"# {_plain(title)}",
         "",
-        "Drag to zoom, double-click to see all again; what is at the cursor is told in every plot. The"
-        " buttons switch runs. The wide grey line is what was asked for.",
+        "Drag to zoom, double-click to reset the view; every plot shows the values at the cursor. The"
+        " buttons switch runs. The wide grey line is the reference.",
     ]
     if thin:
-        lines.append("Long runs are drawn by the lowest and the highest of every few ticks.")
+        lines.append("Long runs are drawn by the lowest and highest value of every few ticks.")
     return "\n".join(lines)
 
 
-def _below(runs: Sequence[Run], told: Sequence[dict[str, Any]]) -> str:
+def _below(runs: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
     head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in runs)]
-    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(told)]
+    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures)]
     return "\n".join(["## Figures", "", *markdown.table(head, rows, [False] + [True] * len(runs))])
 
 
 def _plain(text: str) -> str:
-    """Text in which no sign is markup."""
+    """Return the text with all markup escaped."""
     return "".join(f"\\{sign}" if sign in "\\`*_{}[]<>#|!" else sign for sign in text)

@@ -16,7 +16,7 @@ import numpy as np
 
 from spheretwin.active_config import ActiveConfig, initial_config
 from spheretwin.analysis import recovery
-from spheretwin.analysis.recovery import held, ticks_of
+from spheretwin.analysis.recovery import hold_rows, ticks_of
 from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.base.errors import InputError, shown
 from spheretwin.models.base.files import whole_file
@@ -115,7 +115,7 @@ class Reviewed:
     @cached_property
     def every_tick(self) -> Table:
         """A row a tick: where the file does not keep every one, each is held until the next."""
-        return held(self.table, self.period_s) if self.rate_Hz else self.table
+        return hold_rows(self.table, self.period_s) if self.rate_Hz else self.table
 
 
 def read(path: Path) -> Reviewed:
@@ -126,12 +126,12 @@ def read(path: Path) -> Reviewed:
     InputError
         There is none, it is none of these, or not a row of it is whole.
     """
-    found = recovery.found(path)
+    found = recovery.find_run_file(path)
     try:
         if found.suffix in recovery.RECORDINGS or recovery.is_recording(found):
             return _of_recording(found)
         if found.is_dir():
-            with recovery.joined(found) as joined:
+            with recovery.joined_telemetry(found) as joined:
                 table, metadata = read_parquet(joined)
             return _of_telemetry(found, table, metadata, whole=False, checked=recovery.are_checked(found))
         table, metadata = read_parquet(found)

@@ -1,4 +1,4 @@
-"""What a killed process leaves of its files: found beside them, and made whole again."""
+"""Recovery of the partial files of a killed process: search and completion."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from spheretwin.models.telemetry.partial_files import list_of, read_schema
 from spheretwin.models.telemetry.table import Table, read_parquet
 
 
-def held(table: Table, period_s: float) -> Table:
-    """Rows at every tick from the first to the last, each that of the latest that there is.
+def hold_rows(table: Table, period_s: float) -> Table:
+    """Return a row at every tick from the first to the last: that of the latest row (zero-order hold).
 
     Parameters
     ----------
@@ -46,75 +46,75 @@ RECORDINGS = (".rrd",)
 
 
 class Recovered(NamedTuple):
-    """How much was left."""
+    """Amount of recovered data."""
 
     rows: int
     seconds: float
     checked: bool
-    """True if what was left has checksums; they were compared."""
+    """True if the partial files have checksums; they were compared."""
 
 
-def found(path: Path) -> Path:
-    """The file of a name; where there is none, what a killed process left of it under a hidden one.
+def find_run_file(path: Path) -> Path:
+    """Return the file of a name; if it does not exist, the hidden partial file of a killed process.
 
     Raises
     ------
     InputError
-        There is nothing, or of several processes.
+        There is none, or there are partial files of several processes.
     """
     try:
         if path.exists():
             return path
         left = sorted(
-            each for kind in ("parts", "part") for each in path.parent.glob(f".{path.name}.*.{kind}")
+            file for kind in ("parts", "part") for file in path.parent.glob(f".{path.name}.*.{kind}")
         )
     except (OSError, ValueError) as error:  # ValueError: a zero in the path
         raise InputError(f"review {path}: expected the file of a run, {without_breaks(error)}") from None
     if len(left) == 1:
         return left[0]
-    received = f"what {len(left)} processes left: {', '.join(map(str, left))}" if left else "none"
+    received = f"partial files of {len(left)} processes: {', '.join(map(str, left))}" if left else "none"
     raise InputError(f"review {path}: expected the file of a run, received {received}")
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file that a killed process left is a recording's."""
+    """True if a partial file is one of a recording."""
     return path.suffix == ".part" and ".rrd." in path.name
 
 
 @contextmanager
-def joined(folder: Path) -> Iterator[Path]:
+def joined_telemetry(folder: Path) -> Iterator[Path]:
     """Give a telemetry file of the parts in a folder.
 
     Raises
     ------
     InputError
-        There are none, or not a row of them is whole.
+        There are no parts, or none has a complete row.
     """
     with tempfile.TemporaryDirectory(prefix="spheretwin-") as temporary:
-        join(_parts(folder), path := Path(temporary) / "joined.parquet")
+        join(_part_files(folder), path := Path(temporary) / "joined.parquet")
         yield path
 
 
 def recover(path: Path, out: Path) -> Recovered:
-    """Write what a killed process left as the file that it was to become.
+    """Complete the partial files of a killed process.
 
     Parameters
     ----------
     path : Path
         The file that it did not close, its name, or the folder of its parts.
     out : Path
-        Where to write it.
+        File to write.
 
     Raises
     ------
     InputError
-        Nothing was left, or the file is whole.
+        There are no partial files, or the file is complete.
     SpheretwinError
-        Writing failed; what was there before is untouched.
+        Writing failed; the previous file is unchanged.
     """
-    left = found(path)
+    left = find_run_file(path)
     if left.is_dir():
-        parts = _parts(left)
+        parts = _part_files(left)
         period_s = _period_s(parts[0])
         rows = join(parts, out)
         return Recovered(rows, rows * period_s, are_checked(left))
@@ -124,14 +124,16 @@ def recover(path: Path, out: Path) -> Recovered:
 
         if rerun_internals.extent(left).ended:
             raise InputError(
-                f"recover {left}: expected a recording that was not closed, received a whole one"
+                f"recover {left}: expected a recording that was not closed, received a complete one"
             )
         recorded = reader.rewrite(left, out)
         period_s = recorded.facts["sections"]["controller"]["period_s"]
-        seconds = len(held(recorded.table, period_s)) * period_s
+        seconds = len(hold_rows(recorded.table, period_s)) * period_s
         return Recovered(len(recorded.table), seconds, recorded.checked)
-    read_parquet(left, rows=False)  # what is no telemetry is told as such
-    raise InputError(f"recover {left}: expected what a killed process left, received a whole telemetry file")
+    read_parquet(left, rows=False)  # other files are refused here
+    raise InputError(
+        f"recover {left}: expected partial files of a killed process, received a complete telemetry file"
+    )
 
 
 def _period_s(part: Path) -> float:
@@ -147,10 +149,10 @@ def _period_s(part: Path) -> float:
 
 def are_checked(folder: Path) -> bool:
     """Return whether all parts in a folder have checksums."""
-    return all(list_of(part).is_file() for part in _parts(folder))
+    return all(list_of(part).is_file() for part in _part_files(folder))
 
 
-def _parts(folder: Path) -> list[Path]:
+def _part_files(folder: Path) -> list[Path]:
     if parts := sorted(folder.glob("*.arrows")):
         return parts
     raise InputError(f"telemetry {folder}: expected a folder of parts, received one without any")

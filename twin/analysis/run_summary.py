@@ -1,4 +1,4 @@
-"""What a review tells of one run: facts, the metrics of every run, work and spectrum, events."""
+"""Report of one run: facts, the metrics of every run, work, spectrum and events."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Array = NDArray[np.float64]
 
 
 def mechanical_work_J(table: Table, period_s: float) -> float | None:
-    """Work of the coils' torque over a run, ∫ T·ω dt, J; None without a row.
+    """Return the work of the coils' torque over a run, ∫ T·ω dt, J; None without a row.
 
-    Torque and rates are those at the ticks, held from each to the next.
+    Torque and rates are those at the ticks, constant from each to the next.
 
     Parameters
     ----------
@@ -51,23 +51,23 @@ def angular_velocity(q: Array, qdot: Array) -> Array:
 PEAKS = 3
 FEWEST_ROWS = 16
 
-# The window spreads an oscillation over three lines: weaker ones beside it are its own slopes.
+# The window spreads an oscillation over three lines: weaker lines next to it belong to it.
 _APART = 2
 
 
-class Peak(NamedTuple):
+class SpectralPeak(NamedTuple):
     """An oscillation."""
 
     frequency_Hz: float
     amplitude: float
-    """In the unit of the column."""
+    """Amplitude in the unit of the column."""
 
 
-def peaks(values: Array, period_s: float) -> list[Peak]:
-    """Strongest oscillations about the mean, the strongest first, at most three.
+def peaks(values: Array, period_s: float) -> list[SpectralPeak]:
+    """Return the strongest oscillations about the mean, the strongest first, at most three.
 
-    Hann's window; frequency and amplitude between the lines of the spectrum from the two that a peak stands
-    on, exact for an oscillation that is alone.
+    Hann's window. Frequency and amplitude are interpolated between the two lines of the spectrum of which a
+    peak consists; exact for a single oscillation.
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ def peaks(values: Array, period_s: float) -> list[Peak]:
     inner = np.arange(_APART, len(lines) - 1)
     tops = inner[(lines[inner] > lines[inner - 1]) & (lines[inner] >= lines[inner + 1])]
     strongest = tops[np.argsort(-lines[tops], kind="stable")][:PEAKS]
-    return [_between(lines, int(top), n, period_s) for top in strongest]
+    return [_interpolated_peak(lines, int(top), n, period_s) for top in strongest]
 
 
 def amplitudes(values: Array, period_s: float) -> tuple[Array, Array]:
-    """Frequencies above zero, Hz, and the amplitude at each of the oscillation that it would be alone.
+    """Return the frequencies above zero, Hz, and at each the amplitude of a single oscillation.
 
     Parameters
     ----------
@@ -104,28 +104,28 @@ def amplitudes(values: Array, period_s: float) -> tuple[Array, Array]:
 
 
 def _lines(values: Array) -> Array:
-    """Of the column about its mean, under Hann's window."""
+    """Return the magnitudes of the spectrum of a column about its mean, under Hann's window."""
     n = len(values)
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
     return np.abs(np.fft.rfft((values - values.mean()) * window))
 
 
-def _between(lines: Array, top: int, rows: int, period_s: float) -> Peak:
-    """The oscillation that has its highest line at `top`: under Hann's window neighbours tell how far off."""
+def _interpolated_peak(lines: Array, top: int, rows: int, period_s: float) -> SpectralPeak:
+    """Return the oscillation with its highest line at `top`, interpolated with the higher neighbour."""
     side = 1 if lines[top + 1] > lines[top - 1] else -1
     ratio = lines[top + side] / lines[top]
-    off = (2 * ratio - 1) / (ratio + 1)  # of a line's distance, to that side
-    left = np.sinc(off) / (1 - off * off)  # of the amplitude, at the line
-    return Peak(float((top + side * off) / (rows * period_s)), float(4 * lines[top] / (rows * left)))
+    off = (2 * ratio - 1) / (ratio + 1)  # share of a line's distance, to that side
+    left = np.sinc(off) / (1 - off * off)  # share of the amplitude, at the line
+    return SpectralPeak(float((top + side * off) / (rows * period_s)), float(4 * lines[top] / (rows * left)))
 
 
 def figures(run: Reviewed) -> dict[str, Any]:
-    """All that a review tells of a run, as JSON holds it.
+    """Return the report of a run, in JSON types.
 
     Raises
     ------
     InputError
-        Its scenario is none of this version's, or its model file is no longer there or has other coil groups.
+        Its scenario is not valid in this version, or its model file is missing or has other coil groups.
     """
     try:
         with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
@@ -181,7 +181,7 @@ def _error_peaks(run: Reviewed) -> list[Any]:
 
 
 def _reason(table: Table) -> str | None:
-    """Why the watchdog took the currents away, if there was one and it did."""
+    """Return the reason of the watchdog's failsafe state, if it acted."""
     for signal in table.signals:
         if signal.name == "failsafe_reason" and len(table) and table[signal.name][-1] > 0:
             return signal.states[int(table[signal.name][-1])]

@@ -1,4 +1,4 @@
-"""How far a run may be from a reference, signal by signal, as a TOML file of the user's says it."""
+"""Tolerances of a comparison with a reference run, signal by signal, from a TOML file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Allowance = Annotated[float, Field(ge=0)]
 
 
 class Tolerance(BaseModel):
-    """What one signal is allowed; exactly the reference unless told otherwise."""
+    """Tolerance of one signal; zero by default."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -32,28 +32,28 @@ class Tolerance(BaseModel):
         0.0, description="difference over the reference's magnitude; adds to absolute"
     )
     time_s: Annotated[float, Field(ge=0, le=1e3)] = Field(
-        0.0, description="how much earlier or later the reference may have the value, s"
+        0.0, description="largest time by which the reference may have the value earlier or later, s"
     )
 
 
 class Tolerances(BaseModel):
-    """What each signal is allowed; a signal that is not named may be anything."""
+    """Tolerances by signal; signals that are not named are not compared."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    description: str = Field("", description="what it holds, and why so closely")
+    description: str = Field("", description="purpose and reasons of the tolerances")
     signals: Annotated[dict[str, Tolerance], Field(min_length=1)] = Field(
         description="by the name of the telemetry column"
     )
 
 
 def shipped() -> list[str]:
-    """Names of the tolerances that come with the package."""
+    """Return the names of the tolerances of the package."""
     return sorted(path.name.removesuffix(".toml") for path in FOLDER.iterdir() if path.name.endswith(".toml"))
 
 
 def load(source: str) -> Tolerances:
-    """Tolerances of a shipped name or of a TOML file.
+    """Load tolerances by a shipped name or from a TOML file.
 
     Raises
     ------
@@ -75,11 +75,11 @@ def load(source: str) -> Tolerances:
     try:
         return Tolerances.model_validate_json(json.dumps(fields, default=str))
     except ValidationError as error:
-        raise InputError(f"tolerance {source}: {_complaint(error, fields)}") from None
+        raise InputError(f"tolerance {source}: {_error_text(error, fields)}") from None
 
 
-def _complaint(error: ValidationError, fields: dict[str, Any]) -> str:
-    """First complaint; of a signal's own table it is that of the table by itself, which knows its fields."""
+def _error_text(error: ValidationError, fields: dict[str, Any]) -> str:
+    """Return the first error; for a signal's table, in terms of the fields of that table."""
     match error.errors()[0]["loc"]:
         case ("signals", str() as name, _, *_):
             try:
@@ -91,12 +91,12 @@ def _complaint(error: ValidationError, fields: dict[str, Any]) -> str:
 
 Array = NDArray[np.float64]
 
-# A time in whole ticks is so to rounding only.
+# A time of whole ticks is exact to rounding only.
 WHOLE = 1e-9
 
 
 class Exceeded(NamedTuple):
-    """Where a signal first leaves what it is allowed."""
+    """First violation of a signal's tolerance."""
 
     path: str
     signal: str
@@ -104,15 +104,15 @@ class Exceeded(NamedTuple):
     """Label of the entry; empty for a signal of one number."""
     t_s: float
     by: float
-    """Beyond the tolerance, in the unit of the signal; no number where one of the two has no value."""
+    """Excess over the tolerance, in the unit of the signal; infinite if one of the two has no value."""
 
 
 def exceeded(reference: Reviewed, run: Reviewed, tolerances: Tolerances) -> list[Exceeded]:
-    """First place of each signal that leaves its tolerance, the earliest first.
+    """Return the first violation of each signal, the earliest first.
 
-    A value is allowed within ``absolute + relative · |reference|`` of what the reference has at that time,
-    or anywhere between its lowest and highest within ``time_s`` of it. Where one of the two has ended and the
-    other goes on, no signal is within any tolerance.
+    A value is allowed within ``absolute + relative · |reference|`` of the reference's value at that time,
+    or anywhere between its lowest and highest value within ``time_s`` of it. If one of the two has ended and
+    the other continues, every signal violates its tolerance.
 
     Raises
     ------
@@ -124,29 +124,29 @@ def exceeded(reference: Reviewed, run: Reviewed, tolerances: Tolerances) -> list
             f"review {run.path}: expected a control period of {reference.period_s!r} s as the reference has,"
             f" received {run.period_s!r} s"
         )
-    found = []
+    violations = []
     for name, tolerance in tolerances.signals.items():
-        signal, other = _signal(reference, name), _signal(run, name)
+        signal, other = _find_signal(reference, name), _find_signal(run, name)
         if signal.size != other.size:
             raise InputError(
                 f"review {run.path}: expected {name} of {signal.size} numbers, received {other.size}"
             )
-        if place := _first(*_both(reference, run, name), tolerance, reference.period_s):
+        if place := _first_violation(*_columns_of_both(reference, run, name), tolerance, reference.period_s):
             tick, entry, by = place
             axis = signal.labels[entry] if signal.labels else ""
-            found.append(Exceeded(str(run.path), name, axis, tick * run.period_s, by))
-    return sorted(found, key=lambda each: each.t_s)
+            violations.append(Exceeded(str(run.path), name, axis, tick * run.period_s, by))
+    return sorted(violations, key=lambda violation: violation.t_s)
 
 
 def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: float) -> Array:
-    """How far values are beyond what a reference allows, (n, k): 0 within, infinite where one has no value.
+    """Return the excess of values over a tolerance, (n, k): 0 within, infinite if either has no value.
 
     Parameters
     ----------
     reference, values : (n, k) array
         At the same ticks; a NaN is no value.
     tolerance : Tolerance
-        What is allowed.
+        Tolerance of the signal.
     period_s : float
         Time between rows, s.
     """
@@ -168,10 +168,10 @@ def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: floa
     return np.where(none & np.isnan(values), 0.0, np.where(np.isnan(over), np.inf, over))
 
 
-def _first(
+def _first_violation(
     reference: Array, values: Array, tolerance: Tolerance, period_s: float
 ) -> tuple[int, int, float] | None:
-    """Tick, entry and amount of the first that is beyond, of those of its tick the farthest."""
+    """Return tick, entry and excess of the first violation; within its tick, of the largest."""
     rows = min(len(reference), len(values))
     over = beyond(reference[:rows], values[:rows], tolerance, period_s)
     if len(ticks := np.flatnonzero(over.any(axis=1))):
@@ -180,14 +180,14 @@ def _first(
     return None if len(reference) == len(values) else (rows, 0, np.inf)
 
 
-def _both(reference: Reviewed, run: Reviewed, name: str) -> tuple[Array, Array]:
+def _columns_of_both(reference: Reviewed, run: Reviewed, name: str) -> tuple[Array, Array]:
     of_reference, of_run = (
-        each.every_tick[name].reshape(len(each.every_tick), -1) for each in (reference, run)
+        recorded.every_tick[name].reshape(len(recorded.every_tick), -1) for recorded in (reference, run)
     )
     return of_reference, of_run
 
 
-def _signal(run: Reviewed, name: str) -> Signal:
+def _find_signal(run: Reviewed, name: str) -> Signal:
     signals = {signal.name: signal for signal in run.table.signals}
     if name in signals:
         return signals[name]

@@ -1,4 +1,4 @@
-"""The machine of a bench: a twin that runs at the pace of the clock, and does what it is commanded."""
+"""Interactive bench: a twin that runs at the pace of the clock and executes commands."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.bench.bench_state import Works
-from spheretwin.bench.command_queue import By, Command, Ticket, checked, settled
-from spheretwin.bench.commands import named
-from spheretwin.bench.cycle import Taking, Thread, Turning
+from spheretwin.bench.bench_state import BenchState
+from spheretwin.bench.command_queue import By, Command, Ticket, check_arguments, settled_ticket
+from spheretwin.bench.commands import find_command
+from spheretwin.bench.cycle import CommandProcessor, Cycle, Thread
 from spheretwin.bench.operators import Operators
-from spheretwin.bench.status import State, picture
+from spheretwin.bench.status import BenchStatus, bench_status
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.scenario.fields import fields_of
@@ -22,98 +22,98 @@ from spheretwin.scenario.writing import as_command, as_toml
 
 
 class Bench:
-    """A twin that does what it is commanded, at the pace of the clock.
+    """Twin that executes commands at the pace of the clock.
 
-    ``with Bench(scenario) as bench: bench.begin()`` runs it in a thread of its own; without `begin`, time
-    goes on by `advance` alone. It begins paused, in the mode of its scenario. The clock decides at which tick
-    a command acts, and nothing else: the same commands at the same ticks give the same bytes.
+    ``with Bench(scenario) as bench: bench.begin()`` runs it in a separate thread. Without `begin`, only
+    `advance` moves time. The bench begins paused, in the mode of its scenario. The clock decides only at
+    which tick a command acts: the same commands at the same ticks give the same bytes.
 
     Parameters
     ----------
     scenario : Scenario
         From `scenario.load`.
     operators : Operators, optional
-        Who may command.
+        Clients and their permission to command.
 
     Notes
     -----
     Commands, with their arguments:
 
     ==================================  ================================================================
-    ``start``, ``pause``                let time go on, or not
-    ``step``, ticks=1                   while paused: so many control ticks
+    ``start``, ``pause``                run or pause the time
+    ``step``, ticks=1                   while paused: run this many control ticks
     ``speed``, factor                   0.1 to as fast as possible (1e6); 1 is the clock's pace
     ``stop``                            STOP: currents to zero, latched until ``reset``
-    ``reset``                           tick 0 of the present settings, with those that are pending; paused
+    ``reset``                           tick 0 of the present settings and the pending ones; paused
     ``load``, source, overrides={}      tick 0 of another scenario, by name or file; paused
-    ``snapshot``, ``restore``, name     keep all that the twin goes on from; back to it
+    ``snapshot``, ``restore``, name     save the complete state of the twin; return to it
     ``off``                             no currents; the rotor is free
-    ``hold``                            come to rest here
+    ``hold``                            come to rest at the present pose
     ``point``, pose_rad                 go there, within ``limits``
-    ``trajectory``, fields=None         follow ``{"shape": "sinusoid", ...}``; the last one unless given
+    ``trajectory``, fields=None         follow ``{"shape": "sinusoid", ...}``; default: the last one
     ``jog``, rates_rad_s                turn at these rates, up to the edge of the workspace
     ``manual``, currents_A=None, group=None, current_A=1.0
-                                        these currents, or one group alone at a current
-    ``replay``, file                    show the rows of a recorded run; the twin stands still meanwhile, and
-                                        any mode, ``hold`` say, goes back to it
+                                        these currents, or a single group at a current
+    ``replay``, file                    show the rows of a recorded run; the twin is paused meanwhile, and
+                                        any mode, for example ``hold``, ends the replay
     ``limits``, rate_rad_s=None, acceleration_rad_s2=None
-                                        of the way to a pose or a shape
+                                        limits of the approach to a pose or a shape
     ``set``, name, value                any field of the scenario, dotted; fixed ones wait for ``reset``
-    ``add_fault``, fault                ``{"target": "coil.07", "mode": "open"}``, from now unless it says
+    ``add_fault``, fault                ``{"target": "coil.07", "mode": "open"}``; default start: now
     ``clear_faults``, place=None        all of them, or one by its place
     ``record``, recording=None, telemetry=None
                                         write .rrd and .parquet from now on
     ``keep``                            end that, and complete the files
     ``save``, file                      write the present settings as a scenario (TOML)
-    ``hello``, ``beat``, ``leave``      a client is there, still there, or goes (client=...)
-    ``ask``; ``grant``, to              a watching client asks to operate; the operator gives it over
+    ``hello``, ``beat``, ``leave``      a client connects, is present, or leaves (client=...)
+    ``ask``; ``grant``, to              a watching client asks to operate; the operator grants it
     ==================================  ================================================================
     """
 
     def __init__(self, scenario: Scenario, operators: Operators | None = None) -> None:
-        self._works = Works(scenario, operators or Operators())
-        self._taking = Taking(self._works)
-        self._turning = Turning(self._works, self._taking)
-        self._thread = Thread(self._works, self._taking, self._turning)
+        self._bench_state = BenchState(scenario, operators or Operators())
+        self._processor = CommandProcessor(self._bench_state)
+        self._cycle = Cycle(self._bench_state, self._processor)
+        self._thread = Thread(self._bench_state, self._processor, self._cycle)
 
     @property
     def actuator(self) -> Actuator:
-        """Of the present run."""
-        return self._works.desk.session.actuator
+        """Actuator of the present run."""
+        return self._bench_state.driver.session.actuator
 
     def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> Ticket:
-        """Tell it something; never waits, whatever is asked.
+        """Submit a command; never waits.
 
         Parameters
         ----------
         name : str
-            Of a command.
+            Name of the command.
         client : str, optional
-            Who says it: refused where another one operates. Whoever has the bench in hand need not say.
+            Client that sends it: refused if another one operates. Callers in the same process can omit it.
         **arguments
-            Of the command, as JSON has them.
+            Arguments of the command, in JSON types.
 
         Returns
         -------
         Ticket
-            Refused at once where the command is none, or not this client's to give; otherwise settled
+            Refused at once if the command is unknown or not permitted to this client; otherwise settled
             between two chunks.
         """
         try:
-            command = named(name)
-            given = checked(command, arguments)
+            command = find_command(name)
+            values = check_arguments(command, arguments)
             if command.by is By.CLIENT:
-                return self._said(command, client, given)
+                return self._client_command(command, client, values)
             if command.by is By.OPERATOR:
-                self._works.operators.check(client)
-            return self._taking.ask(command, given)
+                self._bench_state.operators.check(client)
+            return self._processor.submit(command, values)
         except InputError as error:
-            self._works.refused = f"{error}"
+            self._bench_state.refused = f"{error}"
             return Ticket(str(error))
 
-    def state(self) -> State:
-        """The latest picture; does not wait for the loop."""
-        return self._turning.state
+    def state(self) -> BenchStatus:
+        """Return the latest status; does not wait for the loop."""
+        return self._cycle.state
 
     def history(self) -> dict[str, NDArray[np.float64]]:
         """Rows of the last 10 s at 50 Hz, by signal: (n,) or (n, size) arrays, oldest first; a copy.
@@ -121,57 +121,60 @@ class Bench:
         ``t_s``, ``q_rad``, ``q_ref_rad``, ``error_rad``, ``torque_command_Nm``, ``torque_Nm``,
         ``disturbance_Nm``, ``current_command_A``, ``current_A``, ``allocation_scale``, and the rates.
         """
-        return (self._works.player or self._works).history.read()
+        return (self._bench_state.player or self._bench_state).history.read()
 
     def scenario_toml(self) -> str:
         """The present settings as a scenario file."""
-        return as_toml(self._works.desk.settings)
+        return as_toml(self._bench_state.driver.settings)
 
     def command_line(self) -> str:
         """The present settings as a command line."""
-        return as_command(self._works.desk.settings)
+        return as_command(self._bench_state.driver.settings)
 
     def fields(self) -> list[tuple[str, Any, str]]:
         """Every field of the scenario in force: dotted name, value, meaning.
 
-        The trajectory is the one that is set, whatever the mode makes of it meanwhile.
+        The trajectory is the one that is set, whatever the mode.
         """
-        in_force, own = self._works.desk.session.scenario, self._works.desk.settings.trajectory
-        found = fields_of(in_force.model_copy(update={"trajectory": own}))
-        return [(name, value, field.description or "") for name, value, field in found]
+        in_force, own = (
+            self._bench_state.driver.session.scenario,
+            self._bench_state.driver.settings.trajectory,
+        )
+        rows = fields_of(in_force.model_copy(update={"trajectory": own}))
+        return [(name, value, field.description or "") for name, value, field in rows]
 
     def advance(self, ticks: int) -> int:
-        """Take the commands that wait, then run control ticks, at once; returns how many were run.
+        """Execute the waiting commands, then run control ticks, at once; return how many were run.
 
-        What the thread does chunk by chunk. Refused while it is at work.
+        The thread does the same chunk by chunk. Refused while the thread runs.
 
         Raises
         ------
         SpheretwinError
-            The bench runs in a thread of its own, or is closed.
+            The bench runs in its thread, or is closed.
         """
-        if self._thread.begun or not self._taking.open:
+        if self._thread.started or not self._processor.open:
             raise SpheretwinError("bench: expected one that waits for advance, received one at work")
-        return self._turning.turn(ticks, waits=True)
+        return self._cycle.run_chunk(ticks, waits=True)
 
     def begin(self) -> None:
-        """Run in a thread of its own from now on.
+        """Run in a separate thread from now on.
 
-        Until `close`, the interpreter goes from thread to thread every millisecond.
+        Until `close`, the interpreter switches threads every millisecond.
         """
-        if not self._thread.begun and self._taking.open:
+        if not self._thread.started and self._processor.open:
             self._thread.begin()
 
     def close(self) -> None:
-        """End the thread, and complete what is being recorded."""
-        works = self._works
-        self._taking.open = False
+        """End the thread and complete the recordings."""
+        bench_state = self._bench_state
+        self._processor.open = False
         self._thread.end()
-        self._taking.close()
-        works.recording.end(works.desk.session, None)
-        works.recording.join()
-        self._turning.state = picture(works)  # what was kept is known
-        works.desk.session.close()
+        self._processor.close()
+        bench_state.recording.end(bench_state.driver.session, None)
+        bench_state.recording.join()
+        self._cycle.state = bench_status(bench_state)  # with the files that were completed
+        bench_state.driver.session.close()
 
     def __enter__(self) -> Bench:
         return self
@@ -181,9 +184,9 @@ class Bench:
     ) -> None:
         self.close()
 
-    def _said(self, command: Command, client: str | None, given: dict[str, Any]) -> Ticket:
-        """Take note at once of what a client says of itself."""
+    def _client_command(self, command: Command, client: str | None, values: dict[str, Any]) -> Ticket:
+        """Execute a client's command about itself at once."""
         if client is None:
             raise InputError(f"bench: expected {command.name} of a client, received none")
-        command.does(self._works.operators, client, **given)
-        return settled()
+        command.action(self._bench_state.operators, client, **values)
+        return settled_ticket()

@@ -1,4 +1,4 @@
-"""The parts of one bench: what commands act on, what is run, and what is shown."""
+"""State of one bench: the twin, its clock, its commands, its recordings and what is shown."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from spheretwin.analysis import recorded_run as reviewed
 from spheretwin.bench.command_queue import Queue
-from spheretwin.bench.driver import Desk
+from spheretwin.bench.driver import Driver
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import Pace
 from spheretwin.bench.recording import Recording
@@ -26,40 +26,40 @@ LENGTH_s = 10.0
 
 
 class History:
-    """Rows of the signals that every run has, the newest ones alone; whoever reads it delays no one.
+    """Newest rows of the signals that every run has; a reader never delays the writer.
 
     Parameters
     ----------
     groups : int
         Coil groups.
     period_s : float, s
-        From row to row of what is written.
+        Period of the rows that are written.
     """
 
     def __init__(self, groups: int, period_s: float) -> None:
         self._signals = common_signals(groups)
         self._width = width(self._signals)
-        self._each = max(1, round(1 / (RATE_Hz * period_s)))
+        self._stride = max(1, round(1 / (RATE_Hz * period_s)))
         self._rows: deque[NDArray[np.float64]] = deque(maxlen=round(LENGTH_s * RATE_Hz))
 
     def write(self, first_tick: int, rows: Table) -> None:
-        """Take those of some rows that are due, whatever the chunks; they must not change any more."""
-        due = rows.values[-first_tick % self._each :: self._each]
+        """Add the rows that are due, for any chunks; they must not change any more."""
+        due = rows.values[-first_tick % self._stride :: self._stride]
         # A run begins its rows with these signals; a recording may have them in another order.
         if rows.signals[: len(self._signals)] != self._signals:
             parts = [rows[signal.name].reshape(len(rows), -1) for signal in self._signals]
-            due = np.concatenate(parts, axis=1)[-first_tick % self._each :: self._each]
+            due = np.concatenate(parts, axis=1)[-first_tick % self._stride :: self._stride]
         self._rows.extend(due[-(self._rows.maxlen or 0) :, : self._width].copy())
 
     def read(self) -> dict[str, NDArray[np.float64]]:
         """The rows by signal, oldest first; a copy."""
-        rows = list(self._rows)  # at once: the writer may be at work in another thread
+        rows = list(self._rows)  # in one step: another thread may write
         table = Table(self._signals, np.array(rows).reshape(len(rows), self._width))
         return {signal.name: table[signal.name] for signal in self._signals}
 
 
 class Player:
-    """One recorded run, at one of its rows.
+    """Player of one recorded run.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Player:
     Attributes
     ----------
     name, law, shape, allocation : str
-        Of the run, as its file says.
+        As the file of the run states.
     table : Table
     period_s : float
     place : int
@@ -79,7 +79,7 @@ class Player:
     Raises
     ------
     InputError
-        The file is none of a run, or holds no rows.
+        The file is not one of a run, or holds no rows.
     """
 
     def __init__(self, path: Path) -> None:
@@ -88,7 +88,9 @@ class Player:
         groups = run.table["current_A"].shape[1] if len(run.table) else 0
         known = {signal.name for signal in run.table.signals}
         if not {signal.name for signal in common_signals(max(groups, 1))} <= known:
-            raise InputError(f"bench: expected rows of a whole run in {path}, received {len(run.table)} rows")
+            raise InputError(
+                f"bench: expected rows of a complete run in {path}, received {len(run.table)} rows"
+            )
         scenario = run.record.scenario
         self.period_s = run.period_s
         self.name, self.law = str(scenario["name"]), str(scenario["controller"]["law"])
@@ -99,8 +101,8 @@ class Player:
         self.history.write(0, self.row)
 
     @property
-    def over(self) -> bool:
-        """Whether the last row is shown."""
+    def ended(self) -> bool:
+        """True if the last row is shown."""
         return self.place >= len(self.table)
 
     @property
@@ -116,8 +118,8 @@ class Player:
         return self.place - first
 
 
-class Works:
-    """Parts of a bench that begins paused.
+class BenchState:
+    """State of a bench, which begins paused.
 
     Parameters
     ----------
@@ -126,28 +128,28 @@ class Works:
 
     Attributes
     ----------
-    desk : Desk
+    driver : Driver
     operators : Operators
     pace : Pace
     queue : Queue
     recording : Recording
     history : History
-        Of the twin; a player has its own.
+        History of the twin; a player has its own.
     player : Player or None
-        What is shown instead of the twin.
+        Run that is shown instead of the twin.
     running : bool
-        Whether time goes on.
+        Whether time runs.
     steps : int
         Ticks to be run while it does not.
     note, refused : str or None
-        What happened last that nobody commanded; the last command that was refused, and why.
+        Last event without a command; last command that was refused, and the reason.
     tried : set
-        Fields and values that were tried out beside the loop.
+        Fields and values that were tried outside the loop.
     """
 
     def __init__(self, scenario: Scenario, operators: Operators) -> None:
-        self.desk, self.operators = Desk(scenario, Session(scenario)), operators
-        self.pace, self.queue, self.recording = Pace(), Queue(), Recording(self.take_note)
+        self.driver, self.operators = Driver(scenario, Session(scenario)), operators
+        self.pace, self.queue, self.recording = Pace(), Queue(), Recording(self.set_note)
         self.player: Player | None = None
         self.running, self.steps = False, 0
         self.note: str | None = None
@@ -156,55 +158,55 @@ class Works:
         self.history = self._new_history()
 
     @property
-    def moves(self) -> bool:
-        """Whether there are ticks to run."""
+    def is_active(self) -> bool:
+        """True if there are ticks to run."""
         return self.running or self.steps > 0
 
     @property
     def period_s(self) -> float:
-        """From row to row of what is shown."""
-        return self.player.period_s if self.player else self.desk.session.scenario.controller.period_s
+        """Period of the rows that are shown."""
+        return self.player.period_s if self.player else self.driver.session.scenario.controller.period_s
 
     @property
     def t_s(self) -> float:
-        """Simulated time of what is shown."""
-        return float(self.player.row["t_s"][0]) if self.player else self.desk.session.t_s
+        """Simulated time of the row that is shown."""
+        return float(self.player.row["t_s"][0]) if self.player else self.driver.session.t_s
 
-    def take_note(self, text: str | None) -> None:
-        """Remember what happened last that nobody commanded."""
+    def set_note(self, text: str | None) -> None:
+        """Set the note: the last event without a command."""
         self.note = text
 
     def pause(self) -> None:
-        """Let time stand still."""
+        """Pause the time."""
         self.running, self.steps = False, 0
 
-    def check_going(self, name: str) -> None:
-        """Find out whether what is shown can go on.
+    def check_can_run(self, name: str) -> None:
+        """Check that the run or replay that is shown can continue.
 
         Raises
         ------
         InputError
-            It cannot, and `name` asks for it.
+            It cannot continue; the message names the command `name`.
         """
-        if self.player is None and self.desk.reason is not None:
+        if self.player is None and self.driver.reason is not None:
             raise InputError(f"bench: expected reset, as the run has ended, received {name}")
 
     def begin(self, settings: Scenario, session: Session) -> None:
-        """Begin anew with a session at tick 0, paused."""
-        self.desk.begin(settings, session)
+        """Restart with a session at tick 0, paused."""
+        self.driver.begin(settings, session)
         self.player = None
         self.pause()
         self.history = self._new_history()
-        self.recording.begin_anew()
+        self.recording.reset()
         self.pace.clear()
 
-    def went_back(self, end: Callable[..., None] | None) -> None:
-        """Go on from where the session is now, after it went back; `end` completes what was recorded."""
-        session = self.desk.session
+    def resume_after_restore(self, end: Callable[..., None] | None) -> None:
+        """Continue from the restored session; `end` completes what was recorded."""
+        session = self.driver.session
         self.recording.end(session, "the recording has ended: time went back", end)
-        self.recording.go_on_from(session)
+        self.recording.resume_from(session)
         self.player, self.history = None, self._new_history()
 
     def _new_history(self) -> History:
-        session = self.desk.session
+        session = self.driver.session
         return History(len(session.actuator.groups), session.scenario.controller.period_s)

@@ -1,4 +1,4 @@
-"""What a command of a bench is: its arguments, who may give it, what it needs, and what it does."""
+"""Commands of a bench: their definition, their check, their tickets and their queue."""
 
 from __future__ import annotations
 
@@ -23,50 +23,51 @@ Place = Annotated[int, Field(ge=0)]
 
 
 class By(Enum):
-    """Who may give a command."""
+    """Permission to give a command."""
 
     OPERATOR = 1
     ANYONE = 2
     CLIENT = 3
-    """Whoever says who it is: this is of the clients themselves, and done at once."""
+    """Any client that names itself: the command is about the client and is executed at once."""
 
 
 class Command(NamedTuple):
-    """One command."""
+    """Definition of a command."""
 
     name: str
-    does: Callable[..., None]
-    """Takes the works, what was prepared, and the arguments by name; of a client's, operators and client."""
+    action: Callable[..., None]
+    """Takes the bench state, the result of `prepare`, and the arguments by name; for a client's command, the
+    operators and the client."""
     arguments: type[BaseModel]
-    only_last: tuple[str, ...] | None
-    """Where only the last one that waits matters: arguments that must be the same for it to be the same."""
+    replace_equal: tuple[str, ...] | None
+    """Arguments that must be equal for a new command to replace a waiting one; None if none is replaced."""
     by: By
-    prepares: Callable[..., Callable[[], Any] | None] | None
-    """Takes the works and the arguments by name; gives what must be done beside the loop before, if any."""
-    before_all: bool
-    """Whether it waits for no other."""
-    undone: bool
-    """Whether one that goes before all others takes it back where it was said earlier."""
+    prepare: Callable[..., Callable[[], Any] | None] | None
+    """Takes the bench state and the arguments by name; returns work to do outside the loop before, if any."""
+    urgent: bool
+    """True if it is executed before all others."""
+    cancelled_by_stop: bool
+    """True if an urgent command that was given later cancels it."""
 
 
 def command(
     name: str,
-    does: Callable[..., None],
+    action: Callable[..., None],
     /,
-    only_last: tuple[str, ...] | None = None,
+    replace_equal: tuple[str, ...] | None = None,
     by: By = By.OPERATOR,
-    prepares: Callable[..., Callable[[], Any] | None] | None = None,
-    before_all: bool = False,
-    undone: bool = False,
+    prepare: Callable[..., Callable[[], Any] | None] | None = None,
+    urgent: bool = False,
+    cancelled_by_stop: bool = False,
     arguments: Mapping[str, Any] | None = None,
 ) -> Command:
-    """Row of a command; each argument is a type and its default, or ``...`` where it must be given."""
-    taken = create_model("Arguments", __config__=_CONFIG, **(arguments or {}))
-    return Command(name, does, taken, only_last, by, prepares, before_all, undone)
+    """Define a command; each argument is a type and its default, or ``...`` if it is required."""
+    model = create_model("Arguments", __config__=_CONFIG, **(arguments or {}))
+    return Command(name, action, model, replace_equal, by, prepare, urgent, cancelled_by_stop)
 
 
-def checked(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of a command, as it takes them.
+def check_arguments(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the checked arguments of a command.
 
     Raises
     ------
@@ -78,62 +79,62 @@ def checked(command: Command, arguments: Mapping[str, Any]) -> dict[str, Any]:
         known = ", ".join(kind.model_fields) or "no arguments"
         raise InputError(f"bench: {name}: expected {known}, received {unknown[0]}")
     try:
-        found = kind.model_validate_json(json.dumps(arguments, default=as_plain))
+        values = kind.model_validate_json(json.dumps(arguments, default=as_plain))
     except ValidationError as error:
         raise InputError(f"bench: {name}: {explain(error, kind)}") from None
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(
             f"bench: {name}: expected arguments as JSON has them, received {foreign(error)}"
         ) from None
-    return {field: getattr(found, field) for field in kind.model_fields}
+    return {field: getattr(values, field) for field in kind.model_fields}
 
 
 MOST_WAITING = 256
 
 
 class Ticket:
-    """What becomes of a command.
+    """Outcome of a command.
 
     Attributes
     ----------
     refused : str or None
-        Why it was refused, in one line; None while it waits, and where it was done or another like it
-        took its place.
-    begun_s, settled_s : float
-        Clock when it came, and when it was settled (`time.monotonic`).
+        Reason why it was refused, in one line; None while it waits, and if it was executed or replaced by
+        an equal one.
+    created_s, settled_s : float
+        Clock when it was created and when it was settled (`time.monotonic`).
     """
 
     def __init__(self, refused: str | None = None) -> None:
         self.refused: str | None = None
-        self.begun_s = self.settled_s = time.monotonic()
+        self.created_s = self.settled_s = time.monotonic()
         self._done = threading.Event()
         if refused is not None:
             self.settle(refused)
 
     @property
     def done(self) -> bool:
-        """Whether it waits no more."""
+        """True if it no longer waits."""
         return self._done.is_set()
 
     def wait(self, timeout_s: float = 5.0) -> str | None:
-        """Wait until it is done or refused; returns why it was refused, if it was."""
+        """Wait until it is executed or refused; return the reason of a refusal."""
         self._done.wait(timeout_s)
         return self.refused
 
     def settle(self, refused: str | None = None) -> None:
-        """Say what became of it."""
+        """Settle the ticket with the outcome."""
         self.refused, self.settled_s = refused, time.monotonic()
         self._done.set()
 
 
-def settled() -> Ticket:
-    """Ticket of what was done at once."""
+def settled_ticket() -> Ticket:
+    """Return the ticket of a command that was executed at once."""
     ticket = Ticket()
     ticket.settle()
     return ticket
 
 
-class Waiting:
+class QueuedCommand:
     """A command in the queue.
 
     Attributes
@@ -149,25 +150,25 @@ class Waiting:
 
 
 class Queue:
-    """Commands of any threads for the one that acts on them, in the order of their coming.
+    """Queue of commands from any threads to the loop's thread, in the order of arrival.
 
-    One that takes the place of another like it goes to the end: what was said last is done last.
+    A command that replaces an equal one is put at the end: the last one given is executed last.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: OrderedDict[object, Waiting] = OrderedDict()
+        self._waiting: OrderedDict[object, QueuedCommand] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def put(self, waiting: Waiting) -> None:
-        """Let a command wait for its turn.
+    def put(self, waiting: QueuedCommand) -> None:
+        """Add a command.
 
         Raises
         ------
         InputError
-            Too many do.
+            Too many are waiting.
         """
         key = _key(waiting)
         with self._lock:
@@ -181,15 +182,15 @@ class Queue:
         if replaced:
             replaced.ticket.settle()
 
-    def next(self) -> Waiting | None:
-        """The command whose turn it is, if one waits; it waits no more."""
+    def next(self) -> QueuedCommand | None:
+        """Remove and return the first command, if there is one."""
         with self._lock:
             return self._waiting.popitem(last=False)[1] if self._waiting else None
 
 
-def _key(waiting: Waiting) -> object:
-    """Equal for two commands of which only the last one matters."""
-    only_last = waiting.command.only_last
-    if only_last is None:
+def _key(waiting: QueuedCommand) -> object:
+    """Return a key that is equal for two commands of which the last one replaces the other."""
+    replace_equal = waiting.command.replace_equal
+    if replace_equal is None:
         return waiting
-    return waiting.command.name, *(waiting.arguments[name] for name in only_last)
+    return waiting.command.name, *(waiting.arguments[name] for name in replace_equal)

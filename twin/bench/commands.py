@@ -1,4 +1,4 @@
-"""What clients say of themselves: who is there, and who operates."""
+"""All commands of a bench: clients, snapshots and files, modes, time, settings and faults."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Annotated, Any
 from pydantic import Field, JsonValue
 
 from spheretwin import scenario as scenarios
-from spheretwin.bench.bench_state import Player, Works
+from spheretwin.bench.bench_state import BenchState, Player
 from spheretwin.bench.command_queue import By, Command, Place, Text, command
-from spheretwin.bench.driver import Desk, with_field
+from spheretwin.bench.driver import Driver, with_field
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import FASTEST, SLOWEST
@@ -24,47 +24,47 @@ from spheretwin.scenario.writing import as_toml
 from spheretwin.session import Session
 from spheretwin.trajectories.rounding import Triple
 
-HELLO = command("hello", Operators.see, by=By.CLIENT)
-BEAT = command("beat", Operators.see, by=By.CLIENT)
+HELLO = command("hello", Operators.register, by=By.CLIENT)
+BEAT = command("beat", Operators.register, by=By.CLIENT)
 ASK = command("ask", Operators.ask, by=By.CLIENT)
 LEAVE = command("leave", Operators.leave, by=By.CLIENT)
 GRANT = command("grant", Operators.grant, by=By.CLIENT, arguments={"to": (Text, ...)})
 
 
-def _snapshot(works: Works, _: None, name: str) -> None:
-    works.desk.snapshot(name)
+def _snapshot(bench_state: BenchState, _: None, name: str) -> None:
+    bench_state.driver.snapshot(name)
 
 
-def _restore(works: Works, _: None, name: str) -> None:
-    end = works.recording.ending(works.desk.session)  # as it is before time goes back
-    works.desk.restore(name)
-    works.went_back(end)
+def _restore(bench_state: BenchState, _: None, name: str) -> None:
+    end = bench_state.recording.ending(bench_state.driver.session)  # before time goes back
+    bench_state.driver.restore(name)
+    bench_state.resume_after_restore(end)
 
 
-def _opened(works: Works, recording: str | None, telemetry: str | None) -> Callable[[], OpenedFiles]:
+def _open_files(bench_state: BenchState, recording: str | None, telemetry: str | None) -> Callable[[], OpenedFiles]:
     paths = [Path(path) if path else None for path in (recording, telemetry)]
-    return lambda: OpenedFiles(works.desk.session, *paths)
+    return lambda: OpenedFiles(bench_state.driver.session, *paths)
 
 
-def _record(works: Works, files: OpenedFiles, recording: str | None, telemetry: str | None) -> None:
-    if works.recording.on or works.desk.reason is not None:
+def _record(bench_state: BenchState, files: OpenedFiles, recording: str | None, telemetry: str | None) -> None:
+    if bench_state.recording.on or bench_state.driver.reason is not None:
         files.discard()
         raise InputError(
             "bench: expected keep before the next recording, received record"
-            if works.recording.on
-            else "bench: expected a run that goes on, received record after its end"
+            if bench_state.recording.on
+            else "bench: expected a run in progress, received record after its end"
         )
-    works.recording.begin(files, works.desk)
+    bench_state.recording.begin(files, bench_state.driver)
 
 
-def _keep(works: Works, _: None) -> None:
-    if not works.recording.on:
+def _keep(bench_state: BenchState, _: None) -> None:
+    if not bench_state.recording.on:
         raise InputError("bench: expected a recording to keep, received none")
-    works.recording.end(works.desk.session, None)
+    bench_state.recording.end(bench_state.driver.session, None)
 
 
-def _written(works: Works, file: str) -> Callable[[], None]:
-    settings = works.desk.settings
+def _write_scenario(bench_state: BenchState, file: str) -> Callable[[], None]:
+    settings = bench_state.driver.settings
 
     def write() -> None:
         with whole_file(Path(file)) as temporary:
@@ -73,8 +73,8 @@ def _written(works: Works, file: str) -> Callable[[], None]:
     return write
 
 
-def _save(works: Works, _: None, file: str) -> None:
-    """What is prepared is all of it."""
+def _save(bench_state: BenchState, _: None, file: str) -> None:
+    """Do nothing more: the preparation writes the file."""
 
 
 SNAPSHOT = command("snapshot", _snapshot, arguments={"name": (Text, "last")})
@@ -82,40 +82,40 @@ RESTORE = command("restore", _restore, arguments={"name": (Text, "last")})
 RECORD = command(
     "record",
     _record,
-    prepares=_opened,
+    prepare=_open_files,
     arguments={"recording": (Text | None, None), "telemetry": (Text | None, None)},
 )
-KEEP = command("keep", _keep, only_last=())
-SAVE = command("save", _save, prepares=_written, arguments={"file": (Text, ...)})
+KEEP = command("keep", _keep, replace_equal=())
+SAVE = command("save", _save, prepare=_write_scenario, arguments={"file": (Text, ...)})
 
 
 Current = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
-def _mode(way: Callable[..., None]) -> Callable[..., None]:
-    """Go over to a mode of the desk's; a recorded run is shown no more."""
+def _mode(method: Callable[..., None]) -> Callable[..., None]:
+    """Make the action of a mode: it calls the method of the driver and ends a replay."""
 
-    def does(works: Works, _: None, **given: Any) -> None:
-        way(works.desk, **given)
-        works.player = None
+    def action(bench_state: BenchState, _: None, **given: Any) -> None:
+        method(bench_state.driver, **given)
+        bench_state.player = None
 
-    return does
+    return action
 
 
-OFF = command("off", _mode(Desk.off), only_last=())
-HOLD = command("hold", _mode(Desk.hold), only_last=())
-POINT = command("point", _mode(Desk.point), only_last=(), arguments={"pose_rad": (Triple, ...)})
+OFF = command("off", _mode(Driver.off), replace_equal=())
+HOLD = command("hold", _mode(Driver.hold), replace_equal=())
+POINT = command("point", _mode(Driver.point), replace_equal=(), arguments={"pose_rad": (Triple, ...)})
 TRAJECTORY = command(
     "trajectory",
-    _mode(Desk.trajectory),
-    only_last=(),
+    _mode(Driver.trajectory),
+    replace_equal=(),
     arguments={"fields": (dict[str, JsonValue] | None, None)},
 )
-JOG = command("jog", _mode(Desk.jog), only_last=(), arguments={"rates_rad_s": (Triple, ...)})
+JOG = command("jog", _mode(Driver.jog), replace_equal=(), arguments={"rates_rad_s": (Triple, ...)})
 MANUAL = command(
     "manual",
-    _mode(Desk.manual),
-    only_last=(),
+    _mode(Driver.manual),
+    replace_equal=(),
     arguments={
         "currents_A": (tuple[Current, ...] | None, None),
         "group": (Place | None, None),
@@ -124,131 +124,131 @@ MANUAL = command(
 )
 
 
-def _read(works: Works, file: str) -> Callable[[], Player]:
+def _open_player(bench_state: BenchState, file: str) -> Callable[[], Player]:
     return lambda: Player(Path(file))
 
 
-def _replay(works: Works, player: Player, file: str) -> None:
-    works.player = player
+def _replay(bench_state: BenchState, player: Player, file: str) -> None:
+    bench_state.player = player
 
 
-REPLAY = command("replay", _replay, prepares=_read, arguments={"file": (Text, ...)})
+REPLAY = command("replay", _replay, prepare=_open_player, arguments={"file": (Text, ...)})
 
 
 Speed = Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
 Ticks = Annotated[int, Field(ge=1, le=1_000_000)]
 
-Begun = tuple[Scenario, Session]
+NewRun = tuple[Scenario, Session]
 
 
-def _start(works: Works, _: None) -> None:
-    works.check_going("start")
-    works.running = True
+def _start(bench_state: BenchState, _: None) -> None:
+    bench_state.check_can_run("start")
+    bench_state.running = True
 
 
-def _pause(works: Works, _: None) -> None:
-    works.pause()
+def _pause(bench_state: BenchState, _: None) -> None:
+    bench_state.pause()
 
 
-def _step(works: Works, _: None, ticks: int) -> None:
-    works.check_going("step")
-    if works.running:
-        raise InputError("bench: expected step while paused, received it while time goes on")
-    works.steps += ticks
+def _step(bench_state: BenchState, _: None, ticks: int) -> None:
+    bench_state.check_can_run("step")
+    if bench_state.running:
+        raise InputError("bench: expected step while paused, received it while time runs")
+    bench_state.steps += ticks
 
 
-def _speed(works: Works, _: None, factor: float) -> None:
-    works.pace.speed = factor
-    works.pace.rest()
+def _speed(bench_state: BenchState, _: None, factor: float) -> None:
+    bench_state.pace.speed = factor
+    bench_state.pace.rest()
 
 
-def _stop(works: Works, _: None) -> None:
-    works.player, works.note = None, "STOP: currents are taken away until reset"
-    works.desk.stop()
+def _stop(bench_state: BenchState, _: None) -> None:
+    bench_state.player, bench_state.note = None, "STOP: zero currents until reset"
+    bench_state.driver.stop()
 
 
-def _begun_anew(works: Works, ready: Begun, **given: Any) -> None:
-    recorded = works.recording.on
-    works.recording.end(works.desk.session, None)
-    works.desk.session.close()
-    works.begin(*ready)
-    works.note = "the recording has ended: the run was begun anew" if recorded else None
+def _restart(bench_state: BenchState, new_run: NewRun, **arguments: Any) -> None:
+    recorded = bench_state.recording.on
+    bench_state.recording.end(bench_state.driver.session, None)
+    bench_state.driver.session.close()
+    bench_state.begin(*new_run)
+    bench_state.note = "the recording has ended: the run was restarted" if recorded else None
 
 
-def _present(works: Works) -> Callable[[], Begun]:
-    settings = works.desk.settings
+def _present_scenario(bench_state: BenchState) -> Callable[[], NewRun]:
+    settings = bench_state.driver.settings
     return lambda: (settings, Session(settings))
 
 
-def _another(works: Works, source: str, overrides: dict[str, Any]) -> Callable[[], Begun]:
-    def load() -> Begun:
+def _load_scenario(bench_state: BenchState, source: str, overrides: dict[str, Any]) -> Callable[[], NewRun]:
+    def load() -> NewRun:
         scenario = scenarios.load(source, overrides)
         return scenario, Session(scenario)
 
     return load
 
 
-START = command("start", _start, only_last=(), undone=True)
-PAUSE = command("pause", _pause, only_last=())
-STEP = command("step", _step, undone=True, arguments={"ticks": (Ticks, 1)})
-SPEED = command("speed", _speed, only_last=(), arguments={"factor": (Speed, ...)})
-STOP = command("stop", _stop, by=By.ANYONE, before_all=True)
-RESET = command("reset", _begun_anew, only_last=(), prepares=_present, undone=True)
+START = command("start", _start, replace_equal=(), cancelled_by_stop=True)
+PAUSE = command("pause", _pause, replace_equal=())
+STEP = command("step", _step, cancelled_by_stop=True, arguments={"ticks": (Ticks, 1)})
+SPEED = command("speed", _speed, replace_equal=(), arguments={"factor": (Speed, ...)})
+STOP = command("stop", _stop, by=By.ANYONE, urgent=True)
+RESET = command("reset", _restart, replace_equal=(), prepare=_present_scenario, cancelled_by_stop=True)
 LOAD = command(
     "load",
-    _begun_anew,
-    prepares=_another,
-    undone=True,
+    _restart,
+    prepare=_load_scenario,
+    cancelled_by_stop=True,
     arguments={"source": (Text, ...), "overrides": (dict[str, JsonValue], {})},
 )
 
 
 PositiveLimit = Annotated[float, Field(ge=1e-3, le=1e6)]
 
-# Sections whose fields no machine is built from.
+# Sections from which nothing is built or compiled.
 CHEAP = ("trajectory", "disturbance")
 
 
-def _limits(works: Works, _: None, **given: float | None) -> None:
-    desk = works.desk
-    desk.limits = Limits(*(given[field] or own for field, own in desk.limits._asdict().items()))
+def _limits(bench_state: BenchState, _: None, **given: float | None) -> None:
+    driver = bench_state.driver
+    driver.limits = Limits(*(given[field] or own for field, own in driver.limits._asdict().items()))
 
 
-def _set(works: Works, _: None, name: str, value: Any) -> None:
-    works.desk.set(name, value)
+def _set(bench_state: BenchState, _: None, name: str, value: Any) -> None:
+    bench_state.driver.set(name, value)
 
 
-def _add_fault(works: Works, _: None, fault: dict[str, Any]) -> None:
-    works.desk.set(FAULT, fault)
+def _add_fault(bench_state: BenchState, _: None, fault: dict[str, Any]) -> None:
+    bench_state.driver.set(FAULT, fault)
 
 
-def _clear_faults(works: Works, _: None, place: int | None) -> None:
-    works.desk.clear_faults(place)
+def _clear_faults(bench_state: BenchState, _: None, place: int | None) -> None:
+    bench_state.driver.clear_faults(place)
 
 
-def _trial(works: Works, name: str, value: Any) -> Callable[[], None] | None:
-    """A session of the settings to be, the first time that a field is set so: it may be compiled."""
+def _trial(bench_state: BenchState, name: str, value: Any) -> Callable[[], None] | None:
+    """Return a trial of the new settings, the first time that a field has such a value: it may compile."""
     key = (name, value if isinstance(value, str | bool) else type(value))
-    settings = works.desk.settings
-    cheap = name.split(".")[0] in CHEAP or key in works.tried
+    settings = bench_state.driver.settings
+    cheap = name.split(".")[0] in CHEAP or key in bench_state.tried
     if cheap and not is_fixed(name):
         return None
 
     def try_out() -> None:
         Session(with_field(settings, name, value)).close()
-        works.tried.add(key)
+        bench_state.tried.add(key)
 
     return try_out
 
 
-def _trial_of_fault(works: Works, fault: dict[str, Any]) -> Callable[[], None] | None:
-    return _trial(works, FAULT, fault)
+def _trial_of_fault(bench_state: BenchState, fault: dict[str, Any]) -> Callable[[], None] | None:
+    return _trial(bench_state, FAULT, fault)
 
 
 LIMITS = command(
     "limits",
     _limits,
-    only_last=(),
+    replace_equal=(),
     arguments={
         "rate_rad_s": (PositiveLimit | None, None),
         "acceleration_rad_s2": (PositiveLimit | None, None),
@@ -257,12 +257,12 @@ LIMITS = command(
 SET = command(
     "set",
     _set,
-    only_last=("name",),
-    prepares=_trial,
+    replace_equal=("name",),
+    prepare=_trial,
     arguments={"name": (Text, ...), "value": (JsonValue, ...)},
 )
 ADD_FAULT = command(
-    "add_fault", _add_fault, prepares=_trial_of_fault, arguments={"fault": (dict[str, JsonValue], ...)}
+    "add_fault", _add_fault, prepare=_trial_of_fault, arguments={"fault": (dict[str, JsonValue], ...)}
 )
 CLEAR_FAULTS = command("clear_faults", _clear_faults, arguments={"place": (Place | None, None)})
 
@@ -300,16 +300,16 @@ COMMANDS: dict[str, Command] = {
         GRANT,
     )
 }
-"""By name; see `Bench` for what each does."""
+"""All commands by name; `Bench` describes each."""
 
 
-def named(name: object) -> Command:
+def find_command(name: object) -> Command:
     """Command of a name.
 
     Raises
     ------
     InputError
-        There is none.
+        It is unknown.
     """
     if not isinstance(name, str) or name not in COMMANDS:
         raise InputError(

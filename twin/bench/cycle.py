@@ -1,4 +1,4 @@
-"""One chunk of a bench: ticks are run, or rows of a recorded run shown, and handed on."""
+"""Cycle of a bench: commands are executed, then a chunk of ticks is run or of recorded rows is shown."""
 
 from __future__ import annotations
 
@@ -11,101 +11,103 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
-from spheretwin.bench.bench_state import Player, Works
-from spheretwin.bench.command_queue import Command, Ticket, Waiting
-from spheretwin.bench.status import State, picture
+from spheretwin.bench.bench_state import BenchState, Player
+from spheretwin.bench.command_queue import Command, QueuedCommand, Ticket
+from spheretwin.bench.status import BenchStatus, bench_status
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, one_line
 from spheretwin.outputs import import_writers
 
 
-def run(works: Works, ticks: int) -> int:
-    """Run some ticks, no more than are asked for while paused; returns how many were run."""
-    if not works.running:
-        ticks = min(ticks, works.steps)
+def run(bench_state: BenchState, ticks: int) -> int:
+    """Run some ticks, while paused at most the requested steps; return how many were run."""
+    if not bench_state.running:
+        ticks = min(ticks, bench_state.steps)
     if ticks < 1:
         return 0
     began = time.monotonic()
-    done = _play(works, works.player, ticks) if works.player else _simulate(works, ticks)
-    works.steps -= min(done, works.steps)
-    works.pace.ran(done, works.period_s, works.t_s, time.monotonic() - began)
+    done = (
+        _play(bench_state, bench_state.player, ticks) if bench_state.player else _simulate(bench_state, ticks)
+    )
+    bench_state.steps -= min(done, bench_state.steps)
+    bench_state.pace.record_chunk(done, bench_state.period_s, bench_state.t_s, time.monotonic() - began)
     return done
 
 
-def _play(works: Works, player: Player, ticks: int) -> int:
+def _play(bench_state: BenchState, player: Player, ticks: int) -> int:
     done = player.advance(ticks)
-    if player.over:
-        works.pause()
+    if player.ended:
+        bench_state.pause()
     return done
 
 
-def _simulate(works: Works, ticks: int) -> int:
-    desk, recording, done = works.desk, works.recording, 0
-    recording.note_changes(desk.session)
-    while done < ticks and desk.reason is None:
-        first = desk.session.tick
-        rows = desk.advance(ticks - done)
+def _simulate(bench_state: BenchState, ticks: int) -> int:
+    driver, recording, done = bench_state.driver, bench_state.recording, 0
+    recording.note_changes(driver.session)
+    while done < ticks and driver.reason is None:
+        first = driver.session.tick
+        rows = driver.advance(ticks - done)
         if rows is not None and len(rows):
             done += len(rows)
-            works.history.write(first, rows)
+            bench_state.history.write(first, rows)
             recording.write(rows)
-        recording.note_changes(desk.session)
-    if desk.reason is not None:
-        works.pause()
-        recording.end(desk.session, "the recording has ended: so has the run")
+        recording.note_changes(driver.session)
+    if driver.reason is not None:
+        bench_state.pause()
+        recording.end(driver.session, "the recording has ended: so has the run")
     return done
 
 
-class Taking:
-    """Commands of one bench on their way from those who give them to what they act on.
+class CommandProcessor:
+    """Executes the commands of one bench in the loop's thread.
 
     Parameters
     ----------
-    works : Works
+    bench_state : BenchState
 
     Attributes
     ----------
     wake : threading.Event
-        Set where one came that waits for no other.
+        Set when an urgent command arrives.
     outcomes : list of (Ticket, str or None)
-        Commands that were acted on, and why those that were refused were.
+        Executed commands, each with the reason if it was refused.
     """
 
-    def __init__(self, works: Works) -> None:
-        self._works = works
+    def __init__(self, bench_state: BenchState) -> None:
+        self._bench_state = bench_state
         self.wake = threading.Event()
         self.outcomes: list[tuple[Ticket, str | None]] = []
-        self._first: list[Waiting] = []
-        self._first_s = -math.inf
-        self._preparing: tuple[Waiting, Future[Any]] | None = None
+        self._urgent: list[QueuedCommand] = []
+        self._urgent_s = -math.inf
+        self._preparing: tuple[QueuedCommand, Future[Any]] | None = None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="bench")
         self.open = True
 
-    def ask(self, command: Command, arguments: dict[str, Any]) -> Ticket:
-        """Let a command wait for its turn, from any thread; arguments are those that were checked.
+    def submit(self, command: Command, arguments: dict[str, Any]) -> Ticket:
+        """Queue a command, from any thread; its arguments are checked already.
 
         Raises
         ------
         InputError
-            Too many do.
+            Too many are waiting.
         """
-        waiting = Waiting(command, arguments)
-        if command.before_all:
-            self._first_s = waiting.ticket.begun_s
-            self._first.append(waiting)
+        waiting = QueuedCommand(command, arguments)
+        if command.urgent:
+            self._urgent_s = waiting.ticket.created_s
+            self._urgent.append(waiting)
             self.wake.set()
         else:
-            self._works.queue.put(waiting)
+            self._bench_state.queue.put(waiting)
         return waiting.ticket
 
-    def take(self, waits: bool) -> None:
-        """Act on what waits, in its order; what is prepared beside the loop keeps the others waiting.
+    def process(self, waits: bool) -> None:
+        """Execute the waiting commands in order; one in preparation outside the loop delays the others.
 
         Parameters
         ----------
         waits : bool
-            Whether to wait for what is prepared.
+            Whether to wait for the preparation.
         """
-        self._take_first()
+        self._process_urgent()
         while self.open:
             if self._preparing:
                 waiting, future = self._preparing
@@ -114,170 +116,170 @@ class Taking:
                 self._preparing = None
                 self._act(waiting, future.result)
                 continue
-            following = self._works.queue.next()
+            following = self._bench_state.queue.next()
             if following is None:
                 return
             self._begin(following)
 
     def close(self) -> None:
-        """Take no more; wait for what is being prepared."""
+        """Accept no more commands; wait for the one that is being prepared."""
         self._worker.shutdown()
 
-    def _take_first(self) -> None:
-        while self._first:
-            waiting = self._first[0]  # it stays until it is done: whatever goes wrong, it is tried again
-            waiting.command.does(self._works, None, **waiting.arguments)
-            self.outcomes.append((self._first.pop(0).ticket, None))
+    def _process_urgent(self) -> None:
+        while self._urgent:
+            waiting = self._urgent[0]  # it stays until it is executed: after an error it is tried again
+            waiting.command.action(self._bench_state, None, **waiting.arguments)
+            self.outcomes.append((self._urgent.pop(0).ticket, None))
 
-    def _begin(self, waiting: Waiting) -> None:
-        """Act on a command, or let what it needs be prepared."""
-        prepares = waiting.command.prepares
-        work = prepares(self._works, **waiting.arguments) if prepares else None
+    def _begin(self, waiting: QueuedCommand) -> None:
+        """Execute a command, or start its preparation."""
+        prepare = waiting.command.prepare
+        work = prepare(self._bench_state, **waiting.arguments) if prepare else None
         if work is None:
             self._act(waiting, lambda: None)
         else:
             self._preparing = waiting, self._worker.submit(work)
 
-    def _act(self, waiting: Waiting, prepared: Callable[[], Any]) -> None:
-        """Do what is commanded, or say why not."""
+    def _act(self, waiting: QueuedCommand, prepared: Callable[[], Any]) -> None:
+        """Execute a command, or refuse it with the reason."""
         command, refused = waiting.command, None
         try:
-            if command.undone and waiting.ticket.begun_s <= self._first_s:
+            if command.cancelled_by_stop and waiting.ticket.created_s <= self._urgent_s:
                 raise InputError(f"bench: expected {command.name} after STOP, received it before")
-            command.does(self._works, prepared(), **waiting.arguments)
-        except Exception as error:  # files and laws of the user's may raise whatever they will
-            refused = f"{error}" if isinstance(error, SpheretwinError) else told(error)
-            self._works.refused = refused
+            command.action(self._bench_state, prepared(), **waiting.arguments)
+        except Exception as error:  # files and laws of the user may raise any error
+            refused = f"{error}" if isinstance(error, SpheretwinError) else error_text(error)
+            self._bench_state.refused = refused
         self.outcomes.append((waiting.ticket, refused))
 
 
-def told(error: Exception) -> str:
-    """What kind of error it is, and why, in one line."""
+def error_text(error: Exception) -> str:
+    """Return kind and reason of an error in one line."""
     return one_line(exception_text(error))
 
 
-class Turning:
-    """Turns of one bench.
+class Cycle:
+    """Cycle of one bench.
 
     Parameters
     ----------
-    works : Works
-    taking : Taking
-        Of its commands.
+    bench_state : BenchState
+    processor : CommandProcessor
+        Executes the commands of the bench.
 
     Attributes
     ----------
-    state : State
-        The latest picture.
+    state : BenchStatus
+        The latest status.
     """
 
-    def __init__(self, works: Works, taking: Taking) -> None:
-        self._works, self._taking = works, taking
-        self.state: State = picture(works)
+    def __init__(self, bench_state: BenchState, processor: CommandProcessor) -> None:
+        self._bench_state, self._processor = bench_state, processor
+        self.state: BenchStatus = bench_status(bench_state)
 
-    def turn(self, ticks: int, waits: bool) -> int:
-        """Take what waits, then run some ticks; returns how many were run.
+    def run_chunk(self, ticks: int, waits: bool) -> int:
+        """Execute the waiting commands, then run some ticks; return how many were run.
 
-        Whatever goes wrong is the run's end, not the bench's.
+        Any error ends the run, but not the bench.
 
         Parameters
         ----------
         ticks : int
         waits : bool
-            Whether to wait for what commands need.
+            Whether to wait for the preparation of commands.
         """
         done = 0
         try:
-            self._taking.take(waits)
+            self._processor.process(waits)
             self._settle()
-            done = run(self._works, ticks)
-            self._look_around()
-        except Exception as error:  # of whatever kind, else the thread would end and STOP with it
-            self._works.desk.fail(error)
-            self._works.pause()
+            done = run(self._bench_state, ticks)
+            self._hold_without_operator()
+        except Exception as error:  # any kind, else the thread would end, and STOP with it
+            self._bench_state.driver.fail(error)
+            self._bench_state.pause()
         self._settle()
         self._show()
         return done
 
     def _show(self) -> None:
-        """Make the next picture; where it cannot be made, the last one says so."""
+        """Update the status; if that fails, the last one reports the fault."""
         try:
-            self.state = picture(self._works)
+            self.state = bench_status(self._bench_state)
         except Exception as error:  # a page must never show an old state as the present one
-            self.state = replace(self.state, mode="fault", reason=told(error))
+            self.state = replace(self.state, mode="fault", reason=error_text(error))
 
     def _settle(self) -> None:
-        """Say what became of the commands, once it can be seen."""
-        taking = self._taking
-        if not taking.outcomes:
+        """Settle the tickets of executed commands, after the status shows their effect."""
+        processor = self._processor
+        if not processor.outcomes:
             return
         self._show()
-        outcomes, taking.outcomes = taking.outcomes, []
+        outcomes, processor.outcomes = processor.outcomes, []
         for ticket, refused in outcomes:
             ticket.settle(refused)
 
-    def _look_around(self) -> None:
-        """Hold the rotor where its operator is gone."""
-        works = self._works
-        if not works.operators.look():
+    def _hold_without_operator(self) -> None:
+        """Hold the rotor if its operator is gone."""
+        bench_state = self._bench_state
+        if not bench_state.operators.check_silence():
             return
-        works.note = "the operator is gone"
-        if works.player is None and works.desk.moves:
-            works.desk.hold()
-            works.note = "the operator is gone: the twin holds"
+        bench_state.note = "the operator is gone"
+        if bench_state.player is None and bench_state.driver.may_move_rotor:
+            bench_state.driver.hold()
+            bench_state.note = "the operator is gone: the twin holds"
 
 
-# How long a thread may keep the interpreter from the loop's: of Python's own 5 ms, three make a chunk late.
+# Longest time that a thread may keep the interpreter from the loop: three of Python's 5 ms make a chunk late.
 SWITCH_s = 1e-3
 
-# How often a bench at rest looks for clients that are gone.
+# Period at which an idle bench looks for silent clients.
 REST_s = 0.02
 
 
 class Thread:
-    """Thread of one bench, which begins once.
+    """Thread of one bench; it is started once.
 
     Parameters
     ----------
-    works : Works
-    taking : Taking
-    turning : Turning
+    bench_state : BenchState
+    processor : CommandProcessor
+    cycle : Cycle
     """
 
-    def __init__(self, works: Works, taking: Taking, turning: Turning) -> None:
-        self._works, self._taking, self._turning = works, taking, turning
+    def __init__(self, bench_state: BenchState, processor: CommandProcessor, cycle: Cycle) -> None:
+        self._bench_state, self._processor, self._cycle = bench_state, processor, cycle
         self._thread: threading.Thread | None = None
 
     @property
-    def begun(self) -> bool:
-        """Whether it is at work, or was."""
+    def started(self) -> bool:
+        """True if it was started."""
         return self._thread is not None
 
     def begin(self) -> None:
-        """Be at work from now on; until `end`, the interpreter goes from thread to thread more often."""
-        import_writers()  # here, as during the loop it would delay the first chunks
+        """Start the thread; until `end`, the interpreter switches threads more often."""
+        warm()  # here: during the run it would make the first chunks late
         self._switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_s)
         self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)
         self._thread.start()
 
     def end(self) -> None:
-        """Wait until the last turn is done, as no more commands are taken."""
-        self._taking.wake.set()
+        """Wait for the last chunk; no more commands are accepted."""
+        self._processor.wake.set()
         if self._thread and self._thread.is_alive():
             self._thread.join()
             sys.setswitchinterval(self._switch_s)
 
     def _loop(self) -> None:
-        """Chunk by chunk, each at its time; woken by STOP."""
-        works, pace, wake = self._works, self._works.pace, self._taking.wake
-        while self._taking.open:
-            moves = works.moves
+        """Run chunk by chunk, each at its time; STOP wakes the thread."""
+        bench_state, pace, wake = self._bench_state, self._bench_state.pace, self._processor.wake
+        while self._processor.open:
+            moves = bench_state.is_active
             wait_s = pace.wait_s() if moves else REST_s
             if wait_s > 0 and wake.wait(wait_s):
                 wake.clear()
-                self._turning.turn(0, waits=False)
+                self._cycle.run_chunk(0, waits=False)
                 continue
             if not moves:
                 pace.rest()
-            self._turning.turn(pace.ticks(works.period_s) if moves else 0, waits=False)
+            self._cycle.run_chunk(pace.ticks(bench_state.period_s) if moves else 0, waits=False)

@@ -1,4 +1,4 @@
-"""The twin of a bench in one thread's hands: its session, its mode, and what is set."""
+"""Driver of a bench's twin: its session, its mode and its settings. One thread uses it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from spheretwin.session import Session
 from spheretwin.snapshot import Snapshot
 from spheretwin.trajectories.trajectory import Shape
 
-MODES_OWN = ("trajectory.approach", "manual")
+FIELDS_OF_MODES = ("trajectory.approach", "manual")
 """Fields that modes set."""
 
 
 def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
-    """Settings with another value of one field, checked as a whole.
+    """Return the settings with another value of one field, checked as a whole.
 
-    A named set of hardware gives its fields their values, as it does in a file that does not say them; those
+    A named set of hardware gives its fields their values, as in a file that does not state them; the fields
     of the set before get their defaults.
 
     Raises
@@ -32,7 +32,7 @@ def with_field(settings: Scenario, name: str, value: Any) -> Scenario:
     InputError
         A field that is unknown, of the wrong type or out of range, or one that a mode sets.
     """
-    if any(name == own or name.startswith(f"{own}.") for own in MODES_OWN):
+    if any(name == own or name.startswith(f"{own}.") for own in FIELDS_OF_MODES):
         raise InputError(f"bench: expected a mode instead of {name}, as manual or hold")
     if name == "trajectory" and isinstance(value, dict) and value.get("approach") is not None:
         raise InputError("bench: expected a trajectory without approach, which the bench makes")
@@ -64,8 +64,8 @@ CURRENTS = "manual.currents_A"
 MOST_SNAPSHOTS = 16
 
 
-class Kept(NamedTuple):
-    """All that a desk goes on from."""
+class DriverSnapshot(NamedTuple):
+    """Snapshot of a driver."""
 
     session: Snapshot
     settings: Scenario
@@ -74,44 +74,44 @@ class Kept(NamedTuple):
     row: Table | None
 
 
-class Desk:
-    """One twin, and what is done to it; every change of it is one of its session's journal.
+class Driver:
+    """Driver of one twin; every change stands in the journal of its session.
 
     Parameters
     ----------
     settings : Scenario
         To begin with.
     session : Session
-        Of these, at tick 0.
+        Session with these settings, at tick 0.
 
     Attributes
     ----------
     settings : Scenario
-        What the next reset begins with: the modes are no part of it.
+        Settings of the next reset; the modes are no part of them.
     pending : dict
         Fields of it that are not in force as yet.
     mode : str
     stopped : bool
         Whether STOP is latched.
     reason : str or None
-        Why the run can go on no further.
+        Reason why the run cannot continue.
     limits : Limits
-        Of the ways from mode to mode.
+        Limits of the approach from mode to mode.
     row : Table or None
         The last row.
     snapshots : dict
-        By name.
+        Snapshots by name.
     """
 
     def __init__(self, settings: Scenario, session: Session) -> None:
         self.limits = Limits()
-        self.snapshots: dict[str, Kept] = {}
+        self.snapshots: dict[str, DriverSnapshot] = {}
         self.begin(settings, session)
 
     def begin(self, settings: Scenario, session: Session) -> None:
         """Begin with a session at tick 0."""
         self.settings, self.session = settings, session
-        self.begun = record_of(session)
+        self.start_record = record_of(session)
         self.pending: dict[str, Any] = {}
         self.stopped = False
         self.reason: str | None = None
@@ -120,7 +120,7 @@ class Desk:
         self.mode = "trajectory" if by_hand is None else "manual" if any(by_hand) else "off"
 
     def advance(self, ticks: int) -> Table | None:
-        """Run some control ticks; fewer where the columns change, none once the run has ended."""
+        """Run some control ticks; fewer if the columns change, none once the run has ended."""
         if self.reason is not None:
             return None
         try:
@@ -145,46 +145,46 @@ class Desk:
         """Take the currents away until the next reset."""
         self.stopped = True
         if self.reason is None:
-            self._by_hand("off", [0.0] * len(self.session.actuator.groups))
+            self._set_currents("off", [0.0] * len(self.session.actuator.groups))
 
     def off(self) -> None:
         """No currents."""
-        self._check_free("off")
-        self._by_hand("off", [0.0] * len(self.session.actuator.groups))
+        self._check_available("off")
+        self._set_currents("off", [0.0] * len(self.session.actuator.groups))
 
     def manual(self, currents_A: tuple[float, ...] | None, group: int | None, current_A: float) -> None:
-        """Stated currents, or one group alone."""
-        self._check_free("manual")
+        """Apply stated currents, or the current of a single group."""
+        self._check_available("manual")
         groups = len(self.session.actuator.groups)
         if (currents_A is None) == (group is None):
             raise InputError("bench: manual: expected either currents_A or group, received both or none")
         if group is not None and group >= groups:
             raise InputError(f"bench: manual: expected a group from 0 to {groups - 1}, received {group}")
-        alone = [current_A if each == group else 0.0 for each in range(groups)]
-        self._by_hand("manual", alone if currents_A is None else list(currents_A))
+        one_group = [current_A if other == group else 0.0 for other in range(groups)]
+        self._set_currents("manual", one_group if currents_A is None else list(currents_A))
 
     def hold(self) -> None:
-        """Come to rest here."""
-        self._check_free("hold")
-        begun = modes.motion_of(self.session)
-        self._fly("hold", modes.held(begun, self.limits, self._range))
+        """Come to rest at the present pose."""
+        self._check_available("hold")
+        initial_motion = modes.current_motion(self.session)
+        self._approach("hold", modes.hold_shape(initial_motion, self.limits, self._range))
 
     def point(self, pose_rad: tuple[float, float, float]) -> None:
-        """Go to a pose."""
-        self._check_free("point")
-        self._fly("point", modes.pointed(pose_rad, self._range))
+        """Approach a pose and rest there."""
+        self._check_available("point")
+        self._approach("point", modes.point_shape(pose_rad, self._range))
 
     def jog(self, rates_rad_s: tuple[float, float, float]) -> None:
         """Turn at steady rates."""
-        self._check_free("jog")
-        begun = modes.motion_of(self.session)
-        self._fly("jog", modes.jogged(begun, rates_rad_s, self.limits, self._range))
+        self._check_available("jog")
+        initial_motion = modes.current_motion(self.session)
+        self._approach("jog", modes.jog_shape(initial_motion, rates_rad_s, self.limits, self._range))
 
     def trajectory(self, fields: dict[str, Any] | None) -> None:
-        """Follow a shape from its beginning; the last one unless given."""
-        self._check_free("trajectory")
+        """Follow a shape from its beginning; default: the last one."""
+        self._check_available("trajectory")
         after = self.settings if fields is None else with_field(self.settings, "trajectory", fields)
-        self._fly("trajectory", after.trajectory)
+        self._approach("trajectory", after.trajectory)
         self.settings = after
 
     def set(self, name: str, value: Any) -> None:
@@ -199,7 +199,7 @@ class Desk:
         if self.reason is not None or is_fixed(name):
             self.pending[name] = value
         elif name.split(".")[0] == "trajectory":
-            self._reshape(name, after.trajectory)
+            self._change_shape(name, after.trajectory)
         else:
             self.session.set(name, value)
         self.settings = after
@@ -215,13 +215,13 @@ class Desk:
         self.settings = after
 
     def snapshot(self, name: str) -> None:
-        """Keep all that the twin goes on from."""
+        """Save the complete state of the twin."""
         if name not in self.snapshots and len(self.snapshots) >= MOST_SNAPSHOTS:
             raise InputError(f"bench: expected at most {MOST_SNAPSHOTS} snapshots, received one more")
         if self.reason is not None:
-            raise InputError("bench: expected a run that goes on, received one that has ended")
+            raise InputError("bench: expected a run in progress, received one that has ended")
         state = self.session.snapshot()
-        self.snapshots[name] = Kept(state, self.settings, dict(self.pending), self.mode, self.row)
+        self.snapshots[name] = DriverSnapshot(state, self.settings, dict(self.pending), self.mode, self.row)
 
     def restore(self, name: str) -> None:
         """Go back to a snapshot.
@@ -229,26 +229,26 @@ class Desk:
         Raises
         ------
         InputError
-            There is none of this name, it is of another model, or STOP is latched.
+            The name is unknown, the snapshot is of another model, or STOP is latched.
         """
         if self.stopped:
-            self._check_free("restore")
+            self._check_available("restore")
         if name not in self.snapshots:
             raise InputError(
                 f"bench: expected one of {', '.join(self.snapshots) or 'no snapshots'}, received {name}"
             )
-        kept = self.snapshots[name]
-        self.session.restore(kept.session)
-        self.begun = record_of(self.session)
-        self.settings, self.pending, self.mode = kept.settings, dict(kept.pending), kept.mode
-        self.row, self.reason = kept.row, None
+        snapshot = self.snapshots[name]
+        self.session.restore(snapshot.session)
+        self.start_record = record_of(self.session)
+        self.settings, self.pending, self.mode = snapshot.settings, dict(snapshot.pending), snapshot.mode
+        self.row, self.reason = snapshot.row, None
 
     @property
-    def moves(self) -> bool:
-        """Whether the coils may move the rotor, other than to hold it."""
+    def may_move_rotor(self) -> bool:
+        """True if the coils may move the rotor, other than to hold it."""
         return not self.stopped and self.reason is None and self.mode not in ("off", "hold")
 
-    def pending_told(self) -> tuple[tuple[str, str], ...]:
+    def pending_as_json(self) -> tuple[tuple[str, str], ...]:
         """Fields that wait for a reset, and their values as JSON."""
         return tuple((name, json.dumps(value, ensure_ascii=False)) for name, value in self.pending.items())
 
@@ -256,26 +256,28 @@ class Desk:
     def _range(self) -> modes.Array:
         return self.session.actuator.hinge_range_rad
 
-    def _check_free(self, name: str) -> None:
+    def _check_available(self, name: str) -> None:
         if self.stopped:
             raise InputError(f"bench: expected reset after STOP, received {name}")
         if self.reason is not None:
             raise InputError(f"bench: expected reset, as the run has ended, received {name}")
 
-    def _by_hand(self, mode: str, currents_A: list[float]) -> None:
+    def _set_currents(self, mode: str, currents_A: list[float]) -> None:
         self.session.set(CURRENTS, currents_A)
         self.mode = mode
 
-    def _fly(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
-        """Go over to a shape, at a time of its own, from the motion that goes before."""
-        session, begun = self.session, modes.motion_of(self.session)
-        way = modes.approached(shape, begun, session.t_s, shape_s, self.limits, self._range)
-        session.set("trajectory", {**shape.model_dump(mode="json"), "approach": way})
+    def _approach(self, mode: str, shape: Shape, shape_s: float = 0.0) -> None:
+        """Approach a shape, at a time of the shape, from the present motion."""
+        session, initial_motion = self.session, modes.current_motion(self.session)
+        approach = modes.approach_fields(
+            shape, initial_motion, session.t_s, shape_s, self.limits, self._range
+        )
+        session.set("trajectory", {**shape.model_dump(mode="json"), "approach": approach})
         if session.scenario.manual.on:
             session.set(CURRENTS, None)
         self.mode = mode
 
-    def _reshape(self, name: str, shape: Shape) -> None:
+    def _change_shape(self, name: str, shape: Shape) -> None:
         """Follow a shape with another field from where it is; another shape from its beginning."""
         if self.mode != "trajectory":
             return
@@ -284,8 +286,8 @@ class Desk:
         if present.approach:
             own_s += present.approach.shape_s - present.approach.start_s
         same = type(shape) is type(present) and name != "trajectory"
-        self._fly("trajectory", shape, own_s if same else 0.0)
+        self._approach("trajectory", shape, own_s if same else 0.0)
 
 
 def _without(planned: list[Any], place: int | None) -> list[Any]:
-    return [] if place is None else [each for i, each in enumerate(planned) if i != place]
+    return [] if place is None else [fault for i, fault in enumerate(planned) if i != place]

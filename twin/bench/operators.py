@@ -1,4 +1,4 @@
-"""Who may command: one client operates, others watch, and may ask to take over."""
+"""Permission to command: one client operates, the others watch and may ask to operate."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from collections.abc import Callable
 from spheretwin.models.base.errors import InputError, shown
 
 GONE_s = 2.0
-"""How long a twin may be without its operator until it holds."""
+"""Time that the twin may run without its operator before it holds."""
 
 SILENCE_s = 2.0
-"""Silence after which a client is taken to be gone."""
+"""Silence after which a client counts as gone."""
 
 MOST_CLIENTS = 64
 
@@ -23,16 +23,16 @@ class Operators:
     Parameters
     ----------
     gone_s : float, s
-        How long after its operator left the twin is on its own, unless somebody takes over.
+        Time after its operator left until the twin holds, unless another client takes over.
     silence_s : float, s
-        Silence after which a client is gone, as if it had left.
+        Silence after which a client counts as gone, as if it had left.
     clock : callable
         Seconds that never go back.
 
     Notes
     -----
-    The first to come operates. Who asks while nobody does, operates from then on; else the first of those
-    who have asked does so when the operator leaves, is gone, or gives over to it.
+    The first client operates. A client that asks while none operates, operates from then on; else the first
+    that asked operates when the operator leaves, is gone, or grants it.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Operators:
     ) -> None:
         self._gone_s, self._silence_s, self._clock = gone_s, silence_s, clock
         self._lock = threading.RLock()
-        self._seen: dict[str, float] = {}
+        self._last_heard_s: dict[str, float] = {}
         self._asking: list[str] = []
         self._left_s: float | None = None
         self.operator: str | None = None
@@ -52,16 +52,16 @@ class Operators:
     def watching(self) -> tuple[str, ...]:
         """Clients that do not operate."""
         with self._lock:
-            return tuple(client for client in self._seen if client != self.operator)
+            return tuple(client for client in self._last_heard_s if client != self.operator)
 
     @property
     def asking(self) -> tuple[str, ...]:
-        """Those of them that ask to operate, the first one first."""
+        """Clients that ask to operate, the first one first."""
         with self._lock:
             return tuple(self._asking)
 
-    def see(self, client: str) -> None:
-        """Take note that a client is there.
+    def register(self, client: str) -> None:
+        """Register that a client is present.
 
         Raises
         ------
@@ -92,28 +92,30 @@ class Operators:
         Raises
         ------
         InputError
-            A client gives over what it has not, or to nobody, or there are too many.
+            A client that does not operate grants, the other client is unknown, or there are too many.
         """
         with self._lock:
             self._note(client)
             self.check(client)
-            if to not in self._seen:
-                raise InputError(f"bench: expected one of {', '.join(self._seen)}, received {shown(to)}")
+            if to not in self._last_heard_s:
+                raise InputError(
+                    f"bench: expected one of {', '.join(self._last_heard_s)}, received {shown(to)}"
+                )
             self._operate(to)
             self._asking = [asking for asking in self._asking if asking != to]
 
     def leave(self, client: str) -> None:
-        """Take note that a client goes."""
+        """Remove a client that leaves."""
         with self._lock:
             self._drop(client)
 
     def check(self, client: str | None) -> None:
-        """Find out whether a client may command; whoever does not say who it is has the bench in hand.
+        """Check that a client may command; callers in the same process give no name and always may.
 
         Raises
         ------
         InputError
-            Another one operates, or nobody does.
+            Another client operates, or none does.
         """
         if client is not None and client != self.operator:
             raise InputError(
@@ -121,11 +123,13 @@ class Operators:
                 f" received one of {shown(client)}"
             )
 
-    def look(self) -> bool:
-        """Drop clients that are gone; True, once, where the twin is on its own from now on."""
+    def check_silence(self) -> bool:
+        """Remove silent clients; return True, once, if the twin is without an operator from now on."""
         now = self._clock()
         with self._lock:
-            gone = [client for client, seen_s in self._seen.items() if now - seen_s > self._silence_s]
+            gone = [
+                client for client, heard_s in self._last_heard_s.items() if now - heard_s > self._silence_s
+            ]
             fell_silent = self.operator in gone
             for client in gone:
                 self._drop(client)
@@ -136,15 +140,15 @@ class Operators:
             return True
 
     def _note(self, client: str) -> None:
-        if client not in self._seen and len(self._seen) >= MOST_CLIENTS:
+        if client not in self._last_heard_s and len(self._last_heard_s) >= MOST_CLIENTS:
             raise InputError(f"bench: expected at most {MOST_CLIENTS} clients, received one more")
-        first = not self._seen
-        self._seen[client] = self._clock()
+        first = not self._last_heard_s
+        self._last_heard_s[client] = self._clock()
         if first:
             self._operate(client)
 
     def _drop(self, client: str) -> None:
-        self._seen.pop(client, None)
+        self._last_heard_s.pop(client, None)
         self._asking = [asking for asking in self._asking if asking != client]
         if client == self.operator:
             self.operator, self._left_s = None, self._clock()

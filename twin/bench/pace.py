@@ -1,4 +1,4 @@
-"""The clock of a bench: how many ticks are due, when the next are, and how many came late."""
+"""Clock of a bench: the ticks of a chunk, the time of the next one, and the number of late ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CHUNK_s = 0.02
 LONGEST_s, SHORT_s = 0.01, 0.004
 MOST_TICKS = 4096
 
-# Beyond it, time that was lost is not made up for.
+# Time lost beyond this is not made up.
 LATE_s = 5 * CHUNK_s
 
 WINDOW_s = 1.0
@@ -36,22 +36,22 @@ class Pace:
     Attributes
     ----------
     speed : float
-        Wanted, as a multiple of the clock's.
+        Commanded, as a multiple of the clock's.
     chunks, missed : int
-        Chunks that had a deadline, and those that were late: done after the next one was due.
+        Chunks that had a deadline, and the late ones: completed after the next one was due.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self.speed = 1.0
         self.chunks = self.missed = 0
-        self._most = 20
+        self._most_ticks = 20
         self._due: float | None = None
         self._done: deque[tuple[float, float]] = deque()
 
     @property
     def fastest(self) -> bool:
-        """Whether it goes as fast as it can."""
+        """True if it runs as fast as possible."""
         return self.speed >= FASTEST
 
     @property
@@ -59,8 +59,8 @@ class Pace:
         """Share of the chunks that were late."""
         return self.missed / self.chunks if self.chunks else 0.0
 
-    def reached(self) -> float:
-        """Simulated over wall time in the last second; 0 while time stands still."""
+    def realtime_factor(self) -> float:
+        """Return simulated over wall time in the last second; 0 while time is paused."""
         now = self._clock()
         recent = [(at, t_s) for at, t_s in self._done if now - at <= WINDOW_s]
         if len(recent) < 2:
@@ -68,20 +68,20 @@ class Pace:
         return (recent[-1][1] - recent[0][1]) / max(now - recent[0][0], 1e-9)
 
     def clear(self) -> None:
-        """Count anew."""
+        """Reset the counts."""
         self.chunks = self.missed = 0
         self.rest()
 
     def rest(self) -> None:
-        """Time stands still: nothing is due."""
+        """Clear the deadline: time is paused."""
         self._due = None
         self._done.clear()
 
     def ticks(self, period_s: float) -> int:
         """Control ticks of the next chunk."""
         if self.fastest:
-            return self._most
-        return max(1, min(round(CHUNK_s * self.speed / period_s), self._most))
+            return self._most_ticks
+        return max(1, min(round(CHUNK_s * self.speed / period_s), self._most_ticks))
 
     def wait_s(self) -> float:
         """Time until the next chunk is due, s; 0 where it is."""
@@ -89,8 +89,8 @@ class Pace:
             self._due = self._clock()
         return 0.0 if self.fastest else max(0.0, self._due - self._clock())
 
-    def ran(self, ticks: int, period_s: float, t_s: float, took_s: float) -> None:
-        """Take note of a chunk: its ticks, the time it reached, and the wall time that it took."""
+    def record_chunk(self, ticks: int, period_s: float, t_s: float, took_s: float) -> None:
+        """Record a chunk: its ticks, the simulated time at its end, and the wall time that it took."""
         now = self._clock()
         if self._done and t_s < self._done[-1][1]:  # time went back
             self._done.clear()
@@ -98,9 +98,9 @@ class Pace:
         while now - self._done[0][0] > WINDOW_s:
             self._done.popleft()
         if took_s > LONGEST_s:
-            self._most = max(1, self._most // 2)
-        elif took_s < SHORT_s and ticks == self._most:
-            self._most = min(2 * self._most, MOST_TICKS)
+            self._most_ticks = max(1, self._most_ticks // 2)
+        elif took_s < SHORT_s and ticks == self._most_ticks:
+            self._most_ticks = min(2 * self._most_ticks, MOST_TICKS)
         if self.fastest or self._due is None:
             self._due = now
             return

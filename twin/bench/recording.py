@@ -1,10 +1,10 @@
-"""What a bench records: the files that are being written, one recording at a time, and those that were."""
+"""Recordings of a bench: the files in progress, one recording at a time, and the completed ones."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from spheretwin.bench.driver import Desk
+from spheretwin.bench.driver import Driver
 from spheretwin.faults.fault_injector import FaultMessages
 from spheretwin.models.telemetry.table import Table
 from spheretwin.outputs import OpenedFiles, RecordingFiles
@@ -17,92 +17,92 @@ class Recording:
 
     Parameters
     ----------
-    tell : callable
-        Takes why a recording has ended, or what went wrong with it.
+    report : callable
+        Takes the reason why a recording has ended, or its error.
 
     Attributes
     ----------
-    kept : tuple of str
-        Files that were written last.
+    completed_files : tuple of str
+        Files that were completed last.
     """
 
-    def __init__(self, tell: Callable[[str | None], None]) -> None:
-        self._tell = tell
-        self.kept: tuple[str, ...] = ()
-        self._present: RecordingFiles | None = None
+    def __init__(self, report: Callable[[str | None], None]) -> None:
+        self._report = report
+        self.completed_files: tuple[str, ...] = ()
+        self._active: RecordingFiles | None = None
         self._completing: list[RecordingFiles] = []
-        self.begin_anew()
+        self.reset()
 
     @property
     def on(self) -> bool:
-        """Whether something is being recorded."""
-        return self._present is not None
+        """True if a recording is being written."""
+        return self._active is not None
 
     @property
     def paths(self) -> tuple[str, ...]:
         """Files that are being written."""
-        return tuple(str(path) for path in self._present.paths) if self._present else ()
+        return tuple(str(path) for path in self._active.paths) if self._active else ()
 
-    def begin_anew(self) -> None:
-        """A run begins: nothing has happened in it."""
+    def reset(self) -> None:
+        """Reset at the beginning of a run."""
         self._faults, self._noted = FaultMessages(), (0, 0)
 
-    def go_on_from(self, session: Session) -> None:
-        """What was changed until now has been told."""
+    def resume_from(self, session: Session) -> None:
+        """Count the changes until now as written."""
         self._noted = len(session.journal), len(session.events)
 
-    def begin(self, files: OpenedFiles, desk: Desk) -> None:
+    def begin(self, files: OpenedFiles, driver: Driver) -> None:
         """Write opened files from the next tick on."""
-        self.note_changes(desk.session)
-        self._present = RecordingFiles(files, desk.session, desk.begun)
-        self._completing.append(self._present)
+        self.note_changes(driver.session)
+        self._active = RecordingFiles(files, driver.session, driver.start_record)
+        self._completing.append(self._active)
 
     def write(self, rows: Table) -> None:
         """Take the rows of one chunk, which must not change any more."""
-        if self._present is None:
+        if self._active is None:
             return
-        self._present.write(rows)
+        self._active.write(rows)
         for t_s, text in self._faults.of(rows):
-            self._present.note(t_s, text)
+            self._active.note(t_s, text)
 
     def note_changes(self, session: Session) -> None:
-        """Tell what was changed since it was last told."""
-        made, planned = self._noted
-        if self._present:
+        """Write the changes since the last call."""
+        changes_done, events_done = self._noted
+        if self._active:
             period_s = session.scenario.controller.period_s
-            for change in (*session.journal[made:], *session.events[planned:]):
-                self._present.note(change.tick * period_s, change_text(change))
-        self.go_on_from(session)
+            for change in (*session.journal[changes_done:], *session.events[events_done:]):
+                self._active.note(change.tick * period_s, change_text(change))
+        self.resume_from(session)
 
     def ending(self, session: Session) -> Callable[..., None] | None:
-        """What completes the files as the session is now, if there are any."""
-        return self._present.ending(session) if self._present else None
+        """Return the function that completes the files with the session as it is now, if there are any."""
+        return self._active.ending(session) if self._active else None
 
     def end(self, session: Session, why: str | None, end: Callable[..., None] | None = None) -> None:
-        """Complete what is being recorded, if anything is, beside the loop.
+        """Complete the recording in progress, if any, outside the loop.
 
         Parameters
         ----------
         session : Session
         why : str or None
-            To be told.
+            Reason, which is reported.
         end : callable, optional
             From `ending`, where the session is no longer what it was.
         """
-        if self._present is None:
+        if self._active is None:
             return
-        keeping, self._present = self._present, None
-        self._tell(why)
-        (end or keeping.ending(session))(self._completed)
+        files, self._active = self._active, None
+        self._report(why)
+        (end or files.ending(session))(self._completed)
 
     def join(self) -> None:
         """Wait until all files are complete."""
-        for keeping in list(self._completing):
-            keeping.join()
+        for files in list(self._completing):
+            files.join()
 
-    def _completed(self, keeping: RecordingFiles) -> None:
-        self.kept = tuple(str(path) for path in keeping.paths)
-        if keeping.faults:
-            self.kept = ()
-            self._tell(keeping.faults[0])
-        self._completing.remove(keeping)
+    def _completed(self, files: RecordingFiles) -> None:
+        self.completed_files = tuple(str(path) for path in files.paths)
+        if files.faults:
+            self.completed_files = ()
+            self._report(files.faults[0])
+        self._completing.remove(files)

@@ -1,4 +1,4 @@
-"""What a bench shows: one picture of now, which never changes."""
+"""Status of a bench: one immutable snapshot of all that is shown."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spheretwin.bench.bench_state import Works
+from spheretwin.bench.bench_state import BenchState
 from spheretwin.faults.fault import Fault
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 from spheretwin.session import Session
@@ -16,19 +16,19 @@ Three = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class State:
-    """A bench at one moment; the latest alone, and whole.
+class BenchStatus:
+    """Status of a bench at one moment.
 
     Attributes
     ----------
     mode : str
         ``off``, ``hold``, ``point``, ``trajectory``, ``jog``, ``manual``, ``replay`` or ``fault``.
     running : bool
-        Whether time goes on.
+        Whether time runs.
     stopped : bool
-        Whether STOP is latched; `reset` alone lets it go.
+        Whether STOP is latched; only `reset` releases it.
     scenario, law, shape, allocation : str
-        Names of what is in force.
+        Names in the active configuration.
     t_s : float
         Simulated time, s; of a replay, that of its row.
     tick : int
@@ -36,56 +36,56 @@ class State:
     period_s : float
         Control period, s.
     speed : float
-        Wanted, as a multiple of the clock's; infinite for as fast as possible.
+        Commanded, as a multiple of the clock's; infinite for as fast as possible.
     realtime_factor : float
-        Reached over the last second or so; 0 while time stands still.
+        Reached over about the last second; 0 while time is paused.
     chunks, missed : int
-        Chunks that had a deadline since the last reset, and those that were late.
+        Chunks that had a deadline since the last reset, and the late ones.
     missed_share : float
         The latter over the former; 0 before the first.
     q_rad, qdot_rad_s, q_ref_rad, qdot_ref_rad_s, error_rad : tuple of float
-        Hinge angles and rates, those desired, and q - q_ref, (3,).
+        Hinge angles and rates, the desired ones, and q - q_ref, (3,).
     error_mrad, error_deg : float
         Length of the error.
     torque_command_Nm, torque_Nm, disturbance_Nm : tuple of float
-        Generalised torque that the law asked for, torque of the coils on the rotor (stator frame), and
+        Generalised torque that the law commands, torque of the coils on the rotor (stator frame), and
         generalised load, (3,).
     current_command_A, current_A : tuple of float
         One for each coil group.
     current_limit_A : float
-        Largest current that is asked of a group.
+        Largest current that a group can be commanded.
     temperature_C : tuple of float or None
-        Of the windings, one for each group, where the hardware has them.
+        Temperatures of the windings, one for each group, if the hardware has them.
     torque_margin : float
-        Share of the current limit that the group with the largest current asked for leaves, 0 to 1.
+        Share of the current limit that remains in the group with the largest commanded current, 0 to 1.
     saturated : bool
-        Whether the current limit left less than the commanded torque.
+        Whether the current limit reduced the commanded torque.
     rank_lost : bool
-        Whether the groups in use give no torque in one direction, so that no currents are commanded.
+        Whether the active groups give no torque in one direction, so that no currents are commanded.
     status : str
-        Of the session, as ``running`` or ``left_workspace``.
+        Status of the session, as ``running`` or ``left_workspace``.
     reason : str or None
         Why the mode is ``fault``, in one line.
     faults : tuple of str
-        Faults that are planned or at work, one line each, in the order of their places.
+        Planned and active faults, one line each, in the order of their places.
     pending : tuple of (str, str)
         Fields that the next reset will set, and their values as JSON.
     journal : int
         Changes so far in the present run.
     snapshots : tuple of str
-        Names of those kept.
+        Names of the snapshots.
     recording : tuple of str
         Files that are being written.
     kept : tuple of str
-        Files that were written last.
+        Files that were completed last.
     note : str or None
-        What happened last that nobody commanded, as why a recording ended.
+        Last event without a command, as the reason why a recording ended.
     operator : str or None
-        Client whose commands are taken; nobody unless one has come.
+        Client whose commands are accepted; None before the first client.
     watching : tuple of str
         The other clients.
     asking : tuple of str
-        Those of them that ask to take over.
+        Watching clients that ask to operate.
     refused : str or None
         The last command that was refused, and why, in one line.
     waiting : int
@@ -154,24 +154,26 @@ VECTORS = (
 )
 
 
-class Shown(NamedTuple):
+class ShownRow(NamedTuple):
     """The row that is shown."""
 
     row: Table | None
-    """None before the first."""
+    """None before the first row."""
     tick: int
     period_s: float
     current_limit_A: float
 
 
-def pictured(shown: Shown, session: Session, **others: Any) -> State:
-    """Picture of a row, and of what is told beside it; of a session before its first, where there is none."""
-    return State(
+def status_of_row(shown_row: ShownRow, session: Session, **others: Any) -> BenchStatus:
+    """Return the status of a row and other fields; before the first row, that of the session."""
+    return BenchStatus(
         **others,
-        tick=shown.tick,
-        period_s=shown.period_s,
-        current_limit_A=shown.current_limit_A,
-        **(_at_start(session) if shown.row is None else _of_row(shown.row, shown.current_limit_A)),
+        tick=shown_row.tick,
+        period_s=shown_row.period_s,
+        current_limit_A=shown_row.current_limit_A,
+        **(
+            _at_start(session) if shown_row.row is None else _of_row(shown_row.row, shown_row.current_limit_A)
+        ),
     )
 
 
@@ -218,49 +220,54 @@ def _at_start(session: Session) -> dict[str, Any]:
     }
 
 
-def picture(works: Works) -> State:
-    """All that is shown, as it is now."""
-    desk, operators, pace, recording = works.desk, works.operators, works.pace, works.recording
-    session = desk.session
-    return pictured(
-        _shown(works),
+def bench_status(bench_state: BenchState) -> BenchStatus:
+    """Return the present status."""
+    driver, operators, pace, recording = (
+        bench_state.driver,
+        bench_state.operators,
+        bench_state.pace,
+        bench_state.recording,
+    )
+    session = driver.session
+    return status_of_row(
+        _shown_row(bench_state),
         session,
-        **_names(works),
-        running=works.moves,
-        stopped=desk.stopped,
+        **_names(bench_state),
+        running=bench_state.is_active,
+        stopped=driver.stopped,
         speed=pace.speed,
-        realtime_factor=pace.reached(),
+        realtime_factor=pace.realtime_factor(),
         chunks=pace.chunks,
         missed=pace.missed,
         missed_share=pace.missed_share,
         status=str(session.status),
-        reason=desk.reason,
-        faults=tuple(_fault_told(fault) for fault in session.scenario.fault),
-        pending=desk.pending_told(),
+        reason=driver.reason,
+        faults=tuple(_fault_text(fault) for fault in session.scenario.fault),
+        pending=driver.pending_as_json(),
         journal=len(session.journal),
-        snapshots=tuple(desk.snapshots),
+        snapshots=tuple(driver.snapshots),
         recording=recording.paths,
-        kept=recording.kept,
-        note=works.note,
+        kept=recording.completed_files,
+        note=bench_state.note,
         operator=operators.operator,
         watching=operators.watching,
         asking=operators.asking,
-        refused=works.refused,
-        waiting=len(works.queue),
+        refused=bench_state.refused,
+        waiting=len(bench_state.queue),
     )
 
 
-def _shown(works: Works) -> Shown:
-    player, desk = works.player, works.desk
+def _shown_row(bench_state: BenchState) -> ShownRow:
+    player, driver = bench_state.player, bench_state.driver
     if player:
-        return Shown(player.row, player.place, player.period_s, player.current_limit_A)
-    limit_A = desk.session.scenario.nominal.current_limit_A
-    return Shown(desk.row, desk.session.tick, works.period_s, limit_A)
+        return ShownRow(player.row, player.place, player.period_s, player.current_limit_A)
+    limit_A = driver.session.scenario.nominal.current_limit_A
+    return ShownRow(driver.row, driver.session.tick, bench_state.period_s, limit_A)
 
 
-def _names(works: Works) -> dict[str, Any]:
-    """The mode, and what is in force: of the recorded run while one is played back."""
-    player, desk, scenario = works.player, works.desk, works.desk.session.scenario
+def _names(bench_state: BenchState) -> dict[str, Any]:
+    """Return the mode and the names in the active configuration; in a replay, those of the recorded run."""
+    player, driver, scenario = bench_state.player, bench_state.driver, bench_state.driver.session.scenario
     if player:
         return {
             "mode": "replay",
@@ -270,7 +277,7 @@ def _names(works: Works) -> dict[str, Any]:
             "allocation": player.allocation,
         }
     return {
-        "mode": "fault" if desk.reason is not None else desk.mode,
+        "mode": "fault" if driver.reason is not None else driver.mode,
         "scenario": scenario.name,
         "law": scenario.controller.law,
         "shape": scenario.trajectory.shape,
@@ -278,6 +285,6 @@ def _names(works: Works) -> dict[str, Any]:
     }
 
 
-def _fault_told(fault: Fault) -> str:
+def _fault_text(fault: Fault) -> str:
     until = f" to {fault.end_s:g} s" if fault.end_s is not None else ""
     return f"{fault.target} {fault.mode} from {fault.start_s:g} s{until}"

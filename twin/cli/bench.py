@@ -36,7 +36,7 @@ from spheretwin.scenario.fields import every_field, kind_of
 from spheretwin.scenario.reading import shipped
 from spheretwin.scenario.sections import Scenario
 from spheretwin.trajectories import SHAPES
-from spheretwin.viz.bench.protocols import Choices, Setting
+from spheretwin.viz.bench.protocols import Choices, FieldSetting
 from spheretwin.viz.terminal import runs
 
 TRAJECTORY = "trajectory"
@@ -60,13 +60,13 @@ def choices_of(bench: Bench) -> Choices:
     )
 
 
-def settings_of(fields: list[tuple[str, Any, str]]) -> list[Setting]:
+def settings_of(fields: list[tuple[str, Any, str]]) -> list[FieldSetting]:
     """Fields of a run, with what they may be."""
     values = {name: value for name, value, _ in fields}
     return [_setting(name, value, meaning, values) for name, value, meaning in fields]
 
 
-def shape_settings(name: str, bench: Bench) -> list[Setting]:
+def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
     """Fields of a shape: those of the present one as they are, of another as they come."""
     present = {
         dotted.partition(".")[2]: value
@@ -78,7 +78,7 @@ def shape_settings(name: str, bench: Bench) -> list[Setting]:
         return []
     known = _gathered(present) if present.get("shape") == name else {}
     return [
-        Setting(
+        FieldSetting(
             field,
             written(known.get(field, _default(info))),
             written(_default(info)),
@@ -137,11 +137,11 @@ def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> Setting:
+def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> FieldSetting:
     info = _field_of(name, values)
     default = written(_default(info)) if info else None
     choices = _families().get(_anywhere(name)) or (_literals(info.annotation) if info else ())
-    return Setting(name, written(value), default, _meaning(meaning, info), choices)
+    return FieldSetting(name, written(value), default, _meaning(meaning, info), choices)
 
 
 @cache

@@ -13,7 +13,7 @@ from spheretwin.run import Run
 from spheretwin.viz.figures.style import Drawing
 
 if TYPE_CHECKING:
-    from spheretwin.viz.comparison.trajectories import Flight
+    from spheretwin.viz.comparison.trajectories import LawTrajectory
 
 Array = NDArray[np.float64]
 
@@ -126,7 +126,7 @@ class Experiment(NamedTuple):
     """What the JSON says of a case's outcomes beside what it says of all."""
     findings: Callable[[Outcomes], list[Finding]] = lambda outcomes: []
     """What the first page says; nothing of cases that were not run."""
-    side_by_side: Callable[[Outcomes], Mapping[str, Flight]] = lambda outcomes: {}
+    side_by_side: Callable[[Outcomes], Mapping[str, LawTrajectory]] = lambda outcomes: {}
     """Runs of one condition for a recording, by the labels of their laws."""
 
 

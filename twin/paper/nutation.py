@@ -31,7 +31,7 @@ from spheretwin.run import Run
 from spheretwin.viz.figures.style import Drawing
 
 if TYPE_CHECKING:
-    from spheretwin.viz.comparison.trajectories import Flight
+    from spheretwin.viz.comparison.trajectories import LawTrajectory
 
 Array = NDArray[np.float64]
 
@@ -80,12 +80,12 @@ def keep(run: Run) -> Flown:
     return Flown(error.max(axis=1), course if run.scenario.seed == 0 else None)
 
 
-def side_by_side(runs: Mapping[Compared, Outcome]) -> dict[str, Flight]:
+def side_by_side(runs: Mapping[Compared, Outcome]) -> dict[str, LawTrajectory]:
     """Runs of the first seed for a recording, by the labels of their laws."""
-    from spheretwin.viz.comparison.trajectories import Flight
+    from spheretwin.viz.comparison.trajectories import LawTrajectory
 
     return {
-        compared.label: Flight(compared.law, *outcome.kept.course)
+        compared.label: LawTrajectory(compared.law, *outcome.kept.course)
         for compared, outcome in runs.items()
         if len(outcome.kept.course.t_s)
     }
@@ -102,7 +102,7 @@ def angles(runs: Runs) -> Drawing:
 
     desired = _longest(runs)
     by_label = {
-        compared.label: figures.Motion(
+        compared.label: figures.AngleTraces(
             compared.law,
             found[0].kept.course.t_s,
             found[0].kept.course.q_rad,
@@ -121,7 +121,7 @@ def errors(runs: Runs) -> Drawing:
     from spheretwin.viz.figures import over_time as figures
 
     by_label = {
-        compared.label: figures.Course(compared.law, stacked([each.kept.windows_rad for each in found]))
+        compared.label: figures.ErrorBand(compared.law, stacked([each.kept.windows_rad for each in found]))
         for compared, found in runs.items()
     }
     window = f"{1e3 * WINDOW_s:g} ms"
@@ -136,7 +136,7 @@ def paths(runs: Runs) -> Drawing:
 
     actuator, desired = actuators.load(), _longest(runs)
     by_label = {
-        compared.label: figures.Path(
+        compared.label: figures.TipPath(
             compared.law,
             1e3 * shaft_tip(found[0].kept.course.q_rad, actuator),
             1e3 * shaft_tip(desired.q_ref_rad, actuator),

@@ -14,7 +14,7 @@ from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import save_drawings, save_text
 
 if TYPE_CHECKING:
-    from spheretwin.viz.comparison.trajectories import Flight
+    from spheretwin.viz.comparison.trajectories import LawTrajectory
 
 TITLE = "What the paper shows, run again"
 MARKDOWN, HTML = "reproduce.md", "reproduce.html"
@@ -38,7 +38,7 @@ class Chapter(NamedTuple):
     """That run each of its rows alone, under the first seed."""
     told: str = ""
     """On which plant the rows ran, and what says that it may be believed."""
-    flights: Mapping[str, Flight] = {}
+    flights: Mapping[str, LawTrajectory] = {}
     """Runs for a recording, by the labels of their laws."""
 
 

@@ -203,7 +203,7 @@ def _draw(tried: Sequence[Found]) -> Drawing:
     from spheretwin.viz.figures import conditions as figures
 
     rows = [
-        figures.Row(
+        figures.RatioRow(
             f"{each.reading.label}\nscore {each.score:.2f}",
             {law.law: each.ratios[:, place].ravel() for place, law in enumerate(OF_PAPER)},
         )

@@ -13,7 +13,7 @@ from spheretwin.paper.rival_results import current_limits_rad, results, start_er
 from spheretwin.viz.figures.style import Drawing
 
 if TYPE_CHECKING:
-    from spheretwin.viz.figures.fronts import Panel
+    from spheretwin.viz.figures.fronts import FrontPanel
 
 CAPTION = (
     "A marker is a law with the gains that the search found within one limit on the variation, median over"
@@ -38,7 +38,7 @@ def figure(hardware: Hardware, outcomes: Outcomes) -> Drawing:
     return Drawing(f"rivals_{hardware.name}.png", caption, drawn)
 
 
-def _panel(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> Panel:
+def _panel(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> FrontPanel:
     from spheretwin.viz.figures import fronts
 
     scale = np.degrees(1.0) if hardware.in_degrees else 1e3
@@ -55,7 +55,7 @@ def _panel(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> Pane
     }
     floors = () if hardware.in_degrees else current_limits_rad(condition, outcomes).values()
     unit = "degrees" if hardware.in_degrees else "mrad"
-    return fronts.Panel(
+    return fronts.FrontPanel(
         condition.name, f"largest |error|, {unit}", points, marked, [scale * each for each in floors]
     )
 

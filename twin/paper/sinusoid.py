@@ -281,7 +281,7 @@ def _draw(varied: Varied, outcomes: Outcomes) -> Drawing:
             continue
         runs = [outcomes[case(compared, at).name] for at in points]
         errors = [np.quantile([each.max_abs_error for each in some], [0, 0.5, 1], axis=0) for some in runs]
-        by_label[compared.label] = figures.Series(
+        by_label[compared.label] = figures.ErrorsByCondition(
             law=compared.law,
             values=np.array([varied.value(at) for at in points]),
             error_rad=np.stack(errors, axis=1),

@@ -401,7 +401,7 @@ def _draw(outcomes: Outcomes) -> Drawing:
     from spheretwin.viz.figures import conditions as figures
 
     panels = [
-        figures.Panel(
+        figures.MarginPanel(
             f"{of.name}{f', {of.unit}' if of.unit else ''}",
             {
                 law.law: np.array([(step, run.tail_rms_error.max(), holds(run)) for step, run in tried])

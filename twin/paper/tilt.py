@@ -209,10 +209,13 @@ def changes(drawn: Sequence[tuple[Compared, list[tuple[str, Array, Array]]]]) ->
     from spheretwin.viz.figures import over_time as figures
 
     groups = [
-        figures.Group(
+        figures.ErrorGroup(
             compared.law,
             compared.label,
-            [figures.Line(label, np.degrees(measured), np.degrees(true)) for label, measured, true in lines],
+            [
+                figures.ErrorLine(label, np.degrees(measured), np.degrees(true))
+                for label, measured, true in lines
+            ],
             compared.paper_deg,
         )
         for compared, lines in drawn

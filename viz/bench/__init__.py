@@ -1,1 +1,1 @@
-"""The bench's page: the twin that runs, seen and driven from a browser."""
+"""Browser page of the bench: it shows and drives the running twin."""

@@ -1,4 +1,4 @@
-"""The actuator in some 9,000 triangles, from its own numbers: a browser without a GPU moves them."""
+"""Meshes of the actuator with some 9,000 triangles, from its dimensions: fast in a browser without a GPU."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ POLE_SECTIONS = 14
 RING_SECTIONS = 32
 BALL_STEPS = 6
 
-# What is only drawn, as shares of the ball's radius: where the ball is cut, its wall, the joint's two rings.
+# Dimensions that are only drawn, as shares of the ball's radius: cut and wall of the ball, the joint's rings.
 CUT = 0.52
 WALL = 0.06
 OUTER_RING = (0.43, 0.54, 0.07)
@@ -38,12 +38,12 @@ BASE = 0.08
 BASE_GAP = 0.35
 LEGS = 6
 
-# Poles stand out of the ball a little: two surfaces at one place flicker.
+# Poles are a little outside of the ball: two surfaces at one place flicker.
 POLE_PROUD_M = 1e-4
 
 
 @dataclass(frozen=True)
-class Parts:
+class ActuatorSolids:
     """Solids in the frames that carry them."""
 
     stator: Solid
@@ -52,12 +52,12 @@ class Parts:
     rotor: Solid
     shaft: Solid
     pole: Solid
-    """One, its z along its axis, its front's middle at the ball's radius."""
+    """One pole, its z along its axis, the middle of its front at the ball's radius."""
     coil: Solid
-    """One, its z along its axis, its own centre at the origin."""
+    """One coil, its z along its axis, its centre at the origin."""
 
     def triangles(self, actuator: Actuator) -> int:
-        """How many a browser draws, copies counted."""
+        """Return the number of triangles that a browser draws, copies counted."""
         once = (self.stator, self.outer_ring, self.inner_ring, self.rotor, self.shaft)
         copies = len(actuator.pole_axes) * len(self.pole.faces) + len(actuator.coil_axes) * len(
             self.coil.faces
@@ -65,11 +65,11 @@ class Parts:
         return sum(len(solid.faces) for solid in once) + copies
 
 
-def parts_of(actuator: Actuator) -> Parts:
+def actuator_solids(actuator: Actuator) -> ActuatorSolids:
     """Make every solid of an actuator."""
     ball, coil = actuator.magnet.front_m, actuator.coil
     half = coil.length_m / 2
-    return Parts(
+    return ActuatorSolids(
         stator=_stator(actuator),
         outer_ring=_ring(ball, *OUTER_RING),
         inner_ring=_ring(ball, *INNER_RING),
@@ -83,9 +83,9 @@ def parts_of(actuator: Actuator) -> Parts:
 def quaternions_along(axes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotations that turn z to each of some unit vectors, (n, 3): (n, 4), scalar first."""
     # Half the way from z to the axis; a half turn about x where the axis is -z.
-    found = np.stack([1 + axes[:, 2], -axes[:, 1], axes[:, 0], np.zeros(len(axes))], axis=1)
-    found[axes[:, 2] < -1 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    quaternions = np.stack([1 + axes[:, 2], -axes[:, 1], axes[:, 0], np.zeros(len(axes))], axis=1)
+    quaternions[axes[:, 2] < -1 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
+    return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
 
 
 def _ball(radius: float) -> Solid:
@@ -116,7 +116,7 @@ def _ring(ball: float, inner: float, outer: float, half: float) -> Solid:
 
 
 def _stator(actuator: Actuator) -> Solid:
-    """A hoop behind the coils of each latitude, a base, legs, and the neck that carries the joint."""
+    """Return a hoop behind the coils of each latitude, a base, legs, and the neck that carries the joint."""
     ball, coil = actuator.magnet.front_m, actuator.coil
     behind, width = coil.distance_m + coil.length_m / 2, HOOP * actuator.magnet.front_m
     heights = np.unique(np.round(behind * actuator.coil_axes[:, 2], 6)).tolist()

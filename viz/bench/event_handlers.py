@@ -1,4 +1,4 @@
-"""What a person does to a page becomes one command each; a refusal is shown beside what was touched."""
+"""Event handlers of a page: each event becomes one command; a refusal is shown next to its control."""
 
 from __future__ import annotations
 
@@ -10,159 +10,159 @@ from typing import Any, NamedTuple
 
 import viser
 
-from spheretwin.viz.bench.protocols import Bench, Ticket
+from spheretwin.viz.bench.protocols import BenchProtocol, TicketProtocol
 
-# How long a refusal that belongs to no field stays.
+# Time that a refusal without a field is shown.
 SHOWN_S = 8.0
 
-# What waits for so long is said to: the first time, a law or a fault may have to be compiled.
+# Commands that wait longer are shown: the first time, a law or a fault may have to be compiled.
 LONG_S = 0.5
 
 # A way to a pose takes the loop a fifth of a chunk to make: a slider that slides makes ten a second.
-STEERED_S = 0.1
+LATEST_INTERVAL_S = 0.1
 
-# Somebody who floods the bench sees no more than this of what becomes of it.
+# Pending commands that are followed; of a flood, earlier ones are dropped.
 MOST_TICKETS = 200
 
 Event = Any
-"""Of viser's: it has the number of the page that it comes from."""
+"""Event of viser: it has the number of the page that it comes from."""
 
 
 class Note:
-    """A line under a field that says why its value was refused; nothing unless there is something to say.
+    """Line under a field with the reason why its value was refused; empty otherwise.
 
     Parameters
     ----------
     gui : viser.GuiApi
         In the container of the field.
     order : float
-        Of the field.
+        Order of the field.
     """
 
     def __init__(self, gui: viser.GuiApi, order: float) -> None:
         self._html = gui.add_html("", order=order, visible=False)
 
     def say(self, text: str | None) -> None:
-        """Show a text, or take it away."""
+        """Show a text, or hide the line."""
         if text:
             self._html.content = f'<div style="{_REFUSED}">{escape(text)}</div>'
         self._html.visible = bool(text)
 
     def remove(self) -> None:
-        """Take its place away."""
+        """Remove the line."""
         self._html.remove()
 
 
 _REFUSED = "color:#ff8787;font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em;overflow-wrap:anywhere"
 
 
-class Asked(NamedTuple):
-    """A command that waits."""
+class PendingCommand(NamedTuple):
+    """Command without an outcome."""
 
     name: str
-    ticket: Ticket
-    beside: Note | None
+    ticket: TicketProtocol
+    note: Note | None
     since_s: float
 
 
-class Hand:
-    """Passes commands on, and follows what becomes of them.
+class EventHandlers:
+    """Sends the commands of events to the bench and shows their outcomes.
 
     Parameters
     ----------
-    bench : Bench
-        Whom it tells.
+    bench : BenchProtocol
+        Bench that receives the commands.
     """
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: BenchProtocol) -> None:
         self._bench = bench
         self._lock = threading.Lock()
-        self._open: list[Asked] = []
+        self._open: list[PendingCommand] = []
         self._refused, self._until_s = "", 0.0
         self._warned_s: dict[int, float] = {}
-        self._steered: dict[str, tuple[Event, Note | None, dict[str, Any]]] = {}
-        self._steered_s: dict[str, float] = {}
+        self._latest: dict[str, tuple[Event, Note | None, dict[str, Any]]] = {}
+        self._latest_sent_s: dict[str, float] = {}
 
     @property
     def refused(self) -> str:
-        """What was refused last and belongs to no field; empty after a while."""
+        """Last refusal without a field; empty after a while."""
         return self._refused if time.monotonic() < self._until_s else ""
 
     @property
-    def waits_for(self) -> str:
-        """The command that has waited for longest, where that is long enough to be seen; else nothing."""
+    def waiting_command(self) -> str:
+        """Name of the command that has waited longest, if it has waited long enough to show; else empty."""
         since_s = time.monotonic() - LONG_S
-        return next((each.name for each in self._open if each.since_s < since_s), "")
+        return next((pending.name for pending in self._open if pending.since_s < since_s), "")
 
-    def tell(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
-        """Tell the bench one thing in the name of an event's page; False where that may not."""
+    def send(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
+        """Send a command in the name of an event's page; return False if the page may not command."""
         if name not in ANYONES and not self._operates(event):
             self._warn(event)
             return False
-        self.flush(0.0)  # what was steered before it comes before it
-        self._send(event, name, beside, arguments)
+        self.flush(0.0)  # earlier values of sliders come first
+        self._submit(event, name, note, arguments)
         return True
 
-    def steer(self, event: Event, name: str, /, beside: Note | None = None, **arguments: Any) -> bool:
-        """Tell the bench something of which only the latest matters, as often as it can be of use."""
+    def send_latest(self, event: Event, name: str, /, note: Note | None = None, **arguments: Any) -> bool:
+        """Send the latest of a fast sequence of commands, at a limited rate."""
         if not self._operates(event):
             self._warn(event)
             return False
         with self._lock:
-            self._steered[name] = (event, beside, arguments)
+            self._latest[name] = (event, note, arguments)
         return True
 
-    def flush(self, apart_s: float = STEERED_S) -> None:
-        """Tell the latest of what is steered, where the last one is long enough ago."""
+    def flush(self, apart_s: float = LATEST_INTERVAL_S) -> None:
+        """Send the latest value of each slider, if the last one is long enough ago."""
         now = time.monotonic()
         with self._lock:
-            due = [name for name in self._steered if now - self._steered_s.get(name, 0.0) >= apart_s]
-            steered = {name: self._steered.pop(name) for name in due}
-            self._steered_s |= dict.fromkeys(due, now)
-        for name, (event, beside, arguments) in steered.items():
-            self._send(event, name, beside, arguments)
+            due = [name for name in self._latest if now - self._latest_sent_s.get(name, 0.0) >= apart_s]
+            latest = {name: self._latest.pop(name) for name in due}
+            self._latest_sent_s |= dict.fromkeys(due, now)
+        for name, (event, note, arguments) in latest.items():
+            self._submit(event, name, note, arguments)
 
-    def _send(self, event: Event, name: str, beside: Note | None, arguments: dict[str, Any]) -> None:
+    def _submit(self, event: Event, name: str, note: Note | None, arguments: dict[str, Any]) -> None:
         ticket = self._bench.command(name, client=client_name(event.client_id), **arguments)
         with self._lock:
-            self._open = [*self._open[-MOST_TICKETS:], Asked(name, ticket, beside, time.monotonic())]
+            self._open = [*self._open[-MOST_TICKETS:], PendingCommand(name, ticket, note, time.monotonic())]
 
-    def tell_chosen(self, event: Event) -> None:
-        """Tell the bench what a group of buttons has as its value."""
+    def send_selected(self, event: Event) -> None:
+        """Send the command that is the value of a group of buttons."""
         if event.target.value in event.target.options:
-            self.tell(event, event.target.value)
+            self.send(event, event.target.value)
 
-    def complain(self, text: str, beside: Note | None = None) -> None:
-        """Show why something never became a command."""
-        if beside:
-            beside.say(text)
+    def show_refusal(self, text: str, note: Note | None = None) -> None:
+        """Show a refusal at its field, or in the status panel."""
+        if note:
+            note.say(text)
         else:
             self._refused, self._until_s = text, time.monotonic() + SHOWN_S
 
     def settle(self) -> None:
-        """Show what became of commands since."""
+        """Show the outcomes of commands since the last call."""
         with self._lock:
-            settled = [each for each in self._open if each.ticket.done]
-            self._open = [each for each in self._open if not each.ticket.done]
-        for each in settled:
-            if each.ticket.refused:
-                self.complain(each.ticket.refused, each.beside)
-            elif each.beside:
-                each.beside.say(None)
+            settled = [pending for pending in self._open if pending.ticket.done]
+            self._open = [pending for pending in self._open if not pending.ticket.done]
+        for pending in settled:
+            if pending.ticket.refused:
+                self.show_refusal(pending.ticket.refused, pending.note)
+            elif pending.note:
+                pending.note.say(None)
 
     def button(self, gui: viser.GuiApi, label: str, name: str, /, **more: Any) -> Any:
-        """Add a button that is one command without arguments."""
+        """Add a button for a command without arguments."""
         button = gui.add_button(label, **more)
-        on_press(button, lambda event: self.tell(event, name))
+        on_press(button, lambda event: self.send(event, name))
         return button
 
     def on_change(self, line: Any, act: Callable[[Event], object] | None = None) -> None:
-        """Take what the operator writes or moves; give anybody else's page back what it was.
+        """Accept changes of the operator; restore the value on all other pages.
 
         Parameters
         ----------
         line : viser's handle
-            Of a field, a slider or a box, which all pages share.
+            Handle of a field, a slider or a box, which all pages share.
         act : callable, optional
             Called with the event of each change.
         """
@@ -181,22 +181,22 @@ class Hand:
 
     def _operates(self, event: Event) -> bool:
         state, name = self._bench.state(), client_name(event.client_id)
-        # The picture may be older than the page: who is in none of it is let through, and the bench decides.
+        # The status may be older than the page: a client that is not in it passes, and the bench decides.
         return state.operator == name or (state.operator is None and name not in state.watching)
 
     def _warn(self, event: Event) -> None:
-        """Tell a page that only watches, and no other, why nothing happens; not at every key."""
+        """Notify a watching page, and no other, why nothing happens; not at every key."""
         now = time.monotonic()
         if now - self._warned_s.get(event.client_id, -SHOWN_S) >= SHOWN_S:
             self._warned_s[event.client_id] = now
-            told = "Nobody operates; take over, above."
+            message = "No client operates: press “Take over” above."
             if self._bench.state().operator is not None:
-                told = "Another one operates; ask it, above."
-            event.client.add_notification("This page watches", told, auto_close_seconds=SHOWN_S)
+                message = "Another client operates: press “Ask to operate” above."
+            event.client.add_notification("This page is read-only", message, auto_close_seconds=SHOWN_S)
 
 
 ANYONES = ("stop", "ask", "hello", "leave", "beat")
-"""Commands that the bench takes from pages that watch too."""
+"""Commands that the bench also accepts from watching pages."""
 
 
 def on_press(button: Any, act: Callable[[Event], object]) -> None:
@@ -209,5 +209,5 @@ def on_press(button: Any, act: Callable[[Event], object]) -> None:
 
 
 def client_name(number: int) -> str:
-    """What the bench calls a page."""
+    """Return the bench's name of a page."""
     return f"page {number}"

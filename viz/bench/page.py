@@ -1,4 +1,4 @@
-"""The bench's page: every button is one command, everything shown is the bench's latest state."""
+"""Page of the bench: every button sends one command; everything shown is the latest status."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 import viser
 
-from spheretwin.viz.bench import server as front
-from spheretwin.viz.bench.event_handlers import Event, Hand, client_name, on_press
-from spheretwin.viz.bench.modes_tab import Modes
-from spheretwin.viz.bench.protocols import Bench, Choices
+from spheretwin.viz.bench import server
+from spheretwin.viz.bench.event_handlers import Event, EventHandlers, client_name, on_press
+from spheretwin.viz.bench.modes_tab import ModesTab
+from spheretwin.viz.bench.protocols import BenchProtocol, Choices
 from spheretwin.viz.bench.scene import Scene
-from spheretwin.viz.bench.settings_tab import Settings
+from spheretwin.viz.bench.settings_tab import SettingsTab
 from spheretwin.viz.bench.status_panel import TAKE_OVER, currents_html, scale_html, status_html
-from spheretwin.viz.bench.tabs import Faults, Keeping, Plots
+from spheretwin.viz.bench.tabs import CurvesPanel, FaultsTab, FilesTab
 
 FRAME_S = 1 / 30
-"""The picture moves this often; words and curves every so many frames, the fields' values rarely."""
+"""Period of the scene; text and curves follow every few frames, values of fields rarely."""
 
 FRAMES_A_STATUS = 3
 FRAMES_A_SETTING = 30
@@ -36,43 +36,44 @@ TITLE = "bench"
 
 ASK = "Ask to operate"
 
-# A page that is loaded anew may come before it is said that it went. It operates again; who watched does not.
+# A page that is reloaded may connect before the disconnection is known. It operates again; a watching page
+# does not.
 FRESH_S = 5.0
 
 
 class Page:
-    """A page of one bench, on this machine alone.
+    """Page of one bench, for this machine only.
 
-    ``with Page(bench, choices, front.listen(port)) as page: page.show(until)``
+    ``with Page(bench, choices, server.listen(port)) as page: page.show(until)``
 
     Parameters
     ----------
-    bench : Bench
-        What it drives and shows.
+    bench : BenchProtocol
+        Bench that is shown and driven.
     choices : Choices
-        What there is to choose from.
+        Choices of the controls.
     listening : socket.socket
-        Where it is served, from `front.listen`.
+        Socket of the server, from `server.listen`.
     """
 
-    def __init__(self, bench: Bench, choices: Choices, listening: socket.socket) -> None:
-        self._bench, self._choices, self._hand = bench, choices, Hand(bench)
-        self._server = front.serve(listening, TITLE)
+    def __init__(self, bench: BenchProtocol, choices: Choices, listening: socket.socket) -> None:
+        self._bench, self._choices, self._handlers = bench, choices, EventHandlers(bench)
+        self._server = server.serve(listening, TITLE)
         self._watching: dict[int, Any] = {}
         self._frame, self._shown_s = 0, -1.0
         self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._server.gui.set_panel_label(TITLE)
-        _look(self._server)
+        _set_camera(self._server)
         self._build()
         self._pages()
 
     @property
     def address(self) -> str:
-        """To open in a browser."""
-        return front.address(self._server)
+        """Address to open in a browser."""
+        return server.address(self._server)
 
     def show(self, ended: Callable[[], bool]) -> None:
-        """Follow the bench until it is told to end."""
+        """Follow the bench until `ended` is true."""
         due = time.monotonic()
         while not ended():
             self.draw()
@@ -80,27 +81,27 @@ class Page:
             time.sleep(max(0.0, due - time.monotonic()))
 
     def draw(self) -> None:
-        """Show the latest state, once."""
-        if self._bench.actuator is not self._drawn:  # another model was loaded
+        """Show the latest status once."""
+        if self._bench.actuator is not self._actuator:  # another model was loaded
             self._server.scene.reset()
             self._server.gui.reset()
             self._build()
         state = self._bench.state()
-        self._hand.flush()
-        self._hand.settle()
+        self._handlers.flush()
+        self._handlers.settle()
         with self._server.atomic():
             self._scene.move(
                 np.array(state.q_rad), _desired(state), np.array(state.current_A), state.current_limit_A
             )
             if self._frame % FRAMES_A_STATUS == 0:
-                self._tell(state)
+                self._show_status(state)
             if self._frame % FRAMES_A_SETTING == 0:
                 self._renew(state)
         self._frame += 1
 
     def close(self) -> None:
         """End the server."""
-        front.stop(self._server)
+        server.stop(self._server)
 
     def __enter__(self) -> Page:
         return self
@@ -109,10 +110,10 @@ class Page:
         self.close()
 
     def _build(self) -> None:
-        """Make all that the pages share."""
+        """Make all controls that the pages share."""
         gui = self._server.gui
-        self._drawn = self._bench.actuator
-        self._scene = Scene(self._server.scene, self._drawn)
+        self._actuator = self._bench.actuator
+        self._scene = Scene(self._server.scene, self._actuator)
         self._twin_panel(gui)
         self._curves_panel(gui)
         self._controls(gui, self._choices)
@@ -120,15 +121,15 @@ class Page:
     def _twin_panel(self, gui: viser.GuiApi) -> None:
         panel = gui.add_panel()
         with panel.add_tab("status"):
-            # On top: whatever is scrolled, it stays in view.
-            self._hand.button(gui, "STOP (space)", "stop", color="red")
+            # On top: it stays in view at any scroll position.
+            self._handlers.button(gui, "STOP (space)", "stop", color="red")
             self._status = gui.add_html("")
             running = gui.add_button_group("run", ("start", "pause", "step", "reset"))
-            on_press(running, self._hand.tell_chosen)
+            on_press(running, self._handlers.send_selected)
             speed = gui.add_dropdown("speed", list(SPEEDS), initial_value="1×")
-            self._hand.on_change(
+            self._handlers.on_change(
                 speed,
-                lambda event: self._hand.tell(event, "speed", factor=SPEEDS.get(event.target.value, 1.0)),
+                lambda event: self._handlers.send(event, "speed", factor=SPEEDS.get(event.target.value, 1.0)),
             )
         panel.dock_left()
         panel.set_width(LEFT_WIDTH)
@@ -138,42 +139,42 @@ class Page:
 
         @stop.on_trigger
         async def _(event: Event) -> None:
-            self._hand.tell(event, "stop")
+            self._handlers.send(event, "stop")
 
     def _curves_panel(self, gui: viser.GuiApi) -> None:
         panel = gui.add_panel()
         with panel.add_tab("curves"):
             self._currents = gui.add_html("")
             gui.add_html(scale_html(self._bench.state().current_limit_A))
-            self._plots = Plots(gui)
+            self._plots = CurvesPanel(gui)
         panel.dock_below(self._panel)
 
     def _controls(self, gui: viser.GuiApi, choices: Choices) -> None:
         tabs = gui.add_tab_group()
         with tabs.add_tab("move"):
-            self._modes = Modes(gui, self._hand, self._bench, choices, self._scene)
+            self._modes_tab = ModesTab(gui, self._handlers, self._bench, choices, self._scene)
         law, twin = tabs.add_tab("law"), tabs.add_tab("twin")
-        self._settings = Settings(gui, self._hand, choices, law, twin)
+        self._settings = SettingsTab(gui, self._handlers, choices, law, twin)
         with tabs.add_tab("faults"):
-            self._faults = Faults(gui, self._hand, choices)
+            self._faults_tab = FaultsTab(gui, self._handlers, choices)
         with tabs.add_tab("keep"):
-            self._keeping = Keeping(gui, self._hand, self._bench, choices)
+            self._files_tab = FilesTab(gui, self._handlers, self._bench, choices)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(RIGHT_WIDTH)
 
     def _pages(self) -> None:
-        """Say who comes and who goes; a page that watches gets a button of its own."""
+        """Register clients that connect or disconnect; add to each page its own buttons."""
 
         @self._server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
             self._bench.command("hello", client=client_name(client.client_id))
             ask = client.gui.add_button(ASK, visible=False, order=-1e6)
-            on_press(ask, lambda event: self._hand.tell(event, "ask"))
+            on_press(ask, lambda event: self._handlers.send(event, "ask"))
             give = client.gui.add_button("", visible=False, order=-1e6, color="orange")
 
             def grant(event: Event) -> None:
                 for name in self._bench.state().asking[:1]:
-                    self._hand.tell(event, "grant", to=name)
+                    self._handlers.send(event, "grant", to=name)
 
             on_press(give, grant)
             self._watching[client.client_id] = (time.monotonic(), ask, give)
@@ -183,8 +184,8 @@ class Page:
             self._watching.pop(client.client_id, None)
             self._bench.command("leave", client=client_name(client.client_id))
 
-    def _tell(self, state: Any) -> None:
-        _renewed(self._status, status_html(state, self._hand.refused, self._hand.waits_for))
+    def _show_status(self, state: Any) -> None:
+        _renewed(self._status, status_html(state, self._handlers.refused, self._handlers.waiting_command))
         _renewed(self._currents, currents_html(state.current_A, state.current_limit_A, state.temperature_C))
         if state.t_s < self._shown_s:  # another run
             self._scene.forget()
@@ -193,9 +194,9 @@ class Page:
             self._scene.trail(np.array(state.q_rad))
             self._plots.show(self._bench.history())
             self._plots.warm(state.t_s, state.temperature_C)
-        self._modes.show(state)
-        self._faults.show(state)
-        self._keeping.show(state)
+        self._modes_tab.show(state)
+        self._faults_tab.show(state)
+        self._files_tab.show(state)
 
     def _renew(self, state: Any) -> None:
         self._settings.show()
@@ -205,12 +206,12 @@ class Page:
             fresh = time.monotonic() - came_s < FRESH_S
             if state.operator is None and fresh and len(self._watching) == 1:
                 self._bench.command("ask", client=name)
-            with contextlib.suppress(RuntimeError):  # the page has gone meanwhile
+            with contextlib.suppress(RuntimeError):  # the page may be closed meanwhile
                 ask.visible = state.operator != name and name not in state.asking
                 ask.label = ASK if state.operator else TAKE_OVER
                 give.visible = state.operator == name and bool(state.asking)
                 if give.visible:
-                    give.label = f"Let {state.asking[0]} operate"
+                    give.label = f"Grant control to {state.asking[0]}"
 
 
 def _desired(state: Any) -> Any:
@@ -222,7 +223,7 @@ def _renewed(html: Any, content: str) -> None:
         html.content = content
 
 
-def _look(server: viser.ViserServer) -> None:
-    """From where the shaft, all rows of coils and the ball between them are seen."""
+def _set_camera(server: viser.ViserServer) -> None:
+    """Place the camera so that the shaft, all rows of coils and the ball between them are visible."""
     camera = server.initial_camera
     camera.position, camera.look_at, camera.near = (0.15, -0.22, 0.15), (0.0, 0.0, 0.02), 0.01

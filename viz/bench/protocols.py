@@ -1,4 +1,4 @@
-"""What a page knows of the bench that it drives: it tells it commands, and shows what it says."""
+"""Interface of the page to the bench: it sends commands and shows the status."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator
 
 
-class Ticket(Protocol):
-    """What becomes of a command."""
+class TicketProtocol(Protocol):
+    """Outcome of a command."""
 
     @property
     def done(self) -> bool:
-        """Whether it waits no more."""
+        """True if it no longer waits."""
 
     refused: str | None
 
 
-class Bench(Protocol):
+class BenchProtocol(Protocol):
     """The machine: no call of it waits."""
 
     @property
     def actuator(self) -> Actuator:
-        """Of the present run."""
+        """Actuator of the present run."""
 
-    def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> Ticket:
+    def command(self, name: str, /, *, client: str | None = None, **arguments: Any) -> TicketProtocol:
         """Tell it something."""
 
     def state(self) -> Any:
@@ -43,23 +43,23 @@ class Bench(Protocol):
 
 
 @dataclass(frozen=True)
-class Setting:
-    """One field that a person may change, all of it as the command line writes it."""
+class FieldSetting:
+    """Field that a person may change, in the notation of the command line."""
 
     name: str
     """Dotted."""
     text: str
     """Its value."""
     default: str | None
-    """None where it is not known, as of a law of a person's own."""
+    """None if it is not known, as of a user's law."""
     meaning: str
     choices: tuple[str, ...] = ()
-    """Where it can only be one of these."""
+    """Valid values, if they are a list."""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What there is to choose from, and how text is read.
+    """Choices of the controls, and the conversion of text.
 
     Attributes
     ----------
@@ -72,13 +72,13 @@ class Choices:
     scenarios, shapes, laws : sequence of str
         Names.
     limits : (float, float), rad/s and rad/s²
-        Of the way to a pose, until others are set.
+        Limits of the approach to a pose, until others are set.
     targets : dict
-        Of faults: what can happen to each, by its name.
+        Fault targets by name, each with its modes.
     """
 
-    settings: Callable[[], list[Setting]]
-    shape: Callable[[str], list[Setting]]
+    settings: Callable[[], list[FieldSetting]]
+    shape: Callable[[str], list[FieldSetting]]
     read: Callable[[str, str], Any]
     scenarios: Sequence[str]
     shapes: Sequence[str]

@@ -1,4 +1,4 @@
-"""The actuator as a browser draws it: it moves, its coils have the colours of their currents."""
+"""Scene of the bench: the moving actuator, its coils in the colours of their currents."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.viz import theme
-from spheretwin.viz.bench.actuator import parts_of, quaternions_along
+from spheretwin.viz.bench.actuator import actuator_solids, quaternions_along
 from spheretwin.viz.scene.solids import Solid
 
 LIGHT = 1.6
-"""Light of a surface that is seen in its own colour, as a multiple of what a white one needs to be white."""
+"""Light of a surface that appears in its own colour, relative to the light that makes white appear white."""
 
-# The curve comes to its end far away: nobody sees the difference, and a bright colour stays a colour.
+# The end of the curve is cut: the difference is invisible, and a bright colour remains a colour.
 BRIGHTEST = 0.9
 
 _EXPOSURE = 1 / 0.6
@@ -27,12 +27,12 @@ _OUT_OF = np.array(
 )
 
 
-def of_instances(colours: ArrayLike) -> NDArray[np.uint8]:
+def instance_colours(colours: ArrayLike) -> NDArray[np.uint8]:
     """Colours of many copies of a solid, (..., 3), which a page takes for shares of light."""
     return np.round(255 * _albedo(colours)).astype(np.uint8)
 
 
-def of_one(colour: ArrayLike) -> tuple[int, int, int]:
+def mesh_colour(colour: ArrayLike) -> tuple[int, int, int]:
     """Colour of one solid, which a page takes as a screen does."""
     red, green, blue = np.round(255 * _encoded(_albedo(colour))).astype(int).tolist()
     return red, green, blue
@@ -63,11 +63,11 @@ def _encoded(linear: NDArray[np.float64]) -> NDArray[np.float64]:
 STEEL = (150, 156, 166)
 FRAME = (70, 76, 86)
 BALL = (196, 200, 206)
-# Muted, beside the colours of the currents.
+# Muted, compared with the colours of the currents.
 NORTH, SOUTH = (120, 72, 70), (72, 82, 112)
 GHOST_OPACITY = 0.3
 
-# Of the ball's radius.
+# Share of the ball's radius.
 TIP_RADIUS = 0.12
 
 TRAIL_POINTS = 80
@@ -76,14 +76,14 @@ SMALLEST_M = 1e-9
 
 
 class Scene:
-    """What moves, and what can be taken hold of.
+    """Scene of the bench: moving bodies, coil colours, and the handle that can be dragged.
 
     Parameters
     ----------
     api : viser.SceneApi
-        Where it is drawn, in metres.
+        Scene in which it is drawn, in metres.
     actuator : Actuator
-        What is drawn.
+        Actuator that is drawn.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Scene:
 
     def __init__(self, api: viser.SceneApi, actuator: Actuator) -> None:
         self._actuator = actuator
-        parts = parts_of(actuator)
+        parts = actuator_solids(actuator)
         _light(api)
         api.world_axes.visible = False
         _mesh(api, "/stator", parts.stator, FRAME)
@@ -112,7 +112,7 @@ class Scene:
             parts.pole.faces,
             batched_wxyzs=quaternions_along(actuator.pole_axes),
             batched_positions=np.zeros((len(actuator.pole_axes), 3)),
-            batched_colors=of_instances(np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH)),
+            batched_colors=instance_colours(np.where(actuator.pole_polarity[:, None] > 0, NORTH, SOUTH)),
             lod="off",
             cast_shadow=False,
             receive_shadow=False,
@@ -134,7 +134,7 @@ class Scene:
             "/tip",
             radius=TIP_RADIUS * actuator.magnet.front_m,
             subdivisions=2,
-            color=of_one(theme.TRACE),
+            color=mesh_colour(theme.TRACE),
             cast_shadow=False,
             receive_shadow=False,
         )
@@ -154,16 +154,16 @@ class Scene:
         current_A: NDArray[np.float64],
         limit_A: float,
     ) -> None:
-        """Show a pose, the desired one beside it, and the currents.
+        """Show a pose, the desired pose, and the currents.
 
         Parameters
         ----------
         q_rad : (3,) array, rad
             Hinge angles.
         desired_rad : (3,) array, rad, optional
-            Where they should be; nothing is shown of it unless given.
+            Desired hinge angles; the desired pose is hidden unless given.
         current_A : (n,) array, A
-            Of the groups.
+            Currents of the groups.
         limit_A : float, A
             Current of the full colour.
         """
@@ -176,11 +176,11 @@ class Scene:
         if desired_rad is not None:
             w = _pose(desired_rad)
             self._ghost.wxyz = w
-            self.handle.position = _turned(w, self._actuator.shaft_tip_m)
+            self.handle.position = _rotated(w, self._actuator.shaft_tip_m)
 
     def trail(self, q_rad: NDArray[np.float64]) -> None:
-        """Draw the tip's way a little further."""
-        self._trail.append(_turned(_pose(q_rad), self._actuator.shaft_tip_m))
+        """Extend the path of the tip."""
+        self._trail.append(_rotated(_pose(q_rad), self._actuator.shaft_tip_m))
         points = np.array(self._trail, dtype=np.float32)
         if len(points) > 1:
             self._line.points = np.stack([points[:-1], points[1:]], axis=1)
@@ -193,34 +193,34 @@ class Scene:
         Parameters
         ----------
         point_m : (3,) floats, m
-            Where the pointer is, at any depth.
+            Position of the pointer, at any depth.
         eye_m : (3,) array, m
-            Of the one who sees it.
+            Position of the camera.
         gamma_rad : float, rad
-            The angle about the shaft, which a pointer does not say.
+            Angle about the shaft, which a pointer does not determine.
         """
         ahead = np.array(point_m) - eye_m
         ahead /= max(float(np.linalg.norm(ahead)), SMALLEST_M)
         reach_m = float(np.linalg.norm(self._actuator.shaft_tip_m))
         middle = float(eye_m @ ahead)
-        # Where the line of sight meets the sphere of the tip first; beside it, where it comes closest.
+        # First intersection of the line of sight with the tip's sphere; if there is none, the closest point.
         half = np.sqrt(max(0.0, middle**2 - float(eye_m @ eye_m) + reach_m**2))
         met = eye_m + (-middle - half if middle < -half else half - middle) * ahead
         x, y, z = met / max(float(np.linalg.norm(met)), SMALLEST_M)
         return [float(np.arctan2(-y, z)), float(np.arcsin(np.clip(x, -1.0, 1.0))), gamma_rad]
 
     def group_of(self, coil: int | None) -> int | None:
-        """Group of a coil that was clicked, by its place; None where there is none."""
-        found = np.flatnonzero((self._actuator.groups == coil).any(axis=1))
-        return int(found[0]) if len(found) else None
+        """Return the group of a clicked coil by its place; None if there is none."""
+        groups = np.flatnonzero((self._actuator.groups == coil).any(axis=1))
+        return int(groups[0]) if len(groups) else None
 
     def forget(self) -> None:
-        """Begin the tip's way anew."""
+        """Clear the path of the tip."""
         self._trail.clear()
         self._line.points = np.zeros((1, 2, 3), dtype=np.float32)
 
     def _coil_colours(self, current_A: NDArray[np.float64], limit_A: float) -> NDArray[np.uint8]:
-        of_group = of_instances(theme.current_colours(current_A, limit_A))
+        of_group = instance_colours(theme.current_colours(current_A, limit_A))
         coloured = np.empty((len(self._actuator.coil_axes), 3), dtype=np.uint8)
         coloured[self._actuator.groups] = of_group[:, None, :]
         return coloured
@@ -230,7 +230,7 @@ _HINGES = ("/alpha", "/alpha/beta", "/alpha/beta/gamma")
 
 
 def _light(api: viser.SceneApi) -> None:
-    """Few lights, no shadows and no mirrored surroundings: these cost half the frames without a GPU."""
+    """Add few lights, without shadows and reflections: these cost half of the frames without a GPU."""
     api.configure_default_lights(enabled=False)
     api.configure_environment_map(None)
     api.add_light_ambient("/light/all", intensity=AMBIENT * pi * LIGHT)
@@ -257,7 +257,7 @@ def _mesh(
         name,
         solid.vertices,
         solid.faces,
-        color=of_one(colour),
+        color=mesh_colour(colour),
         wxyz=wxyz,
         opacity=opacity,
         cast_shadow=False,
@@ -288,8 +288,8 @@ def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float
     return np.array([a[0] * b[0] - a[1:] @ b[1:], *vector])
 
 
-def _turned(quaternion: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A vector, turned."""
+def _rotated(quaternion: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a vector rotated by a quaternion."""
     w, axis = quaternion[0], quaternion[1:]
     across = 2 * np.cross(axis, vector)
     return vector + w * across + np.cross(axis, across)

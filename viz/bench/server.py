@@ -1,9 +1,9 @@
-"""The page's server, which lets in nothing but the page: this machine alone, and only what a page sends.
+"""Server of the page. It accepts connections of this machine only, and only messages of the page.
 
-viser serves to whoever asks and believes what it is told, and a message may have it open a tunnel elsewhere.
-So its server is made with a door of ours: hosts and origins that are not this machine are refused (a foreign
+viser accepts every client and every message, and a message may open a tunnel to another host. Its server is
+therefore made with a connection guard: hosts and origins other than this machine are refused (a foreign
 page cannot reach it, nor by a name that it has turned to 127.0.0.1), so is every message that is not a page's
-in form, and the page may load nothing from elsewhere.
+in form, and the page may load nothing from other hosts.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HOST = "127.0.0.1"
 
 MOST_PAGES = 64
 
-# What a person does to a page is far less; a flood waits in its own socket.
+# A person sends far less; a flood waits in its own socket.
 MOST_MESSAGES_PER_S = 300.0
 
 LARGEST_MESSAGE = 16_384
@@ -41,8 +41,8 @@ POLICY = (
 )
 
 # A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
-# viser's camera listens to keys too, at the document, after its commands: an arrow steers the twin alone.
-# Notices stand below, where they hide nothing.
+# viser's camera listens to keys too, at the document, after its commands: an arrow moves the twin only.
+# Notifications are at the bottom, where they hide nothing.
 HEAD = """<style>.mantine-Notifications-root { top: auto !important; bottom: 8px !important; }</style>
 <script>
 for (const kind of ["keydown", "keyup"]) addEventListener(kind, (event) => {
@@ -55,60 +55,58 @@ document.documentElement.addEventListener("keydown", (event) => {
 
 
 def listen(port: int) -> socket.socket:
-    """Take a port of this machine, for itself alone.
+    """Bind a port of this machine exclusively.
 
     Parameters
     ----------
     port : int
-        Where; 0 for any that is free.
+        Port; 0 for any free port.
 
     Raises
     ------
     InputError
-        The port is taken, or is none.
+        The port is in use or invalid.
     """
     listening = socket.socket()
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((HOST, port))
-        listening.listen()  # now, not by the server: until then another may take a port that is bound alone
+        listening.listen()  # now: another process may take a bound port until it listens
     except (OSError, OverflowError) as error:
         listening.close()
-        raise InputError(
-            f"bench: expected a port that is free, received {port}: {without_breaks(error)}"
-        ) from None
+        raise InputError(f"bench: expected a free port, received {port}: {without_breaks(error)}") from None
     return listening
 
 
 def serve(listening: socket.socket, title: str) -> viser.ViserServer:
-    """Start the server.
+    """Start the server of the page.
 
     Parameters
     ----------
     listening : socket.socket
-        Where, from `listen`; it is the server's from now on.
+        Socket from `listen`; the server owns it from now on.
     title : str
-        Of the page.
+        Title of the page.
     """
-    with _as_door(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser tells its address
+    with _with_guard(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
         server = viser.ViserServer(host=HOST, port=listening.getsockname()[1], verbose=False)
-    server.get_event_loop().set_exception_handler(_unheard)
+    server.get_event_loop().set_exception_handler(_ignore_exception)
     return server
 
 
 def stop(server: viser.ViserServer) -> None:
-    """End it."""
+    """Stop the server."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
 def address(server: viser.ViserServer) -> str:
-    """Where its page is."""
+    """Return the address of the page."""
     return f"http://{HOST}:{server.get_port()}"
 
 
-class _Door(servers.serve):
-    """What viser takes for the function that makes a server."""
+class _ConnectionGuard(servers.serve):
+    """Connection guard: replaces the function with which viser makes its server."""
 
     def __init__(
         self,
@@ -129,10 +127,10 @@ class _Door(servers.serve):
             process_request=self._answer,
             subprotocols=subprotocols,
             select_subprotocol=select_subprotocol,
-            create_connection=_Visitor,
+            create_connection=_PageConnection,
             max_size=LARGEST_MESSAGE,
             compression=None,
-            # A browser opens sockets to be ready, and says nothing: these shall not hold up the end.
+            # A browser opens spare sockets that send nothing: they must not delay the end.
             open_timeout=1.0,
             close_timeout=1.0,
             logger=_SILENT,
@@ -163,7 +161,7 @@ class _Door(servers.serve):
         return {f"http://{host}" for host in self._hosts}
 
     def _admission(self, request: Request) -> Response | None:
-        """None where a socket is let in: for a page that is as old as its server."""
+        """Return a refusal, or None if a socket is admitted: its page must have the version of the server."""
         if request.headers.get_all("Sec-WebSocket-Protocol") != [f"viser-v{viser.__version__}"]:
             return _refusal(http.HTTPStatus.BAD_REQUEST)
         return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE) if self._pages >= MOST_PAGES else None
@@ -171,25 +169,25 @@ class _Door(servers.serve):
     def _file(self, connection: Any, request: Request, host: str) -> Response:
         plain = Request(request.path, Headers())
         try:
-            found = self._serve_file(connection, plain)
-        except (ValueError, OSError):  # no file can have the name that was asked for
-            found = None
-        if found is None or found.status_code != http.HTTPStatus.OK:
+            response = self._serve_file(connection, plain)
+        except (ValueError, OSError):  # no file can have the requested name
+            response = None
+        if response is None or response.status_code != http.HTTPStatus.OK:
             return _refusal(http.HTTPStatus.NOT_FOUND)
-        if found.headers["Content-Type"].startswith("text/html"):
+        if response.headers["Content-Type"].startswith("text/html"):
             head = f"<head><title>{self._title}</title>{HEAD}".encode()
-            found.body = found.body.replace(b"<title>Viser</title>", b"").replace(b"<head>", head, 1)
-            del found.headers["Content-Length"]
-            found.headers["Content-Length"] = str(len(found.body))
-        found.headers["Content-Security-Policy"] = POLICY.format(host=host)
-        found.headers["X-Content-Type-Options"] = "nosniff"
-        found.headers["Referrer-Policy"] = "no-referrer"
-        found.headers["Cache-Control"] = "no-store"
-        return found
+            response.body = response.body.replace(b"<title>Viser</title>", b"").replace(b"<head>", head, 1)
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(response.body))
+        response.headers["Content-Security-Policy"] = POLICY.format(host=host)
+        response.headers["X-Content-Type-Options"] = "nosniff"
+        response.headers["Referrer-Policy"] = "no-referrer"
+        response.headers["Cache-Control"] = "no-store"
+        return response
 
 
-class _Visitor(servers.ServerConnection):
-    """A page's socket, which hands over only messages of the forms below, and not too many at once."""
+class _PageConnection(servers.ServerConnection):
+    """Socket of a page: it passes only messages of the forms below, at a limited rate."""
 
     _due = 0.0
 
@@ -200,12 +198,12 @@ class _Visitor(servers.ServerConnection):
             self._due = max(self._due + 1 / MOST_MESSAGES_PER_S, now - 1.0)
             if self._due > now:
                 await asyncio.sleep(self._due - now)
-            if isinstance(raw, bytes) and _is_a_pages(raw):
+            if isinstance(raw, bytes) and _is_page_message(raw):
                 return raw
 
 
 Name = Annotated[str, msgspec.Meta(max_length=256)]
-# No number of a page's is without end, and none is not a number.
+# Numbers of a page are finite.
 Number = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 Two = tuple[Number, Number]
 Three = tuple[Number, Number, Number]
@@ -282,7 +280,7 @@ _PAGES: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(
 )
 
 
-def _is_a_pages(raw: bytes) -> bool:
+def _is_page_message(raw: bytes) -> bool:
     try:
         _PAGES.decode(raw)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
@@ -300,15 +298,17 @@ _SILENT = logging.getLogger("spheretwin.bench")
 _SILENT.addHandler(logging.NullHandler())
 _SILENT.propagate = False
 
-_making = threading.Lock()
+_server_lock = threading.Lock()
 
 
 @contextlib.contextmanager
-def _as_door(listening: socket.socket, title: str) -> Iterator[None]:
-    """Have viser make its server with our door: it asks the library for one, and cannot be told which."""
+def _with_guard(listening: socket.socket, title: str) -> Iterator[None]:
+    """Make viser create its server with the connection guard: viser has no option for it."""
 
-    def door(handler: Any, host: str, port: int, *, process_request: Any, **options: Any) -> _Door:
-        return _Door(
+    def guard(
+        handler: Any, host: str, port: int, *, process_request: Any, **options: Any
+    ) -> _ConnectionGuard:
+        return _ConnectionGuard(
             listening,
             title,
             handler,
@@ -317,13 +317,13 @@ def _as_door(listening: socket.socket, title: str) -> Iterator[None]:
             options["select_subprotocol"],
         )
 
-    with _making:
-        plain, servers.serve = servers.serve, door  # type: ignore[misc, assignment]
+    with _server_lock:
+        plain, servers.serve = servers.serve, guard  # type: ignore[misc, assignment]
         try:
             yield
         finally:
             servers.serve = plain  # type: ignore[misc]
 
 
-def _unheard(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """What a page's message made viser stumble over ends with that message."""
+def _ignore_exception(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Ignore an exception that a message of a page raised in viser; only that message is lost."""

@@ -1,4 +1,4 @@
-"""Forms of settings: a line for each field, taken when a person says so, refused beside the field."""
+"""Forms of settings: a line for each field, applied by a button, refused next to the field."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from typing import Any
 import viser
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.bench.event_handlers import Event, Hand, Note, on_press
-from spheretwin.viz.bench.protocols import Choices, Setting
+from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
+from spheretwin.viz.bench.protocols import Choices, FieldSetting
 
 ApplyFields = Callable[[Event, dict[str, str]], None]
 
 
 class Form:
-    """Lines of text, one for each setting.
+    """Form with a line for each setting.
 
     Parameters
     ----------
     gui : viser.GuiApi
-        In the container it is to be in.
-    hand : Hand
-        Who takes what is written.
+        GUI of the container.
+    handlers : EventHandlers
+        Handlers that send the values.
     apply : str
-        What its button says.
+        Label of its button.
     whole : bool
-        Whether all of the fields are handed over, or those that a person has changed.
+        Whether all of the fields are sent, or only the changed ones.
 
     Attributes
     ----------
@@ -35,9 +35,9 @@ class Form:
         Under all of them.
     """
 
-    def __init__(self, gui: viser.GuiApi, hand: Hand, apply: str, whole: bool = False) -> None:
-        self._gui, self._hand, self._whole = gui, hand, whole
-        self._settings: list[Setting] = []
+    def __init__(self, gui: viser.GuiApi, handlers: EventHandlers, apply: str, whole: bool = False) -> None:
+        self._gui, self._handlers, self._whole = gui, handlers, whole
+        self._settings: list[FieldSetting] = []
         self._lines: dict[str, Any] = {}
         self._notes: dict[str, Note] = {}
         self._act: ApplyFields = lambda event, fields: None
@@ -57,17 +57,17 @@ class Form:
             self._form.submit()  # no line is marked as changed any more
 
     def on_apply(self, act: ApplyFields) -> None:
-        """Say what is done with the fields: texts by name."""
+        """Set the function that receives the fields: texts by name."""
         self._act = act
 
     def note_of(self, name: str) -> Note:
-        """The line under a field."""
+        """Return the line under a field."""
         return self._notes.get(name, self.note)
 
-    def show(self, settings: list[Setting]) -> None:
-        """Show these fields; what a person is about to change in one of them stays."""
-        names = [(each.name, each.choices) for each in settings]
-        if names == [(each.name, each.choices) for each in self._settings]:
+    def show(self, settings: list[FieldSetting]) -> None:
+        """Show these fields; a change in progress remains."""
+        names = [(setting.name, setting.choices) for setting in settings]
+        if names == [(setting.name, setting.choices) for setting in self._settings]:
             self._refresh(settings)
         else:
             self._make(settings)
@@ -75,31 +75,31 @@ class Form:
 
     def _apply(self, event: Event) -> None:
         changed = {
-            each.name: _written(line)
-            for each, line in zip(self._settings, self._lines.values(), strict=True)
-            if self._whole or _written(line) != each.text
+            setting.name: _written(line)
+            for setting, line in zip(self._settings, self._lines.values(), strict=True)
+            if self._whole or _written(line) != setting.text
         }
         for note in self._notes.values():
             note.say(None)
         self._act(event, changed)
 
-    def _refresh(self, settings: list[Setting]) -> None:
+    def _refresh(self, settings: list[FieldSetting]) -> None:
         for before, now, line in zip(self._settings, settings, self._lines.values(), strict=True):
             if now.text != before.text and _written(line) == before.text:
                 line.value = now.text == "true" if isinstance(line.value, bool) else now.text
 
-    def _make(self, settings: list[Setting]) -> None:
+    def _make(self, settings: list[FieldSetting]) -> None:
         for line in self._lines.values():
             line.remove()
         for note in self._notes.values():
             note.remove()
         with self._form:
-            self._lines = {each.name: self._line(each) for each in settings}
+            self._lines = {setting.name: self._line(setting) for setting in settings}
             for line in self._lines.values():
-                self._hand.on_change(line)
+                self._handlers.on_change(line)
             self._notes = {name: Note(self._gui, line.order + 0.5) for name, line in self._lines.items()}
 
-    def _line(self, setting: Setting) -> Any:
+    def _line(self, setting: FieldSetting) -> Any:
         label = setting.name.partition(".")[2] or setting.name
         hint = setting.meaning
         if setting.default is not None:
@@ -112,15 +112,15 @@ class Form:
         return self._gui.add_text(label, setting.text, hint=hint)
 
 
-class Settings:
-    """The tabs of the law and of all other sections of the scenario.
+class SettingsTab:
+    """Tabs of the law and of all other sections of the scenario.
 
     Parameters
     ----------
     gui : viser.GuiApi
-        Of the server.
-    hand : Hand
-        Whom it tells.
+        GUI of the server.
+    handlers : EventHandlers
+        Handlers that send the commands.
     choices : Choices
         Fields and laws.
     law, twin : viser.GuiTabHandle
@@ -130,12 +130,12 @@ class Settings:
     def __init__(
         self,
         gui: viser.GuiApi,
-        hand: Hand,
+        handlers: EventHandlers,
         choices: Choices,
         law: viser.GuiTabHandle,
         twin: viser.GuiTabHandle,
     ) -> None:
-        self._gui, self._hand, self._choices = gui, hand, choices
+        self._gui, self._handlers, self._choices = gui, handlers, choices
         self._showing = threading.Lock()
         self._known_law = ""
         self._laws: Any
@@ -147,47 +147,55 @@ class Settings:
         self.show()
 
     def show(self) -> None:
-        """Show what is in force now; called by the page, and by a person's choice of a section."""
+        """Show the active values; called by the page, and when a section is chosen."""
         with self._showing:
             self._show(self._choices.settings())
 
-    def _show(self, settings: list[Setting]) -> None:
-        law = next(each for each in settings if each.name == LAW)
+    def _show(self, settings: list[FieldSetting]) -> None:
+        law = next(setting for setting in settings if setting.name == LAW)
         if self._known_law != law.text:
             self._known_law = law.text
             self._laws.options = list(dict.fromkeys([*self._choices.laws, law.text]))
             self._laws.value = law.text
-        self._gains.show([each for each in settings if _section(each.name) == "controller" and each != law])
-        self._often.show([each for each in settings if each.name in OFTEN])
+        self._gains.show(
+            [setting for setting in settings if _section(setting.name) == "controller" and setting != law]
+        )
+        self._often.show([setting for setting in settings if setting.name in OFTEN])
         section = self._sections.value
         self._fields.show(
-            [each for each in settings if _section(each.name) == section and each.name not in OFTEN]
+            [
+                setting
+                for setting in settings
+                if _section(setting.name) == section and setting.name not in OFTEN
+            ]
         )
 
     def _law(self, gui: viser.GuiApi) -> None:
         self._laws = gui.add_dropdown("law", self._choices.laws)
-        own = gui.add_text("or your own", "", hint="FILE.py:NAME, on this machine")
-        self._hand.on_change(own)
-        take = gui.add_button("Take your own")
+        own = gui.add_text("user law", "", hint="FILE.py:NAME, on this machine")
+        self._handlers.on_change(own)
+        take = gui.add_button("Load user law")
         note = Note(gui, take.order + 0.5)
-        self._hand.on_change(self._laws, lambda event: self._set(event, LAW, event.target.value, note))
+        self._handlers.on_change(self._laws, lambda event: self._set(event, LAW, event.target.value, note))
         on_press(take, lambda event: self._set(event, LAW, own.value, note))
         self._gains = self._form(gui, "Set gains")
-        defaults = gui.add_button("Gains as they come")
+        defaults = gui.add_button("Reset gains to defaults")
         on_press(defaults, self._reset_gains)
 
     def _twin(self, gui: viser.GuiApi) -> None:
         self._often = self._form(gui, "Set")
         gui.add_divider()
         settings = self._choices.settings()
-        sections = list(dict.fromkeys(_section(each.name) for each in settings if each.name not in OFTEN))
-        sections = [each for each in sections if each not in ELSEWHERE]
+        sections = list(
+            dict.fromkeys(_section(setting.name) for setting in settings if setting.name not in OFTEN)
+        )
+        sections = [setting for setting in sections if setting not in ELSEWHERE]
         self._sections = gui.add_dropdown("section", sections, initial_value=FIRST_SECTION)
-        self._hand.on_change(self._sections, lambda event: self.show())
+        self._handlers.on_change(self._sections, lambda event: self.show())
         self._fields = self._form(gui, "Set these")
 
     def _form(self, gui: viser.GuiApi, apply: str) -> Form:
-        form = Form(gui, self._hand, apply)
+        form = Form(gui, self._handlers, apply)
 
         def set_all(event: Event, fields: dict[str, str]) -> None:
             for name, text in fields.items():
@@ -197,19 +205,19 @@ class Settings:
         return form
 
     def _reset_gains(self, event: Event) -> None:
-        for each in self._choices.settings():
-            if _section(each.name) != "controller" or each.name == LAW:
+        for setting in self._choices.settings():
+            if _section(setting.name) != "controller" or setting.name == LAW:
                 continue
-            if each.default is not None and each.text != each.default:
-                self._set(event, each.name, each.default, self._gains.note_of(each.name))
+            if setting.default is not None and setting.text != setting.default:
+                self._set(event, setting.name, setting.default, self._gains.note_of(setting.name))
 
     def _set(self, event: Event, name: str, text: str, note: Note) -> None:
         try:
             value = self._choices.read(name, text)
         except InputError as error:
-            self._hand.complain(str(error), note)
+            self._handlers.show_refusal(str(error), note)
         else:
-            self._hand.tell(event, "set", note, name=name, value=value)
+            self._handlers.send(event, "set", note, name=name, value=value)
 
 
 LAW = "controller.law"
@@ -218,7 +226,7 @@ OFTEN = ("allocation", "disturbance.load", "plant.payload_kg", "plant.modelling_
 
 FIRST_SECTION = "plant"
 
-# The law and its gains, the shape and the faults have tabs of their own; the rest is no setting.
+# The law and its gains, the shape and the faults have their own tabs; the others are not settings.
 ELSEWHERE = ("controller", "trajectory", "fault", "event", "manual", "name", "description")
 
 

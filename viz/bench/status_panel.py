@@ -1,4 +1,4 @@
-"""What is always in view: how the twin is, in words, figures and colours."""
+"""Status panel, which is always in view: text, figures and colours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from spheretwin.viz import theme
 GOOD, WARN, BAD, QUIET = "#40c057", "#fab005", "#fa5252", "#868e96"
 
 TAKE_OVER = "Take over"
-"""What a page that watches presses where nobody operates."""
+"""Label of the button of a watching page while no client operates."""
 
 _MODES = {"off": QUIET, "hold": GOOD, "fault": BAD, "replay": "#4dabf7"}
 _WORKING = "#4dabf7"
@@ -23,22 +23,22 @@ _LARGE = "font-size:1.25em;font-weight:700;font-variant-numeric:tabular-nums"
 _TABLE = "display:grid;grid-template-columns:auto 1fr;column-gap:0.8em;font-variant-numeric:tabular-nums"
 
 
-def status_html(state: Any, refused: str, waits_for: str) -> str:
-    """The box on top.
+def status_html(state: Any, refused: str, waiting_command: str) -> str:
+    """Return the status box as HTML.
 
     Parameters
     ----------
     state : State
-        Of the bench.
+        Status of the bench.
     refused : str
-        What was refused last; may be empty.
+        Last refusal; may be empty.
     waits_for : str
         The command that is being prepared; may be empty.
     """
-    wanted = "as fast as possible" if isinf(state.speed) or state.speed > 1e3 else f"{state.speed:g}×"
+    speed = "as fast as possible" if isinf(state.speed) or state.speed > 1e3 else f"{state.speed:g}×"
     rows = [
         ("time", f"<b>{state.t_s:.3f} s</b>"),
-        ("speed", f"{wanted}, reached <b>{state.realtime_factor:.2f}×</b>"),
+        ("speed", f"{speed}, reached <b>{state.realtime_factor:.2f}×</b>"),
         ("|e|", f"<b>{state.error_mrad:.2f} mrad</b> = {state.error_deg:.3f}°"),
         ("margin", _bar(state.torque_margin)),
         ("law", f"{escape(state.law)}, {escape(state.scenario)}"),
@@ -48,13 +48,13 @@ def status_html(state: Any, refused: str, waits_for: str) -> str:
     return (
         f'<div style="{_BOX}" data-bench="status">'
         f'<div style="{_LARGE}">{_badge(state.mode.upper(), _MODES.get(state.mode, _WORKING))}'
-        f"{_going(state)}{''.join(_alarms(state))}</div>{_nobody(state)}"
-        f'<div style="{_TABLE}">{table}</div>{_lines(state, refused, waits_for)}</div>'
+        f"{_run_badge(state)}{''.join(_alarms(state))}</div>{_operator_hint(state)}"
+        f'<div style="{_TABLE}">{table}</div>{_lines(state, refused, waiting_command)}</div>'
     )
 
 
 def scale_html(limit_A: float) -> str:
-    """Colours of the currents, from least to greatest."""
+    """Return the colour scale of the currents, from least to greatest."""
     at = np.linspace(-1.0, 1.0, 17)
     stops = ",".join("rgb({},{},{})".format(*colour) for colour in theme.current_colours(at, 1.0).tolist())
     return (
@@ -68,7 +68,7 @@ def scale_html(limit_A: float) -> str:
 def currents_html(
     current_A: tuple[float, ...], limit_A: float, temperature_C: tuple[float, ...] | None
 ) -> str:
-    """A bar for each group, up for positive currents, and the warmest winding."""
+    """Return a bar for each group, up for positive currents, and the warmest winding."""
     limit = limit_A or max(map(abs, current_A)) or 1.0
     colours = theme.current_colours(np.array(current_A), limit).tolist()
     bars = "".join(
@@ -102,14 +102,14 @@ def _badge(text: str, colour: str) -> str:
     )
 
 
-def _going(state: Any) -> str:
+def _run_badge(state: Any) -> str:
     return _badge("RUNS", GOOD) if state.running else _badge("PAUSED", QUIET)
 
 
-def _nobody(state: Any) -> str:
+def _operator_hint(state: Any) -> str:
     if state.operator is not None or not state.watching:
         return ""
-    return f'<div style="color:{WARN}">Nobody operates: press “{TAKE_OVER}”.</div>'
+    return f'<div style="color:{WARN}">No client operates: press “{TAKE_OVER}”.</div>'
 
 
 def _alarms(state: Any) -> list[str]:
@@ -127,9 +127,9 @@ def _alarms(state: Any) -> list[str]:
     return alarms
 
 
-def _lines(state: Any, refused: str, waits_for: str) -> str:
+def _lines(state: Any, refused: str, waiting_command: str) -> str:
     lines = [(BAD, state.reason), (BAD, refused), (WARN, state.note)]
-    lines += [(_WORKING, f"preparing {waits_for} …")] if waits_for else []
+    lines += [(_WORKING, f"preparing {waiting_command} …")] if waiting_command else []
     lines += [(WARN, f"at the next reset: {name} = {value}") for name, value in state.pending]
     lines += [(GOOD, f"recording {file}") for file in state.recording]
     return "".join(f'<div style="color:{colour}">{escape(str(text))}</div>' for colour, text in lines if text)

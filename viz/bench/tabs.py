@@ -1,4 +1,4 @@
-"""The tab of the faults: add one, see them, take them back."""
+"""Tabs of the bench's page for faults and files, and its curves."""
 
 from __future__ import annotations
 
@@ -12,31 +12,33 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz import theme
-from spheretwin.viz.bench.event_handlers import Event, Hand, Note, on_press
-from spheretwin.viz.bench.protocols import Bench, Choices
+from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
+from spheretwin.viz.bench.protocols import BenchProtocol, Choices
 
 
-class Faults:
-    """What fails, from now on.
+class FaultsTab:
+    """Tab of the faults: add, list and clear them.
 
     Parameters
     ----------
     gui : viser.GuiApi
         In the tab.
-    hand : Hand
-        Whom it tells.
+    handlers : EventHandlers
+        Handlers that send the commands.
     choices : Choices
         Targets and modes.
     """
 
-    def __init__(self, gui: viser.GuiApi, hand: Hand, choices: Choices) -> None:
+    def __init__(self, gui: viser.GuiApi, handlers: EventHandlers, choices: Choices) -> None:
         targets = choices.targets
         first = next(iter(targets))
         target = gui.add_dropdown("target", list(targets), initial_value=first)
         mode: Any = gui.add_dropdown("mode", list(targets[first]), initial_value=targets[first][0])
-        value = gui.add_text("value", "", hint="where the mode has one")
-        detect = gui.add_checkbox("look for it", False, hint="the controller looks for it by itself")
-        known = gui.add_checkbox("told of it", False, hint="the controller is told")
+        value = gui.add_text("value", "", hint="if the mode has one")
+        detect = gui.add_checkbox("detect", False, hint="the controller detects the fault itself")
+        known = gui.add_checkbox(
+            "report to controller", False, hint="the controller is informed of the fault"
+        )
         add = gui.add_button("Add from now on", color="orange")
         note = Note(gui, add.order + 0.5)
 
@@ -50,102 +52,106 @@ class Faults:
                 try:
                     fault["value"] = choices.read("fault.0.value", value.value)
                 except InputError as error:
-                    hand.complain(str(error), note)
+                    handlers.show_refusal(str(error), note)
                     return
             fault |= {name: True for name, box in (("detect", detect), ("known", known)) if box.value}
-            hand.tell(event, "add_fault", note, fault=fault)
+            handlers.send(event, "add_fault", note, fault=fault)
 
-        hand.on_change(target, retarget)
+        handlers.on_change(target, retarget)
         for line in (mode, value, detect, known):
-            hand.on_change(line)
+            handlers.on_change(line)
         on_press(add, add_fault)
         self._list = gui.add_html("")
         self._shown: tuple[str, ...] | None = None
         place = gui.add_number("place", 0, min=0, step=1)
-        hand.on_change(place)
-        one = gui.add_button("Clear the one at this place")
-        on_press(one, lambda event: hand.tell(event, "clear_faults", note, place=int(place.value)))
-        hand.button(gui, "Clear all", "clear_faults")
+        handlers.on_change(place)
+        one = gui.add_button("Clear the fault at this place")
+        on_press(one, lambda event: handlers.send(event, "clear_faults", note, place=int(place.value)))
+        handlers.button(gui, "Clear all", "clear_faults")
 
     def show(self, state: Any) -> None:
-        """List what is planned or at work."""
+        """List the planned and active faults."""
         if state.faults != self._shown:
             self._shown = state.faults
             lines = "".join(f"<li>{escape(fault)}</li>" for fault in state.faults)
-            told = f'<ol start="0" style="margin:0;padding-left:1.6em">{lines}</ol>' if lines else "no faults"
-            self._list.content = f'<div style="padding:0.3em 0.8em;font-size:0.85em">{told}</div>'
+            content = (
+                f'<ol start="0" style="margin:0;padding-left:1.6em">{lines}</ol>' if lines else "no faults"
+            )
+            self._list.content = f'<div style="padding:0.3em 0.8em;font-size:0.85em">{content}</div>'
 
 
-class Keeping:
-    """Files and snapshots.
+class FilesTab:
+    """Tab of files and snapshots.
 
     Parameters
     ----------
     gui : viser.GuiApi
         In the tab.
-    hand : Hand
-        Whom it tells.
-    bench : Bench
-        Whose command line is shown.
+    handlers : EventHandlers
+        Handlers that send the commands.
+    bench : BenchProtocol
+        Bench whose command line is shown.
     choices : Choices
         Scenarios.
     """
 
-    def __init__(self, gui: viser.GuiApi, hand: Hand, bench: Bench, choices: Choices) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, handlers: EventHandlers, bench: BenchProtocol, choices: Choices
+    ) -> None:
         with gui.add_folder("record"):
             recording = gui.add_text("recording", "bench.rrd", hint="for Rerun; empty for none")
-            telemetry = gui.add_text("telemetry", "bench.parquet", hint="runs again from it; empty for none")
+            telemetry = gui.add_text("telemetry", "bench.parquet", hint="can be replayed; empty for none")
             record = gui.add_button("Record from now on", color="red")
             for line in (recording, telemetry):
-                hand.on_change(line)
-            told = Note(gui, record.order + 0.5)
+                handlers.on_change(line)
+            note = Note(gui, record.order + 0.5)
 
             def begin(event: Event) -> None:
                 files = {"recording": recording.value.strip(), "telemetry": telemetry.value.strip()}
-                hand.tell(event, "record", told, **{kind: file for kind, file in files.items() if file})
+                handlers.send(event, "record", note, **{kind: file for kind, file in files.items() if file})
 
             on_press(record, begin)
-            hand.button(gui, "End it, and complete the files", "keep")
+            handlers.button(gui, "Stop and complete the files", "keep")
         with gui.add_folder("scenario"):
-            source = gui.add_dropdown("begin anew with", choices.scenarios)
-            load = gui.add_button("Load it")
+            source = gui.add_dropdown("restart with", choices.scenarios)
+            load = gui.add_button("Load")
             file = gui.add_text("save as", "bench.toml")
             save = gui.add_button("Save the present settings")
-            hand.on_change(source)
-            hand.on_change(file)
+            handlers.on_change(source)
+            handlers.on_change(file)
             saved = Note(gui, save.order + 0.5)
-            on_press(load, lambda event: hand.tell(event, "load", saved, source=source.value))
-            on_press(save, lambda event: hand.tell(event, "save", saved, file=file.value))
+            on_press(load, lambda event: handlers.send(event, "load", saved, source=source.value))
+            on_press(save, lambda event: handlers.send(event, "save", saved, file=file.value))
         with gui.add_folder("as a command line"):
             shown: Any = gui.add_text("copy", "", multiline=True)
 
-            def tell_line(event: Event) -> None:
+            def show_command_line(event: Event) -> None:
                 shown.value = bench.command_line()
 
-            on_press(gui.add_button("Show it as it is now"), tell_line)
+            on_press(gui.add_button("Show the present command line"), show_command_line)
         with gui.add_folder("snapshot"):
             name = gui.add_text("name", "last")
-            hand.on_change(name)
-            keep = gui.add_button("Take one")
-            self._kept: Any = gui.add_button_group("back to", NONE_YET, visible=False)
-            note = Note(gui, self._kept.order + 0.5)
-            on_press(keep, lambda event: hand.tell(event, "snapshot", note, name=name.value))
+            handlers.on_change(name)
+            keep = gui.add_button("Save a snapshot")
+            self._snapshots: Any = gui.add_button_group("restore", NONE_YET, visible=False)
+            note = Note(gui, self._snapshots.order + 0.5)
+            on_press(keep, lambda event: handlers.send(event, "snapshot", note, name=name.value))
 
             def go_back(event: Event) -> None:
                 if event.target.value in event.target.options:
-                    hand.tell(event, "restore", note, name=event.target.value)
+                    handlers.send(event, "restore", note, name=event.target.value)
 
-            on_press(self._kept, go_back)
+            on_press(self._snapshots, go_back)
 
     def show(self, state: Any) -> None:
         """List the snapshots."""
-        if state.snapshots and tuple(self._kept.options) != state.snapshots:
-            self._kept.options = state.snapshots
-        if self._kept.visible != bool(state.snapshots):
-            self._kept.visible = bool(state.snapshots)
+        if state.snapshots and tuple(self._snapshots.options) != state.snapshots:
+            self._snapshots.options = state.snapshots
+        if self._snapshots.visible != bool(state.snapshots):
+            self._snapshots.visible = bool(state.snapshots)
 
 
-# A group of buttons has to have one.
+# A group of buttons needs at least one button.
 NONE_YET = ("",)
 
 
@@ -157,8 +163,8 @@ MOST_POINTS = 150
 _INK, _LINES = "#adb5bd", "#343a40"
 
 
-class Plots:
-    """Curves that follow the bench.
+class CurvesPanel:
+    """Curves over the last seconds.
 
     Parameters
     ----------
@@ -168,13 +174,13 @@ class Plots:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._error = _plot(gui, "error, mrad", ("α", "β", "γ"))
-        self._torque = _plot(gui, "torque asked for, N·m", ("α", "β", "γ"))
+        self._torque = _plot(gui, "commanded torque, N·m", ("α", "β", "γ"))
         self._temperature = _plot(gui, "warmest winding, °C", ("T",))
         self._temperature.visible = False
         self._warmest: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)
 
     def warm(self, t_s: float, temperature_C: tuple[float, ...] | None) -> None:
-        """Draw the warmest winding, where the hardware has any that warm."""
+        """Draw the temperature of the warmest winding, if the hardware models it."""
         if temperature_C is None:
             self._temperature.visible = False
             return

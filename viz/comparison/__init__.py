@@ -1,1 +1,1 @@
-"""Runs held beside each other: what is drawn of each, under which name and in which colour."""
+"""Comparison of runs in one recording: bodies, lines, names and colours of each."""

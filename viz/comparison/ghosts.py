@@ -1,4 +1,4 @@
-"""The actuator once, the rotor of every run in it: the first's as it is, the others' as tinted ghosts."""
+"""Bodies of several runs in one scene: the first run's actuator, the others' rotors as tinted ghosts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.recording.part import Part, Subject, scalars, strips, time_index
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.scene3d import Frames, MovingActuator
 from spheretwin.viz.scene.meshes import WORLD, read_meshes
@@ -40,7 +40,7 @@ def send_line(
 
 
 def style_point(recording: rr.RecordingStream, entity: str, label: str, colour: theme.Colour) -> None:
-    """Say how a point looks that is sent later."""
+    """Log the style of a point that is sent later."""
     thick = rr.Radius.ui_points(6.0)
     recording.log(entity, rr.Points3D.from_fields(labels=[label], colors=[colour], radii=thick), static=True)
 
@@ -51,7 +51,7 @@ def send_point(recording: rr.RecordingStream, entity: str, t_s: Array, positions
 
 
 def style_path(recording: rr.RecordingStream, entity: str, colour: theme.Colour) -> None:
-    """Say how a path looks that is sent later."""
+    """Log the style of a path that is sent later."""
     style = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.5))
     recording.log(entity, style, static=True)
 
@@ -68,7 +68,7 @@ def send_path(
     t_s : (n,) array, s
     positions : (n, 3) array, m
     before : (1, 3) or (0, 3) array, m
-        Where it was before, if it was.
+        Its position before, if there is one.
     """
     starts = np.concatenate([before if len(before) else positions[:1], positions[:-1]])
     segments = strips(np.stack([starts, positions], axis=1))
@@ -77,22 +77,22 @@ def send_path(
 
 ROTOR = f"{WORLD}/rotor"
 
-# Of 255: through a ghost the rotor within it is seen, and its colour still.
+# Of 255: the rotor within a ghost is visible, and so is the ghost's colour.
 GHOST_ALPHA = 90
 
 _TINT = rr.Asset3D.descriptor_albedo_factor()
 
 
-class Ghost(Part):
-    """A rotor alone, in one colour, that what is behind it is seen through.
+class Ghost(RecordingPart):
+    """Transparent rotor in one colour.
 
     Parameters
     ----------
-    subject : Subject
+    subject : RecordingSubject
     colour : Colour
     """
 
-    def __init__(self, subject: Subject, colour: theme.Colour) -> None:
+    def __init__(self, subject: RecordingSubject, colour: theme.Colour) -> None:
         super().__init__(subject)
         self._colour, self._frames = colour, Frames()
 
@@ -103,7 +103,7 @@ class Ghost(Part):
                 asset, *places = piece.archetypes()
                 tint = rr.Asset3D.from_fields(albedo_factor=[*self._colour, GHOST_ALPHA])
                 shape = [
-                    each for each in asset.as_component_batches() if each.component_descriptor() != _TINT
+                    batch for batch in asset.as_component_batches() if batch.component_descriptor() != _TINT
                 ]
                 recording.log(entity, [*shape, *tint.as_component_batches()], *places, static=True)
 
@@ -115,12 +115,12 @@ class Ghost(Part):
             recording.send_columns(ROTOR, time_index(rows["t_s"][new]), pose)
 
 
-class Tip(Part):
-    """The end of the shaft, or where it should be: the path behind it, and it itself where it has a label.
+class Tip(RecordingPart):
+    """Tip of the shaft, actual or desired: its path, and a point if it has a label.
 
     Parameters
     ----------
-    subject : Subject
+    subject : RecordingSubject
     entity : str
     signal : str
         Hinge angles, rad.
@@ -129,13 +129,15 @@ class Tip(Part):
     colour : Colour
     """
 
-    def __init__(self, subject: Subject, entity: str, signal: str, label: str, colour: theme.Colour) -> None:
+    def __init__(
+        self, subject: RecordingSubject, entity: str, signal: str, label: str, colour: theme.Colour
+    ) -> None:
         super().__init__(subject)
         self._entity, self._signal, self._label, self._colour = entity, signal, label, colour
         self._frames, self._last = Frames(), np.empty((0, 3))
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log how both look."""
+        """Log the styles of point and path."""
         if self._label:
             style_point(recording, f"{self._entity}/point", self._label, self._colour)
         style_path(recording, f"{self._entity}/path", self._colour)
@@ -151,6 +153,6 @@ class Tip(Part):
             self._last = tips[-1:]
 
 
-def body(subject: Subject, colour: theme.Colour, *, ghost: bool) -> Part:
-    """What of a run is drawn: the whole actuator, or its rotor as a ghost."""
+def body(subject: RecordingSubject, colour: theme.Colour, *, ghost: bool) -> RecordingPart:
+    """Return the bodies of a run: the whole actuator, or its rotor as a ghost."""
     return Ghost(subject, colour) if ghost else MovingActuator(subject)

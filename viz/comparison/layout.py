@@ -1,4 +1,4 @@
-"""How a recording of several runs is laid out: all in one actuator, and each quantity of all in one plot."""
+"""Layout of a recording of several runs: all in one actuator, and each quantity of all in one plot."""
 
 from __future__ import annotations
 
@@ -16,49 +16,49 @@ from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import TRAIL_S
 
 COMPARE, RUNS, TIP = "compare", "runs", "tip"
-"""Parts of the paths of entities, behind the name of a run but for `RUNS`."""
+"""Parts of the paths of entities, after the name of a run, except `RUNS`."""
 
-ASKED = "what_was_asked"
+REFERENCE = "what_was_asked"
 """Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
 
-# Plots that share a row are too narrow for names; the one that has a row of its own tells them.
+# Plots that share a row are too narrow for names; the plot with its own row shows them.
 NAMED, BESIDE_TEXTS = "whole", "more"
 
 
 class Plot(NamedTuple):
-    """One quantity of all runs."""
+    """Plot of one quantity of all runs."""
 
     name: str
     title: str
     group: str
     desired: bool
-    """Whether what was asked for is drawn with it."""
+    """True if the reference is drawn with it."""
     limits: tuple[float, float]
 
 
-class View(NamedTuple):
-    """What a layout is made for."""
+class ComparisonView(NamedTuple):
+    """Properties of the runs on which the layout depends."""
 
     runs: tuple[str, ...]
     """Names."""
     leaders: tuple[str, ...]
-    """Names of those that show what was asked for."""
+    """Names of the runs that show the reference."""
     plots: tuple[Plot, ...]
     duration_s: float
     states: tuple[str, ...]
-    """Names of those that have parts whose states change."""
+    """Names of the runs with changes of state."""
     logs: tuple[str, ...]
-    """Names of those in which something happens."""
+    """Names of the runs with events."""
     size: float
-    """Of the actuator of the first, which is drawn whole."""
+    """Size of the first run's actuator, which is drawn completely."""
 
 
-def application(view: View) -> str:
-    """Application id of recordings with one layout: a viewer keeps one for each."""
+def application(view: ComparisonView) -> str:
+    """Return the application id of recordings with one layout: a viewer keeps one layout for each."""
     return f"spheretwin-runs-{hashlib.sha256(repr(view).encode()).hexdigest()[:12]}"
 
 
-def layout(view: View) -> rrb.Blueprint:
+def layout(view: ComparisonView) -> rrb.Blueprint:
     """Blueprint of a recording of several runs."""
     groups = dict.fromkeys(plot.group for plot in view.plots if plot.group != BESIDE_TEXTS)
     rows = [rrb.Horizontal(*_plots(view, group)) for group in groups]
@@ -68,13 +68,20 @@ def layout(view: View) -> rrb.Blueprint:
         *([_states(view)] if view.states else []),
         *_plots(view, BESIDE_TEXTS),
     )
-    return rrb.Blueprint(
+    return blueprint(
         rrb.Horizontal(
             rrb.Vertical(_bodies(view), texts, row_shares=[3, 1]),
             rrb.Vertical(*rows, row_shares=[4 if group == NAMED else 3 for group in groups]),
             column_shares=[2, 3],
             name="compare",
-        ),
+        )
+    )
+
+
+def blueprint(contents: rrb.Container) -> rrb.Blueprint:
+    """Return the blueprint of a recording of several runs, which plays in a loop."""
+    return rrb.Blueprint(
+        contents,
         rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
@@ -91,21 +98,21 @@ def time_axis(duration_s: float) -> rrb.TimeAxis:
 
 
 def trail_behind() -> rrb.VisibleTimeRanges:
-    """What of a path is seen: the last seconds of it."""
+    """Return the time range of a path that is visible: its last seconds."""
     boundary = rrb.TimeRangeBoundary
     start, end = boundary.cursor_relative(seconds=-TRAIL_S), boundary.cursor_relative()
     return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
 
 
-def _plots(view: View, group: str) -> list[rrb.TimeSeriesView]:
+def _plots(view: ComparisonView, group: str) -> list[rrb.TimeSeriesView]:
     return [_plot(view, plot, legend=group == NAMED) for plot in view.plots if plot.group == group]
 
 
-def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
-    wanted = [f"/{ASKED}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
+def _plot(view: ComparisonView, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
+    reference_lines = [f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
     return rrb.TimeSeriesView(
         origin="/",
-        contents=[*wanted, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
+        contents=[*reference_lines, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
         name=plot.title,
         axis_x=time_axis(view.duration_s),
         axis_y=rrb.ScalarAxis(range=plot.limits),
@@ -114,13 +121,13 @@ def _plot(view: View, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
     )
 
 
-def _bodies(view: View) -> rrb.Spatial3DView:
+def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
     first, *ghosts = view.runs
-    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{ASKED}/{run}/{TIP}" for run in view.leaders]
-    drawn = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
+    tips = [f"/{run}/{TIP}" for run in view.runs] + [f"/{REFERENCE}/{run}/{TIP}" for run in view.leaders]
+    bodies = [f"/{first}/{WORLD}/**", *(f"/{run}/{ROTOR}/**" for run in ghosts)]
     return rrb.Spatial3DView(
         origin="/",
-        contents=[*drawn, *(f"{tip}/**" for tip in tips)],
+        contents=[*bodies, *(f"{tip}/**" for tip in tips)],
         name="run 1 in the actuator, the others as ghosts",
         background=list(theme.BACKGROUND),
         line_grid=False,
@@ -129,7 +136,7 @@ def _bodies(view: View) -> rrb.Spatial3DView:
     )
 
 
-def _states(view: View) -> rrb.StateTimelineView:
+def _states(view: ComparisonView) -> rrb.StateTimelineView:
     contents = [f"/{run}/{STATES}/**" for run in view.states]
     return rrb.StateTimelineView(
         origin="/", contents=contents, name="states", time_view=time_axis(view.duration_s)

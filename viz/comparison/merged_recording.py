@@ -16,23 +16,32 @@ from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Tip, body, send_line
-from spheretwin.viz.comparison.layout import ASKED, COMPARE, RUNS, TIP, Plot, View, application, layout
-from spheretwin.viz.comparison.runs import Run, leaders, on_dark, run_colours
+from spheretwin.viz.comparison.layout import (
+    COMPARE,
+    REFERENCE,
+    RUNS,
+    TIP,
+    ComparisonView,
+    Plot,
+    application,
+    layout,
+)
+from spheretwin.viz.comparison.runs import ComparedRun, leaders, on_dark, run_colours
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.plots import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
-from spheretwin.viz.quantities import ComparedQuantity, compared_quantities
-from spheretwin.viz.recording.part import Part, Subject
+from spheretwin.viz.quantities import ScalarQuantity, scalar_quantities
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.signals import Signals
-from spheretwin.viz.recording.status import StateChanges, States, log_lines
+from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
 from spheretwin.viz.rerun_internals import PIPE_PATHS, FilePipe
 from spheretwin.viz.scene.meshes import read_meshes
 from spheretwin.viz.scene.static import size_of
 
 
-class Below:
-    """A recording in which all that is logged stands below one path.
+class SubtreeStream:
+    """Stream that logs everything below one path of a recording.
 
     Parameters
     ----------
@@ -53,7 +62,7 @@ class Below:
         self._recording.send_columns(f"{self._path}/{entity}", indexes, columns)
 
     def flush(self) -> None:
-        """Send what is not yet sent."""
+        """Send pending data."""
         self._recording.flush()
 
 
@@ -65,7 +74,7 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
     ----------
     path : Path
     application : str
-        A viewer keeps one layout for each.
+        Application id: a viewer keeps one layout for each.
     layout : Blueprint
 
     Raises
@@ -73,7 +82,7 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
     InputError
         No file can be made there.
     SpheretwinError
-        Writing failed; what was at `path` before is untouched.
+        Writing failed; the previous file is unchanged.
     """
     rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
     with whole_file(path) as temporary:
@@ -92,42 +101,48 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
             raise pipe.error
 
 
-# Of a range of what hardly differs from zero; and steps for which the lowest of the plots is high enough.
+# Least half range, for values near zero; and steps that fit in the lowest of the plots.
 LEAST, STEPS = 1e-3, 6
 
 
-def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: str) -> Path:
+def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingSubject], text: str) -> Path:
     """Write a recording of several runs; returns its path.
 
-    Below the name of each stands what its own recording holds, and what is drawn beside the others'.
+    Below the name of each run is the content of its own recording, and its lines in the common plots.
 
     Parameters
     ----------
     path : Path
-    runs : sequence of Run
-        Two at least, of names that tell them apart.
-    subjects : sequence of Subject
-        Of each run.
+    runs : sequence of ComparedRun
+        At least two, with unique names.
+    subjects : sequence of RecordingSubject
+        Subject of each run.
     text : str
-        What the runs are, in Markdown.
+        Description of the runs, in Markdown.
 
     Raises
     ------
     InputError
         No file can be made there, or a mesh of a model cannot be read.
     SpheretwinError
-        Writing failed; what was there before is untouched.
+        Writing failed; the previous file is unchanged.
     """
     for subject in subjects:
         read_meshes(subject.facts.mjcf)  # found missing before there is a file
     tables = [run.table for run in runs]
-    quantities, leading = compared_quantities(tables), leaders(tables)
-    view = View(
+    quantities, leading = scalar_quantities(tables), leaders(tables)
+    view = ComparisonView(
         tuple(run.name for run in runs),
         tuple(runs[place].name for place in leading),
         tuple(
-            Plot(each.name, each.heading, each.group, each.desired is not None, _limits(each, runs))
-            for each in quantities
+            Plot(
+                quantity.name,
+                quantity.heading,
+                quantity.group,
+                quantity.desired is not None,
+                _limits(quantity, runs),
+            )
+            for quantity in quantities
         ),
         max(float(table["t_s"][-1]) for table in tables),
         tuple(run.name for run in runs if StateChanges().of(run.table)),
@@ -139,62 +154,72 @@ def write(path: Path, runs: Sequence[Run], subjects: Sequence[Subject], text: st
         recording.send_recording_name(f"{len(runs)} runs")
         recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
         for place, (run, subject, colour) in enumerate(zip(runs, subjects, colours, strict=True)):
-            below = cast(rr.RecordingStream, Below(recording, run.name))
+            below = cast(rr.RecordingStream, SubtreeStream(recording, run.name))
             parts = [
                 Signals(subject),
                 body(subject, colour, ghost=place > 0),
                 Tip(subject, TIP, "q_rad", f"{place + 1}", colour),
-                States(subject),
+                StateLanes(subject),
             ]
             _write_run(below, run, parts)
-            for each in quantities:
-                entity, t_s, values = f"{COMPARE}/{each.name}", run.table["t_s"], each.of(run.rows)
-                width = THICK if each.desired else MIDDLE  # what was asked for lies over it
+            for quantity in quantities:
+                entity, t_s, values = (
+                    f"{COMPARE}/{quantity.name}",
+                    run.table["t_s"],
+                    quantity.values(run.rows),
+                )
+                width = THICK if quantity.desired else MIDDLE  # the reference is drawn over it
                 send_line(below, entity, run.label, t_s, values, colour, width)
         for place in leading:
-            run, asked = runs[place], Below(recording, f"{ASKED}/{runs[place].name}")
-            _write_asked(
-                cast(rr.RecordingStream, asked), run, subjects[place], quantities, alone=len(leading) == 1
+            run, reference = runs[place], SubtreeStream(recording, f"{REFERENCE}/{runs[place].name}")
+            _write_reference(
+                cast(rr.RecordingStream, reference), run, subjects[place], quantities, alone=len(leading) == 1
             )
     return path
 
 
-def _write_run(recording: rr.RecordingStream, run: Run, parts: Sequence[Part]) -> None:
-    """What a recording of the run alone has, but for the text of its scenario."""
+def _write_run(recording: rr.RecordingStream, run: ComparedRun, parts: Sequence[RecordingPart]) -> None:
+    """Write the content of the run's own recording, except the text of its scenario."""
     recording.log(SCENARIO, rr.AnyValues(record=json.dumps(dict(run.record))), static=True)
     log_lines(recording, list(run.events))
     for part in parts:
         _write_part(recording, run, part)
 
 
-def _write_asked(
+def _write_reference(
     recording: rr.RecordingStream,
-    run: Run,
-    subject: Subject,
-    quantities: Sequence[ComparedQuantity],
+    run: ComparedRun,
+    subject: RecordingSubject,
+    quantities: Sequence[ScalarQuantity],
     *,
     alone: bool,
 ) -> None:
-    """What was asked for: lines, and the path of the tip."""
-    colour, label = theme.DESIRED_TRACE, "asked for" if alone else f"asked for in {run.label}"
+    """Write the reference: lines, and the path of the tip."""
+    colour, label = theme.DESIRED_TRACE, "reference" if alone else f"reference of {run.label}"
     _write_part(recording, run, Tip(subject, TIP, "q_ref_rad", "", colour))
-    for each in quantities:
-        if each.desired:
+    for quantity in quantities:
+        if quantity.desired:
             send_line(
-                recording, each.name, label, run.table["t_s"], each.desired(run.rows), theme.ASKED, THIN
+                recording,
+                quantity.name,
+                label,
+                run.table["t_s"],
+                quantity.desired(run.rows),
+                theme.COMMAND,
+                THIN,
             )
 
 
-def _limits(quantity: ComparedQuantity, runs: Sequence[Run]) -> tuple[float, float]:
+def _limits(quantity: ScalarQuantity, runs: Sequence[ComparedRun]) -> tuple[float, float]:
     """Range of all values of all runs, in which numbers can be read."""
     if quantity.limits:
         return quantity.limits
-    values = np.concatenate([quantity.of(run.rows) for run in runs])
-    told = values[np.isfinite(values)]
-    return labelled(float(np.min(told, initial=0.0)), float(np.max(told, initial=0.0)), LEAST, STEPS)
+    values = np.concatenate([quantity.values(run.rows) for run in runs])
+    finite = values[np.isfinite(values)]
+    return labelled(float(np.min(finite, initial=0.0)), float(np.max(finite, initial=0.0)), LEAST, STEPS)
 
 
-def _write_part(recording: rr.RecordingStream, run: Run, part: Part) -> None:
+def _write_part(recording: rr.RecordingStream, run: ComparedRun, part: RecordingPart) -> None:
     part.begin(recording)
     for rows in _chunks(run.table):
         part.write(recording, rows)

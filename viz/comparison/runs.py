@@ -1,4 +1,4 @@
-"""A run among others, as those who draw it need it."""
+"""Runs of a comparison: their data, colours, references and spectra."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from numpy.typing import NDArray
 from spheretwin.models.telemetry.status import Level
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.quantities import Rows
+from spheretwin.viz.quantities import QuantityRows
 
 Event = tuple[float, Level, str]
 """Simulated time in s, level, text."""
 
 
-class Run(NamedTuple):
-    """One run."""
+class ComparedRun(NamedTuple):
+    """Run of a comparison."""
 
     name: str
-    """What tells it from the others where there is room for a word: ``run_1_nutation``."""
+    """Unique short name: ``run_1_nutation``."""
     label: str
-    """What a legend says: file, law, what else is not the same in all."""
+    """Text of a legend: file, law, and the differing fields."""
     law: str
     period_s: float
-    """Between two rows."""
-    rows: Rows
-    """Its telemetry, with a row at least, and what is derived from it needs beside it."""
+    """Period of the rows."""
+    rows: QuantityRows
+    """Telemetry with at least one row, and the parameters of derived quantities."""
     record: Mapping[str, str]
-    """What its telemetry file says of it beside the rows."""
+    """Metadata of its telemetry file."""
     events: Sequence[Event]
 
     @property
@@ -41,11 +41,11 @@ class Run(NamedTuple):
         return self.rows.table
 
 
-# Of what the eye makes of white: a line of less is lost on a dark ground.
+# Share of white's luminance: darker lines are invisible on a dark ground.
 DARKEST = 0.15
-# What has no hue becomes almost white there: grey is what was asked for.
+# Colours without a hue become almost white there: grey is the reference.
 HUELESS, WHITE = 0.15, 0.92
-# Of 441 from black to white: colours nearer to each other are taken for one.
+# Of 441 from black to white: nearer colours cannot be distinguished.
 APART = 25.0
 
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -60,21 +60,23 @@ def run_colours(laws: Sequence[str]) -> list[str]:
     Parameters
     ----------
     laws : sequence of str
-        Of each run.
+        Law of each run.
     """
     own = [theme.law_colour(law) for law in laws]
-    found: list[str] = []
+    colours: list[str] = []
     for colour in own:
-        taken = {*found, *own}
-        spare = [each for each in theme.SPARE if _nearest(each, taken) > APART]
-        if colour in found and not spare:
+        taken = {*colours, *own}
+        spare = [candidate for candidate in theme.SPARE if _nearest(candidate, taken) > APART]
+        if colour in colours and not spare:
             return ["#{:02x}{:02x}{:02x}".format(*hue) for hue in theme.group_colours(len(laws))]
-        found.append(max(spare, key=lambda each: _nearest(each, taken)) if colour in found else colour)
-    return found
+        colours.append(
+            max(spare, key=lambda candidate: _nearest(candidate, taken)) if colour in colours else colour
+        )
+    return colours
 
 
 def on_dark(colour: str) -> theme.Colour:
-    """A page's colour for a dark ground: as it is, or no lighter than is seen there."""
+    """Return a page's colour for a dark ground: unchanged, or lightened until it is visible."""
     red, green, blue = (value / 255 for value in bytes.fromhex(colour.removeprefix("#")))
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
     if saturation < HUELESS:
@@ -111,16 +113,16 @@ def leaders(tables: Sequence[Table]) -> list[int]:
     tables : sequence of Table
         With a row each at least.
     """
-    found: list[int] = []
+    leading: list[int] = []
     for place in sorted(range(len(tables)), key=lambda place: -float(tables[place]["t_s"][-1])):
-        if not any(_same(tables[place], tables[leader]) for leader in found):
-            found.append(place)
-    return sorted(found)
+        if not any(_same(tables[place], tables[leader]) for leader in leading):
+            leading.append(place)
+    return sorted(leading)
 
 
 def _same(one: Table, other: Table) -> bool:
-    """Whether two were asked for the same at all ticks that they have in common."""
-    t_ns, others_ns = (np.round(each["t_s"] * 1e9).astype(np.int64) for each in (one, other))
+    """True if two runs have the same reference at all common ticks."""
+    t_ns, others_ns = (np.round(table["t_s"] * 1e9).astype(np.int64) for table in (one, other))
     _, rows, others = np.intersect1d(t_ns, others_ns, assume_unique=True, return_indices=True)
     apart = np.abs(one["q_ref_rad"][rows] - other["q_ref_rad"][others])
     return bool(apart.max(initial=0.0) <= SAME_rad)
@@ -130,7 +132,7 @@ Array = NDArray[np.float64]
 
 
 class Spectrum(NamedTuple):
-    """Of one run's tracking error about one hinge."""
+    """Spectrum of one run's tracking error about one hinge."""
 
     frequency_Hz: Array  # (n,) above zero
     amplitude_mrad: Array  # (n,)

@@ -16,10 +16,9 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import send_line, send_path, send_point, style_path, style_point
-from spheretwin.viz.comparison.layout import time_axis, trail_behind
+from spheretwin.viz.comparison.layout import blueprint, time_axis, trail_behind
 from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.comparison.runs import on_dark
-from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import shaft_tip
 
@@ -28,8 +27,8 @@ Array = NDArray[np.float64]
 DESIRED = "desired"
 
 
-class Flight(NamedTuple):
-    """One run."""
+class LawTrajectory(NamedTuple):
+    """Trajectory of one run under a law."""
 
     law: str
     t_s: Array  # (n,)
@@ -38,45 +37,49 @@ class Flight(NamedTuple):
     torque_Nm: Array  # (n,) norm
 
 
-def write(path: Path, flights: Mapping[str, Flight], actuator: Actuator, name: str) -> Path:
+def write(path: Path, trajectories: Mapping[str, LawTrajectory], actuator: Actuator, name: str) -> Path:
     """Write a recording of runs side by side; returns its path.
 
     Parameters
     ----------
     path : Path
-    flights : mapping of label to Flight
+    flights : mapping of label to LawTrajectory
         At least one.
     actuator : Actuator
-        Whose shaft tip is drawn.
+        Actuator whose shaft tip is drawn.
     name : str
-        Of the recording.
+        Name of the recording.
 
     Raises
     ------
     InputError, SpheretwinError
         The file cannot be written there.
     """
-    digest = hashlib.sha256(repr((name, list(flights))).encode()).hexdigest()[:12]
-    with recorded(path, f"spheretwin-flights-{digest}", _layout(flights)) as recording:
+    digest = hashlib.sha256(repr((name, list(trajectories))).encode()).hexdigest()[:12]
+    with recorded(path, f"spheretwin-flights-{digest}", _layout(trajectories)) as recording:
         recording.send_recording_name(name)
         recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        longest = max(flights.values(), key=lambda flight: len(flight.t_s))
-        wanted = shaft_tip(longest.q_ref_rad, actuator)
-        _send_tip(recording, DESIRED, longest.t_s, wanted, theme.DESIRED_TRACE)
-        colours = theme.law_colours([flight.law for flight in flights.values()])
-        for label, flight in flights.items():
-            _send_flight(recording, label, flight, actuator, on_dark(colours[flight.law]))
+        longest = max(trajectories.values(), key=lambda trajectory: len(trajectory.t_s))
+        desired = shaft_tip(longest.q_ref_rad, actuator)
+        _send_tip(recording, DESIRED, longest.t_s, desired, theme.DESIRED_TRACE)
+        colours = theme.law_colours([trajectory.law for trajectory in trajectories.values()])
+        for label, trajectory in trajectories.items():
+            _send_trajectory(recording, label, trajectory, actuator, on_dark(colours[trajectory.law]))
     return path
 
 
-def _send_flight(
-    recording: rr.RecordingStream, label: str, flight: Flight, actuator: Actuator, colour: theme.Colour
+def _send_trajectory(
+    recording: rr.RecordingStream,
+    label: str,
+    trajectory: LawTrajectory,
+    actuator: Actuator,
+    colour: theme.Colour,
 ) -> None:
-    t_s, error_mrad = flight.t_s, 1e3 * (flight.q_rad - flight.q_ref_rad)
-    _send_tip(recording, label, t_s, shaft_tip(flight.q_rad, actuator), colour)
+    t_s, error_mrad = trajectory.t_s, 1e3 * (trajectory.q_rad - trajectory.q_ref_rad)
+    _send_tip(recording, label, t_s, shaft_tip(trajectory.q_rad, actuator), colour)
     for axis, angle in enumerate(ANGLES):
         send_line(recording, f"error/{angle}/{_part(label)}", label, t_s, error_mrad[:, axis], colour)
-    send_line(recording, f"torque/{_part(label)}", label, t_s, flight.torque_Nm, colour)
+    send_line(recording, f"torque/{_part(label)}", label, t_s, trajectory.torque_Nm, colour)
 
 
 def _send_tip(
@@ -89,13 +92,13 @@ def _send_tip(
     send_path(recording, f"{below}/path", t_s, tips, tips[:1])
 
 
-def _layout(flights: Mapping[str, Flight]) -> rrb.Blueprint:
-    last_s, trail = max(float(flight.t_s[-1]) for flight in flights.values()), trail_behind()
+def _layout(trajectories: Mapping[str, LawTrajectory]) -> rrb.Blueprint:
+    last_s, trail = max(float(trajectory.t_s[-1]) for trajectory in trajectories.values()), trail_behind()
     tips = rrb.Spatial3DView(
         origin=f"/{WORLD}",
         name="the shaft's tip under each law",
         background=list(theme.BACKGROUND),
-        overrides={f"/{WORLD}/{_part(label)}/path": trail for label in (DESIRED, *flights)},
+        overrides={f"/{WORLD}/{_part(label)}/path": trail for label in (DESIRED, *trajectories)},
     )
     plots = [
         rrb.TimeSeriesView(origin=f"/{origin}", name=name, axis_x=time_axis(last_s))
@@ -104,14 +107,7 @@ def _layout(flights: Mapping[str, Flight]) -> rrb.Blueprint:
             ("torque", "torque of the coils, norm [N·m]"),
         )
     ]
-    return rrb.Blueprint(
-        rrb.Horizontal(tips, rrb.Vertical(*plots), column_shares=[4, 5]),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return blueprint(rrb.Horizontal(tips, rrb.Vertical(*plots), column_shares=[4, 5]))
 
 
 def _part(label: str) -> str:

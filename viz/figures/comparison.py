@@ -11,31 +11,31 @@ from matplotlib.figure import Figure
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level
-from spheretwin.viz.comparison.runs import Run, Spectrum
-from spheretwin.viz.decimation import highest_by_octave, strongest, thinned
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
+from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octave_maxima
 from spheretwin.viz.figures.crosscheck import BROKEN, FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.style import MOST_POINTS, looks, name_runs, plain
-from spheretwin.viz.quantities import Array, ComparedQuantity
+from spheretwin.viz.figures.style import MOST_POINTS, name_runs, plain, run_styles
+from spheretwin.viz.quantities import Array, ScalarQuantity
 
 MOST_COLUMNS = 1000
 
 
-def currents(runs: Sequence[Run], title: str) -> Figure:
+def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
     """Draw them on one scale: blue is negative, red positive.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of ComparedRun
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 1.2 + 2.3 * len(runs)), layout="constrained")
     panels = figure.subplots(len(runs), 1, sharex=True, squeeze=False)[:, 0]
     largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs) or 1.0
     for panel, run in zip(panels, runs, strict=True):
-        few = strongest(run.table["current_A"], MOST_COLUMNS)
+        few = decimate_largest(run.table["current_A"], MOST_COLUMNS)
         groups = few.values.shape[1]
         start_s = float(run.table["t_s"][0])
-        end_s = start_s + run.period_s * few.rows_each * len(few.values)
+        end_s = start_s + run.period_s * few.stride * len(few.values)
         place = (start_s, end_s, groups - 0.5, -0.5)
         scale = {"cmap": "RdBu_r", "vmin": -largest_A, "vmax": largest_A, "interpolation": "nearest"}
         image = panel.imshow(few.values.T, extent=place, aspect="auto", **scale)
@@ -54,21 +54,21 @@ def currents(runs: Sequence[Run], title: str) -> Figure:
 MARKS = {Level.INFO: ("|", INK), Level.WARN: ("^", "#e69f00"), Level.ERROR: ("X", BROKEN)}
 
 
-def happened(runs: Sequence[Run], title: str) -> Figure:
+def events_figure(runs: Sequence[ComparedRun], title: str) -> Figure:
     """Draw them over time; a line is as long as its run.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of ComparedRun
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 1.5 + 0.45 * len(runs)), layout="constrained")
     axes = figure.subplots()
-    for row, (run, look) in enumerate(zip(runs, looks(runs), strict=True)):
+    for row, (run, look) in enumerate(zip(runs, run_styles(runs), strict=True)):
         t_s = run.table["t_s"]
         axes.plot([t_s[0], t_s[-1]], [row, row], color=look.colour, linewidth=2.5, alpha=0.6)
         for level, (mark, colour) in MARKS.items():
-            times = [each[0] for each in run.events if each[1] == level]
+            times = [event[0] for event in run.events if event[1] == level]
             axes.plot(times, [row] * len(times), mark, color=colour, markersize=8)
     for level, (mark, colour) in MARKS.items():
         axes.plot([], [], mark, color=colour, markersize=8, linestyle="", label=level.value.lower())
@@ -85,14 +85,14 @@ def happened(runs: Sequence[Run], title: str) -> Figure:
 LINES_EACH_OCTAVE = 64
 
 
-def spectra(runs: Sequence[Run], of_runs: Sequence[Sequence[Spectrum]], title: str) -> Figure:
+def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], title: str) -> Figure:
     """Draw them, both axes logarithmic.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of ComparedRun
     of_runs : sequence of sequence of Spectrum
-        Of each run, of each hinge.
+        Spectra of each run and each hinge.
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 7.0), layout="constrained")
@@ -100,9 +100,9 @@ def spectra(runs: Sequence[Run], of_runs: Sequence[Sequence[Spectrum]], title: s
     for axis, (panel, name) in enumerate(zip(panels, ANGLES, strict=True)):
         panel.set_xscale("log")
         panel.set_yscale("log")
-        for run, look, of_run in zip(runs, looks(runs), of_runs, strict=True):
+        for run, look, of_run in zip(runs, run_styles(runs), of_runs, strict=True):
             spectrum = of_run[axis]
-            lines = highest_by_octave(spectrum.frequency_Hz, spectrum.amplitude_mrad, LINES_EACH_OCTAVE)
+            lines = octave_maxima(spectrum.frequency_Hz, spectrum.amplitude_mrad, LINES_EACH_OCTAVE)
             panel.plot(*lines, label=run.label, **look.line())
             for frequency_Hz, amplitude_mrad in spectrum.peaks:
                 panel.plot(frequency_Hz, amplitude_mrad, "o", color=look.colour, markersize=4)
@@ -114,26 +114,26 @@ def spectra(runs: Sequence[Run], of_runs: Sequence[Sequence[Spectrum]], title: s
 
 
 def over_time(
-    runs: Sequence[Run], leading: Sequence[int], quantities: Sequence[ComparedQuantity], title: str
+    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[ScalarQuantity], title: str
 ) -> Figure:
-    """Draw them; what was asked for is a thin dark line on the others.
+    """Draw quantities over time; the reference is a thin dark line over the others.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of ComparedRun
     leading : sequence of int
-        Places of the runs that show what was asked for.
+        Places of the runs that show the reference.
     quantities : sequence of Quantity
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 1.3 + 1.75 * len(quantities)), layout="constrained")
     panels = figure.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0]
     for panel, quantity in zip(panels, quantities, strict=True):
-        for run, of_run in zip(runs, looks(runs), strict=True):
-            _draw(panel, run, quantity.of(run.rows), label=run.label, **of_run.line())
+        for run, of_run in zip(runs, run_styles(runs), strict=True):
+            _draw(panel, run, quantity.values(run.rows), label=run.label, **of_run.line())
         for place in leading:
             if quantity.desired:
-                name = "asked for" if len(leading) == 1 else f"asked for in {runs[place].label}"
+                name = "reference" if len(leading) == 1 else f"reference of {runs[place].label}"
                 look = {"label": name, "color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
                 _draw(panel, runs[place], quantity.desired(runs[place].rows), **look)
         if quantity.limits:
@@ -145,7 +145,7 @@ def over_time(
     return figure
 
 
-def _draw(panel: Axes, run: Run, values: Array, **look: Any) -> None:
-    few, start_s = thinned(values, MOST_POINTS), run.table["t_s"][0]
-    t_s = start_s + run.period_s * few.rows_each * np.arange(len(few.values))
+def _draw(panel: Axes, run: ComparedRun, values: Array, **look: Any) -> None:
+    few, start_s = decimate_extremes(values, MOST_POINTS), run.table["t_s"][0]
+    t_s = start_s + run.period_s * few.stride * np.arange(len(few.values))
     panel.plot(t_s, few.values, **look)

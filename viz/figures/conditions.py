@@ -11,33 +11,33 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.crosscheck import FAINT, INK, SERIES, WIDTH_in, save
-from spheretwin.viz.figures.style import Style, on_errors, styles
+from spheretwin.viz.figures.style import LawStyle, on_errors, styles
 
 Array = NDArray[np.float64]
 
 MARGIN = 1.25
 SHIFT = 0.035
-"""Of the steps of x, between the laws: their ranges do not lie upon each other."""
+"""Shift between the laws, as a share of the steps of x: their ranges do not overlap."""
 
 
-class Series(NamedTuple):
+class ErrorsByCondition(NamedTuple):
     """Largest errors of one law over the condition."""
 
     law: str
     values: Array  # (n,)
     error_rad: Array  # (3, n, hinges) lowest, median and highest over the seeds
-    whole: NDArray[np.bool_]  # (n,) whether every run came to its end
+    whole: NDArray[np.bool_]  # (n,) True if every run was completed
     paper_rad: Mapping[float, Sequence[float]]  # printed, by the value of the condition
 
 
 def by_condition(
-    by_label: Mapping[str, Series], hinges: Sequence[str], x: str, quantity: str, title: str
+    by_label: Mapping[str, ErrorsByCondition], hinges: Sequence[str], x: str, quantity: str, title: str
 ) -> Figure:
-    """Draw it; hollow where a run did not come to its end, bars where the paper prints a number.
+    """Draw the errors; hollow if a run was not completed, bars for the numbers printed in the paper.
 
     Parameters
     ----------
-    by_label : mapping of label to Series
+    by_label : mapping of label to ErrorsByCondition
     hinges : sequence of str
     x, quantity, title : str
     """
@@ -62,7 +62,9 @@ def by_condition(
     return figure
 
 
-def _series(panel: Axes, label: str, series: Series, style: Style, hinge: int, shift: float) -> None:
+def _series(
+    panel: Axes, label: str, series: ErrorsByCondition, style: LawStyle, hinge: int, shift: float
+) -> None:
     step = np.min(np.diff(series.values)) if len(series.values) > 1 else 1.0
     x = series.values + shift * step
     low, middle, high = 1e3 * series.error_rad[:, :, hinge]
@@ -83,7 +85,7 @@ def _series(panel: Axes, label: str, series: Series, style: Style, hinge: int, s
         panel.plot(at, paper, style.marker, color="white", markersize=4.5, markeredgecolor=INK)
 
 
-def _legend(figure: Figure, panel: Axes, by_label: Mapping[str, Series]) -> None:
+def _legend(figure: Figure, panel: Axes, by_label: Mapping[str, ErrorsByCondition]) -> None:
     looks = styles([series.law for series in by_label.values()])
     handles = [
         panel.plot([], [], style.marker, markersize=6, label=label, **style.line())[0]
@@ -102,24 +104,24 @@ WIDE = 9.0
 """Ratio of largest to smallest step from which on a scale is logarithmic."""
 
 
-class Panel(NamedTuple):
-    """One thing that is made worse."""
+class MarginPanel(NamedTuple):
+    """Panel of one condition that is varied."""
 
     name: str
-    by_law: Mapping[str, Array]  # (n, 3) step, error in rad, whether the law holds
+    by_law: Mapping[str, Array]  # (n, 3) step, error in rad, 1 if the law holds
 
 
 def margins(
-    panels: Sequence[Panel], labels: Mapping[str, str], bound_rad: float, quantity: str, title: str
+    panels: Sequence[MarginPanel], labels: Mapping[str, str], bound_rad: float, quantity: str, title: str
 ) -> Figure:
     """Draw them on one scale of errors.
 
     Parameters
     ----------
-    panels : sequence of Panel
+    panels : sequence of MarginPanel
     labels : mapping of law to label
     bound_rad : float, rad
-        Below which a law holds.
+        Bound below which a law holds.
     quantity, title : str
     """
     across = min(3, len(panels))
@@ -131,10 +133,10 @@ def margins(
         spare.set_visible(False)
     for axes, panel in zip(grid.flat, panels, strict=False):
         for law, values in panel.by_law.items():
-            step, error_mrad, held = values[:, 0], 1e3 * values[:, 1], values[:, 2] > 0
+            step, error_mrad, within_bound = values[:, 0], 1e3 * values[:, 1], values[:, 2] > 0
             style = looks[law]
             axes.plot(step, error_mrad, linewidth=1.4, **style.line())
-            for chosen, inside in ((held, style.colour), (~held, "white")):
+            for chosen, inside in ((within_bound, style.colour), (~within_bound, "white")):
                 axes.plot(step[chosen], error_mrad[chosen], style.marker, color=style.colour,
                           markerfacecolor=inside, markersize=6)  # fmt: skip
         axes.axhline(1e3 * bound_rad, color=INK, linestyle="--", linewidth=1)
@@ -162,19 +164,19 @@ def margins(
 ROW_in = 0.5
 
 
-class Row(NamedTuple):
-    """One reading."""
+class RatioRow(NamedTuple):
+    """One reading of the paper."""
 
     label: str
     by_law: Mapping[str, Array]  # (n,) ratios of each law
 
 
-def ratios(rows: Sequence[Row], labels: Mapping[str, str], quantity: str, title: str) -> Figure:
+def ratios(rows: Sequence[RatioRow], labels: Mapping[str, str], quantity: str, title: str) -> Figure:
     """Draw them on a logarithmic axis, the laws of a row below each other.
 
     Parameters
     ----------
-    rows : sequence of Row
+    rows : sequence of RatioRow
     labels : mapping of law to label
     quantity, title : str
     """
@@ -207,11 +209,11 @@ def ratios(rows: Sequence[Row], labels: Mapping[str, str], quantity: str, title:
 __all__ = ["Curve", "estimators", "save"]
 
 
-LEAST_LAG_s = 1e-5  # less is drawn as this much: beside a period of 1 ms it is none
+LEAST_LAG_s = 1e-5  # lower bound of the axis: negligible compared with a period of 1 ms
 
 
 class Curve(NamedTuple):
-    """One estimator over the bandwidths."""
+    """Errors and lags of one estimator over the bandwidths."""
 
     rms_error_rad_s: Array  # (b,)
     lag_s: Array  # (b,) below zero where it is ahead
@@ -224,8 +226,8 @@ class Curve(NamedTuple):
 def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str) -> Figure:
     """RMS error of the rate above, lag below: a colour an estimator, dots measured, lines derived.
 
-    Each estimator's default is a dashed line of its colour. A lag that the noise does not let be told from
-    none is drawn hollow, at the largest that it may be.
+    Each estimator's default is a dashed line of its colour. A lag that the noise hides is drawn hollow, at
+    its largest possible value.
 
     Parameters
     ----------
@@ -239,12 +241,12 @@ def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str)
         dots = {"linestyle": "", "marker": marker, "color": colour, "markersize": 5}
         above.plot(bandwidths_rad_s, curve.rms_error_rad_s, label=name, **dots)
         above.plot(bandwidths_rad_s, curve.derived_rms_error_rad_s, color=colour, linewidth=1)
-        told = curve.lag_s > 2 * curve.lag_deviation_s
-        lag_s = np.where(told, curve.lag_s, np.maximum(curve.lag_s, 0) + 2 * curve.lag_deviation_s)
+        distinct = curve.lag_s > 2 * curve.lag_deviation_s
+        lag_s = np.where(distinct, curve.lag_s, np.maximum(curve.lag_s, 0) + 2 * curve.lag_deviation_s)
         lag_ms = 1e3 * np.maximum(lag_s, LEAST_LAG_s)
-        below.plot(bandwidths_rad_s[told], lag_ms[told], label=name, **dots)
-        if not np.all(told):
-            below.plot(bandwidths_rad_s[~told], lag_ms[~told], markerfacecolor="none",
+        below.plot(bandwidths_rad_s[distinct], lag_ms[distinct], label=name, **dots)
+        if not np.all(distinct):
+            below.plot(bandwidths_rad_s[~distinct], lag_ms[~distinct], markerfacecolor="none",
                        label=f"{name}: at most", **dots)  # fmt: skip
         if np.any(curve.derived_lag_s > 0):
             below.plot(bandwidths_rad_s, 1e3 * curve.derived_lag_s, color=colour, linewidth=1)

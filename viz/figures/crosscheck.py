@@ -1,7 +1,7 @@
 """Figures for a page: matplotlib without its global state, one function a figure.
 
 Axes have the colours of the recordings; every series is named, every axis has its unit, and a bound is
-drawn as a dashed line beside what it bounds.
+drawn as a dashed line with what it bounds.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from spheretwin.viz.theme import AXIS_COLOURS
 Array = NDArray[np.float64]
 
 AXES = tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in AXIS_COLOURS)
-# Okabe and Ito's: told apart by the colour-blind too.
+# Colours of Okabe and Ito: distinct for the colour-blind.
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00")
 INK, FAINT, BROKEN = "#30343a", "#a4aab3", "#c8102e"
 
@@ -35,7 +35,7 @@ NOTHING = 1e-18  # what a difference of exactly zero is drawn as, on a logarithm
 
 
 class Slope(NamedTuple):
-    """A method's error at several steps, and the power of the step it goes with."""
+    """Errors of a method at several steps, and its order."""
 
     steps_s: Array
     errors: Array
@@ -66,7 +66,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def margins(values: Mapping[str, float], title: str) -> Figure:
-    """How much of its bound each figure takes up: a dot a figure, the bound a line.
+    """Draw each figure as a share of its bound: a dot for each figure, the bound as a line.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ def margins(values: Mapping[str, float], title: str) -> Figure:
     axes = figure.subplots()
     rows = np.arange(len(values))
     shares = np.clip(list(values.values()), LEAST_SHARE, 1 / LEAST_SHARE)
-    for kept, colour, label in ((True, SERIES[0], "kept"), (False, BROKEN, "broken")):
-        chosen = (shares <= 1) == kept
+    for within, colour, label in ((True, SERIES[0], "kept"), (False, BROKEN, "broken")):
+        chosen = (shares <= 1) == within
         if np.any(chosen):
             axes.plot(shares[chosen], rows[chosen], "o", color=colour, markersize=6, label=label)
             axes.hlines(rows[chosen], LEAST_SHARE, shares[chosen], color=colour, linewidth=1, alpha=0.5)
@@ -187,7 +187,7 @@ def convergence(slopes: Mapping[str, Slope], title: str) -> Figure:
 
 
 def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) -> Figure:
-    """What should stay at zero, over time: a panel a quantity, each series with its own bound.
+    """Draw quantities that should stay at zero, over time: a panel for each, each series with its bound.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ def _draw_bound(axes: Axes, bound: float | None, unit: str, colour: str = INK) -
 
 
 def _finish(axes: Axes, x: str, y: str, title: str) -> None:
-    """Labels, a faint grid behind, no box."""
+    """Set labels and a faint grid; remove the box."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize="medium")
@@ -279,7 +279,7 @@ __all__ = ["Ramped", "Resting", "hinge_friction", "save"]
 
 
 SLOWEST_rad_s, FASTEST_rad_s, FASTEST_AT_STOP_rad_s = 1e-4, 2.0, 0.3  # of the logarithmic axes
-UP, BACK = 0.06, 0.8  # shares of the largest rate at which arrows on the ideal curve say where the ramp goes
+UP, BACK = 0.06, 0.8  # shares of the largest rate at which arrows show the direction of the ramp
 AROUND_STOP_ms = 60.0
 
 
@@ -304,7 +304,7 @@ class Resting(NamedTuple):
 
 
 def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -> Figure:
-    """A column a bearing: rate against a slow torque, coasting beside ideal friction, coming to rest.
+    """Draw a column for each bearing: rate against a slow torque, coasting against ideal friction, stopping.
 
     Each way has one colour; ideal friction is dashed.
 
@@ -338,9 +338,9 @@ def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -
 def _ramp(axes: Axes, ramped: Ramped) -> None:
     torque_mNm = 1e3 * ramped.torque_Nm
     for colour, way, rate in _ways(ramped.rates_rad_s):
-        axes.plot(torque_mNm, _drawn(rate), color=colour, label=way)
+        axes.plot(torque_mNm, _clipped(rate), color=colour, label=way)
         axes.plot(1e3 * ramped.push_Nm, ramped.creep_rad_s[way], "o", color=colour, markersize=5)
-    _ideal(axes, torque_mNm, _drawn(ramped.ideal_rad_s))
+    _ideal(axes, torque_mNm, _clipped(ramped.ideal_rad_s))
     axes.axvline(1e3 * ramped.level_Nm, color=FAINT, linewidth=1.2, label="Coulomb level")
     axes.plot([], [], "o", color=INK, markersize=5, label="settled at half the level")
     ideal, fastest = ramped.ideal_rad_s, int(np.argmax(ramped.ideal_rad_s))
@@ -362,8 +362,8 @@ def _stop(axes: Axes, resting: Resting) -> None:
     after_ms = 1e3 * (resting.t_s - resting.ideal_stop_s)
     shown = np.abs(after_ms) <= AROUND_STOP_ms
     for colour, _, rate in _ways(resting.rates_rad_s):
-        axes.plot(after_ms[shown], _drawn(rate[shown]), color=colour)
-    _ideal(axes, after_ms[shown], _drawn(resting.ideal_rad_s[shown]))
+        axes.plot(after_ms[shown], _clipped(rate[shown]), color=colour)
+    _ideal(axes, after_ms[shown], _clipped(resting.ideal_rad_s[shown]))
     _slow_rates(axes, FASTEST_AT_STOP_rad_s)
     _label_axes(axes, "time after the ideal stop, ms")
 
@@ -393,8 +393,8 @@ def _ideal(axes: Axes, x: Array, rate_rad_s: Array) -> None:
     axes.plot(x, rate_rad_s, color=INK, linewidth=1.1, linestyle=(0, (4, 4)), label="ideal friction")
 
 
-def _drawn(rate_rad_s: Array) -> Array:
-    """Rates for a logarithmic axis: what is less than it shows lies on its edge, and rest below it."""
+def _clipped(rate_rad_s: Array) -> Array:
+    """Return rates for a logarithmic axis: smaller ones lie on its edge, and zero below it."""
     return np.maximum(rate_rad_s, 0.1 * SLOWEST_rad_s)
 
 

@@ -1,4 +1,4 @@
-"""Figures of a study over many axes: how figures are spread, and what the worst of them goes with."""
+"""Figures of a study over many axes: distributions of figures, and their rank correlations with the axes."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ BINS = 10
 
 
 class Rank(NamedTuple):
-    """What a figure goes with, under one law."""
+    """Rank correlations of a figure with the axes, under one law."""
 
     by_value: Array  # (axes,) rank correlation with the value
     by_distance: Array  # (axes,) and with its distance from the middle one
     chance: float  # below this, 95 % of what does not matter
-    is_partial: bool  # whether what goes with the other axes was taken away before
+    is_partial: bool  # True if the effect of the other axes is removed
 
 
 def distributions(
@@ -37,12 +37,12 @@ def distributions(
 ) -> Figure:
     """Share of the rows at or below each value: a panel a figure, a colour a law.
 
-    What has no figure, as a run that was lost or never settled, is missing from the share.
+    Rows without a figure, as a run that was lost or never settled, are missing from the share.
 
     Parameters
     ----------
     figures : mapping of figure to mapping of law to (n,) array
-        Numbers alone.
+        Finite numbers only.
     totals : mapping of law to int
         All rows.
     title : str
@@ -140,7 +140,7 @@ def _scatter(axes: Axes, x: Array, y: Array, colour: str, law: str) -> None:
     edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
     if len(edges) > 2:
         inside = [(x >= low) & (x <= high) for low, high in pairwise(edges)]
-        middles = [(np.median(x[each]), np.median(y[each])) for each in inside]
+        middles = [(np.median(x[rows]), np.median(y[rows])) for rows in inside]
         axes.plot(*zip(*middles, strict=True), color=colour, linewidth=2, label=f"{law}, median")
 
 

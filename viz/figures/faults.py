@@ -16,8 +16,8 @@ from spheretwin.viz.figures.crosscheck import FAINT, INK, SERIES, WIDTH_in
 Array = NDArray[np.float64]
 
 MARKERS = ("o", "s", "^", "D", "v")
-COLOURS = "cividis"  # told apart by the colour-blind, and in grey
-EVERY = 3  # one group number in so many is written
+COLOURS = "cividis"  # distinct for the colour-blind, and in grey
+EVERY = 3  # every third group number is written
 
 
 def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: str) -> Figure:
@@ -48,7 +48,7 @@ def shares(by_name: Mapping[str, Mapping[int, float]], x: str, y: str, title: st
 
 
 def remaining(by_name: Mapping[str, Sequence[float]], x: str, y: str, title: str) -> Figure:
-    """Steps of the share in percent whose time has not come, on logarithmic axes.
+    """Draw the share in percent whose time has not come as steps, on logarithmic axes.
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ def triangles(panels: Mapping[str, Array], label: str, quantity: str, bound: flo
     Parameters
     ----------
     panels : mapping of title to (n, n) array
-        What is no number stays empty.
+        NaN stays empty.
     label : str
-        Of both axes.
+        Label of both axes.
     quantity : str
-        What the colours are.
+        Quantity of the colours.
     bound : float
     title : str
     """
@@ -130,9 +130,9 @@ def clouds(
     ----------
     panels : mapping of title to points (x, y, number)
     labels : tuple of str
-        Of x, y and the number.
+        Labels of x, y and the number.
     bounds : tuple of float
-        Of x and y.
+        Bounds of x and y.
     title : str
     """
     numbers = sorted({point[2] for points in panels.values() for point in points})

@@ -12,21 +12,21 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from numpy.typing import NDArray
 
 from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.style import Style, styles
+from spheretwin.viz.figures.style import LawStyle, styles
 from spheretwin.viz.theme import law_colour
 
 Array = NDArray[np.float64]
 
 MARGIN = 1.15
 SIZES = {"*": 9.0}
-"""Of markers that look smaller than others."""
+"""Sizes of markers that look smaller than others."""
 
 MOST = 40.0
 """Largest error that is drawn, over the least."""
 
 
-class Panel(NamedTuple):
-    """One condition."""
+class FrontPanel(NamedTuple):
+    """Panel of one condition."""
 
     title: str
     error: str
@@ -35,12 +35,12 @@ class Panel(NamedTuple):
     floors: Sequence[float] = ()  # errors that no cost avoids
 
 
-def fronts(panels: Sequence[Panel], labels: Mapping[str, str], cost: str) -> Figure:
+def fronts(panels: Sequence[FrontPanel], labels: Mapping[str, str], cost: str) -> Figure:
     """Draw the panels side by side.
 
     Parameters
     ----------
-    panels : sequence of Panel
+    panels : sequence of FrontPanel
     labels : mapping of law to label
     cost : str
         Label of the axis.
@@ -59,7 +59,7 @@ def fronts(panels: Sequence[Panel], labels: Mapping[str, str], cost: str) -> Fig
     return figure
 
 
-def _panel(axes: Axes, panel: Panel, looks: Mapping[str, Style]) -> None:
+def _panel(axes: Axes, panel: FrontPanel, looks: Mapping[str, LawStyle]) -> None:
     for floor in panel.floors:
         axes.axhline(floor, color=FAINT, linewidth=1.0, zorder=1)
     for law, values in panel.by_law.items():
@@ -83,7 +83,7 @@ def _panel(axes: Axes, panel: Panel, looks: Mapping[str, Style]) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _set_limits(axes: Axes, panel: Panel) -> None:
+def _set_limits(axes: Axes, panel: FrontPanel) -> None:
     """Show everything within `MOST` times the least error."""
     marked = np.array([(x, y) for _, x, y in panel.marked.values()]).reshape(-1, 2)
     points = np.concatenate([marked, *panel.by_law.values()])
@@ -102,11 +102,11 @@ def _set_limits(axes: Axes, panel: Panel) -> None:
         axis.set_minor_locator(NullLocator())
 
 
-def _size(style: Style) -> float:
+def _size(style: LawStyle) -> float:
     return SIZES.get(style.marker, 6.0)
 
 
-# Beyond this many times the best a figure of a bad trial would leave no room for the good ones.
+# Larger multiples of the best are cut: bad trials would leave no room for the good ones.
 DECADES_ON = 30.0
 
 
@@ -115,18 +115,18 @@ class Trials(NamedTuple):
 
     law: str
     numbers: Array  # (n,)
-    values: Array  # (n, objectives); of a pruned trial what is certain, NaN of one that lost
+    values: Array  # (n, objectives); of a pruned trial a lower bound, NaN of one that was lost
     completed: NDArray[np.bool_]  # (n,)
     best: NDArray[np.bool_]  # (n,)
     signs: Array  # (objectives,) −1 where large is good
-    has_start: bool  # whether trial 0 is what the others are held against
-    fresh: Array  # (b, objectives) of the best under fresh seeds; empty where there are none
+    has_start: bool  # True if trial 0 is the reference of the others
+    fresh: Array  # (b, objectives) of the best under fresh seeds; empty if there are none
 
 
 def progress(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str) -> Figure:
     """Each objective over the trials: a dot a completed one, a ring a pruned one, a line the best so far.
 
-    What lost, or is off the scale, is a tick at the edge.
+    Trials that were lost, or are off the scale, are ticks at the edge.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def progress(by_label: Mapping[str, Trials], objectives: Sequence[str], title: s
 
 
 def front(by_label: Mapping[str, Trials], objectives: Sequence[str], title: str) -> Figure:
-    """Two objectives of all completed trials, and the front of those that none is better than in both.
+    """Draw two objectives of all completed trials, and their Pareto front.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _progress(panel: Axes, label: str, trials: Trials, place: int) -> None:
 
 
 def _finish(panel: Axes, values: Sequence[Array], which: str) -> None:
-    """A logarithmic axis where all is above zero, cut where only what is far from the best lies."""
+    """Make an axis logarithmic if all values are positive, and cut values far from the best."""
     of_all = np.concatenate(values)
     if len(of_all) and np.all(of_all > 0):
         (panel.set_xscale if which == "x" else panel.set_yscale)("log")

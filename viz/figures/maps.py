@@ -1,4 +1,4 @@
-"""Figure of numbers by row and column: each written into its square, whose colour is what has changed."""
+"""Figures of numbers by row and column: each in a square, coloured by value or by change."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Array = NDArray[np.float64]
 ROW_in = 0.3
 NEAR, FAR = 0.003, 0.1  # degrees: less change is hardly coloured, more has the full colour
 TICKS = (-0.1, -0.03, -0.01, 0, 0.01, 0.03, 0.1)
-MOST_BESIDE = 5  # columns of panels that have room side by side
+MOST_SIDE_BY_SIDE = 5  # columns of panels that have room side by side
 DARK = 0.36  # distance from the middle of the scale beyond which numbers are written in white
 
 
 class HeatPanel(NamedTuple):
-    """Numbers of one panel; what is no number stays empty."""
+    """Numbers of one panel; NaN stays empty."""
 
     values: Array  # (rows, columns)
     changes: Array  # (rows, columns)
@@ -45,14 +45,14 @@ def heat(
     rows, columns : sequence of str
     title : str
     change : str
-        What the colours are, with its unit.
+        Quantity of the colours, with its unit.
     """
     scale = SymLogNorm(linthresh=NEAR, vmin=-FAR, vmax=FAR)
-    beside = len(columns) <= MOST_BESIDE
-    down, across = (1, len(panels)) if beside else (len(panels), 1)
+    side_by_side = len(columns) <= MOST_SIDE_BY_SIDE
+    down, across = (1, len(panels)) if side_by_side else (len(panels), 1)
     height_in = 1.8 + ROW_in * len(rows) * down
     figure = Figure(figsize=(1.35 * WIDTH_in, height_in), layout="constrained")
-    sides = figure.subplots(down, across, sharex=not beside, sharey=beside, squeeze=False).ravel()
+    sides = figure.subplots(down, across, sharex=not side_by_side, sharey=side_by_side, squeeze=False).ravel()
     for axes, (name, panel) in zip(sides, panels.items(), strict=True):
         image = axes.imshow(np.clip(panel.changes, -FAR, FAR), norm=scale, cmap="RdBu_r", aspect="auto")
         _write_cells(axes, panel, scale)
@@ -82,7 +82,7 @@ def _text(value: float) -> str:
 
 CELL_in = 0.42
 LIGHT = 0.55  # share of the scale beyond which numbers are written in black
-MANY = 200.0  # from which on whole powers of ten are ticks enough
+MANY = 200.0  # beyond this ratio, ticks at whole powers of ten are enough
 SEVERAL = 5.0  # ratio of largest to smallest from which on a scale is logarithmic
 MOST_WRITTEN = 12  # rows or columns: in more, the numbers of the squares cannot be read
 
@@ -90,7 +90,7 @@ MOST_WRITTEN = 12  # rows or columns: in more, the numbers of the squares cannot
 class MapPanel(NamedTuple):
     """Numbers of one law."""
 
-    values: Array  # (rows, columns); NaN where no run came to its end
+    values: Array  # (rows, columns); NaN if no run was completed
     lost: NDArray[np.bool_]  # (rows, columns) where some runs did not
 
 
@@ -100,7 +100,7 @@ class StudyLine(NamedTuple):
     median: Array  # (n,)
     low: Array  # (n,)
     high: Array  # (n,)
-    lost: NDArray[np.bool_]  # (n,) where some runs did not come to their end
+    lost: NDArray[np.bool_]  # (n,) True if some runs were not completed
 
 
 def maps(
@@ -110,22 +110,22 @@ def maps(
     quantity: str,
     title: str,
 ) -> Figure:
-    """Squares of a panel a law, on one scale of colours; crossed out where runs did not come to their end.
+    """Draw squares, a panel for each law, on one scale of colours; crossed out if runs were not completed.
 
     Parameters
     ----------
     panels : mapping of law to Panel
     axes_names : two str
-        What the rows are, and what the columns.
+        Names of the rows and of the columns.
     labels : two sequences of str
         Values of the rows, and of the columns.
     quantity : str
-        What the numbers are.
+        Name of the numbers.
     title : str
     """
     count, colours = len(panels), law_colours(list(panels))
     across, down = min(count, 3), -(-count // 3)
-    cells = [min(len(each), MOST_WRITTEN) * CELL_in for each in labels]
+    cells = [min(len(names), MOST_WRITTEN) * CELL_in for names in labels]
     figure = Figure(
         figsize=(max(WIDTH_in, across * (cells[1] + 0.5) + 1.6), 1.5 + down * (cells[0] + 0.9)),
         layout="constrained",
@@ -154,7 +154,7 @@ def maps(
         _in_plain_numbers(bar.ax.yaxis, float(np.nanmax(values) / np.nanmin(values)))
     bar.ax.tick_params(labelsize="small")
     lost = any(np.any(panel.lost) for panel in panels.values())
-    figure.suptitle(f"{title}\n× not all rows came to their end" if lost else title, fontsize="medium")
+    figure.suptitle(f"{title}\n× not all runs completed" if lost else title, fontsize="medium")
     return figure
 
 
@@ -179,7 +179,7 @@ def lines(
         axes.plot(places, line.median, "o-", color=colour, markersize=4, linewidth=1.3, label=law)
         axes.plot(places[line.lost], line.median[line.lost], "x", color=INK, markersize=9)
     if any(np.any(line.lost) for line in by_law.values()):
-        axes.plot([], [], "x", color=INK, label="not all runs came to their end")
+        axes.plot([], [], "x", color=INK, label="not all runs completed")
     if named:
         axes.set_xticks(places, list(x), rotation=20, ha="right")
     values = np.concatenate([line.median for line in by_law.values()])
@@ -195,13 +195,13 @@ def lines(
 
 
 def is_wide(values: Array) -> bool:
-    """Whether a scale for some values is better logarithmic."""
+    """True if a logarithmic scale suits some values better."""
     numbers = values[np.isfinite(values)]
     return bool(len(numbers)) and numbers.min() > 0 and numbers.max() > SEVERAL * numbers.min()
 
 
 def fit_scale(axes: Axes, which: Literal["x", "y"], values: Array) -> None:
-    """Make an axis logarithmic, in plain numbers, where its values are better seen so."""
+    """Make an axis logarithmic, in plain numbers, if that suits its values better."""
     if is_wide(values):
         (axes.set_yscale if which == "y" else axes.set_xscale)("log")
         numbers = values[np.isfinite(values)]
@@ -209,7 +209,7 @@ def fit_scale(axes: Axes, which: Literal["x", "y"], values: Array) -> None:
 
 
 def _in_plain_numbers(axis: Axis, ratio: float) -> None:
-    """Ticks of a logarithmic axis: 1, 2 and 5, or where it is long, whole powers of ten."""
+    """Set ticks of a logarithmic axis: 1, 2 and 5, or on a long axis whole powers of ten."""
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ratio < MANY else (1,)))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_locator(NullLocator())

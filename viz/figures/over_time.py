@@ -28,10 +28,10 @@ class ErrorCourse(NamedTuple):
     law: str
     errors_deg: Array  # (seeds, windows, axes)
     paper_deg: float
-    paper_axes: tuple[int, ...]  # for which the paper prints it; none where it has not the law
+    paper_axes: tuple[int, ...]  # axes for which the paper prints it; empty if it does not have the law
 
 
-class Line(NamedTuple):
+class ErrorLine(NamedTuple):
     """Largest errors under one condition, one for each seed."""
 
     label: str
@@ -39,12 +39,12 @@ class Line(NamedTuple):
     true_deg: Array
 
 
-class Group(NamedTuple):
+class ErrorGroup(NamedTuple):
     """Conditions of one law."""
 
     law: str
     label: str
-    lines: Sequence[Line]
+    lines: Sequence[ErrorLine]
     paper_deg: float | None
 
 
@@ -55,7 +55,7 @@ def courses(
 
     Parameters
     ----------
-    by_label : mapping of label to Course
+    by_label : mapping of label to ErrorBand
     window_s : float, s
         Length of what each entry is the largest error of.
     axes_names : sequence of str
@@ -74,14 +74,14 @@ def courses(
     return figure
 
 
-def lines(groups: Sequence[Group], quantity: str, title: str) -> Figure:
+def lines(groups: Sequence[ErrorGroup], quantity: str, title: str) -> Figure:
     """Largest errors by law and condition: a row a condition, a dot the median, a line the range.
 
     Parameters
     ----------
-    groups : sequence of Group
+    groups : sequence of ErrorGroup
     quantity : str
-        What the axis is, with its unit.
+        Label of the axis, with its unit.
     title : str
     """
     rows = [len(group.lines) for group in groups]
@@ -125,7 +125,7 @@ def _spread(panel: Axes, y: float, values: Array, colour: str, inside: str) -> N
 
 
 def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
-    """A logarithmic axis in plain numbers, a faint grid behind, no box."""
+    """Make a logarithmic axis in plain numbers, with a faint grid and no box."""
     axis = panel.yaxis if which == "y" else panel.xaxis
     (panel.set_yscale if which == "y" else panel.set_xscale)("log")
     axis.set_major_formatter("{x:g}")
@@ -137,33 +137,33 @@ def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
 
 LEAST_mrad = 0.2  # less is drawn as this much, on a logarithmic axis
 MARKS = 9  # markers along a line
-OUTLINED = [withStroke(linewidth=1.6, foreground="white")]  # seen on a dark line too
+OUTLINED = [withStroke(linewidth=1.6, foreground="white")]  # visible on a dark line too
 
 
-class Course(NamedTuple):
+class ErrorBand(NamedTuple):
     """Errors of one law."""
 
     law: str
     error_rad: Array  # (seeds, windows, hinges) largest within each; no numbers after the end of a run
 
 
-class Motion(NamedTuple):
+class AngleTraces(NamedTuple):
     """Angles of one run."""
 
     law: str
     t_s: Array  # (n,)
     q_rad: Array  # (n, hinges)
     desired_t_s: Array  # (m,)
-    desired_rad: Array  # (m, hinges) of the whole motion, however long the run
-    whole: bool  # whether it came to its end
+    desired_rad: Array  # (m, hinges) of the whole motion, for any length of the run
+    whole: bool  # True if it was completed
 
 
-def errors(by_label: Mapping[str, Course], window_s: float, hinges: Sequence[str], title: str) -> Figure:
+def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[str], title: str) -> Figure:
     """Errors over time: the median over the seeds a line, their range a band, a cross where runs end early.
 
     Parameters
     ----------
-    by_label : mapping of label to Course
+    by_label : mapping of label to ErrorBand
     window_s : float, s
         Length of what each entry is the largest error of.
     hinges : sequence of str
@@ -198,16 +198,16 @@ def errors(by_label: Mapping[str, Course], window_s: float, hinges: Sequence[str
     return figure
 
 
-def _ends_early(course: Course, longest: int) -> bool:
+def _ends_early(course: ErrorBand, longest: int) -> bool:
     return course.error_rad.shape[1] < longest or bool(np.isnan(course.error_rad).any())
 
 
-def angles(by_label: Mapping[str, Motion], hinges: Sequence[str], title: str) -> Figure:
-    """Angles and what was asked of them: a column a law, a row a hinge.
+def angles(by_label: Mapping[str, AngleTraces], hinges: Sequence[str], title: str) -> Figure:
+    """Draw angles and their references: a column for each law, a row for each hinge.
 
     Parameters
     ----------
-    by_label : mapping of label to Motion
+    by_label : mapping of label to AngleTraces
     hinges : sequence of str
     title : str
     """

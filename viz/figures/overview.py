@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.decimation import thinned
+from spheretwin.viz.decimation import decimate_extremes
 from spheretwin.viz.figures.crosscheck import AXES, DPI, INK, WIDTH_in
 from spheretwin.viz.figures.style import MOST_POINTS, plain
 
@@ -55,7 +55,7 @@ def as_html(figure: Figure) -> str:
 
 
 def _decimated(table: Table, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    few = thinned(values, MOST_POINTS)
+    few = decimate_extremes(values, MOST_POINTS)
     period_s = float(table["t_s"][1] - table["t_s"][0]) if len(table) > 1 else 0.0
-    t_s = float(table["t_s"][0]) + period_s * few.rows_each * np.arange(len(few.values))
+    t_s = float(table["t_s"][0]) + period_s * few.stride * np.arange(len(few.values))
     return t_s, few.values

@@ -17,21 +17,21 @@ from spheretwin.viz.figures.style import styles
 Array = NDArray[np.float64]
 
 
-class Path(NamedTuple):
-    """Of one run."""
+class TipPath(NamedTuple):
+    """Path of the tip in one run."""
 
     law: str
     tip_mm: Array  # (n, 3)
     desired_mm: Array  # (n, 3)
-    whole: bool  # whether it came to its end
+    whole: bool  # True if it was completed
 
 
-def paths(by_label: Mapping[str, Path], title: str) -> Figure:
+def paths(by_label: Mapping[str, TipPath], title: str) -> Figure:
     """Draw them, on the same scales; a cross where a run ended early.
 
     Parameters
     ----------
-    by_label : mapping of label to Path
+    by_label : mapping of label to TipPath
     title : str
     """
     count = len(by_label)
@@ -64,7 +64,7 @@ def paths(by_label: Mapping[str, Path], title: str) -> Figure:
 
 
 def _space(
-    axes: Axes3D, path: Path, colour: str, sides: tuple[float, float], heights: tuple[float, float]
+    axes: Axes3D, path: TipPath, colour: str, sides: tuple[float, float], heights: tuple[float, float]
 ) -> None:
     reach, aside = sides
     axes.plot(*path.tip_mm.T, color=colour, linewidth=1.8)
@@ -82,7 +82,7 @@ def _space(
     axes.set_zlabel("z, mm", fontsize="x-small", labelpad=-6)
 
 
-def _plan(axes: Axes, path: Path, colour: str, sides: tuple[float, float]) -> None:
+def _plan(axes: Axes, path: TipPath, colour: str, sides: tuple[float, float]) -> None:
     reach, aside = sides
     axes.plot(*path.tip_mm[:, :2].T, color=colour, linewidth=2)
     axes.plot(*path.desired_mm[:, :2].T, color=INK, linewidth=0.9, linestyle=(0, (4, 2)))
@@ -96,8 +96,8 @@ def _plan(axes: Axes, path: Path, colour: str, sides: tuple[float, float]) -> No
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _ends(axes: Axes, path: Path, colour: str, which: slice) -> None:
-    """Where a path starts, and where it ends too early."""
+def _ends(axes: Axes, path: TipPath, colour: str, which: slice) -> None:
+    """Mark the start of a path, and an early end."""
     axes.plot(*path.tip_mm[:1, which].T, "o", color=INK, markersize=5)
     if not path.whole:
         axes.plot(*path.tip_mm[-1:, which].T, "x", color=colour, markersize=9, markeredgewidth=2)

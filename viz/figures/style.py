@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from spheretwin.viz.comparison.runs import Run, run_colours
+from spheretwin.viz.comparison.runs import ComparedRun, run_colours
 from spheretwin.viz.figures.crosscheck import FAINT
 from spheretwin.viz.theme import law_colours, law_marks
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Drawing(NamedTuple):
-    """A figure, the file it goes to, and what it shows."""
+    """Figure of a page, with its file and its caption."""
 
     file: str
     caption: str
@@ -28,31 +28,31 @@ class Drawing(NamedTuple):
 
 
 MOST_POINTS = 3000
-"""Of a line: a print of 20 cm has fewer dots."""
+"""Points of a line: a print of 20 cm has fewer dots."""
 
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2)), (0, (2, 1)))
-"""By the place of a run: what tells them apart in grey print."""
+"""Dashes by the place of a run: runs are distinct in grey print."""
 
 
-class Look(NamedTuple):
-    """Of one run."""
+class RunStyle(NamedTuple):
+    """Colour and dash of one run."""
 
     colour: str
     dash: Any
 
     def line(self) -> dict[str, Any]:
-        """For a line of the run."""
+        """Return the properties of a line of the run."""
         return {"color": self.colour, "linestyle": self.dash, "linewidth": 1.1}
 
 
-def looks(runs: Sequence[Run]) -> list[Look]:
+def run_styles(runs: Sequence[ComparedRun]) -> list[RunStyle]:
     """Look of each run."""
     colours = run_colours([run.law for run in runs])
-    return [Look(colour, DASHES[place % len(DASHES)]) for place, colour in enumerate(colours)]
+    return [RunStyle(colour, DASHES[place % len(DASHES)]) for place, colour in enumerate(colours)]
 
 
 def plain(axes: Axes, y: str) -> None:
-    """A quantity with its unit at the side, a faint grid behind, no box."""
+    """Set a quantity with its unit as the label, a faint grid, and no box."""
     axes.set_ylabel(y, fontsize="small")
     axes.tick_params(labelsize="small")
     axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
@@ -71,25 +71,25 @@ Array = NDArray[np.float64]
 
 mrad_per_degree = 1e3 * np.pi / 180
 MANY = 2000.0
-"""Ratio of an axis from which on whole powers of ten are ticks enough."""
+"""Ratio of an axis beyond which ticks at whole powers of ten are enough."""
 
 
-class Style(NamedTuple):
-    """Of one law."""
+class LawStyle(NamedTuple):
+    """Colour, marker and dash of one law."""
 
     colour: str
     marker: str
     dash: Any
 
     def line(self) -> dict[str, Any]:
-        """For a line without markers."""
+        """Return the properties of a line without markers."""
         return {"color": self.colour, "linestyle": self.dash}
 
 
-def styles(laws: Sequence[str]) -> dict[str, Style]:
+def styles(laws: Sequence[str]) -> dict[str, LawStyle]:
     """Colour, marker and dash of each law."""
     colours, marks = law_colours(laws), law_marks(laws)
-    return {law: Style(colours[law], *marks[law]) for law in laws}
+    return {law: LawStyle(colours[law], *marks[law]) for law in laws}
 
 
 def on_errors(panels: Sequence[Axes], lowest_mrad: float, highest_mrad: float) -> None:
@@ -112,8 +112,8 @@ def on_errors(panels: Sequence[Axes], lowest_mrad: float, highest_mrad: float) -
 def _ticks(axes: Axes, lowest: float, highest: float) -> None:
     steps = (1,) if highest > MANY * lowest else (1, 2, 5)
     ticks = [step * 10.0**power for power in range(-4, 5) for step in steps]
-    wanted = [tick for tick in ticks if lowest <= tick <= highest]
-    axes.yaxis.set_major_locator(FixedLocator(wanted))
+    shown = [tick for tick in ticks if lowest <= tick <= highest]
+    axes.yaxis.set_major_locator(FixedLocator(shown))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_minor_formatter(NullFormatter())

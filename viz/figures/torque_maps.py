@@ -25,7 +25,7 @@ def capability_map(workspace: Workspace, on_grid: Capability, limit_A: float) ->
     workspace : Workspace
         The grid.
     on_grid : Capability
-        Of its poses, in the grid's shape.
+        Capability of its poses, in the grid's shape.
     limit_A : float, A
         Current limit, for the titles.
     """
@@ -102,7 +102,7 @@ def _polar(
 ) -> None:
     azimuth = np.append(workspace.azimuth_rad, 2 * np.pi)
     closed = np.column_stack([values, values[:, :1]])  # (t, a + 1)
-    drawn = axes.pcolormesh(
+    mesh = axes.pcolormesh(
         azimuth,
         np.degrees(workspace.tilt_rad),
         closed,
@@ -111,7 +111,7 @@ def _polar(
         norm=scale,
         rasterized=True,
     )
-    figure.colorbar(drawn, ax=axes, shrink=0.8, pad=0.09)
+    figure.colorbar(mesh, ax=axes, shrink=0.8, pad=0.09)
     axes.set_title(title)
     axes.set_rlabel_position(15)
     axes.tick_params(axis="y", colors="white")
@@ -126,7 +126,7 @@ def _at_all_tilts(workspace: Workspace, values: Array) -> Array:
 
 
 def _over_spin(workspace: Workspace, values: Array, worst: Callable[..., Array]) -> Array:
-    """(t, a) worst finite value over the reachable spins; NaN where there is none."""
+    """Return (t, a) worst finite values over the reachable spins; NaN if there are none."""
     usable = workspace.reachable & np.isfinite(values)
     start = np.inf if worst is np.min else -np.inf
     result = worst(values, axis=2, where=usable, initial=start)

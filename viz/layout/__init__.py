@@ -1,1 +1,1 @@
-"""How recordings are laid out: what stands where under which name, in which colours."""
+"""Layout of recordings: views, plots, ranges, names and colours."""

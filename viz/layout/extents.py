@@ -1,4 +1,4 @@
-"""What a run has shown, from which ranges and titles of plots are made."""
+"""Extents of a run's signals, from which ranges and titles of plots follow."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from spheretwin.models.telemetry.table import Table
 
 Array = NDArray[np.float64]
 
-# What goes less far beyond the range in which the settled run can be read is drawn whole.
+# Extents up to this factor beyond the range of the settled run are drawn completely.
 CLIPPED_FROM = 2.5
 
-# Of the spans of a run, those that are within its range wherever they are.
+# Share of the spans of a run that the range always contains.
 USUAL = 0.85
 
 # Above and below a curve.
 MARGIN = 1.1
 
-# A viewer labels steps of a power of ten, each some 22 pixels high: in a plot of a small window so many.
+# Steps of a power of ten, each some 22 pixels high, that a viewer can label in a plot of a small window.
 LABELLED = 8
 
-# Halves and ends of ranges in which there are such steps.
+# Halves and ends of ranges with such steps.
 _NICE = (1.0, 1.5, 2.0, 3.0, 4.0, 10.0)
 _NICE_ABOVE_ZERO = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 10.0)
 
-# Of a range, beyond the greatest number that is labelled: half of its height would be cut.
+# Share of a range beyond the greatest labelled number: otherwise half of its height would be cut.
 ROOM = 0.06
 
 
-class Channel(NamedTuple):
-    """One entry of a signal or of a quantity, or all of them."""
+class PlotChannel(NamedTuple):
+    """Entry of a signal or of a quantity, or all entries."""
 
     name: str
     place: int | None = None
 
 
-class Seen:
+class Extents:
     """Bounds of every channel over spans of a run.
 
     Parameters
@@ -49,7 +49,7 @@ class Seen:
     t_s : (n,) array
         Start of each span.
     low, high : mapping of name to (n, size) arrays
-        Least and greatest value within each; NaN where there was none.
+        Least and greatest value within each; NaN if there is none.
     ended_s : float, optional
         When the run ended before its time.
     """
@@ -59,17 +59,17 @@ class Seen:
     ) -> None:
         self.t_s, self._low, self._high, self.ended_s = t_s, low, high, ended_s
 
-    def limit(self, *channels: Channel, least: float, above_zero: bool = False) -> float:
-        """Half of a range about 0, or its end, in which the run can be read once it has settled.
+    def limit(self, *channels: PlotChannel, least: float, above_zero: bool = False) -> float:
+        """Return half of a range about 0, or its end, in which the settled run can be read.
 
-        It holds the whole second half and 85 % of all, or everything where that is not much more.
+        It contains the whole second half and 85 % of all, or everything if that is not much larger.
 
         Parameters
         ----------
         *channels : Channel
             Drawn in one plot, or in plots that are compared.
         least : float
-            What the range never falls below.
+            Least range.
         above_zero : bool
             Whether the range begins at 0.
         """
@@ -77,55 +77,55 @@ class Seen:
         second_half = size[self.t_s >= self.t_s[-1] / 2]
         usual = max(least, float(np.max(second_half)), float(np.quantile(size, USUAL)))
         whole = float(np.max(size))
-        drawn = whole if least < whole <= CLIPPED_FROM * usual else usual
-        return nice(MARGIN * drawn, _NICE_ABOVE_ZERO if above_zero else _NICE)
+        shown = whole if least < whole <= CLIPPED_FROM * usual else usual
+        return nice(MARGIN * shown, _NICE_ABOVE_ZERO if above_zero else _NICE)
 
-    def bounds(self, *channels: Channel) -> tuple[float, float]:
-        """Least and greatest of all that some channels have shown."""
+    def bounds(self, *channels: PlotChannel) -> tuple[float, float]:
+        """Return the least and greatest value of some channels."""
         low = min(_least(self._bounds(self._low, channel)) for channel in channels)
         high = max(-_least(-self._bounds(self._high, channel)) for channel in channels)
         return low, high
 
-    def band(self, *channels: Channel, least: float) -> tuple[float, float]:
-        """Range of all that some channels have shown, at least twice `least` wide, with two labels."""
+    def band(self, *channels: PlotChannel, least: float) -> tuple[float, float]:
+        """Return the range of some channels, at least twice `least` wide, with two labels."""
         return labelled(*self.bounds(*channels), least)
 
-    def largest(self, limit: float, *channels: Channel) -> str:
-        """What the title of a plot says of its largest magnitude, and when it lies outside of the range."""
+    def largest(self, limit: float, *channels: PlotChannel) -> str:
+        """Return the part of a plot's title with the largest magnitude, and the time outside of the range."""
         size = self._largest(*channels)
         outside = np.flatnonzero(size > limit)
-        told = f", largest {number(float(np.max(size)))}"
+        text = f", largest {number(float(np.max(size)))}"
         if not len(outside):
-            return told
+            return text
         until = self.t_s[min(outside[-1] + 1, len(self.t_s) - 1)]
-        return f"{told} in first {until:.2g} s"
+        return f"{text} in first {until:.2g} s"
 
-    def _largest(self, *channels: Channel) -> Array:
-        """Largest magnitude among some channels in each span; 0 where there was no number."""
-        sizes = np.concatenate([self._size(each) for each in channels], axis=1)
+    def _largest(self, *channels: PlotChannel) -> Array:
+        """Return the largest magnitude among some channels in each span; 0 if there is no number."""
+        sizes = np.concatenate([self._size(channel) for channel in channels], axis=1)
         return np.max(np.where(np.isfinite(sizes), sizes, 0.0), axis=1)
 
-    def _size(self, channel: Channel) -> Array:
+    def _size(self, channel: PlotChannel) -> Array:
         return np.maximum(np.abs(self._bounds(self._low, channel)), np.abs(self._bounds(self._high, channel)))
 
-    def _bounds(self, of: Mapping[str, Array], channel: Channel) -> Array:
+    def _bounds(self, of: Mapping[str, Array], channel: PlotChannel) -> Array:
         values = of[channel.name]
         return values if channel.place is None else values[:, channel.place : channel.place + 1]
 
 
 def nice(value: float, among: Sequence[float] = _NICE) -> float:
-    """The least of some numbers of a decade, up to 10 of it, that is not below a positive value."""
+    """Return the least of some numbers of a decade, up to 10 times it, that is not below a positive value."""
     decade = 10.0 ** floor(log10(value))
-    return next(each for each in among if each * decade >= value * (1 - 1e-9)) * decade
+    return next(step for step in among if step * decade >= value * (1 - 1e-9)) * decade
 
 
 def number(value: float) -> str:
-    """Three digits, and thousands without a power of ten."""
+    """Return a number as text: three digits, and thousands without a power of ten."""
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def labelled(low: float, high: float, least: float, most: int = LABELLED) -> tuple[float, float]:
-    """Range around two numbers in which a viewer labels two ticks or more.
+    """Return a range around two numbers in which a viewer labels two ticks or more.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def labelled(low: float, high: float, least: float, most: int = LABELLED) -> tup
     room = ROOM * (high - low)
     if last > first:
         return low, high
-    if last < first:  # none lies within
+    if last < first:  # no step lies within
         return step * last - room, step * first + room
     below, above = step * (first - 1), step * (last + 1)
     return (below - room, high) if low - below < above - high else (low, above + room)
@@ -153,11 +153,11 @@ def _least(values: Array) -> float:
     return float(np.min(finite)) if len(finite) else 0.0
 
 
-# Beyond twice as many, two neighbours become one.
+# Beyond twice this number, pairs of neighbours are united.
 SPANS = 512
 
 
-class Survey:
+class ExtentTracker:
     """Bounds of channels over spans of a run.
 
     Parameters
@@ -184,19 +184,19 @@ class Survey:
             self._low = np.fmin.reduceat(self._low, pairs, axis=0)
             self._high = np.fmax.reduceat(self._high, pairs, axis=0)
 
-    def seen(self, ended_s: float | None) -> Seen | None:
-        """All of it, once there is some."""
+    def extents(self, ended_s: float | None) -> Extents | None:
+        """Return the extents, if there are rows."""
         if not len(self._t_s):
             return None
-        return Seen(self._t_s, self._parted(self._low), self._parted(self._high), ended_s)
+        return Extents(self._t_s, self._split(self._low), self._split(self._high), ended_s)
 
-    def _parted(self, bounds: Array) -> dict[str, Array]:
+    def _split(self, bounds: Array) -> dict[str, Array]:
         ends = np.cumsum(list(self._sizes.values()))[:-1]
         return dict(zip(self._sizes, np.split(bounds, ends, axis=1), strict=True))
 
 
-def watched(signals: tuple[Signal, ...]) -> dict[str, int]:
-    """Signals that are plotted in ranges of the run's own, of which bounds are kept; with their sizes."""
+def plotted_signals(signals: tuple[Signal, ...]) -> dict[str, int]:
+    """Return signals plotted in ranges of the run's own, for which bounds are tracked, with their sizes."""
     plotted = (signal for signal in signals if not signal.states)
     return {signal.name: signal.size for signal in plotted if signal.name not in _OF_FIXED_RANGE}
 
@@ -217,10 +217,10 @@ _OF_FIXED_RANGE = frozenset(
         "time_to_detection_s",
     }
 )
-"""And those that are not plotted."""
+"""Signals with a fixed range, and those that are not plotted."""
 
 
-class Picked:
+class ColumnSelector:
     """Columns of the watched signals side by side.
 
     Parameters
@@ -235,7 +235,7 @@ class Picked:
         self._places = self._missing = np.empty(0, dtype=np.int64)
 
     def of(self, rows: Table) -> Array:
-        """Of the rows of a chunk; NaN where they have none, after a change of law."""
+        """Return the columns of the rows of a chunk; NaN if they are missing, after a change of law."""
         if rows.signals is not self._signals:
             self._signals = rows.signals
             self._find(rows.signals)
@@ -247,5 +247,5 @@ class Picked:
         first, places = offsets(signals), []
         for name, size in self._sizes.items():
             places += list(range(first[name], first[name] + size)) if name in first else [-1] * size
-        found = np.array(places, dtype=np.int64)
-        self._places, self._missing = np.maximum(found, 0), np.flatnonzero(found < 0)
+        columns = np.array(places, dtype=np.int64)
+        self._places, self._missing = np.maximum(columns, 0), np.flatnonzero(columns < 0)

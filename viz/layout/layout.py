@@ -1,4 +1,4 @@
-"""How a recording is laid out: one view a question about the run, each in a tab."""
+"""Layout of a run's recording: one view for each question about the run, each in a tab."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from spheretwin.viz.layout import views
-from spheretwin.viz.layout.extents import Seen
+from spheretwin.viz.layout.extents import Extents
 from spheretwin.viz.layout.plots import Plots
 from spheretwin.viz.layout.view import TIMELINE, View
 from spheretwin.viz.layout.views import VIEWS
@@ -17,18 +17,18 @@ from spheretwin.viz.layout.views import VIEWS
 ROW_SHARES = (1, 10)
 
 
-def layout(view: View, seen: Seen | None = None) -> rrb.Blueprint:
+def layout(view: View, extents: Extents | None = None) -> rrb.Blueprint:
     """Blueprint of a run's recording.
 
     Parameters
     ----------
     view : View
-        What it is made for.
-    seen : Seen, optional
-        What the run has shown; ranges and titles are made of it.
+        Properties of the run.
+    extents : Extents, optional
+        Extents of the run; ranges and titles follow from them.
     """
-    plots = Plots(view, seen)
-    tabs = [made(plots) for made in VIEWS.values()]
+    plots = Plots(view, extents)
+    tabs = [view_function(plots) for view_function in VIEWS.values()]
     return _blueprint(rrb.Tabs(*tabs, active_tab=list(VIEWS).index(view.shown), name="views"), view)
 
 
@@ -37,7 +37,7 @@ def opening_layout(view: View) -> rrb.Blueprint:
     """Blueprint of a recording that is still written.
 
     One that is watched has every view. A file has the one that is shown: a layout takes room, and when the
-    run has ended, the whole one with its ranges takes this one's place.
+    run has ended, the complete one with its ranges replaces it.
     """
     return layout(view) if view.live else _blueprint(VIEWS[view.shown](Plots(view, None)), view)
 

@@ -1,4 +1,4 @@
-"""Plots over time: what stands in one, in which range, and what its title says."""
+"""Plots over time: their lines, ranges and titles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMa
 
 from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
 from spheretwin.viz import theme
-from spheretwin.viz.layout.extents import ROOM, Channel, Seen, number
+from spheretwin.viz.layout.extents import ROOM, Extents, PlotChannel, number
 from spheretwin.viz.layout.view import (
     ENDED,
     STATES,
@@ -25,27 +25,27 @@ from spheretwin.viz.layout.view import (
 from spheretwin.viz.quantities import Quantity
 
 LOOKS = ("names", "colors", "widths", "aggregation_policy")
-"""What of `rr.SeriesLines` a style says."""
+"""Properties of `rr.SeriesLines` in a style."""
 
 WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
 
-_ASKED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
-_BELIEVED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
-_BESIDE = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
+_COMMANDED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
+_ESTIMATED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
+_SECONDARY = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
 
-# Lines are drawn in the order of their names: what the controller believes first, as a rim of what is true,
-# and what was asked for last and thin.
+# Lines are drawn in the order of their names: estimates first, as a rim of the true values,
+# and commands last and thin.
 _ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
 
 
 def signal_style(signal: Signal) -> rr.SeriesLines:
-    """Names with units, colours and widths of a signal's lines."""
+    """Return names with units, colours and widths of a signal's lines."""
     names = _names(_short(signal.name), signal.labels or ("",), signal.unit)
     return _style(names, _colours(signal), _width(signal.name))
 
 
 def quantity_style(quantity: Quantity) -> rr.SeriesLines:
-    """Names with units, colours and width of a derived quantity's lines."""
+    """Return names with units, colours and width of a derived quantity's lines."""
     names = _names(_short(quantity.name), quantity.labels, quantity.unit)
     return _style(names, list(quantity.colours), _width(quantity.name))
 
@@ -63,7 +63,7 @@ def _names(short: str, labels: tuple[str, ...], unit: str) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """Name without its unit, which stands in brackets behind it."""
+    """Return the name without its unit, which follows in brackets."""
     for suffix in ("_rad_s", "_mrad", "_rad", "_Nm", "_deg", "_mm", "_A", "_W", "_s"):
         if name.endswith(suffix):
             return name.removesuffix(suffix)
@@ -72,9 +72,9 @@ def _short(name: str) -> str:
 
 def _colours(signal: Signal) -> list[theme.Colour]:
     for names, colour in (
-        (_ASKED, theme.ASKED),
-        (_BELIEVED, theme.BELIEVED),
-        (_BESIDE, theme.DESIRED_TRACE),
+        (_COMMANDED, theme.COMMAND),
+        (_ESTIMATED, theme.ESTIMATE),
+        (_SECONDARY, theme.DESIRED_TRACE),
     ):
         if signal.name in names:
             return [colour] * signal.size
@@ -84,7 +84,7 @@ def _colours(signal: Signal) -> list[theme.Colour]:
 
 
 def _width(name: str) -> float:
-    for names, width in ((_BELIEVED, WIDEST), (_ACTUAL, THICK), (_ASKED, THIN)):
+    for names, width in ((_ESTIMATED, WIDEST), (_ACTUAL, THICK), (_COMMANDED, THIN)):
         if name in names:
             return width
     return MIDDLE
@@ -93,24 +93,24 @@ def _width(name: str) -> float:
 Range = tuple[float, float]
 
 _NO_LEGEND = rrb.PlotLegend(visible=False)
-"""It would lie over data, and titles and the colours of the axes tell what it says."""
+"""A legend would cover data; titles and the colours of the axes say the same."""
 
 
-class Line(NamedTuple):
-    """What is drawn: an entity, or a signal of the telemetry; its bounds are known under the name."""
+class PlotLine(NamedTuple):
+    """Line of a plot: an entity, or a signal of the telemetry; its bounds have this name."""
 
     entity: str
     name: str
 
 
-def signal(name: str) -> Line:
-    """A signal of the telemetry."""
-    return Line(TELEMETRY, name)
+def signal(name: str) -> PlotLine:
+    """Return the line of a signal of the telemetry."""
+    return PlotLine(TELEMETRY, name)
 
 
-def quantity(of: Quantity) -> Line:
-    """A derived quantity."""
-    return Line(derived(of.name), of.name)
+def quantity(of: Quantity) -> PlotLine:
+    """Return the line of a derived quantity."""
+    return PlotLine(derived(of.name), of.name)
 
 
 class Plots:
@@ -119,93 +119,93 @@ class Plots:
     Parameters
     ----------
     view : View
-        What the layout is made for.
-    seen : Seen, optional
-        What the run has shown; without it, ranges follow the data.
+        Properties of the run.
+    extents : Extents, optional
+        Extents of the run; without them, ranges follow the data.
     """
 
-    def __init__(self, view: View, seen: Seen | None) -> None:
-        self.view, self.seen = view, seen
+    def __init__(self, view: View, extents: Extents | None) -> None:
+        self.view, self.extents = view, extents
 
     def about_zero(
         self,
         what: str,
         unit: str,
-        *lines: Line,
+        *lines: PlotLine,
         least: float,
         axis: int | None = None,
         key: str = "",
     ) -> rrb.TimeSeriesView:
-        """Plot whose range is that of the settled run; its title says what lies outside.
+        """Make a plot with the range of the settled run; its title gives the extent outside.
 
         Parameters
         ----------
         what, unit : str
-            What is drawn, in which unit.
+            Quantity and its unit.
         *lines : Line
             The lines.
         least : float
             Half of the range at least.
         axis : int, optional
-            The hinge whose entries are drawn; all of them unless given.
+            Hinge whose entries are drawn; all unless given.
         key : str
-            Ends the title: which line is which.
+            End of the title: identifies the lines.
 
         Notes
         -----
-        Plots of the other hinges have the same range, so that what is small looks small. The title
-        tells the range too: a low plot may have room for one number at its side.
+        Plots of the other hinges have the same range, so that magnitudes can be compared. The title
+        gives the range too: a low plot may have room for one number at its side.
         """
-        if self.seen is None:
+        if self.extents is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        limit = self.seen.limit(*(Channel(line.name) for line in lines), least=least)
-        told = self.seen.largest(limit, *(Channel(line.name, axis) for line in lines))
+        limit = self.extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
+        suffix = self.extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
         reach = (1 + ROOM) * limit
-        return self._plot(f"{what} ±{number(limit)} {unit}{told}{key}", lines, axis, (-reach, reach))
+        return self._plot(f"{what} ±{number(limit)} {unit}{suffix}{key}", lines, axis, (-reach, reach))
 
-    def above_zero(self, what: str, unit: str, line: Line, *, least: float) -> rrb.TimeSeriesView:
-        """Plot of what is never negative, its range that of the settled run."""
-        if self.seen is None:
+    def above_zero(self, what: str, unit: str, line: PlotLine, *, least: float) -> rrb.TimeSeriesView:
+        """Make a plot of a quantity that is never negative, with the range of the settled run."""
+        if self.extents is None:
             return self._plot(f"{what} [{unit}]", (line,), None, None)
-        limit = self.seen.limit(Channel(line.name), least=least, above_zero=True)
-        told = self.seen.largest(limit, Channel(line.name))
-        return self._plot(f"{what} [{unit}]{told}", (line,), None, (-ROOM * limit, (1 + ROOM) * limit))
+        limit = self.extents.limit(PlotChannel(line.name), least=least, above_zero=True)
+        suffix = self.extents.largest(limit, PlotChannel(line.name))
+        return self._plot(f"{what} [{unit}]{suffix}", (line,), None, (-ROOM * limit, (1 + ROOM) * limit))
 
     def whole(
         self,
         what: str,
         unit: str,
-        *lines: Line,
+        *lines: PlotLine,
         least: float,
         axis: int | None = None,
         key: str = "",
     ) -> rrb.TimeSeriesView:
-        """Plot of all that some lines have shown, over a range of twice `least` at least."""
-        if self.seen is None:
+        """Make a plot with the full range of some lines, at least twice `least`."""
+        if self.extents is None:
             return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        channels = [Channel(line.name, axis) for line in lines]
-        low, high = self.seen.bounds(*channels)
-        told = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
-        return self._plot(told, lines, axis, self.seen.band(*channels, least=least))
+        channels = [PlotChannel(line.name, axis) for line in lines]
+        low, high = self.extents.bounds(*channels)
+        title = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
+        return self._plot(title, lines, axis, self.extents.band(*channels, least=least))
 
-    def fixed(self, title: str, *lines: Line, low: float, high: float) -> rrb.TimeSeriesView:
-        """Plot of a range that is known before the run."""
+    def fixed(self, title: str, *lines: PlotLine, low: float, high: float) -> rrb.TimeSeriesView:
+        """Make a plot with a range that is known before the run."""
         return self._plot(title, lines, None, (low, high))
 
     def states(self, name: str = "states") -> rrb.StateTimelineView:
-        """Lanes of states."""
+        """Make a timeline with the lanes of states."""
         axis = self._time_axis()
         return rrb.StateTimelineView(origin=f"/{STATES}", name=name, time_view=axis)
 
     def _plot(
         self,
         title: str,
-        lines: tuple[Line, ...],
+        lines: tuple[PlotLine, ...],
         axis: int | None,
         band: Range | None,
     ) -> rrb.TimeSeriesView:
         contents = list(dict.fromkeys(f"/{line.entity}" for line in lines))
-        if band and self.seen and self.seen.ended_s is not None:
+        if band and self.extents and self.extents.ended_s is not None:
             contents.append(f"/{ENDED}")
         # Drawn in this order, as entities are in that of their names.
         names = sorted(line.name for line in lines if line.entity == TELEMETRY)
@@ -223,12 +223,12 @@ class Plots:
         )
 
     def _time_axis(self) -> rrb.TimeAxis | None:
-        """Axis over the time that is planned, while it is watched, or until behind an early end.
+        """Return an axis over the planned time in a live view, or until after an early end.
 
-        Else none: it is as long as the data, and takes no room in the file.
+        Otherwise None: the axis is as long as the data, and needs no room in the file.
         """
-        if self.seen and self.seen.ended_s is not None:
-            last_s = shown_until_s(self.view.duration_s, self.seen.ended_s)
+        if self.extents and self.extents.ended_s is not None:
+            last_s = shown_until_s(self.view.duration_s, self.extents.ended_s)
         elif self.view.live:
             last_s = self.view.duration_s
         else:
@@ -239,15 +239,17 @@ class Plots:
 
 
 def _mappings(name: str) -> list[VisualizerComponentMapping]:
-    """What the lines of a signal are drawn from: fields of the telemetry's components."""
+    """Map the lines of a signal to fields of the telemetry's components."""
     looks = [f"SeriesLines:{look}" for look in LOOKS]
-    mappings = [_taken(VALUES, name, "", "Scalars:scalars")]
-    mappings += [_taken(STYLES, name, f".{look}", target) for look, target in zip(LOOKS, looks, strict=True)]
+    mappings = [_mapping(VALUES, name, "", "Scalars:scalars")]
+    mappings += [
+        _mapping(STYLES, name, f".{look}", target) for look, target in zip(LOOKS, looks, strict=True)
+    ]
     return mappings
 
 
-def _taken(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:
-    """Where a visualizer takes something from; plotted signals are there from the start."""
+def _mapping(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:
+    """Return the source of a visualizer's component; plotted signals exist from the start."""
     source, selector = component(kind, 0), f".{name}{of}[]"
     return VisualizerComponentMapping(
         target, ComponentSourceKind.SourceComponent, source_component=source, selector=selector

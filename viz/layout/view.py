@@ -1,4 +1,4 @@
-"""What a layout is made for, and the application that it belongs to."""
+"""Properties of a run on which its layout depends, and paths of the entities."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 OVERVIEW = "overview"
 
 VIEW_NAMES = (OVERVIEW, "control", "coils", "hardware", "compare", "scenario")
-"""What a recording has in tabs; kept apart from the views, for Rerun is slow to import."""
+"""Tabs of a recording; apart from the views, because Rerun is slow to import."""
 
-# Of the time until a run has ended early, what the time axes show behind it.
+# Time after an early end that the time axes show, as a share of the time before.
 AFTER_THE_END = 0.15
 
 
 class View(NamedTuple):
-    """What the layout of a run's recording is made for."""
+    """Properties of a run on which its layout depends."""
 
     duration_s: float
     """Length of the time axes."""
@@ -34,9 +34,9 @@ class View(NamedTuple):
     shown: str = OVERVIEW
     """The view that is open at first."""
     size: float = 1.0
-    """Of the actuator, beside the shipped one; the eye stands as many times as far."""
+    """Size of the actuator relative to the shipped one; the distance of the camera is proportional to it."""
     run: str = ""
-    """What tells the recording from others, for figures of its run stand in the layout."""
+    """Identity of the recording: figures of its run stand in the layout."""
 
     @property
     def names(self) -> frozenset[str]:
@@ -45,14 +45,14 @@ class View(NamedTuple):
 
 
 def shown_until_s(duration_s: float, ended_s: float) -> float:
-    """End of the time axes of a run that has ended early: so that one sees that it has, and where."""
+    """Return the end of the time axes of a run that has ended early: the end of the run is visible."""
     return min(duration_s, (1 + AFTER_THE_END) * ended_s)
 
 
 def application(view: View) -> str:
-    """Application id of recordings with one layout.
+    """Return the application id of recordings with one layout.
 
-    A viewer keeps one layout for each application: under a common id the second recording that it opens
+    A viewer keeps one layout for each application: with a common id the second recording that it opens
     would be shown in the first one's, with its length, its ranges and its tabs. Of letters, digits and dashes
     only, else the viewer changes it.
     """
@@ -76,7 +76,7 @@ ENDED = "ended"
 
 
 VALUES, STYLES, DESCRIBED = "values", "styles", "described"
-"""Components of `TELEMETRY`: what all signals are in each row, how their lines look, what they are.
+"""Components of `TELEMETRY`: values of all signals in each row, styles of their lines, descriptions.
 
 The first two are structs with a field a signal: each component would cost some bytes more in every row."""
 
@@ -89,13 +89,13 @@ is of a line: its number in the upper 32 bits, the checksum in the lower.
 
 
 def component(kind: str, arrival: int) -> str:
-    """Component of the signals that came together: 0 for those of the start; a change of law brings others.
+    """Return a component of the signals that arrived together: 0 at the start; a change of law brings others.
 
-    They have components of their own: of one whose fields change, viewers draw nothing.
+    They have separate components: viewers draw nothing of a component whose fields change.
     """
     return f"{kind}_{arrival}"
 
 
 def derived(quantity: str) -> str:
-    """Entity that holds a derived quantity."""
+    """Return the entity of a derived quantity."""
     return f"{DERIVED}/{rr.escape_entity_path_part(quantity)}"

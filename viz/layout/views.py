@@ -1,4 +1,4 @@
-"""Which coils work how hard, and how near to their limit."""
+"""Views of a recording, each a tab."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Callable
 import rerun.blueprint as rrb
 
 from spheretwin.models.telemetry.signals import ANGLES, Signal
-from spheretwin.viz.layout.extents import Channel
-from spheretwin.viz.layout.plots import Line, Plots, quantity, signal
+from spheretwin.viz.layout.extents import PlotChannel
+from spheretwin.viz.layout.plots import PlotLine, Plots, quantity, signal
 from spheretwin.viz.layout.view import (
     CURRENT_BARS,
     CURRENT_MAP,
@@ -31,7 +31,7 @@ from spheretwin.viz.quantities import (
     TIP_DISTANCE,
 )
 from spheretwin.viz.scene import meshes as scene
-from spheretwin.viz.scene.motion import SCALE, TRACES, Trace
+from spheretwin.viz.scene.motion import SCALE, TRACES, TipTrace
 
 LEAST_rad, LEAST_rad_s = 0.02, 0.05
 
@@ -46,7 +46,7 @@ RATE_SIGNALS = (
 
 
 def compare(plots: Plots) -> rrb.Container:
-    """Angles and rates of each axis, white as asked; below, how far apart the shaft's tips are."""
+    """Angles and rates of each axis with their references; below, the distance between the shaft's tips."""
     angles, rates = _lines(plots, ANGLE_SIGNALS), _lines(plots, RATE_SIGNALS)
     angles_of_each = [
         plots.whole(name, "rad", *angles, least=LEAST_rad, axis=axis) for axis, name in enumerate(ANGLES)
@@ -56,13 +56,13 @@ def compare(plots: Plots) -> rrb.Container:
         for axis, name in enumerate(ANGLES)
     ]
     apart = plots.above_zero(
-        "shaft's tip from where it should be", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
+        "tip's distance from its reference", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
     )
     above = rrb.Horizontal(*angles_of_each), rrb.Horizontal(*rates_of_each)
     return rrb.Vertical(*above, apart, row_shares=[4, 4, 3], name="compare")
 
 
-def _lines(plots: Plots, names: tuple[str, ...]) -> list[Line]:
+def _lines(plots: Plots, names: tuple[str, ...]) -> list[PlotLine]:
     return [signal(name) for name in names if name in plots.view.names]
 
 
@@ -75,7 +75,7 @@ PHASE_TRAIL_S = 1.0
 
 
 def run_line() -> rrb.TextDocumentView:
-    """What the run is and how it stands."""
+    """Name and state of the run in a line."""
     return rrb.TextDocumentView(origin=f"/{SUMMARY}", name="run", titlebar=False)
 
 
@@ -83,7 +83,7 @@ def current_map(plots: Plots) -> rrb.TimeSeriesView:
     """Currents as colours: a row for each group, time along it."""
     limit, groups = plots.view.current_limit_A, plots.view.groups
     title = f"currents of groups 0 (lowest) to {groups - 1}: blue -{limit:g} A, red +{limit:g} A"
-    return plots.fixed(title, Line(CURRENT_MAP, CURRENT_MAP), low=-0.7, high=groups - 0.3)
+    return plots.fixed(title, PlotLine(CURRENT_MAP, CURRENT_MAP), low=-0.7, high=groups - 0.3)
 
 
 def current_bars(plots: Plots) -> rrb.Spatial2DView:
@@ -104,8 +104,8 @@ def phase_plane(plots: Plots) -> rrb.Spatial2DView:
         end=boundary.cursor_relative(),
     )
     bounds = None
-    if plots.seen:
-        size = plots.seen.limit(Channel("sliding_s"), least=0.1) / 2
+    if plots.extents:
+        size = plots.extents.limit(PlotChannel("sliding_s"), least=0.1) / 2
         bounds = rrb.VisualBounds2D(x_range=[-size, size], y_range=[-size, size])
     return rrb.Spatial2DView(
         origin=f"/{PHASE_PLANE}",
@@ -116,13 +116,13 @@ def phase_plane(plots: Plots) -> rrb.Spatial2DView:
 
 
 def log() -> rrb.TextLogView:
-    """What is worth a line."""
+    """Log of events."""
     columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])  # all have one path
     return rrb.TextLogView(origin=f"/{EVENTS}", name="events", columns=columns)
 
 
 def coils(plots: Plots) -> rrb.Container:
-    """Currents over time; below, those at the cursor, and the heat of all."""
+    """Currents over time; below, those at the cursor, and the copper loss of all coils."""
     heat = plots.above_zero("heat of all coils", "W", quantity(COPPER_LOSS), least=COPPER_LOSS.floor)
     below = rrb.Horizontal(current_bars(plots), heat)
     return rrb.Vertical(current_map(plots), below, row_shares=[3, 2], name="coils")
@@ -135,28 +135,28 @@ LEAST = {"N·m": 0.01, "rad/s": 0.05, "rad": 0.02, "rad/s²": 0.5}
 
 
 def control(plots: Plots) -> rrb.Container:
-    """Errors and torques of each axis; below, what the law says of itself, and the coupling of the axes."""
+    """Errors and torques of each axis; below, the signals of the law and the coupling of the axes."""
     errors = [
         plots.about_zero(f"error {name}", "mrad", quantity(ERROR), least=ERROR.floor, axis=axis)
         for axis, name in enumerate(ANGLES)
     ]
-    asked = [signal("torque_command_Nm"), quantity(DELIVERED), signal("disturbance_Nm")]
+    lines = [signal("torque_command_Nm"), quantity(DELIVERED), signal("disturbance_Nm")]
     torques = [
         plots.about_zero(
             f"torque {name}",
             "N·m",
-            *asked,
+            *lines,
             least=DELIVERED.floor,
             axis=axis,
             key=", grey load",
         )
         for axis, name in enumerate(ANGLES)
     ]
-    return rrb.Grid(*errors, *torques, *_of_the_law(plots), grid_columns=3, name="control")
+    return rrb.Grid(*errors, *torques, *_law_plots(plots), grid_columns=3, name="control")
 
 
-def _of_the_law(plots: Plots) -> list[rrb.Container | rrb.View]:
-    own = {each.name: each for each in plots.view.own if _is_of_the_law(each)}
+def _law_plots(plots: Plots) -> list[rrb.Container | rrb.View]:
+    own = {own_signal.name: own_signal for own_signal in plots.view.own if _is_law_signal(own_signal)}
     coupling = plots.about_zero("coupling", "N·m", quantity(COUPLING), least=COUPLING.floor)
     sliding = []
     if SLIDING in own:
@@ -165,23 +165,23 @@ def _of_the_law(plots: Plots) -> list[rrb.Container | rrb.View]:
             plots.about_zero("sliding variables s", "rad/s", signal(SLIDING), least=LEAST["rad/s"]),
             phase_plane(plots),
         ]
-    units = dict.fromkeys(each.unit for each in own.values())
+    units = dict.fromkeys(own_signal.unit for own_signal in own.values())
     tabs = [coupling, *(_plot(plots, unit, own) for unit in units)]
     return [*sliding, rrb.Tabs(*tabs, active_tab=0) if len(tabs) > 1 else coupling]
 
 
 def _plot(plots: Plots, unit: str, own: dict[str, Signal]) -> rrb.TimeSeriesView:
     """Plot of all signals of one unit."""
-    names = [name for name, each in own.items() if each.unit == unit]
+    names = [name for name, own_signal in own.items() if own_signal.unit == unit]
     return plots.whole(", ".join(names), unit, *map(signal, names), least=LEAST.get(unit, 1e-3))
 
 
-def _is_of_the_law(of: Signal) -> bool:
-    """Whether a signal is one of those that laws log, and not of a stage around them."""
-    return of.size <= len(ANGLES) and not of.states and of.name not in _AROUND
+def _is_law_signal(of: Signal) -> bool:
+    """True if a signal is one that laws log, and not one of a stage around them."""
+    return of.size <= len(ANGLES) and not of.states and of.name not in _OTHER_VIEWS
 
 
-_AROUND = frozenset(
+_OTHER_VIEWS = frozenset(
     {
         "q_measured_rad",
         "qdot_estimated_rad_s",
@@ -193,10 +193,10 @@ _AROUND = frozenset(
         "supply_power_W",
     }
 )
-"""Signals that stand in other views."""
+"""Signals that other views show."""
 
 
-# Half of a range of temperatures: what a coil warms by in a short run is nothing yet.
+# Half of the least range of temperatures: the warming of a coil in a short run is negligible.
 LEAST_degC = 5.0
 
 # Half of a range of powers.
@@ -204,7 +204,7 @@ LEAST_W = 1.0
 
 
 def hardware(plots: Plots) -> rrb.Container:
-    """States and events beside what the chain of sensors, amplifiers and coils shows of itself."""
+    """States and events next to the signals of sensors, amplifiers and coils."""
     names = plots.view.names
     shown = []
     if "coil_temperature_degC" in names:
@@ -223,12 +223,12 @@ def hardware(plots: Plots) -> rrb.Container:
         shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
     if "friction_Nm" in names:
         shown.append(plots.whole("friction", "N·m", signal("friction_Nm"), least=0.002))
-    told = [plots.states("states of what can fail"), log()]
+    state_views = [plots.states("states of the components"), log()]
     if not shown:
-        return rrb.Vertical(*told, name="hardware")
+        return rrb.Vertical(*state_views, name="hardware")
     chain = rrb.Grid(*shown, grid_columns=2)
     return rrb.Horizontal(
-        rrb.Vertical(*told, row_shares=[3, 2]), chain, column_shares=[2, 3], name="hardware"
+        rrb.Vertical(*state_views, row_shares=[3, 2]), chain, column_shares=[2, 3], name="hardware"
     )
 
 
@@ -236,11 +236,11 @@ EYE_m, LOOKED_AT_m = (0.16, -0.16, 0.22), (0.0, 0.0, 0.02)
 
 
 def eye(size: float) -> rrb.EyeControls3D:
-    """Where all of an actuator of a size is seen from, and of what is drawn beside it."""
+    """Return the camera from which an actuator of a size, and its surroundings, are visible."""
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        position=[size * each for each in EYE_m],
-        look_target=[size * each for each in LOOKED_AT_m],
+        position=[size * coordinate for coordinate in EYE_m],
+        look_target=[size * coordinate for coordinate in LOOKED_AT_m],
         eye_up=[0, 0, 1],
     )
 
@@ -256,7 +256,7 @@ def actuator_view(size: float) -> rrb.Spatial3DView:
     )
 
 
-def _ages(trace: Trace) -> rrb.VisibleTimeRanges:
+def _ages(trace: TipTrace) -> rrb.VisibleTimeRanges:
     boundary = rrb.TimeRangeBoundary
     return rrb.VisibleTimeRanges(
         timeline=TIMELINE,
@@ -266,9 +266,9 @@ def _ages(trace: Trace) -> rrb.VisibleTimeRanges:
 
 
 def overview(plots: Plots) -> rrb.Container:
-    """Actuator and currents beside the errors, what is left of the torque, states and events."""
-    seen = rrb.Vertical(actuator_view(plots.view.size), current_map(plots), row_shares=[3, 2])
-    told = rrb.Vertical(
+    """Actuator and currents; next to them errors, torque margin, states and events."""
+    left = rrb.Vertical(actuator_view(plots.view.size), current_map(plots), row_shares=[3, 2])
+    right = rrb.Vertical(
         plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
         plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor),
         plots.fixed(
@@ -278,9 +278,9 @@ def overview(plots: Plots) -> rrb.Container:
             high=1.05 * MOST,
         ),
         rrb.Horizontal(plots.states(), log(), column_shares=[1, 1]),
-        row_shares=[3, 3, 2, 4 if any(each.states for each in plots.view.own) else 3],
+        row_shares=[3, 3, 2, 4 if any(own_signal.states for own_signal in plots.view.own) else 3],
     )
-    return rrb.Horizontal(seen, told, column_shares=[4, 5], name="overview")
+    return rrb.Horizontal(left, right, column_shares=[4, 5], name="overview")
 
 
 VIEWS: dict[str, Callable[[Plots], rrb.Container | rrb.View]] = {

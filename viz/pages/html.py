@@ -1,4 +1,4 @@
-"""A page of Markdown as HTML that stands alone: no font, no request to any host, of itself no script."""
+"""HTML of a Markdown page, complete in one file: no font, no request to any host, no script of its own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from markdown_it.renderer import RendererHTML
 from markdown_it.token import Token
 from markdown_it.utils import OptionsDict
 
-# Figures are drawn on white, so they keep it in the dark; what is wide is moved within its own box.
+# Figures have a white ground in the dark theme too; wide content scrolls within its own box.
 STYLE = """
 :root { color-scheme: light dark; --ink: #24282d; --faint: #d5d9de; --paper: #fff; --soft: #f4f6f8; }
 @media (prefers-color-scheme: dark) {
@@ -51,13 +51,13 @@ def page(title: str, markdown: str, figures: Path | None = None) -> str:
     markdown : str
         CommonMark with tables; tags in it are shown, not obeyed.
     figures : Path, optional
-        Folder of its figures, which are put into the page; it refers to their files unless given.
+        Folder of its figures, which are embedded in the page; it refers to their files unless given.
     """
     return whole(title, rendered(markdown, figures))
 
 
 def rendered(markdown: str, figures: Path | None = None) -> str:
-    """What a page shows of Markdown; as in `page`."""
+    """Return the HTML of Markdown; parameters as in `page`."""
     reader = MarkdownIt("commonmark", {"html": False}).enable("table")
     reader.add_render_rule("table_open", _table_opens)
     reader.add_render_rule("table_close", _table_closes)

@@ -11,12 +11,12 @@ import plotly.graph_objects as plotly
 from plotly.offline import get_plotlyjs
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.comparison.runs import Run, Spectrum, run_colours
-from spheretwin.viz.decimation import highest_by_octave, strongest, thinned
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, run_colours
+from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octave_maxima
 from spheretwin.viz.pages import html
-from spheretwin.viz.quantities import Array, ComparedQuantity
+from spheretwin.viz.quantities import Array, ScalarQuantity
 
-# The browser itself is told to ask no host for anything.
+# The browser is told to contact no host.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:;"
     " font-src data:; form-action 'none'; base-uri 'none'"
@@ -56,7 +56,7 @@ for (const button of document.querySelectorAll(".runs button")) {
 
 def page(
     title: str,
-    runs: Sequence[Run],
+    runs: Sequence[ComparedRun],
     over_time: plotly.Figure,
     spectra: plotly.Figure,
     above: str,
@@ -67,10 +67,10 @@ def page(
     Parameters
     ----------
     title : str
-    runs : sequence of Run
+    runs : sequence of ComparedRun
     over_time, spectra : Figure
     above, below : str
-        What stands above and below the figures, in Markdown.
+        Markdown above and below the figures.
     """
     figures = {"over-time": over_time, "spectra": spectra}
     content = ", ".join(f'"{name}": {figure.to_json()}' for name, figure in figures.items())
@@ -88,7 +88,7 @@ def page(
     return html.whole(title, "\n".join(body), head)
 
 
-def _switches(runs: Sequence[Run]) -> str:
+def _switches(runs: Sequence[ComparedRun]) -> str:
     colours = run_colours([run.law for run in runs])
     return "".join(
         f'<button type="button" data-run="{place}" aria-pressed="true" style="--run: {colour}">'
@@ -97,33 +97,33 @@ def _switches(runs: Sequence[Run]) -> str:
     )
 
 
-FAINT, INK, ASKED = "#e3e6ea", "#30343a", "#9aa1ab"
+FAINT, INK, REFERENCE_COLOUR = "#e3e6ea", "#30343a", "#9aa1ab"
 
 HEIGHT_px, GAP_px, MARGIN_px = 150, 26, 46
 
 
-class Panel(NamedTuple):
-    """One of them."""
+class PlotPanel(NamedTuple):
+    """Panel of a figure."""
 
     title: str
-    """With its unit."""
+    """Title with its unit."""
     traces: Sequence[Any]
     axis: dict[str, Any]
-    """What its vertical axis has beside the looks of all."""
+    """Properties of its vertical axis besides those of all panels."""
     height: float = 1.0
-    """Of that of an ordinary one."""
+    """Height relative to an ordinary panel."""
 
 
-def stacked(panels: Sequence[Panel], x: str, **axis: Any) -> plotly.Figure:
+def stacked(panels: Sequence[PlotPanel], x: str, **axis: Any) -> plotly.Figure:
     """Figure of panels.
 
     Parameters
     ----------
-    panels : sequence of Panel
+    panels : sequence of PlotPanel
     x : str
-        What the common axis is, with its unit.
+        Label of the common axis, with its unit.
     **axis
-        What it has beside the looks of all.
+        Properties of the axis besides the common ones.
     """
     inner_px = sum(panel.height * HEIGHT_px + GAP_px for panel in panels)
     figure, top = plotly.Figure(), 1.0
@@ -156,7 +156,7 @@ def stacked(panels: Sequence[Panel], x: str, **axis: Any) -> plotly.Figure:
 
 
 MOST_NUMBERS = 130_000
-"""In all lines; each takes five to six bytes of the page, beside the library's 4.8 MB."""
+"""Numbers in all lines; each takes five to six bytes of the page, in addition to the library's 4.8 MB."""
 
 MOST_POINTS, FEWEST_POINTS = 20_000, 300
 MOST_COLUMNS, MOST_CURRENTS = 500, 30_000
@@ -167,61 +167,65 @@ BLUE_TO_RED = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]]
 
 
 def over_time(
-    runs: Sequence[Run], leading: Sequence[int], quantities: Sequence[ComparedQuantity]
+    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[ScalarQuantity]
 ) -> plotly.Figure:
     """Figure of every quantity, the currents of each run and what happened.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of ComparedRun
     leading : sequence of int
-        Places of the runs that show what was asked for.
+        Places of the runs that show the reference.
     quantities : sequence of Quantity
     """
-    most = int(np.clip(points_each(runs, leading, quantities), FEWEST_POINTS, MOST_POINTS))
+    most = int(np.clip(points_per_line(runs, leading, quantities), FEWEST_POINTS, MOST_POINTS))
     colours = run_colours([run.law for run in runs])
     panels = []
     for quantity in quantities:
-        asked = [
-            _line(runs[place], place, quantity.desired(runs[place].rows), most, ASKED, 4.0)
+        reference_lines = [
+            _line(runs[place], place, quantity.desired(runs[place].rows), most, REFERENCE_COLOUR, 4.0)
             for place in leading
             if quantity.desired
         ]
         lines = [
-            _line(run, place, quantity.of(run.rows), most, colour, 1.3)
+            _line(run, place, quantity.values(run.rows), most, colour, 1.3)
             for place, (run, colour) in enumerate(zip(runs, colours, strict=True))
         ]
-        for trace in asked:
+        for trace in reference_lines:
             trace.hoverinfo, trace.hovertemplate = "skip", None
         axis = {"range": quantity.limits} if quantity.limits else {}
-        panels.append(Panel(_text(quantity.heading), [*asked, *lines], axis))
+        panels.append(PlotPanel(_text(quantity.heading), [*reference_lines, *lines], axis))
     panels += _currents(runs)
-    panels.append(_happened(runs, colours))
+    panels.append(_events(runs, colours))
     return stacked(panels, "time [s]")
 
 
-def points_each(runs: Sequence[Run], leading: Sequence[int], quantities: Sequence[ComparedQuantity]) -> int:
+def points_per_line(
+    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[ScalarQuantity]
+) -> int:
     """Points that each line may have."""
-    lines = sum(len(runs) + (len(leading) if each.desired else 0) for each in quantities)
+    lines = sum(len(runs) + (len(leading) if quantity.desired else 0) for quantity in quantities)
     return MOST_NUMBERS // max(lines, 1)
 
 
-def of_errors(runs: Sequence[Run], spectra: Sequence[Sequence[Spectrum]]) -> plotly.Figure:
+def error_spectra(runs: Sequence[ComparedRun], spectra: Sequence[Sequence[Spectrum]]) -> plotly.Figure:
     """Figure of the errors' spectra.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of ComparedRun
     spectra : sequence of sequence of Spectrum
-        Of each run, of each hinge.
+        Spectra of each run and each hinge.
     """
     colours, panels = run_colours([run.law for run in runs]), []
-    each = int(np.clip(LINES_OF_ALL // len(runs), FEWEST_LINES_EACH_OCTAVE, MOST_LINES_EACH_OCTAVE))
+    lines_per_octave = int(
+        np.clip(LINES_OF_ALL // len(runs), FEWEST_LINES_EACH_OCTAVE, MOST_LINES_EACH_OCTAVE)
+    )
     for axis, name in enumerate(ANGLES):
         traces = []
         for place, (colour, of_run) in enumerate(zip(colours, spectra, strict=True)):
             spectrum, look = of_run[axis], {"color": colour, "width": 1.3}
-            x, y = highest_by_octave(spectrum.frequency_Hz, spectrum.amplitude_mrad, each)
+            x, y = octave_maxima(spectrum.frequency_Hz, spectrum.amplitude_mrad, lines_per_octave)
             hover = "%{x:.4g} Hz: %{y:.3g} mrad<extra></extra>"
             traces.append(plotly.Scatter(x=_small(x), y=_small(y), mode="lines", line=look,
                                          meta=f"{place}", hovertemplate=hover))  # fmt: skip
@@ -229,16 +233,20 @@ def of_errors(runs: Sequence[Run], spectra: Sequence[Sequence[Spectrum]]) -> plo
             traces.append(plotly.Scatter(x=tops[0], y=tops[1], mode="markers", hoverinfo="skip",
                                          marker={"color": colour, "size": 8}, meta=f"{place}"))  # fmt: skip
         panels.append(
-            Panel(f"error of {name}, amplitude [mrad]", traces, {"type": "log", "exponentformat": "power"})
+            PlotPanel(
+                f"error of {name}, amplitude [mrad]", traces, {"type": "log", "exponentformat": "power"}
+            )
         )
     return stacked(panels, "frequency [Hz]", type="log")
 
 
-def _line(run: Run, place: int, values: Array, most: int, colour: str, width: float) -> plotly.Scatter:
-    few = thinned(values, most)
+def _line(
+    run: ComparedRun, place: int, values: Array, most: int, colour: str, width: float
+) -> plotly.Scatter:
+    few = decimate_extremes(values, most)
     return plotly.Scatter(
         x0=float(run.table["t_s"][0]),
-        dx=run.period_s * few.rows_each,
+        dx=run.period_s * few.stride,
         y=_small(few.values),
         mode="lines",
         line={"color": colour, "width": width},
@@ -247,41 +255,43 @@ def _line(run: Run, place: int, values: Array, most: int, colour: str, width: fl
     )
 
 
-def _currents(runs: Sequence[Run]) -> list[Panel]:
-    """Of each run a panel: a row a group, blue negative, red positive, on one scale."""
+def _currents(runs: Sequence[ComparedRun]) -> list[PlotPanel]:
+    """Return a panel for each run: a row for each group, blue negative, red positive, on one scale."""
     largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs)
     panels = []
     for place, run in enumerate(runs):
         groups = run.table["current_A"].shape[1]
-        few = strongest(run.table["current_A"], min(MOST_COLUMNS, MOST_CURRENTS // (groups * len(runs))))
-        step_s, hover = run.period_s * few.rows_each, "group %{y}: %{z:.3g} A<extra></extra>"
+        few = decimate_largest(
+            run.table["current_A"], min(MOST_COLUMNS, MOST_CURRENTS // (groups * len(runs)))
+        )
+        step_s, hover = run.period_s * few.stride, "group %{y}: %{z:.3g} A<extra></extra>"
         trace = plotly.Heatmap(z=_small(few.values.T), x0=float(run.table["t_s"][0]) + step_s / 2, dx=step_s,
                                colorscale=BLUE_TO_RED, zmin=-largest_A, zmax=largest_A, showscale=False,
                                meta=f"{place}", hovertemplate=hover)  # fmt: skip
         title = f"currents by group, up to ±{largest_A:.3g} A: {_text(run.label)}"
-        panels.append(Panel(title, [trace], {"autorange": "reversed", "dtick": max(1, groups // 6)}))
+        panels.append(PlotPanel(title, [trace], {"autorange": "reversed", "dtick": max(1, groups // 6)}))
     return panels
 
 
-def _happened(runs: Sequence[Run], colours: Sequence[str]) -> Panel:
+def _events(runs: Sequence[ComparedRun], colours: Sequence[str]) -> PlotPanel:
     """A row a run, a mark an event."""
     traces = []
     for place, (run, colour) in enumerate(zip(runs, colours, strict=True)):
-        times = [each[0] for each in run.events]
+        times = [event[0] for event in run.events]
         text = [_text(f"{t_s:.4g} s: {text}") for t_s, _, text in run.events]
         symbols = ["circle" if level == "INFO" else "triangle-up" for _, level, _ in run.events]
         traces.append(plotly.Scatter(x=times, y=[place + 1] * len(times), mode="markers", text=text,
                                      marker={"color": colour, "size": 9, "symbol": symbols},
                                      meta=f"{place}", hovertemplate="%{text}<extra></extra>"))  # fmt: skip
     axis = {"range": (len(runs) + 0.6, 0.4), "dtick": 1, "fixedrange": True}
-    return Panel("events, by run", traces, axis, height=0.25 + 0.15 * len(runs))
+    return PlotPanel("events, by run", traces, axis, height=0.25 + 0.15 * len(runs))
 
 
 def _small(values: Array) -> np.ndarray:
-    """In half the bytes: seven digits are more than a plot shows."""
+    """Halve the bytes: seven digits are more than a plot shows."""
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
 def _text(text: str) -> str:
-    """Text in which no tag is obeyed; quotes stay, which the library would show as they are written."""
+    """Escape all tags; quotes stay, because the library would show their escapes."""
     return escape(text, quote=False)

@@ -20,7 +20,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
         A heading for each column.
     rows : sequence of sequence of str
     numbers : sequence of bool
-        Whether each column is of figures, and so at the right.
+        Whether each column contains numbers, aligned at the right.
     """
     return [
         _row(head),
@@ -50,7 +50,7 @@ def prepare(folder: Path, *libraries: str) -> None:
     ----------
     folder : Path
     *libraries : str
-        What draws, beside matplotlib.
+        Libraries besides matplotlib.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing], *, vector: bool = F
     folder : Path
     drawings : iterable of Drawing
     vector : bool
-        Write each as SVG beside its PNG, too.
+        Write each as SVG too, next to its PNG.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing], *, vector: bool = F
 
 
 def save_text(path: Path, text: str) -> Path:
-    """Write a file, whole or not at all; returns its path.
+    """Write a file completely or not at all; return its path.
 
     Raises
     ------

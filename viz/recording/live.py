@@ -1,4 +1,4 @@
-"""Watching a run while it goes on: Rerun's web viewer, reachable from this machine alone."""
+"""Live view of a run: Rerun's web viewer, reachable from this machine only."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.decimation import Firsts
+from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.layout.layout import opening_layout
 from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.part import Subject
+from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.recording.viewer_server import Broadcast, ViewerServer
 from spheretwin.viz.rerun_internals import HEADER_BYTES, messages
 
-# More than a plot has pixels for; few enough for a viewer that draws in software.
+# More than the pixels of a plot; few enough for a viewer that renders in software.
 LIVE_RATE_Hz = 100.0
 
 # Recorded together: each entity costs some kilobytes each time, and a viewer that draws in software takes no
@@ -29,8 +29,8 @@ _TOGETHER_S = 0.25
 class LiveView(Stream):
     """Takes a run's telemetry chunk by chunk and shows it to any number of viewers.
 
-    None of them is waited for: they read what is kept in memory, which is bounded, and one that is too far
-    behind goes on with the newest. The page answers from the moment this is made.
+    The run waits for no viewer: viewers read a bounded buffer in memory, and one that is too far
+    behind continues with the newest data. The page answers as soon as the object exists.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class LiveView(Stream):
     def __init__(
         self, actuator: Actuator, signals: tuple[Signal, ...], facts: RunFacts, *, shown: str = OVERVIEW
     ) -> None:
-        subject = Subject(actuator, signals, facts, True, shown, uuid4().hex, LIVE_RATE_Hz)
-        super().__init__(subject, Firsts(LIVE_RATE_Hz))
+        subject = RecordingSubject(actuator, signals, facts, True, shown, uuid4().hex, LIVE_RATE_Hz)
+        super().__init__(subject, FirstRows(LIVE_RATE_Hz))
         self._together = max(1, round(_TOGETHER_S / facts.sections["controller"]["period_s"]))
         self._bytes = rr.binary_stream(self.recording)
         self._broadcast = Broadcast()
@@ -77,7 +77,7 @@ class LiveView(Stream):
         return self._together
 
     def send(self) -> None:
-        """Give viewers what was recorded since the last time."""
+        """Send viewers the data recorded since the last call."""
         encoded = self._bytes.read() or b""
         if not self._begun:
             self._begun = True
@@ -86,7 +86,7 @@ class LiveView(Stream):
             self._broadcast.send(piece)
 
     def complete(self) -> None:
-        """Serve nobody any more.
+        """Stop the server.
 
         Raises
         ------

@@ -20,17 +20,17 @@ from spheretwin.viz.layout.view import CHECKSUM, OVERVIEW, TIMELINE, TOTAL, View
 from spheretwin.viz.scene.static import size_of
 
 
-class Rows(Enum):
-    """Which rows of a run a part is given."""
+class RowSet(Enum):
+    """Set of rows that a part receives."""
 
     ALL = "all"
     """Every row, at once: for what thins them itself, or must not miss any."""
-    KEPT = "kept"
-    """Those that the recording keeps, whole; known some seconds later where it is thinned."""
+    SELECTED = "kept"
+    """Rows that the recording keeps, whole; with a reduced rate they are known some seconds later."""
 
 
-class Subject(NamedTuple):
-    """What is recorded."""
+class RecordingSubject(NamedTuple):
+    """Run to record, and options of the recording."""
 
     actuator: Actuator
     """Has as many groups as the telemetry has currents."""
@@ -38,17 +38,17 @@ class Subject(NamedTuple):
     """Columns of the telemetry at the start; a change of law may bring others."""
     facts: RunFacts
     live: bool = False
-    """Whether it is watched while it runs."""
+    """True if it is a live view."""
     shown: str = OVERVIEW
     """The view of it that is open at first."""
     run: str = ""
-    """What tells this recording from all others."""
+    """Identity of this recording."""
     rate_Hz: float | None = None
-    """Rows a second that are kept beside those that stand out; None for every row."""
+    """Rate of the rows that are kept besides the extremes; None for every row."""
 
     @property
     def view(self) -> View:
-        """What its layout is made for."""
+        """Properties of the run on which the layout depends."""
         return View(
             self.facts.duration_s,
             self.facts.current_limit_A,
@@ -61,23 +61,23 @@ class Subject(NamedTuple):
         )
 
 
-class Part:
-    """Logs nothing; a subclass says what it logs, and when.
+class RecordingPart:
+    """Part of a recording, which logs nothing; subclasses override the methods.
 
     Parameters
     ----------
-    subject : Subject
-        What is recorded.
+    subject : RecordingSubject
+        Run to record.
 
     Attributes
     ----------
-    rows : Rows
-        Which rows `write` is given.
+    rows : RowSet
+        Set of rows that `write` receives.
     """
 
-    rows: ClassVar[Rows] = Rows.ALL
+    rows: ClassVar[RowSet] = RowSet.ALL
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         self.subject = subject
 
     def begin(self, recording: rr.RecordingStream) -> None:
@@ -93,7 +93,7 @@ class Part:
         """Log how the run ended."""
 
     def close(self, recording: rr.RecordingStream) -> None:
-        """Log what is known when nothing else will be logged."""
+        """Log the totals at the end."""
 
 
 Index = list[rr.TimeColumn]
@@ -102,7 +102,7 @@ _SCALARS = next(iter(rr.Scalars.columns(scalars=np.zeros(1)))).component_descrip
 
 
 def time_index(t_s: NDArray[np.float64]) -> Index:
-    """Times in whole nanoseconds: Rerun would cut the fraction of seconds off, a nanosecond too early."""
+    """Return times in whole nanoseconds: Rerun would truncate seconds to a nanosecond too early."""
     return [rr.TimeColumn(TIMELINE, duration=nanoseconds(t_s).astype("timedelta64[ns]"))]
 
 
@@ -112,15 +112,15 @@ def nanoseconds(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
-    """What `rr.Scalars.columns` makes of (n, size) values, at half its price."""
+    """Return the result of `rr.Scalars.columns` for (n, size) values, at half of its cost."""
     batch = rr.components.ScalarBatch(values.ravel())
     return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
 
 
-class Struct:
+class StructComponent:
     """Values with named fields, as a component.
 
-    Rerun's own form for types that it does not know wants each name to have one type in a whole process,
+    Rerun's own form for unknown types requires one type for each name in a whole process,
     and runs differ in their signals.
     """
 
@@ -128,34 +128,34 @@ class Struct:
         self._array = pa.StructArray.from_arrays(list(fields.values()), list(fields))
 
     def as_arrow_array(self) -> pa.Array:
-        """What Rerun asks for."""
+        """Return the array; Rerun calls this."""
         return self._array
 
 
-class Numbers:
+class IntegerComponent:
     """Whole numbers as a component."""
 
     def __init__(self, values: Sequence[int] | NDArray[np.uint64]) -> None:
         self._array = pa.array(values, type=pa.uint64())
 
     def as_arrow_array(self) -> pa.Array:
-        """Return what Rerun asks for."""
+        """Return the array; Rerun calls this."""
         return self._array
 
 
 def checksums(values: NDArray[np.uint64]) -> rr.ComponentColumn:
     """Return the component with number and checksum of each line."""
-    return rr.ComponentColumn(CHECKSUM, Numbers(values))
+    return rr.ComponentColumn(CHECKSUM, IntegerComponent(values))
 
 
 def range_checksum(first: int, count: int, checksum: int) -> rr.ComponentColumn:
     """Return the component with the checksum of some rows, by the number of the first and their count."""
-    return rr.ComponentColumn(CHECKSUM, Numbers([first, count, checksum]), lengths=[3])
+    return rr.ComponentColumn(CHECKSUM, IntegerComponent([first, count, checksum]), lengths=[3])
 
 
 def total(count: int) -> rr.DescribedComponentBatch:
     """Return the component with the number of rows or lines of a complete recording."""
-    return rr.DescribedComponentBatch(Numbers([count]), rr.ComponentDescriptor(TOTAL))
+    return rr.DescribedComponentBatch(IntegerComponent([count]), rr.ComponentDescriptor(TOTAL))
 
 
 def vectors(values: NDArray[np.float64], size: int) -> pa.Array:
@@ -164,7 +164,7 @@ def vectors(values: NDArray[np.float64], size: int) -> pa.Array:
 
 
 def no_vectors(rows: int, size: int) -> pa.Array:
-    """What stands for (n, size) values where there are none."""
+    """Return a null array in place of (n, size) values."""
     return pa.nulls(rows, pa.list_(pa.float64(), size))
 
 

@@ -13,8 +13,8 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.decimation import Binned, Bins
-from spheretwin.viz.layout.extents import Picked, Survey, watched
+from spheretwin.viz.decimation import CompletedBins, TimeBins
+from spheretwin.viz.layout.extents import ColumnSelector, ExtentTracker, plotted_signals
 from spheretwin.viz.layout.layout import layout, opening_layout
 from spheretwin.viz.layout.plots import quantity_style
 from spheretwin.viz.layout.view import (
@@ -26,8 +26,8 @@ from spheretwin.viz.layout.view import (
     SUMMARY,
     derived,
 )
-from spheretwin.viz.quantities import ERROR_ANGLE, Kept, Rows, quantities_of
-from spheretwin.viz.recording.part import Part, Subject, scalars, time_index
+from spheretwin.viz.quantities import ERROR_ANGLE, Aggregation, QuantityRows, quantities_of
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.recording.status import Summary
 
 PHASE_PLANE_RATE_Hz = 20.0
@@ -38,12 +38,12 @@ SLIDING = "sliding_s"
 _FAR = 1e3
 
 
-class PhasePlane(Part):
-    """Points (s - ė, ė) of the axes, both in rad/s: with s = λe + ė (30) the first is λe, whatever λ is."""
+class PhasePlane(RecordingPart):
+    """Points (s - ė, ė) of the axes, both in rad/s: with s = λe + ė (30) the first is λe, for any λ."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
-        self._bins = Bins(PHASE_PLANE_RATE_Hz, at_once=subject.live)
+        self._bins = TimeBins(PHASE_PLANE_RATE_Hz, immediate=subject.live)
         self._axes_drawn = False
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
@@ -59,9 +59,9 @@ class PhasePlane(Part):
 
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:
         """Record the last bin."""
-        self._record(recording, self._bins.rest())
+        self._record(recording, self._bins.flush())
 
-    def _record(self, recording: rr.RecordingStream, binned: Binned | None) -> None:
+    def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
         if binned is None:
             return
         # Both coordinates of one moment: extremes of each would be a point that never was.
@@ -73,7 +73,7 @@ class PhasePlane(Part):
 
 def _log_axes(recording: rr.RecordingStream) -> None:
     ends = [[[-_FAR, 0], [_FAR, 0]], [[0, -_FAR], [0, _FAR]], [[-_FAR, -_FAR], [_FAR, _FAR]]]
-    colours = [theme.DESIRED_TRACE, theme.DESIRED_TRACE, theme.ASKED]
+    colours = [theme.DESIRED_TRACE, theme.DESIRED_TRACE, theme.COMMAND]
     axes = rr.LineStrips2D(ends, colors=colours, radii=rr.Radius.ui_points(0.5))
     points = rr.Points2D.from_fields(colors=theme.AXIS_COLOURS, radii=rr.Radius.ui_points(2.5))
     recording.log(PHASE_PLANE, axes, points, static=True)
@@ -108,31 +108,35 @@ QUANTITY_RATE_Hz = 25.0
 # A file has a layout before the one of its end from then on, in s of the clock: it takes some 100 kB.
 OPENED_AFTER_s = 2.0
 
-# After these ends there is nothing that was planned and did not come.
+# After these statuses the planned time has been run.
 _AS_PLANNED = (Status.COMPLETED, Status.RUNNING)
 
 
-class Quantities(Part):
-    """Of each bin of time what the quantity says of itself that matters."""
+class Quantities(RecordingPart):
+    """Derived quantities, aggregated in bins of time."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._quantities = quantities_of({signal.name for signal in subject.signals})
-        self._watched = watched(subject.signals)
-        self._picked = Picked(self._watched)
-        self._survey = Survey(
-            {**{quantity.name: quantity.size for quantity in self._quantities}, **self._watched}
+        self._plotted_signals = plotted_signals(subject.signals)
+        self._column_selector = ColumnSelector(self._plotted_signals)
+        self._extent_tracker = ExtentTracker(
+            {**{quantity.name: quantity.size for quantity in self._quantities}, **self._plotted_signals}
         )
-        averaged = [each.kept is Kept.MEAN for each in self._quantities for _ in range(each.size)]
-        self._averaged = np.array(averaged + [False] * sum(self._watched.values()))
-        self._bins = Bins(QUANTITY_RATE_Hz, at_once=subject.live)
+        averaged = [
+            quantity.aggregation is Aggregation.MEAN
+            for quantity in self._quantities
+            for _ in range(quantity.size)
+        ]
+        self._averaged = np.array(averaged + [False] * sum(self._plotted_signals.values()))
+        self._bins = TimeBins(QUANTITY_RATE_Hz, immediate=subject.live)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
-        self._begun_s: float | None = None  # of the clock, when the first rows came: all is compiled then
+        self._begun_s: float | None = None  # clock at the first rows: all is compiled then
         self._opened = False
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log how the quantities look, and for whoever watches what is known of the run from its start."""
+        """Log the styles of the quantities and, in a live view, the facts of the run."""
         for quantity in self._quantities:
             recording.log(derived(quantity.name), quantity_style(quantity), static=True)
         if self.subject.live:
@@ -142,26 +146,28 @@ class Quantities(Part):
         """Record what bins the rows of a chunk have completed."""
         self._open(recording)
         facts = self.subject.facts
-        given = Rows(rows, self._before or rows.rows(0, 1), self.subject.actuator, facts.current_limit_A)
+        given = QuantityRows(
+            rows, self._before or rows.rows(0, 1), self.subject.actuator, facts.current_limit_A
+        )
         with np.errstate(all="ignore"):  # of a run that diverged, the last rows may hold no numbers
             values = {quantity.name: quantity.values(given) for quantity in self._quantities}
         self._before = Table(rows.signals, rows.values[-1:].copy())
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
-        columns = np.concatenate([*values.values(), self._picked.of(rows)], axis=1)
+        columns = np.concatenate([*values.values(), self._column_selector.of(rows)], axis=1)
         self._record(recording, self._bins.add(rows["t_s"], columns))
 
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:
         """Record the last bin, and lay the recording out for what the run has shown."""
-        self._record(recording, self._bins.rest())
+        self._record(recording, self._bins.flush())
         _log_summary(recording, self._summary.ended(status))
         last_s = self._summary.last_s
         ended_s = None if status in _AS_PLANNED else last_s
         if ended_s is not None:
             log_end(recording, ended_s)
-        recording.send_blueprint(layout(self.subject.view, self._survey.seen(ended_s)))
+        recording.send_blueprint(layout(self.subject.view, self._extent_tracker.extents(ended_s)))
 
     def _open(self, recording: rr.RecordingStream) -> None:
-        """Lay a file out for whoever finds it without its end; most runs end before it could be killed."""
+        """Send a layout in case the process is killed; most runs end before that is necessary."""
         self._begun_s = self._begun_s or monotonic()
         if self._opened or self.subject.live or monotonic() - self._begun_s < OPENED_AFTER_s:
             return
@@ -169,21 +175,21 @@ class Quantities(Part):
         _log_summary(recording, self._summary.running())
         recording.send_blueprint(opening_layout(self.subject.view))
 
-    def _record(self, recording: rr.RecordingStream, binned: Binned | None) -> None:
+    def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
         if binned is None:
             return
         low, high = (np.where(self._averaged, binned.mean, bound) for bound in (binned.low, binned.high))
-        self._survey.add(binned.t_s, low, high)
+        self._extent_tracker.add(binned.t_s, low, high)
         t_s, both = binned.pairs()
-        drawn = {
-            Kept.BOTH: (time_index(t_s), both),
-            Kept.LEAST: (time_index(binned.t_s), binned.low),
-            Kept.GREATEST: (time_index(binned.t_s), binned.high),
-            Kept.MEAN: (time_index(binned.t_s), binned.mean),
+        columns = {
+            Aggregation.BOTH: (time_index(t_s), both),
+            Aggregation.LEAST: (time_index(binned.t_s), binned.low),
+            Aggregation.GREATEST: (time_index(binned.t_s), binned.high),
+            Aggregation.MEAN: (time_index(binned.t_s), binned.mean),
         }
         first = 0
         for quantity in self._quantities:
-            index, values = drawn[quantity.kept]
+            index, values = columns[quantity.aggregation]
             block = np.ascontiguousarray(values[:, first : first + quantity.size])
             recording.send_columns(derived(quantity.name), index, [scalars(block, quantity.size)])
             first += quantity.size
@@ -197,20 +203,20 @@ Array = NDArray[np.float64]
 
 CURRENT_MAP_RATE_Hz = 12.5
 
-# Of a row of the map, in points of the screen: rows of 18 groups touch in a panel of some 230 of them.
+# Height of a row of the map, in points of the screen: rows of 18 groups touch in a panel of some 230 of them.
 ROW_HEIGHT = 12.0
 
 # The bars' panel: as wide as this, as high as 1 between the limits.
 WIDTH = 2.0
 
 
-class Currents(Part):
-    """Of each bin of time each group's current of the largest magnitude."""
+class Currents(RecordingPart):
+    """Current of the largest magnitude of each group in each bin of time."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._groups = len(subject.actuator.groups)
-        self._bins = Bins(CURRENT_MAP_RATE_Hz, at_once=subject.live)
+        self._bins = TimeBins(CURRENT_MAP_RATE_Hz, immediate=subject.live)
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the names of the rows, the limits and the numbers of the bars."""
@@ -222,8 +228,8 @@ class Currents(Part):
         lines = rr.LineStrips2D(ends, colors=[theme.DESIRED_TRACE] * 3, radii=rr.Radius.ui_points(0.5))
         places = [[-0.05, -0.5], [-0.05, 0.5], *([x, 0.56] for x in self._places())]
         labels = [f"+{limit_A:g} A", f"-{limit_A:g} A", *map(str, range(self._groups))]
-        told = rr.Points2D(places, labels=labels, show_labels=True, radii=0.0, colors=[theme.PLAIN])
-        recording.log(CURRENT_BARS_STILL, lines, told, static=True)
+        captions = rr.Points2D(places, labels=labels, show_labels=True, radii=0.0, colors=[theme.PLAIN])
+        recording.log(CURRENT_BARS_STILL, lines, captions, static=True)
         bars = rr.LineStrips2D.from_fields(radii=0.3 * WIDTH / self._groups)
         recording.log(CURRENT_BARS, bars, static=True)
 
@@ -233,9 +239,9 @@ class Currents(Part):
 
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:
         """Record the last bin."""
-        self._record(recording, self._bins.rest())
+        self._record(recording, self._bins.flush())
 
-    def _record(self, recording: rr.RecordingStream, binned: Binned | None) -> None:
+    def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
         if binned is None:
             return
         current_A, index = binned.extremes(), time_index(binned.t_s)

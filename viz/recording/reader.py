@@ -1,4 +1,4 @@
-"""A recording read back: facts, telemetry bit for bit, events; of one that was not closed, what is whole."""
+"""Reader of recordings: facts, telemetry bit for bit, events; of an unclosed one all complete data."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class _Lines(NamedTuple):
 
 
 class Contents:
-    """What the chunks of a recording hold of its run; poses and colours are not read.
+    """Run data in the chunks of a recording; poses and colours are not read.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Contents:
         self._totals: dict[str, int] = {}
 
     def take(self, chunk: Chunk) -> None:
-        """Take what a chunk holds.
+        """Read the content of a chunk.
 
         Raises
         ------
@@ -117,16 +117,16 @@ class Contents:
         return bool(
             self._totals
             or self._ranges
-            or any(each.checksum for each in texts)
-            or any(each.checksums is not None for each in self._lines)
+            or any(text.checksum for text in texts)
+            or any(lines.checksums is not None for lines in self._lines)
         )
 
     @property
     def counts(self) -> dict[str, int]:
         """Rows of the telemetry and lines of the log, by entity."""
         return {
-            TELEMETRY: sum(len(each.t_ns) for each in self._rows),
-            EVENTS: sum(len(each.lines) for each in self._lines),
+            TELEMETRY: sum(len(rows.t_ns) for rows in self._rows),
+            EVENTS: sum(len(lines.lines) for lines in self._lines),
         }
 
     def facts(self) -> dict[str, Any]:
@@ -135,7 +135,7 @@ class Contents:
         Raises
         ------
         InputError
-            There are none, or they are not what was written.
+            There are none, or they are damaged.
         """
         if self._facts is None:
             raise InputError(
@@ -147,22 +147,22 @@ class Contents:
         return facts
 
     def table(self, *, ended: bool) -> Table:
-        """Return all rows by tick, NaN where a run had no such column.
+        """Return all rows by tick, NaN if a run had no such column then.
 
         Parameters
         ----------
         ended : bool
-            Whether the recording was closed: it has to state how many rows it has.
+            Whether the recording was closed: it must state its number of rows.
 
         Raises
         ------
         InputError
-            A row is not what was written, or is missing.
+            A row is damaged or missing.
         """
         signals = self._signals()
         if self.checked:
             self._check_ranges(signals, ended=ended)
-        ticks = np.unique(np.concatenate([each.t_ns for each in self._rows] or [np.empty(0, np.int64)]))
+        ticks = np.unique(np.concatenate([rows.t_ns for rows in self._rows] or [np.empty(0, np.int64)]))
         values = allocated(len(ticks), width(signals))
         values[:] = np.nan
         first = offsets(signals)
@@ -178,12 +178,12 @@ class Contents:
         Parameters
         ----------
         ended : bool
-            Whether the recording was closed: it has to state how many lines it has.
+            Whether the recording was closed: it must state its number of lines.
 
         Raises
         ------
         InputError
-            A line is not what was written, or is missing.
+            A line is damaged or missing.
         """
         if self.checked:
             self._check_line_numbers(ended=ended)
@@ -193,7 +193,7 @@ class Contents:
                 changed = np.flatnonzero(line_checksums(lines, first) != checksums)
                 if len(changed):
                     raise self._damaged(f"entity {EVENTS}, line {first + changed[0]}")
-        return [line for each in self._lines for line in each.lines]
+        return [line for lines in self._lines for line in lines.lines]
 
     # --- gathering
 
@@ -214,12 +214,12 @@ class Contents:
         if values:
             self._rows.append(_Rows(_times(batch), values))
         if CHECKSUM in batch.schema.names:
-            self._ranges += [_Range(*each) for each in batch.column(CHECKSUM).to_pylist() if each]
+            self._ranges += [_Range(*fields) for fields in batch.column(CHECKSUM).to_pylist() if fields]
 
     def _take_events(self, batch: pa.RecordBatch) -> None:
         self._take_total(EVENTS, batch)
         if TIMELINE in batch.schema.names:
-            levels, texts = (batch.column(f"TextLog:{each}").to_pylist() for each in ("level", "text"))
+            levels, texts = (batch.column(f"TextLog:{name}").to_pylist() for name in ("level", "text"))
             lines = [
                 (t_ns, level[0], text[0])
                 for t_ns, level, text in zip(_times(batch).tolist(), levels, texts, strict=True)
@@ -245,7 +245,7 @@ class Contents:
 
     def _check_line_numbers(self, *, ended: bool) -> None:
         """Refuse numbers with a gap, lines without numbers, and fewer than a closed recording states."""
-        present = [each.checksums for each in self._lines if each.checksums is not None]
+        present = [lines.checksums for lines in self._lines if lines.checksums is not None]
         if len(present) < len(self._lines):
             raise self._damaged(f"entity {EVENTS}, component {CHECKSUM}")
         numbers = np.sort(line_numbers(np.concatenate(present or [np.empty(0, np.uint64)])))
@@ -255,10 +255,10 @@ class Contents:
         self._check_total(EVENTS, len(numbers), ended=ended)
 
     def _check_ranges(self, signals: tuple[Signal, ...], *, ended: bool) -> None:
-        """Refuse rows that are not those of their checksums, and fewer than a closed recording states."""
+        """Refuse rows that do not match their checksums, and fewer rows than a closed recording states."""
         ranges = sorted(self._ranges)
-        ends = list(accumulate(each.rows for each in ranges))
-        if [each.first for each in ranges] != [0, *ends][: len(ranges)]:
+        ends = list(accumulate(row_range.rows for row_range in ranges))
+        if [row_range.first for row_range in ranges] != [0, *ends][: len(ranges)]:
             raise self._damaged(f"entity {TELEMETRY}, component {CHECKSUM}")
         place = number = checksum = 0
         for rows in self._rows:
@@ -281,14 +281,14 @@ class Contents:
 
     def _check_total(self, entity: str, count: int, *, ended: bool) -> None:
         if (ended or entity in self._totals) and self._totals.get(entity) != count:
-            raise self._damaged(f"entity {entity}, behind number {count - 1}")
+            raise self._damaged(f"entity {entity}, after number {count - 1}")
 
     def _values(self, rows: _Rows, signals: tuple[Signal, ...]) -> NDArray[np.float64]:
-        """Values of a chunk, signals in the order in which they came, as they were summed up."""
+        """Return the values of a chunk, signals in the order of arrival, as for the checksum."""
         present = tuple(signal for signal in signals if signal.name in rows.values)
         values = [rows.values[signal.name] for signal in present]
         known = len(present) == len(rows.values) and "t_s" in rows.values
-        if not known or [each.shape[1] for each in values] != [signal.size for signal in present]:
+        if not known or [columns.shape[1] for columns in values] != [signal.size for signal in present]:
             raise self._damaged(f"entity {TELEMETRY}, components {DESCRIBED}")
         with np.errstate(invalid="ignore"):  # a damaged time may be no number
             moved = np.flatnonzero(nanoseconds(rows.values["t_s"][:, 0]) != rows.t_ns)
@@ -298,7 +298,7 @@ class Contents:
 
     def _damaged(self, place: str) -> InputError:
         return InputError(
-            f"recording {self._path}: expected what was written, received something else in {place}:"
+            f"recording {self._path}: expected intact data, received other data in {place}:"
             " the file is damaged, or was changed by another program"
         )
 
@@ -309,7 +309,7 @@ def _text(batch: pa.RecordBatch, name: str) -> str:
 
 def _only(batch: pa.RecordBatch, name: str) -> Any:
     """The one value of a component; Rerun may put rows without it into the same chunk."""
-    (value,) = [each[0] for each in batch.column(name).to_pylist() if each]
+    (value,) = [entry[0] for entry in batch.column(name).to_pylist() if entry]
     return value
 
 
@@ -339,12 +339,12 @@ def _times(batch: pa.RecordBatch) -> NDArray[np.int64]:
     return np.asarray(batch.column(TIMELINE).cast(pa.int64()))
 
 
-# A recording has its times in whole nanoseconds.
+# Recordings have times in whole nanoseconds.
 _NS = 1e-9
 
 
 class Recorded(NamedTuple):
-    """What a recording says of its run."""
+    """Run data of a recording."""
 
     facts: dict[str, Any]
     """`RunFacts` as JSON has them, and versions."""
@@ -353,7 +353,7 @@ class Recorded(NamedTuple):
     events: list[Event]
     """Its log, in the order of time."""
     whole: bool
-    """Whether it was closed; else the process was killed, or its end cut off."""
+    """True if it was closed; otherwise the process was killed, or the end is missing."""
     checked: bool
     """True if it has checksums; they were compared."""
 
@@ -364,7 +364,7 @@ def read(path: Path) -> Recorded:
     Raises
     ------
     InputError
-        It is no recording of a run of this package, is damaged, or not one tick of it is whole.
+        It is no recording of a run of this package, is damaged, or has no complete tick.
     """
     return _read(path)[0]
 
@@ -378,7 +378,7 @@ def _read(path: Path) -> tuple[Recorded, Contents]:
         log = contents.log(ended=whole)
     period_s = float(facts["sections"]["controller"]["period_s"])
     if not len(table) and not whole:
-        raise InputError(f"recording {path}: expected a whole tick, received one that ends before its first")
+        raise InputError(f"recording {path}: expected at least one complete tick, received none")
     t_s = _exact(np.array([line[0] for line in log], dtype=np.float64), period_s)
     events = [(float(t), Level(level), text) for t, (_, level, text) in zip(t_s, log, strict=True)]
     events.sort(key=lambda event: event[0])
@@ -386,7 +386,7 @@ def _read(path: Path) -> tuple[Recorded, Contents]:
 
 
 def rewrite(path: Path, target: Path) -> Recorded:
-    """Write what is whole of a recording as one that is closed, with its layout; returns what it says.
+    """Write the complete data of a recording as a closed one, with its layout; return its run data.
 
     Raises
     ------
@@ -403,7 +403,7 @@ def rewrite(path: Path, target: Path) -> Recorded:
         recording.set_log_time_enabled(False)
         recording.set_sinks(rr.FileSink(temporary), default_blueprint=layout(view))
         recording.send_chunks(chunks)
-        if recorded.checked:  # a recording that is closed states how much it holds
+        if recorded.checked:  # a closed recording states its numbers of rows and lines
             for entity, count in contents.counts.items():
                 recording.log(entity, [total(count)], static=True)
         recording.flush()
@@ -424,19 +424,19 @@ def _chunks(path: Path) -> Iterator[tuple[Iterable[Chunk], bool]]:
 
     try:
         with whole_messages(path) as (readable, extent), warnings.catch_warnings():
-            warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # that it has no footer is told here
+            warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # a missing footer is reported here
             check_readable(readable, path)
             yield counted(RrdReader(readable).stream()), extent.ended
     except (SpheretwinError, KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # a panic inside Rerun is no `Exception`
-        told = shortened(without_breaks(error), LONGEST_WORD)
+        reason = shortened(without_breaks(error), LONGEST_WORD)
         place = f"chunk {done}" if done else "its footer or first chunk"
         raise InputError(
-            f"recording {path}: expected one of a run, received one that cannot be read in {place}: {told}"
+            f"recording {path}: expected one of a run, received one that cannot be read in {place}: {reason}"
         ) from None
 
 
 def _exact(t_ns: NDArray[np.float64], period_s: float) -> NDArray[np.float64]:
-    """Times of ticks from whole nanoseconds, to the last bit: sessions make them as products."""
+    """Return times of ticks from whole nanoseconds, exact to the last bit: sessions make them as products."""
     return np.round(t_ns * _NS / period_s) * period_s

@@ -12,26 +12,26 @@ from spheretwin.models.base.errors import InputError, SpheretwinError, without_b
 from spheretwin.models.base.files import OPEN_FILES, OutputFile, PartialFile
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.decimation import FirstsAndExtremes, Thinning
+from spheretwin.viz.decimation import FirstAndExtremeRows, RowSelection
 from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.part import Subject
+from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.rerun_internals import PIPE_PATHS, FilePipe
 
-# Rerun keeps some bytes of each chunk to the end of a recording. Chunks therefore grow with it, up to this.
+# Rerun keeps some bytes of each chunk until the end of a recording. Chunks therefore grow, up to this.
 MOST_ROWS = 12_288
 
-# How long a process that ends at once waits for each step of what is being recorded.
+# Time that an ending process waits for each step of the recording.
 PATIENCE_s = 2.0
 
 
 class Recorder(Stream):
     """Takes a run's telemetry chunk by chunk and writes it to a recording.
 
-    Every signal is recorded at the rate of the control ticks, or at a lower one with all that stands out
-    (`thinning.FirstsAndExtremes`), bit for bit; poses, coil colours and traces at 60 Hz; events and states
-    from all rows. The file appears under its name when the recording closes; until then it is hidden, under a
-    name of its own that ends in ``.part``.
+    Every signal is recorded at the rate of the control ticks, or at a lower one with all extremes
+    (`decimation.FirstAndExtremeRows`), bit for bit; poses, coil colours and traces at 60 Hz; events and
+    states from all rows. The file gets its name when the recording closes; until then it is hidden, under a
+    temporary name that ends in ``.part``.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ class Recorder(Stream):
     shown : str
         The view that is open at first, one of `VIEWS`.
     rate_Hz : float, optional
-        Rows a second that are kept beside those that stand out; every row unless given.
+        Rate of the rows that are kept besides the extremes; every row unless given.
 
     Raises
     ------
     InputError
-        A mesh of the model cannot be read, or no file can be put at `path`; nothing is left there.
+        A mesh of the model cannot be read, or no file can be written at `path`; no file remains there.
     """
 
     def __init__(
@@ -64,9 +64,9 @@ class Recorder(Stream):
         shown: str = OVERVIEW,
         rate_Hz: float | None = None,
     ) -> None:
-        thinning = FirstsAndExtremes(rate_Hz) if rate_Hz else Thinning()
-        subject = Subject(actuator, signals, facts, False, shown, uuid4().hex, rate_Hz)
-        super().__init__(subject, thinning)
+        row_selection = FirstAndExtremeRows(rate_Hz) if rate_Hz else RowSelection()
+        subject = RecordingSubject(actuator, signals, facts, False, shown, uuid4().hex, rate_Hz)
+        super().__init__(subject, row_selection)
         self._path = path
         self._output = OutputFile(path)
         self._pipe = _pipe_to(self._output) if PIPE_PATHS.is_dir() else None
@@ -92,7 +92,7 @@ class Recorder(Stream):
         return min(self.rows_handed_over // 4, MOST_ROWS)
 
     def send(self) -> None:
-        """Encode what was recorded here, beside the loop, rather than all at the end."""
+        """Encode the recorded data now, in this thread, rather than all at the end."""
         self.recording.flush()
 
     def complete(self) -> None:
@@ -101,7 +101,7 @@ class Recorder(Stream):
         Raises
         ------
         SpheretwinError
-            Some of the recording could not be made or written; what there is of it keeps ``.part``.
+            Some of the recording could not be made or written; the incomplete file keeps ``.part``.
         """
         try:
             self._complete()
@@ -117,7 +117,7 @@ class Recorder(Stream):
         if self.fault:
             raise SpheretwinError(
                 f"recording: {self._path} could not be completed, {self.fault};"
-                f" what there is of it is in {self._output.path}"
+                f" the incomplete recording is in {self._output.path}"
             )
         try:
             self._output.keep()

@@ -11,14 +11,14 @@ from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.recording.part import Part, Subject, strips, time_index
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, strips, time_index
 from spheretwin.viz.scene.meshes import COILS, FAILURE, FAILURE_TEXT, TORQUES, WORLD
 from spheretwin.viz.scene.motion import (
-    SHOWN,
+    TORQUE_STYLES,
     TRACES,
     LONGEST_m,
     METRES_PER_Nm,
-    Trace,
+    TipTrace,
     body_quaternions,
     gravity_torque,
     load_torque,
@@ -29,7 +29,7 @@ from spheretwin.viz.scene.static import labels, log_static, size_of
 FRAME_RATE_Hz = 60.0
 
 LARGEST_rad = 1e6
-"""Beyond it a pose is none any more, and its sine has no digits left."""
+"""Beyond it a pose is meaningless, and its sine has no correct digits."""
 
 
 class Frames:
@@ -38,7 +38,7 @@ class Frames:
     Parameters
     ----------
     rate_Hz : float
-        Of the frames.
+        Rate of the frames.
     """
 
     def __init__(self, rate_Hz: float = FRAME_RATE_Hz) -> None:
@@ -46,7 +46,7 @@ class Frames:
         self._next = 0
 
     def of(self, rows: Table) -> NDArray[np.bool_]:
-        """Whether each row of a chunk is drawn."""
+        """Return True for each row of a chunk that is drawn."""
         frame = np.floor(rows["t_s"] * self._rate_Hz + 1e-6).astype(np.int64)
         new = frame >= np.concatenate([[self._next], frame[:-1] + 1])
         self._next = max(self._next, int(frame[-1]) + 1)
@@ -54,20 +54,20 @@ class Frames:
 
 
 def posed(rows: Table) -> NDArray[np.bool_]:
-    """Whether each row has a pose; the last of a run that diverged may have none."""
+    """Return True for each row that has a pose; the last of a run that diverged may have none."""
     small: NDArray[np.bool_] = np.all(np.abs(rows["q_rad"]) < LARGEST_rad, axis=1)
     return small
 
 
-class MovingActuator(Part):
+class MovingActuator(RecordingPart):
     """Meshes, and of every frame the poses and the coils' colours."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._frames = Frames()
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log what keeps its shape."""
+        """Log the static parts."""
         log_static(recording, self.subject.actuator, self.subject.facts)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
@@ -92,10 +92,10 @@ class MovingActuator(Part):
 MARK_RADIUS_m, POLE_m = 0.006, 0.1
 
 
-class Ending(Part):
+class Ending(RecordingPart):
     """A mark at the shaft's tip from the last tick on, where that is a failure."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._t_s = 0.0
         self._q_rad = np.zeros((1, 3))
@@ -122,28 +122,28 @@ class Ending(Part):
             ),
         ]
         text = f"{status.replace('_', ' ')} at {self._t_s:.3f} s"
-        told = rr.Points3D.columns(
+        label = rr.Points3D.columns(
             positions=top, colors=[theme.FAILURE], radii=rr.Radius.ui_points(0.0), labels=[text]
         )
         index = time_index(np.array([self._t_s]))
         recording.send_columns(FAILURE, index, mark)
-        recording.send_columns(FAILURE_TEXT, index, told)
+        recording.send_columns(FAILURE_TEXT, index, label)
 
 
 RATE_Hz = 20.0
 
 
-class Torques(Part):
-    """Of the coils, of a payload's weight, and of the load where there is one."""
+class Torques(RecordingPart):
+    """Torques of the coils, of a payload's weight, and of the load if there is one."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._frames = Frames(RATE_Hz)
         self._gravity_m_s2 = _gravity(subject.facts)
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log names and colours; the load is the last, so that it can be left out."""
-        shown = [SHOWN[name] for name in ("coils", *self._weight(), "load")]
+        shown = [TORQUE_STYLES[name] for name in ("coils", *self._weight(), "load")]
         colours = [torque.colour for torque in shown]
         style = rr.Arrows3D.from_fields(colors=colours, radii=rr.Radius.ui_points(2.5))
         recording.log(TORQUES, style, labels([torque.label for torque in shown], colours), static=True)
@@ -161,13 +161,13 @@ class Torques(Part):
         torques.append(load_torque(q, load_Nm))
         metres = size_of(self.subject.actuator) * METRES_PER_Nm
         vectors = np.clip(metres * np.stack(torques, axis=1), -LONGEST_m, LONGEST_m)
-        drawn = np.ones(vectors.shape[:2], dtype=bool)
-        drawn[:, -1] = np.any(load_Nm != 0, axis=1)
-        count = drawn.sum(axis=1)
+        visible = np.ones(vectors.shape[:2], dtype=bool)
+        visible[:, -1] = np.any(load_Nm != 0, axis=1)
+        count = visible.sum(axis=1)
         columns = [
-            *rr.Arrows3D.columns(vectors=vectors[drawn]).partition(count),
+            *rr.Arrows3D.columns(vectors=vectors[visible]).partition(count),
             # Labels at the heads: the same numbers once more, which takes no bytes.
-            *rr.Points3D.columns(positions=vectors[drawn]).partition(count),
+            *rr.Points3D.columns(positions=vectors[visible]).partition(count),
             *rr.Transform3D.columns(translation=shaft_tip(q, self.subject.actuator)),
         ]
         recording.send_columns(TORQUES, time_index(rows["t_s"][new]), columns)
@@ -183,16 +183,16 @@ def _gravity(facts: RunFacts) -> NDArray[np.float64]:
     return np.array(mjcf.gravity(mjcf.read(facts.mjcf).described.opt))
 
 
-class Traces(Part):
-    """One short segment a frame; the view shows those of each trace's ages."""
+class Traces(RecordingPart):
+    """Traces of the tip: one short segment for each frame; the view shows those of each trace's ages."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._frames = {trace: Frames(trace.rate_Hz) for trace in TRACES}
-        self._last: dict[Trace, NDArray[np.float64]] = {}
+        self._last: dict[TipTrace, NDArray[np.float64]] = {}
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log what each trace looks like."""
+        """Log the style of each trace."""
         for trace in TRACES:
             width = rr.Radius.ui_points(trace.width)
             style = rr.LineStrips3D.from_fields(colors=[trace.colour], radii=width)
@@ -206,7 +206,7 @@ class Traces(Part):
                 self._send(recording, trace, rows["t_s"][new], rows[trace.signal][new])
 
     def _send(
-        self, recording: rr.RecordingStream, trace: Trace, t_s: NDArray[np.float64], q: NDArray[np.float64]
+        self, recording: rr.RecordingStream, trace: TipTrace, t_s: NDArray[np.float64], q: NDArray[np.float64]
     ) -> None:
         tips = shaft_tip(q, self.subject.actuator)
         before = np.concatenate([self._last.get(trace, tips[:1]), tips[:-1]])

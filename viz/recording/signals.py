@@ -1,4 +1,4 @@
-"""What a recording says for those who read it back: facts of the run, what each signal is."""
+"""Data for readers of a recording: facts of the run, descriptions and values of the signals."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.plots import LOOKS, signal_style
 from spheretwin.viz.layout.view import CHECKSUM, DESCRIBED, SCENARIO, STYLES, TELEMETRY, VALUES, component
 from spheretwin.viz.recording.part import (
-    Part,
-    Rows,
-    Struct,
-    Subject,
+    RecordingPart,
+    RecordingSubject,
+    RowSet,
+    StructComponent,
     no_vectors,
     range_checksum,
     time_index,
@@ -36,24 +36,24 @@ FACTS_CHECKSUM = f"{FACTS}_{CHECKSUM}"
 DESCRIBED_CHECKSUM = f"{DESCRIBED}_{CHECKSUM}"
 
 RATE = "record_rate_Hz"
-"""Among the facts: rows a second that are kept beside those that stand out; null for every row."""
+"""Among the facts: rate of the rows that are kept besides the extremes; null for every row."""
 
 
 def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
-    """Facts of a run from its start, the versions that it was made with, and the rate of the rows kept."""
+    """Return the facts of a run, the versions that made it, and the rate of the rows."""
     text = json.dumps({**asdict(facts), RATE: rate_Hz, "versions": versions()}, default=str)
     return rr.AnyValues(facts=text, facts_checksum=text_checksum(text))
 
 
 def signals_as_json(arrival: int, signals: Sequence[Signal]) -> list[rr.DescribedComponentBatch]:
-    """Signals that come together, in the order of their columns, and the checksum of their text."""
+    """Return signals that arrived together, in the order of their columns, and the checksum of their text."""
     text = json.dumps([asdict(signal) for signal in signals])
     texts = {DESCRIBED: text, DESCRIBED_CHECKSUM: text_checksum(text)}
     return [
         rr.DescribedComponentBatch(
-            rr.components.TextBatch(each), rr.ComponentDescriptor(component(kind, arrival))
+            rr.components.TextBatch(content), rr.ComponentDescriptor(component(kind, arrival))
         )
-        for kind, each in texts.items()
+        for kind, content in texts.items()
     ]
 
 
@@ -65,7 +65,7 @@ def signals_of(text: str) -> list[Signal]:
     ]
 
 
-class ScenarioText(Part):
+class ScenarioText(RecordingPart):
     """The resolved scenario."""
 
     def begin(self, recording: rr.RecordingStream) -> None:
@@ -91,12 +91,12 @@ def _as_markdown(facts: RunFacts) -> str:
 TIME = "t_s"
 
 
-class Signals(Part):
-    """Every column of the telemetry, all of a row together: a killed process leaves whole rows."""
+class Signals(RecordingPart):
+    """All columns of the telemetry, those of a row together: a killed process leaves complete rows."""
 
-    rows = Rows.KEPT
+    rows = RowSet.SELECTED
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._arrived: list[list[Signal]] = []
         self._rows = 0
@@ -122,36 +122,36 @@ class Signals(Part):
         recording.log(TELEMETRY, [total(self._rows)], static=True)
 
     def _check(self, recording: rr.RecordingStream, rows: Table) -> None:
-        """Record the checksum of the rows of a chunk, before them: none is ever without one."""
+        """Record the checksum of the rows of a chunk, before the rows: no row is ever without one."""
         sums = range_checksum(self._rows, len(rows), values_checksum(self._in_order(rows)))
         recording.send_columns(TELEMETRY, time_index(rows["t_s"][:1]), [sums])
         self._rows += len(rows)
 
     def _in_order(self, rows: Table) -> NDArray[np.float64]:
-        """Values of a chunk, signals in the order in which they came: a law may bring back earlier ones."""
+        """Return the values of a chunk, signals in order of arrival: a law may bring back earlier ones."""
         names = {signal.name for signal in rows.signals}
         order = [signal for arrived in self._arrived for signal in arrived if signal.name in names]
         if list(rows.signals) == order:
             return rows.values
-        return np.concatenate([rows[each.name].reshape(len(rows), -1) for each in order], axis=1)
+        return np.concatenate([rows[signal.name].reshape(len(rows), -1) for signal in order], axis=1)
 
     def _describe(self, recording: rr.RecordingStream, signals: tuple[Signal, ...]) -> None:
-        """Say of signals that come for the first time what they are; a change of law may bring some."""
+        """Describe signals that arrive for the first time, as after a change of law."""
         known = {signal.name for arrived in self._arrived for signal in arrived}
         new = [signal for signal in signals if signal.name not in known]
         if not new:
             return
         arrival = len(self._arrived)
         self._arrived.append(new)
-        styles = Struct({signal.name: _style(signal) for signal in new if signal.name != TIME})
-        drawn = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
-        recording.log(TELEMETRY, [*signals_as_json(arrival, new), drawn], static=True)
-        recording.flush()  # before their rows: what a killed process leaves says what they are
+        styles = StructComponent({signal.name: _style(signal) for signal in new if signal.name != TIME})
+        style_batch = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
+        recording.log(TELEMETRY, [*signals_as_json(arrival, new), style_batch], static=True)
+        recording.flush()  # before their rows: partial files describe their signals
 
 
-def _values(rows: Table, signals: list[Signal], names: set[str]) -> Struct:
-    """Values of signals that came together; none of those that the rows do not have any more."""
-    return Struct(
+def _values(rows: Table, signals: list[Signal], names: set[str]) -> StructComponent:
+    """Return the values of signals that arrived together; null for those that the rows no longer have."""
+    return StructComponent(
         {
             signal.name: vectors(rows[signal.name], signal.size)
             if signal.name in names
@@ -162,13 +162,13 @@ def _values(rows: Table, signals: list[Signal], names: set[str]) -> Struct:
 
 
 def _style(signal: Signal) -> pa.Array:
-    """How a signal's lines look: what `rr.SeriesLines` has of it, as lists in a struct."""
+    """Return the style of a signal's lines: properties of `rr.SeriesLines` as lists in a struct."""
     style = signal_style(signal)
     return pa.StructArray.from_arrays([_look(getattr(style, look)) for look in LOOKS], list(LOOKS))
 
 
 def _look(batch: rr.ComponentBatchLike | None) -> pa.Array:
-    """One list; none where the viewer may choose."""
+    """Return one list; null if the viewer may choose."""
     if batch is None:
         return pa.nulls(1, pa.list_(pa.uint8(), 1))
     values = batch.as_arrow_array()

@@ -15,7 +15,14 @@ from spheretwin.models.telemetry.status import QUIET_S, Event, Events, Level, St
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 from spheretwin.viz import theme
 from spheretwin.viz.layout.view import EVENTS, STATES, shown_until_s
-from spheretwin.viz.recording.part import Part, Subject, checksums, nanoseconds, time_index, total
+from spheretwin.viz.recording.part import (
+    RecordingPart,
+    RecordingSubject,
+    checksums,
+    nanoseconds,
+    time_index,
+    total,
+)
 
 
 class Lane(NamedTuple):
@@ -58,10 +65,10 @@ def _entity(signal: Signal, place: int) -> str:
     return "/".join(rr.escape_entity_path_part(name.replace(" ", "-")) for name in names)
 
 
-class States(Part):
+class StateLanes(RecordingPart):
     """Lanes of a timeline."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._changes = StateChanges()
         self._styled: set[str] = set()
@@ -78,16 +85,16 @@ class States(Part):
             recording.send_columns(entity, time_index(t_s), rr.StateChange.columns(state=states))
 
 
-class Log(Part):
+class Log(RecordingPart):
     """Lines of what the telemetry shows, and how the run ended."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._events = Events()
         self._lines = 0
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
-        """Log what is worth a line in a chunk."""
+        """Log the events of a chunk."""
         self._log(recording, self._events.of(rows))
 
     def note(self, recording: rr.RecordingStream, event: Event) -> None:
@@ -134,14 +141,14 @@ WITHIN, VOLTAGE, CURRENT, RANK = LEVELS = (
     "saturated",
     "rank lost",
 )
-"""From what holds nothing back to what holds back most."""
+"""From no limit to the most severe one."""
 
 Change = tuple[float, str]
 """Time in s, and the state from then on."""
 
 
-class Spells:
-    """Finds when a run is at a limit, chunk by chunk: pauses shorter than `QUIET_S` are none."""
+class LimitSpells:
+    """Finds the times at a limit, chunk by chunk; pauses shorter than `QUIET_S` are ignored."""
 
     def __init__(self) -> None:
         self._level = 0
@@ -149,7 +156,7 @@ class Spells:
         self._free_s = 0.0  # of the first tick after the last one at a limit
 
     def of(self, rows: Table) -> list[Change]:
-        """Changes that the rows of a chunk make sure of."""
+        """Return the changes that are certain after the rows of a chunk."""
         t_s, levels, changes = rows["t_s"], _levels(rows), []
         if self._free_s < self._last_s:  # the last row of the chunk before was at a limit
             self._free_s = float(t_s[0])
@@ -170,7 +177,7 @@ class Spells:
 
 
 def _levels(rows: Table) -> NDArray[np.int64]:
-    """What holds back most at each tick, as a place among `LEVELS`."""
+    """Return the most severe limit at each tick, as a place among `LEVELS`."""
     levels = np.zeros(len(rows), dtype=np.int64)
     if any(signal.name == "voltage_limited" for signal in rows.signals):
         levels[np.any(rows["voltage_limited"] > 0, axis=1)] = LEVELS.index(VOLTAGE)
@@ -179,18 +186,18 @@ def _levels(rows: Table) -> NDArray[np.int64]:
     return levels
 
 
-class Limits(Part):
+class LimitLanes(RecordingPart):
     """Logs both lanes."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
-        self._spells = Spells()
+        self._spells = LimitSpells()
         self._last_s = 0.0
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log colours, and how a run begins."""
         endings = {status.replace("_", " "): _colour(status) for status in Status}
-        levels = dict(zip(LEVELS, (theme.FINE, theme.BELIEVED, theme.WARNING, theme.FAILURE), strict=True))
+        levels = dict(zip(LEVELS, (theme.FINE, theme.ESTIMATE, theme.WARNING, theme.FAILURE), strict=True))
         for lane, colours in ((RUN, endings), (LIMITS, levels)):
             states = rr.StateConfiguration(values=list(colours), colors=list(colours.values()))
             recording.log(lane, states, static=True)
@@ -219,8 +226,8 @@ def _log(recording: rr.RecordingStream, lane: str, changes: list[Change]) -> Non
         recording.send_columns(lane, time_index(np.array(t_s)), rr.StateChange.columns(state=list(states)))
 
 
-# Axes, what was asked and what the controller believes have the same colours in every plot.
-KEY = "α red, β green, γ blue; white what was asked, amber what the controller takes for true"
+# Axes, commands and estimates have the same colours in every plot.
+KEY = "α red, β green, γ blue; white commands and references, amber measurements and estimates"
 
 
 class Summary:
@@ -229,7 +236,7 @@ class Summary:
     Parameters
     ----------
     facts : RunFacts
-        What is known from the start.
+        Facts of the run.
 
     Attributes
     ----------
@@ -251,31 +258,33 @@ class Summary:
         self._ticks += len(rows)
         self._saturated += int(np.count_nonzero(saturated(rows)))
         self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
-        told = error_deg[np.isfinite(error_deg)]  # the last rows of a run that diverged may hold no numbers
-        self._largest_deg = max(self._largest_deg, float(np.max(told, initial=0.0)))
-        self._squares += float(np.sum(told**2))
+        finite_deg = error_deg[
+            np.isfinite(error_deg)
+        ]  # the last rows of a run that diverged may hold no numbers
+        self._largest_deg = max(self._largest_deg, float(np.max(finite_deg, initial=0.0)))
+        self._squares += float(np.sum(finite_deg**2))
 
     def running(self) -> str:
-        """The line while the run goes on."""
-        return _told(f"{self._what()} — running")
+        """Return the line of a run in progress."""
+        return _with_colour_key(f"{self._run_text()} — running")
 
     def ended(self, status: Status) -> str:
         """The line once it has ended."""
         how = "completed" if status.level is Level.INFO else f"**{status.replace('_', ' ')}**"
         at = "" if status == Status.COMPLETED else f" at {self.last_s:.3g} s of {self._facts.duration_s:g} s"
         if not self._ticks:
-            return _told(f"{self._what()} — {how}")
+            return _with_colour_key(f"{self._run_text()} — {how}")
         lost = f"; rank lost {_percent(self._rank_lost / self._ticks)} of the time" if self._rank_lost else ""
         rms_deg = np.sqrt(self._squares / self._ticks)
-        return _told(
-            f"{self._what()} — {how}{at}; error largest **{self._largest_deg:.3g}°**, RMS **{rms_deg:.3g}°**;"
-            f" saturated {_percent(self._saturated / self._ticks)} of the time{lost}"
+        return _with_colour_key(
+            f"{self._run_text()} — {how}{at}; error largest **{self._largest_deg:.3g}°**,"
+            f" RMS **{rms_deg:.3g}°**; saturated {_percent(self._saturated / self._ticks)} of the time{lost}"
         )
 
-    def _what(self) -> str:
+    def _run_text(self) -> str:
         facts = self._facts
-        told = [f"**{facts.name}** under **{facts.law}**"]
-        told += [
+        parts = [f"**{facts.name}** under **{facts.law}**"]
+        parts += [
             f"{symbol} = {value:g}"
             for symbol, section, field in (
                 ("m", "plant", "modelling_error"),
@@ -284,12 +293,12 @@ class Summary:
             if isinstance(value := self._field(section, field), int | float)
         ]
         if facts.payload_kg:
-            told.append(f"payload {facts.payload_kg:g} kg")
+            parts.append(f"payload {facts.payload_kg:g} kg")
         if hardware := self._field("run", "hardware"):
-            told.append(f"{hardware} hardware")
+            parts.append(f"{hardware} hardware")
         if faults := self._field("run", "fault"):
-            told.append(f"{len(faults)} fault{'s' * (len(faults) > 1)} planned")
-        return " · ".join(told)
+            parts.append(f"{len(faults)} fault{'s' * (len(faults) > 1)} planned")
+        return " · ".join(parts)
 
     def _field(self, section: str, field: str) -> Any:
         return self._facts.sections.get(section, {}).get(field)
@@ -299,6 +308,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %" if 0 < share < 0.1 else f"{100 * share:.0f} %"
 
 
-def _told(line: str) -> str:
+def _with_colour_key(line: str) -> str:
     """The line, and below it what the colours mean."""
     return f"{line}\n\n{KEY}"

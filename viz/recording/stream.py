@@ -1,4 +1,4 @@
-"""What follows a run into Rerun: the parts of a recording, made by a thread of its own."""
+"""Stream of a run's telemetry to Rerun: the parts of a recording, made in a separate thread."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ import rerun as rr
 from spheretwin.models.base.errors import without_breaks
 from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.decimation import Thinning
+from spheretwin.viz.decimation import RowSelection
 from spheretwin.viz.layout.view import application
-from spheretwin.viz.recording.part import Part, Rows, Subject
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSet
 from spheretwin.viz.recording.plots import Currents, PhasePlane, Quantities
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
 from spheretwin.viz.recording.signals import ScenarioText, Signals
-from spheretwin.viz.recording.status import Limits, Log, States
+from spheretwin.viz.recording.status import LimitLanes, Log, StateLanes
 from spheretwin.viz.scene.meshes import read_meshes
 
-PARTS: tuple[type[Part], ...] = (
+PARTS: tuple[type[RecordingPart], ...] = (
     ScenarioText,
     Signals,
     MovingActuator,
     Traces,
     Torques,
     Ending,
-    States,
-    Limits,
+    StateLanes,
+    LimitLanes,
     Log,
     Currents,
     PhasePlane,
@@ -47,26 +47,26 @@ PENDING_CHUNKS = 3
 
 
 class Stream(ABC):
-    """Takes a run's telemetry chunk by chunk, and makes its recording in a thread beside the simulation.
+    """Receives a run's telemetry chunk by chunk, and makes its recording in a separate thread.
 
-    The thread leaves the interpreter free while the compiled loop runs. What goes wrong in it ends the
-    recording and is told when the recording closes, so that the run itself goes on.
+    The thread leaves the interpreter free while the compiled loop runs. An error in it ends the
+    recording and is reported when the recording closes; the run itself continues.
 
     Parameters
     ----------
-    subject : Subject
-        What is recorded.
-    thinning : Thinning
-        Which rows are kept for the parts that do not need all.
+    subject : RecordingSubject
+        Run to record.
+    row_selection : RowSelection
+        Selects the rows for the parts that do not need all.
 
     Attributes
     ----------
     view : View
-        What the layout is made for.
+        Properties of the run on which the layout depends.
     recording : rr.RecordingStream
-        What the parts are recorded into.
+        Recording that the parts write.
     fault : str or None
-        What went wrong in the thread.
+        Error of the thread.
     rows_handed_over : int
         To the thread, so far.
 
@@ -76,7 +76,7 @@ class Stream(ABC):
         A mesh of the model cannot be read.
     """
 
-    def __init__(self, subject: Subject, thinning: Thinning) -> None:
+    def __init__(self, subject: RecordingSubject, row_selection: RowSelection) -> None:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
         read_meshes(
             subject.facts.mjcf
@@ -86,7 +86,7 @@ class Stream(ABC):
         self.recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.fault: str | None = None
         self.rows_handed_over = 0
-        self._parts, self._thinning = [part(subject) for part in PARTS], thinning
+        self._parts, self._row_selection = [part(subject) for part in PARTS], row_selection
         self._waiting: list[Table] = []
         self._closed = False
         self._handing_over = Lock()
@@ -95,7 +95,7 @@ class Stream(ABC):
 
     @abstractmethod
     def connect(self) -> None:
-        """Say where the recording goes, before anything is in it."""
+        """Set the destination of the recording, before any data."""
 
     @abstractmethod
     def due(self) -> int:
@@ -103,16 +103,16 @@ class Stream(ABC):
 
     @abstractmethod
     def send(self) -> None:
-        """Send on what was recorded since the last time."""
+        """Send the data recorded since the last call."""
 
     @abstractmethod
     def complete(self) -> None:
-        """End where the recording goes, after all that is in it.
+        """Close the destination of the recording, after all data.
 
         Raises
         ------
         SpheretwinError
-            Some of the recording could not be made or kept.
+            Some of the recording could not be made or saved.
         """
 
     def __enter__(self) -> Stream:
@@ -140,17 +140,17 @@ class Stream(ABC):
 
     def finish(self, status: Status) -> None:
         """Record how the run ended."""
-        ending = named(status)  # a name that is none is told here, not in the recorder's thread
+        ending = named(status)  # an invalid name is refused here, not in the recorder's thread
         self._hand_over()
         self._submit(self._finish, ending)
 
     def close(self) -> None:
-        """Complete the recording. A second time does nothing.
+        """Complete the recording. A second call does nothing.
 
         Raises
         ------
         SpheretwinError
-            Some of it could not be made or kept.
+            Some of it could not be made or saved.
         """
         if self._closed:
             return
@@ -161,11 +161,11 @@ class Stream(ABC):
         self.complete()
 
     def begin(self) -> None:
-        """Have the thread record all that stays the same; nothing else is recorded before."""
+        """Let the thread record the static data first."""
         self._submit(self._begin)
 
     def _hand_over(self) -> None:
-        """Give what is waiting to the worker as one chunk."""
+        """Give the waiting rows to the worker as one chunk."""
         with self._handing_over:
             if not self._waiting:
                 return
@@ -202,9 +202,9 @@ class Stream(ABC):
         self.send()
 
     def _write(self, rows: Table) -> None:
-        self._write_kept(self._thinning.take(rows))
+        self._write_selected(self._row_selection.add(rows))
         for part in self._parts:
-            if part.rows == Rows.ALL:
+            if part.rows == RowSet.ALL:
                 part.write(self.recording, rows)
         self.send()
 
@@ -213,19 +213,19 @@ class Stream(ABC):
             part.note(self.recording, event)
 
     def _write_rest(self) -> None:
-        self._write_kept(self._thinning.rest())
+        self._write_selected(self._row_selection.flush())
         for part in self._parts:
             part.close(self.recording)
         self.send()
 
-    def _write_kept(self, kept: list[Table]) -> None:
-        for rows in kept:
+    def _write_selected(self, selected: list[Table]) -> None:
+        for rows in selected:
             for part in self._parts:
-                if part.rows == Rows.KEPT:
+                if part.rows == RowSet.SELECTED:
                     part.write(self.recording, rows)
 
     def _finish(self, ending: Status) -> None:
-        self._write_kept(self._thinning.rest())
+        self._write_selected(self._row_selection.flush())
         for part in self._parts:
             part.finish(self.recording, ending)
         self.send()

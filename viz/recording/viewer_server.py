@@ -1,4 +1,4 @@
-"""What a browser on this machine asks for: the viewer's files, and the recording as it grows."""
+"""Server for a browser on this machine: the viewer's files, and the growing recording."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ import rerun_cli
 
 from spheretwin.models.base.errors import SpheretwinError, without_breaks
 
-# Kept for viewers that come late; the oldest make room first.
+# Kept for viewers that connect late; the oldest pieces are dropped first.
 KEPT_BYTES = 200 << 20
 
-# A reader that is farther behind goes on with the newest: what it shows is to be of now.
+# A reader that is farther behind continues with the newest piece: a live view shows the present.
 BEHIND_BYTES = 8 << 20
 
 
 class Broadcast:
-    """Pieces of a recording, each of whole messages, in memory that is bounded.
+    """Pieces of a recording, each of complete messages, in bounded memory.
 
     Parameters
     ----------
     kept_bytes : int
-        Of pieces, beside what every reader needs; at least the newest is kept.
+        Bytes of pieces, besides those that every reader needs; at least the newest is kept.
     behind_bytes : int
-        How far a reader may be behind.
+        Bytes that a reader may be behind.
     """
 
     def __init__(self, kept_bytes: int = KEPT_BYTES, behind_bytes: int = BEHIND_BYTES) -> None:
@@ -56,7 +56,7 @@ class Broadcast:
             self._changed.notify_all()
 
     def send(self, piece: bytes) -> None:
-        """Give what comes next."""
+        """Send the next piece."""
         with self._changed:
             self._pieces.append((self._sent_bytes, piece))
             self._sent_bytes += len(piece)
@@ -66,23 +66,23 @@ class Broadcast:
             self._changed.notify_all()
 
     def end(self) -> None:
-        """Nothing more comes."""
+        """End the broadcast."""
         with self._changed:
             self._ended = True
             self._changed.notify_all()
 
     def read(self) -> Iterator[bytes]:
-        """What every reader needs, what is kept, and then what comes, to the end.
+        """Yield the first bytes, the pieces that are kept, and then new pieces, to the end.
 
-        A reader that falls behind after it has caught up with what was kept lacks what is between.
+        A reader that falls behind after it has read the kept pieces misses those between.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._first is not None or self._ended)
             first, place, late = self._first, self._dropped, self._count
         if first is not None:
             yield first
-        while (found := self._next(place, late)) is not None:
-            place, piece = found
+        while (result := self._next(place, late)) is not None:
+            place, piece = result
             yield piece
 
     @property
@@ -91,7 +91,7 @@ class Broadcast:
         return self._dropped + len(self._pieces)
 
     def _next(self, place: int, late: int) -> tuple[int, bytes] | None:
-        """The piece at a place, or a newer one, and the place behind it; None where nothing more comes."""
+        """Return the piece at a place, or a newer one, and the next place; None after the end."""
         with self._changed:
             self._changed.wait_for(lambda: place < self._count or self._ended)
             if place == self._count:
@@ -107,10 +107,10 @@ HOST = "127.0.0.1"
 INDEX = "/index.html"
 FILES = (INDEX, "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
 
-# Its program is large, and where nothing of it is in the machine's cache it has to be read first.
+# The program is large, and has to be read from the disk first if the machine's cache is empty.
 _PATIENCE_S = 60.0
 
-# Without this, it asks its makers' server for the number of its latest release, and tells it what is opened.
+# Without this, the viewer asks Rerun's server for the latest release, and reports what is opened.
 _GUARD = """<script>
       const ask = window.fetch;
       window.fetch = (what, options) =>
@@ -121,7 +121,7 @@ _GUARD = """<script>
     """
 _OUTSIDE = re.compile(r"<link\b[^>]*https://[^>]*>\s*")
 
-# Ends the program as soon as whoever wanted its files is gone, even by SIGKILL: then its input ends.
+# Ends the program as soon as the process that needs its files ends, even by SIGKILL: its input ends then.
 _SUPERVISED = """
 import os, subprocess, sys, threading
 program = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
@@ -139,12 +139,12 @@ class Asset(NamedTuple):
 
 
 def read_assets() -> dict[str, Asset]:
-    """Files of the viewer by their paths; the program that holds them runs as long as this takes.
+    """Return the files of the viewer by their paths; the program that contains them runs meanwhile.
 
     Raises
     ------
     SpheretwinError
-        The program is missing or gives none.
+        The program is missing or does not serve them.
     """
     program = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
     if not program.is_file():
@@ -155,7 +155,7 @@ def read_assets() -> dict[str, Asset]:
     try:
         with subprocess.Popen(
             [sys.executable, "-I", "-S", "-c", _SUPERVISED, str(program), *options],
-            env={**os.environ, "CI": "1", "RUST_LOG": "off"},  # in a CI it keeps no statistics of its use
+            env={**os.environ, "CI": "1", "RUST_LOG": "off"},  # in a CI it collects no statistics
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -166,7 +166,7 @@ def read_assets() -> dict[str, Asset]:
         raise SpheretwinError(
             f"viewer: expected the files of Rerun's viewer, {without_breaks(error)}"
         ) from None
-    return {**assets, INDEX: _kept_here(assets[INDEX])}
+    return {**assets, INDEX: _without_requests(assets[INDEX])}
 
 
 def _read(port: int, path: str, process: subprocess.Popen[bytes]) -> Asset:
@@ -184,8 +184,8 @@ def _read(port: int, path: str, process: subprocess.Popen[bytes]) -> Asset:
             time.sleep(0.01)
 
 
-def _kept_here(index: Asset) -> Asset:
-    """The page without fonts of another host, and with its own requests kept on this one."""
+def _without_requests(index: Asset) -> Asset:
+    """Return the page without fonts of other hosts, and with requests to this host only."""
     text = _OUTSIDE.sub("", index.content.decode())
     return index._replace(content=text.replace("<script>", f"{_GUARD}<script>", 1).encode())
 
@@ -198,7 +198,7 @@ def _free_port() -> int:
 
 RECORDING = "/live.rrd"
 
-# The browser itself refuses whatever a page of this server asks of another host.
+# The browser refuses any request of a page of this server to another host.
 POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline';"
     " connect-src 'self' data: blob:; img-src 'self' data: blob:; worker-src 'self' blob:"
@@ -213,7 +213,7 @@ class ViewerServer:
     Parameters
     ----------
     recording : Broadcast
-        What the viewer is to show.
+        Recording for the viewer.
 
     Raises
     ------
@@ -243,13 +243,13 @@ class ViewerServer:
         return f"http://{HOST}:{self._server.server_port}/"
 
     def close(self) -> None:
-        """Serve nobody any more."""
+        """Stop the server."""
         self._server.shutdown()
         self._server.server_close()
 
 
 class _Server(ThreadingHTTPServer):
-    """Answers each request in a thread that nobody waits for: a viewer may take nothing for ever."""
+    """Answers each request in a separate thread, not waited for: a viewer may never read its answer."""
 
     daemon_threads = True
     block_on_close = False
@@ -259,14 +259,14 @@ class _Server(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """One request; a subclass says what there is."""
+    """Handler of one request; a subclass defines the content."""
 
     def answer(self, path: str) -> None:
         """Answer a request for a path."""
         raise NotImplementedError
 
     def do_GET(self) -> None:
-        """Answer, unless a page of another host asks under a name of its own for this one."""
+        """Answer, unless a page of another host sent the request under another name of this host."""
         here = f"{HOST}:{self.connection.getsockname()[1]}"
         path, _, query = self.path.partition("?")
         with suppress(OSError):  # the viewer was closed

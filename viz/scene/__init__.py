@@ -1,1 +1,1 @@
-"""The actuator as it is drawn in 3D: its meshes, where they are, and what is drawn beside them."""
+"""Scene of the actuator in 3D: meshes, static parts and motion."""

@@ -23,7 +23,7 @@ from spheretwin.viz.scene.solids import merged_surface, revolved_surface
 
 MEDIA_TYPE = "model/gltf-binary"
 
-# Of the format: what its numbers mean.
+# Codes of the format.
 _FLOAT, _SHORT, _INT = 5126, 5123, 5125
 _MAGIC, _VERSION = b"glTF", 2
 _JSON, _BINARY = b"JSON", b"BIN\0"
@@ -31,7 +31,7 @@ _HEADER_BYTES = 12
 
 
 def binary(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> bytes:
-    """One mesh without normals, as glTF has it: the viewer shades each triangle by its own.
+    """Return one mesh without normals in glTF: the viewer shades each triangle by its own normal.
 
     Parameters
     ----------
@@ -73,20 +73,20 @@ def _chunk(kind: bytes, contents: bytes) -> bytes:
 
 
 def _padded(contents: bytes, filling: bytes = b"\0") -> bytes:
-    """To whole words of four bytes."""
+    """Pad to whole words of four bytes."""
     return contents + filling * (-len(contents) % 4)
 
 
-# What a coil looks like beside its numbers: a winding between two flanges.
+# Shape of a coil besides its dimensions: a winding between two flanges.
 SECTIONS = 14
 FLANGE_SHARE = 0.07  # of the length
 RECESS_SHARE = 0.12  # of the winding's depth
 
 
 def coil_mesh(coil: CoilGeometry, centres: Array, axes: Array, places: list[int], count: int) -> rr.Mesh3D:
-    """All coils as one mesh; each looks up its own pixel of a texture, whose bytes then change over time.
+    """Return all coils as one mesh; each has its pixel of a texture, whose bytes change over time.
 
-    Of the ways to colour dozens of coils at 60 Hz this is the cheapest that keeps their shape: a mesh entity
+    This is the fastest way to colour dozens of coils at 60 Hz without changing their shape: a mesh entity
     for each costs the viewer three times as long a frame.
 
     Parameters
@@ -94,18 +94,20 @@ def coil_mesh(coil: CoilGeometry, centres: Array, axes: Array, places: list[int]
     coil : Coil
         Its radii and its length.
     centres : (n, 3) array, m
-        Where coils are drawn.
+        Centres of the coils.
     axes : (n, 3) array
         Unit vectors along them.
     places : list of int
         Each one's place among the actuator's coils.
     count : int
-        How many the actuator has.
+        Number of the actuator's coils.
     """
     one = revolved_surface(_outline(coil), SECTIONS)
-    drawn = [one.placed(_turned_to(axis), centre) for axis, centre in zip(axes, centres, strict=True)]
+    coil_surfaces = [
+        one.placed(_rotation_to(axis), centre) for axis, centre in zip(axes, centres, strict=True)
+    ]
     pixel = np.repeat((np.array(places) + 0.5) / count, len(one.positions))
-    whole = merged_surface(drawn)
+    whole = merged_surface(coil_surfaces)
     return rr.Mesh3D.from_fields(
         vertex_positions=whole.positions,
         vertex_normals=whole.normals,
@@ -127,7 +129,7 @@ def _outline(coil: CoilGeometry) -> list[tuple[float, float]]:
     return [*below, *above, below[0]]
 
 
-def _turned_to(axis: Array) -> Array:
+def _rotation_to(axis: Array) -> Array:
     """A rotation that takes z to a unit vector: its columns."""
     aside = np.eye(3)[np.argmin(np.abs(axis))]
     x = np.cross(aside, axis)
@@ -155,15 +157,15 @@ FRAME = "frame"
 """Name of a mesh that has that of its body."""
 
 DECIMALS = 7
-"""Of vertices in m: what a mesh file holds, and equal where they were equal there, which compresses."""
+"""Decimals of vertices in m: those of a mesh file; equal vertices stay equal, which compresses."""
 
 
 ROUNDING = 1e-12
-"""Of a pose that the engine has turned to a mesh's own axes and back."""
+"""Error of a pose that the engine has rotated to a mesh's own axes and back."""
 
 
 class Piece(NamedTuple):
-    """What is drawn under one name: copies of one mesh."""
+    """Copies of one mesh with one name."""
 
     positions: Array  # (n, 3) m, as in the mesh's file
     triangles: NDArray[np.int64]  # (m, 3), counter-clockwise from outside
@@ -172,29 +174,29 @@ class Piece(NamedTuple):
     translations: Array  # (copies, 3) m
 
     def archetypes(self) -> list[rr.Asset3D | rr.InstancePoses3D]:
-        """In the form in which a recording takes it: without poses where its body carries one as it is."""
+        """Return the archetypes of a recording: without poses if the mesh has the pose of its body."""
         contents = binary(self.positions, self.triangles)
         asset = rr.Asset3D(contents=contents, media_type=MEDIA_TYPE, albedo_factor=self.colour)
-        if self._lies_as_in_its_file():
+        if self._has_identity_pose():
             return [asset]
         return [asset, rr.InstancePoses3D(translations=self.translations, mat3x3=self.rotations)]
 
-    def _lies_as_in_its_file(self) -> bool:
+    def _has_identity_pose(self) -> bool:
         one = len(self.rotations) == 1 and np.allclose(self.rotations[0], np.eye(3), rtol=0, atol=ROUNDING)
         return one and np.allclose(self.translations, 0.0, rtol=0, atol=ROUNDING)
 
 
 class Meshes(NamedTuple):
-    """What is drawn of a model."""
+    """Meshes of a model."""
 
     coils: rr.Mesh3D | None
-    """All of them, turned from their numbers; None where the model draws none."""
+    """All coils in one mesh, from their dimensions; None if the model draws none."""
     others: dict[str, Piece]
-    """By entity."""
+    """Pieces by entity."""
 
 
-class Look(NamedTuple):
-    """What copies of one thing have in common."""
+class MeshLook(NamedTuple):
+    """Common properties of copies."""
 
     body: int
     mesh: int
@@ -203,7 +205,7 @@ class Look(NamedTuple):
 
 
 def read_meshes(mjcf: Path) -> Meshes:
-    """Read what is drawn of a model, which a run does without; once while no file that it names has changed.
+    """Read the meshes of a model, which a run does not need; once while no file that it names has changed.
 
     A piece is a mesh of a body in one colour, named after the mesh. Poles are named and coloured by their
     polarity.
@@ -220,18 +222,18 @@ def read_meshes(mjcf: Path) -> Meshes:
 def _meshes(mjcf: Path, _: str) -> Meshes:
     mujoco.mj_clearCache(mujoco.mj_getCache())  # it misses a mesh edited within a second
     try:
-        # Not `models.mjcf.read`: it leaves out what is only drawn, which is all that is wanted here.
+        # not `models.mjcf.read`: it leaves out visual meshes, the only ones needed here
         with compiler_warnings():  # a run has them from there
             model = mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as error:
         raise InputError(
             f"model {mjcf}: expected meshes that can be drawn, {without_breaks(error)}"
         ) from None
-    mujoco.mj_clearCache(mujoco.mj_getCache())  # 12 MB of meshes that nobody reads again
+    mujoco.mj_clearCache(mujoco.mj_getCache())  # 12 MB of meshes that are not read again
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     coils: list[int] = []
-    others: dict[Look, list[int]] = defaultdict(list)
+    others: dict[MeshLook, list[int]] = defaultdict(list)
     for geom in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH).tolist():
         if model.geom(geom).name.startswith("coil_"):
             coils.append(geom)
@@ -239,7 +241,7 @@ def _meshes(mjcf: Path, _: str) -> Meshes:
             others[_look(model, data, geom)].append(geom)
     pieces: dict[str, Piece] = {}
     for look, geoms in others.items():
-        pieces[_free(_entity(model, look), pieces)] = _piece(model, data, look, geoms)
+        pieces[_unused_name(_entity(model, look), pieces)] = _piece(model, data, look, geoms)
     return Meshes(_coils(model, data, coils, mjcf) if coils else None, pieces)
 
 
@@ -252,32 +254,32 @@ def _coils(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], mjcf: P
     return coil_mesh(coil, data.site_xpos[at], axes, places, len(sites))
 
 
-def _look(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Look:
+def _look(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> MeshLook:
     body, mesh = int(model.geom_bodyid[geom]), int(model.geom_dataid[geom])
     if model.geom(geom).name.startswith("pole_"):
         poles = _sites(model, "pole_")
         polarity = model.site_user[poles[_nearest(data, geom, poles)], 0]
-        return Look(body, mesh, *POLES[int(polarity)])
+        return MeshLook(body, mesh, *POLES[int(polarity)])
     name = model.mesh(mesh).name
     red, green, blue = (round(255 * share) for share in model.geom_rgba[geom, :3].tolist())
-    return Look(body, mesh, FRAME if name == model.body(body).name else name, (red, green, blue))
+    return MeshLook(body, mesh, FRAME if name == model.body(body).name else name, (red, green, blue))
 
 
-def _entity(model: mujoco.MjModel, look: Look) -> str:
-    """Below the body that carries it: what is fixed to a moving body moves with it."""
+def _entity(model: mujoco.MjModel, look: MeshLook) -> str:
+    """Return an entity below the body that carries it: parts fixed to a moving body move with it."""
     own = model.body(look.body).name or f"body{look.body}"
     carrier = model.body(_carrier(model, look.body)).name
     folders = [own] if carrier in ("world", own) else [carrier, own]
     return "/".join([WORLD, *map(rr.escape_entity_path_part, [*folders, look.name])])
 
 
-def _free(entity: str, taken: dict[str, Piece]) -> str:
-    """The same name, or with a number where it is taken."""
+def _unused_name(entity: str, taken: dict[str, Piece]) -> str:
+    """Return the name, or with a number if it is in use."""
     names = [entity, *(f"{entity}_{i}" for i in range(2, len(taken) + 2))]
     return next(name for name in names if name not in taken)
 
 
-def _piece(model: mujoco.MjModel, data: mujoco.MjData, look: Look, geoms: list[int]) -> Piece:
+def _piece(model: mujoco.MjModel, data: mujoco.MjData, look: MeshLook, geoms: list[int]) -> Piece:
     vertex, face = model.mesh_vertadr[look.mesh], model.mesh_faceadr[look.mesh]
     body = _carrier(model, look.body)
     R_SB, p_SB = data.xmat[body].reshape(3, 3), data.xpos[body]

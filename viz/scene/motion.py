@@ -1,4 +1,4 @@
-"""Where the moving parts of the actuator are, from its hinge angles."""
+"""Motion of the actuator's parts as a function of the hinge angles, torque arrows and traces."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def body_quaternions(q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
 
 def shaft_tip(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
     """Position of the shaft's tip, wherever in the rotor it is: (n, 3) in m, for hinge angles (n, 3)."""
-    return carried(q, actuator.shaft_tip_m)
+    return point_in_stator(q, actuator.shaft_tip_m)
 
 
-def carried(q: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
+def point_in_stator(q: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """Position in the stator frame of a point of the rotor: (n, 3) in m, for hinge angles (n, 3)."""
     (ca, cb, cg), (sa, sb, sg) = np.cos(q).T, np.sin(q).T
     x, y, z = point_m
@@ -57,28 +57,28 @@ def _product(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float
 Array = NDArray[np.float64]
 
 
-class Shown(NamedTuple):
-    """How a torque is shown."""
+class TorqueStyle(NamedTuple):
+    """Label and colour of a torque."""
 
     label: str
     colour: theme.Colour
 
 
-SHOWN = {
-    "coils": Shown("coils", theme.COIL_TORQUE),
-    "gravity": Shown("gravity", theme.PAYLOAD),
-    "load": Shown("load", theme.LOAD),
+TORQUE_STYLES = {
+    "coils": TorqueStyle("coils", theme.COIL_TORQUE),
+    "gravity": TorqueStyle("gravity", theme.PAYLOAD),
+    "load": TorqueStyle("load", theme.LOAD),
 }
-"""By name."""
+"""Styles by the name of the torque."""
 
 METRES_PER_Nm = 0.1
-"""Beside an actuator as large as the shipped one; like the axes, longer beside a larger one."""
+"""Length of an arrow for an actuator of the shipped size; like the axes, it grows with the actuator."""
 
 SCALE = f"torque arrows: the length of x, y, z is {AXES_LENGTH_m / METRES_PER_Nm:g} N·m"
-"""What the arrows' lengths mean, for people."""
+"""Scale of the arrows, for the name of the view."""
 
 LONGEST_m = 1e3
-"""Of an arrow along each axis: torques of a run that diverges are beyond single precision."""
+"""Largest component of an arrow: torques of a run that diverges are beyond single precision."""
 
 
 def load_torque(q: Array, disturbance_Nm: Array) -> Array:
@@ -112,7 +112,7 @@ def gravity_torque(q: Array, payload_kg: float, mount_m: Array, gravity_m_s2: Ar
     payload_kg : float, kg
         Point mass.
     mount_m : (3,) array, m
-        Where it is, rotor frame.
+        Its position, rotor frame.
     gravity_m_s2 : (3,) array, m/s²
         Stator frame.
 
@@ -121,14 +121,14 @@ def gravity_torque(q: Array, payload_kg: float, mount_m: Array, gravity_m_s2: Ar
     (n, 3) array, N·m
         On the rotor, stator frame.
     """
-    return np.cross(carried(q, mount_m), payload_kg * gravity_m_s2)
+    return np.cross(point_in_stator(q, mount_m), payload_kg * gravity_m_s2)
 
 
 TRAIL_S = 2.0
-"""What is older is not shown."""
+"""Older parts are not shown."""
 
 
-class Trace(NamedTuple):
+class TipTrace(NamedTuple):
     """Part of a way, between two ages."""
 
     entity: str
@@ -144,10 +144,10 @@ class Trace(NamedTuple):
 
 _FADED = [theme.mixed(theme.TRACE, theme.DESIRED_TRACE, share) for share in (0.0, 0.4, 0.75)]
 
-TRACES: tuple[Trace, ...] = (
-    Trace(f"{WORLD}/tip/new", "q_rad", 0.0, 0.6, 30.0, _FADED[0], 2.4),
-    Trace(f"{WORLD}/tip/older", "q_rad", 0.6, 1.2, 15.0, _FADED[1], 1.7),
-    Trace(f"{WORLD}/tip/oldest", "q_rad", 1.2, TRAIL_S, 15.0, _FADED[2], 1.2),
-    Trace(f"{WORLD}/tip_desired", "q_ref_rad", 0.0, TRAIL_S, 15.0, theme.DESIRED_TRACE, 0.7),
+TRACES: tuple[TipTrace, ...] = (
+    TipTrace(f"{WORLD}/tip/new", "q_rad", 0.0, 0.6, 30.0, _FADED[0], 2.4),
+    TipTrace(f"{WORLD}/tip/older", "q_rad", 0.6, 1.2, 15.0, _FADED[1], 1.7),
+    TipTrace(f"{WORLD}/tip/oldest", "q_rad", 1.2, TRAIL_S, 15.0, _FADED[2], 1.2),
+    TipTrace(f"{WORLD}/tip_desired", "q_ref_rad", 0.0, TRAIL_S, 15.0, theme.DESIRED_TRACE, 0.7),
 )
-"""The older, the thinner and greyer, which is fainter on any ground; each age has segments of its own."""
+"""Older parts are thinner and greyer, which is fainter on any ground; each age has its own segments."""

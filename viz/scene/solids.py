@@ -22,19 +22,19 @@ class Surface:
     triangles: NDArray[np.int64]  # (m, 3), counter-clockwise from outside
 
     def placed(self, rotation: Array, translation: Array) -> Surface:
-        """The same, turned and then moved."""
+        """Return the surface rotated and then translated."""
         positions = self.positions @ rotation.T + translation
         normals = self.normals @ rotation.T
         return Surface(positions.astype(np.float32), normals.astype(np.float32), self.triangles)
 
 
-def merged_surface(drawn: list[Surface]) -> Surface:
+def merged_surface(surfaces: list[Surface]) -> Surface:
     """Several as one, in their order."""
-    first = np.cumsum([0] + [len(part.positions) for part in drawn[:-1]])
+    first = np.cumsum([0] + [len(part.positions) for part in surfaces[:-1]])
     return Surface(
-        np.concatenate([part.positions for part in drawn]),
-        np.concatenate([part.normals for part in drawn]),
-        np.concatenate([part.triangles + start for part, start in zip(drawn, first, strict=True)]),
+        np.concatenate([part.positions for part in surfaces]),
+        np.concatenate([part.normals for part in surfaces]),
+        np.concatenate([part.triangles + start for part, start in zip(surfaces, first, strict=True)]),
     )
 
 
@@ -46,14 +46,14 @@ def revolved_surface(outline: list[tuple[float, float]], sections: int) -> Surfa
     outline : list of (float, float), m
         Corners, distance from z and height, the solid on their left.
     sections : int
-        Of a circle.
+        Sections of a circle.
     """
     corners = np.array(outline)
     return merged_surface([_band(*ends, sections) for ends in pairwise(corners)])
 
 
 def _band(first: Array, last: Array, sections: int) -> Surface:
-    """What a stretch between two corners sweeps."""
+    """Return the surface that a segment between two corners sweeps."""
     angle = 2 * np.pi * np.arange(sections) / sections
     along = (last - first) / np.linalg.norm(last - first)
     outward = _circle(np.array([along[1], -along[0]]), angle)
@@ -119,7 +119,7 @@ def zone(radius: float, low: float, high: float, steps: int, sections: int) -> S
 
 
 def merged_solid(solids: Sequence[Solid]) -> Solid:
-    """One of several."""
+    """Merge several solids."""
     first = np.cumsum([0, *(len(solid.vertices) for solid in solids[:-1])]).astype(np.uint32)
     return Solid(
         np.concatenate([solid.vertices for solid in solids]),
@@ -128,7 +128,7 @@ def merged_solid(solids: Sequence[Solid]) -> Solid:
 
 
 def reversed_(solid: Solid) -> Solid:
-    """The same, seen from inside."""
+    """Return the solid with its surface turned inside out."""
     return Solid(solid.vertices, solid.faces[:, ::-1].copy())
 
 
@@ -136,7 +136,7 @@ def bar(lengths: tuple[float, float, float]) -> Solid:
     """Box about the origin."""
     square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
     two = np.array([[0, 1, 2], [0, 2, 3]])
-    # Each pair of sides is the first, its axes in cyclic order; the far one is its image, seen from behind.
+    # Each pair of sides is the first with its axes in cyclic order; the far side is its image from behind.
     near = [np.roll(square, shift, axis=1) * np.array(lengths) / 2 for shift in range(3)]
     sides = [Solid(corners.astype(np.float32), two.astype(np.uint32)) for corners in near]
     far = [Solid(-side.vertices, side.faces[:, ::-1].copy()) for side in sides]
@@ -144,7 +144,7 @@ def bar(lengths: tuple[float, float, float]) -> Solid:
 
 
 def _strip(circle: NDArray[np.float64], start: tuple[float, float], end: tuple[float, float]) -> Solid:
-    """What one straight piece of an outline sweeps, with vertices of its own."""
+    """Return the surface that one segment of an outline sweeps, with its own vertices."""
     rings = [
         np.column_stack([radius * circle, np.full(len(circle), height)]) for radius, height in (start, end)
     ]

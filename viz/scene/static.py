@@ -1,4 +1,4 @@
-"""What keeps its shape for a whole run."""
+"""Static parts of the scene: axes, labels, colour scale and meshes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from spheretwin.viz.scene.meshes import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROT
 Array = NDArray[np.float64]
 
 AXES_LENGTH_m = 0.05
-"""Of the stator's: the measure of all that is drawn."""
+"""Length of the stator's axes: the unit of all lengths in the scene."""
 
 REACH_m = 0.12
-"""From the joint to the farthest that an actuator has, of one beside which the lengths here are right."""
+"""Reach from the joint of an actuator for which the lengths here are right."""
 
 # A bar before the foot, square to the eye of the layout; its ends are the current limit.
 MIDDLE_m = np.array([0.064, -0.064, -0.078])
@@ -31,7 +31,7 @@ TICKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 
 
 def size_of(actuator: Actuator) -> float:
-    """How many times as large as the lengths here what is drawn beside an actuator is."""
+    """Return the size of an actuator relative to the one for which the lengths here are right."""
     coils_m = actuator.coil.distance_m + actuator.coil.length_m / 2
     return max(float(np.linalg.norm(actuator.shaft_tip_m)), coils_m) / REACH_m
 
@@ -47,7 +47,7 @@ def axes(origin_m: Sequence[float] | Array, length_m: float) -> rr.Arrows3D:
 
 
 def labels(texts: Sequence[str], colours: Sequence[theme.Colour]) -> rr.Points3D:
-    """Texts for the heads of arrows, as points without a size: an arrow's own text stands in its middle."""
+    """Return texts for the heads of arrows, as points of size 0: an arrow's own text is at its middle."""
     size = rr.Radius.ui_points(0.0)
     return rr.Points3D.from_fields(labels=texts, colors=colours, radii=size, show_labels=True)
 
@@ -82,14 +82,14 @@ def current_scale_labels(limit_A: float, size: float) -> rr.Points3D:
 
 PAYLOAD_LENGTH_m, PAYLOAD_RADIUS_m = 0.014, 0.011
 
-# The stator's axes stand beside its foot; the rotor's, shorter, around the shaft below a payload.
+# The stator's axes are next to its foot; the rotor's, shorter, around the shaft below a payload.
 AXES_AT_m = (-0.085, -0.105, -0.075)
 NAMED_AT = 1.15  # of the length: beyond the head
 ROTOR_AXES_HEIGHT, ROTOR_AXES_LENGTH_m = 0.6, 0.025
 
 
 def log_static(recording: rr.RecordingStream, actuator: Actuator, facts: RunFacts) -> None:
-    """Log everything that keeps its shape: meshes, axes of both frames, the scale of the coils' colours."""
+    """Log the static parts: meshes, axes of both frames, the scale of the coils' colours."""
     recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     meshes = read_meshes(facts.mjcf)
     if meshes.coils:

@@ -1,1 +1,1 @@
-"""What is shown in a terminal: tables and progress."""
+"""Terminal output: tables and progress."""

@@ -21,27 +21,27 @@ FIGURE_NAMES = {
 
 
 def print_computed_curve(computed: ComputedCurve) -> None:
-    """Print what is known of a curve that was computed."""
+    """Print the results for a computed curve."""
     _print_curve("torque curve computed from the geometry", [("peak", _peak(computed.peak))])
 
 
 def print_judged_curve(path: Path, judged: JudgedCurve) -> None:
-    """Print what is known of a user's curve."""
+    """Print the results for a user's curve."""
     geometry = judged.geometry
     rows = [
         ("samples", str(judged.rows)),
         ("peak", _peak(judged.peak)),
-        ("a sample left out is missed by", _misfit(judged.leave_one_out, "peak")),
-        ("apart from the geometry's curve", _misfit(geometry.as_given, "its peak")),
+        ("leave-one-out error of a sample", _misfit(judged.leave_one_out, "peak")),
+        ("difference from the geometry's curve", _misfit(geometry.as_given, "its peak")),
         ("best factor on the geometry's curve", f"{geometry.scale:.4f}"),
-        ("apart from it, so scaled", _misfit(geometry.scaled, "its peak")),
-        ("look-up table apart from the spline", f"{judged.lookup_error:.1e} of the peak"),
+        ("difference from it after scaling", _misfit(geometry.scaled, "its peak")),
+        ("difference of look-up table and spline", f"{judged.lookup_error:.1e} of the peak"),
     ]
     _print_curve(f"torque curve {path}", rows)
 
 
 def print_field(verdict: FieldVerdict) -> None:
-    """Print the errors of the torque matrix by tilt, and where they come from."""
+    """Print the errors of the torque matrix by tilt, and their sources."""
     console = tables.terminal_console()
     title = f"torque by the curve against the direct sum (largest torque {verdict.largest_torque_Nm:.3f} N·m)"
     table = tables.new_table(
@@ -60,7 +60,7 @@ def print_field(verdict: FieldVerdict) -> None:
     console.print(table)
     sources = verdict.sources
     console.print(
-        "Where it comes from: the direct sum's quadrature"
+        "Sources of the error: the direct sum's quadrature"
         f" (half the points change it by {sources.quadrature_of_largest_torque:.0e} of the largest torque);"
         f" the curve between its samples ({sources.curve_between_samples_of_peak:.0e} of its peak);"
         f" the look-up table ({sources.lookup_of_peak:.0e} of the peak)."

@@ -15,7 +15,7 @@ from spheretwin.models.telemetry.table import Table
 
 
 def tracked(label: str) -> Callable[[range], Iterable[int]]:
-    """A bar for a range of steps, which is gone when they are done."""
+    """Return a progress bar for a range of steps; it disappears at the end."""
 
     def followed(steps: range) -> Iterator[int]:
         with _bars(transient=True) as bars:
@@ -26,15 +26,15 @@ def tracked(label: str) -> Callable[[range], Iterable[int]]:
 
 @contextmanager
 def parts(label: str, count: int) -> Iterator[Callable[[str], None]]:
-    """A bar for named parts of some work, to be told the name of each as it begins; gone at the end."""
+    """Yield a function that shows the name of each part as it begins; the bar disappears at the end."""
     with _bars(transient=True) as bars:
-        task = bars.add_task(label, total=count, completed=-1)  # the first to begin has none before it
+        task = bars.add_task(label, total=count, completed=-1)  # the first part follows none
         yield lambda name: bars.update(task, description=name, advance=1)
 
 
 @contextmanager
 def runs(label: str, count: int) -> Iterator[Callable[[str], None]]:
-    """A bar for many runs, to be told what each was of when it is done; gone at the end."""
+    """Yield a function that shows the name of each run when it is done; the bar disappears at the end."""
     with _bars(transient=True) as bars:
         task = bars.add_task(f"{label}: getting ready", total=count)
         yield lambda name: bars.update(task, description=f"{label}, {name}", advance=1)
@@ -42,22 +42,22 @@ def runs(label: str, count: int) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def counted(label: str, what: str = "rows") -> Iterator[Callable[[int, int], None]]:
-    """A bar for work that is told how much of it is done, and of how much; gone at the end."""
+    """Yield a function that shows the completed number and the total; the bar disappears at the end."""
     with _bars(_Rate(what), transient=True) as bars:
         task = bars.add_task(f"{label}: getting ready", total=None)
-        before: list[int] = []  # done earlier, which is told first: what does the rest has yet to start
+        before: list[int] = []  # completed earlier, which is reported first: the rest has yet to start
 
-        def told(done: int, of: int) -> None:
+        def update(done: int, of: int) -> None:
             if not before:
                 before.append(done)
             named = label if done > before[0] else f"{label}: getting ready"
             bars.update(task, description=named, completed=done, total=of)
 
-        yield told
+        yield update
 
 
 class _Rate(ProgressColumn):
-    """How many a second."""
+    """Rate for each second."""
 
     def __init__(self, what: str) -> None:
         super().__init__()
@@ -71,7 +71,7 @@ class _Rate(ProgressColumn):
 
 
 class Progress:
-    """A bar for the control ticks of a run, which stays and tells how it ended."""
+    """Progress bar for the control ticks of a run, which remains and shows its status."""
 
     def __init__(self, name: str, ticks: int) -> None:
         self._name = name
@@ -94,7 +94,7 @@ class Progress:
             self._bars.update(self._task, advance=len(rows), simulated_s=simulated_s, description=self._name)
 
     def note(self, t_s: float, text: str) -> None:
-        """Nothing is shown of it."""
+        """Ignore notes."""
 
     def finish(self, status: str) -> None:
         """Show how the run ended."""
@@ -102,7 +102,7 @@ class Progress:
 
 
 def _bars(*more: ProgressColumn, transient: bool = False) -> Bars:
-    """Description, bar, share, whatever else there is to tell, and the time that is left."""
+    """Return bars with description, share, other columns, and the remaining time."""
     console = Console(stderr=True)
     return Bars(
         TextColumn("{task.description}", markup=False),

@@ -1,4 +1,4 @@
-"""For people, on stdout: what a run found, where files are, and what a scenario's fields are."""
+"""Tables of runs, studies, tunings, files and scenario fields, on stdout."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COLOURS = {Level.INFO: "italic", Level.WARN: "bold yellow", Level.ERROR: "bold r
 
 
 def print_run(law: str, planned_s: float, summary: dict[str, Any], own: Sequence[str] = ()) -> None:
-    """Print the figures of one run: errors per axis, currents and speed, then those of the user's own."""
+    """Print the figures of one run: errors per axis, currents and speed, then the user's own metrics."""
     console, status = tables.terminal_console(), named(summary["status"])
     title = f"{summary['scenario']['name']} under {law}: {_ending(status, planned_s, summary)}"
     errors = tables.new_table(title, "tracking error, mrad (degrees)", *ANGLES)
@@ -59,7 +59,7 @@ def print_run(law: str, planned_s: float, summary: dict[str, Any], own: Sequence
 
 
 def _ending(status: Status, planned_s: float, summary: dict[str, Any]) -> str:
-    """How a run ended; where it did not complete, also when, and why."""
+    """Return the status of a run; if it did not complete, also time and reason."""
     if status == Status.COMPLETED:
         return status
     why = f", {summary['reason']}" if summary["reason"] else ""
@@ -67,7 +67,7 @@ def _ending(status: Status, planned_s: float, summary: dict[str, Any]) -> str:
 
 
 def angle(value_rad: float) -> str:
-    """An angle in mrad, and in degrees behind it."""
+    """Return an angle in mrad, followed by degrees."""
     return f"{three_digits(1e3 * value_rad)} ({three_digits(math.degrees(value_rad))}°)"
 
 
@@ -88,23 +88,23 @@ def print_files(record: Path | None, telemetry: Path | None) -> None:
         console.print(f"open it:   rerun {escape(str(record))}", soft_wrap=True)
 
 
-def print_study(name: str, found: dict[str, Any], summary: dict[str, Any]) -> None:
+def print_study(name: str, result: dict[str, Any], summary: dict[str, Any]) -> None:
     """Print what a study found: rows by status, then each figure's median and 95 % range, a column a law."""
     figures = [figure for figure in next(iter(summary.values()), {}) if figure != "statuses"]
     table = tables.new_table(
-        f"{name}: {found['rows']} of {found['of']} rows", "median (95 % range)", *summary
+        f"{name}: {result['rows']} of {result['of']} rows", "median (95 % range)", *summary
     )
     for figure in figures:
         table.add_row(figure, *(_spread(of_law[figure]) for of_law in summary.values()))
     counts = [of_law["statuses"] for of_law in summary.values()]
-    for status in sorted({status for each in counts for status in each}):
-        table.add_row(status, *(str(each.get(status, 0)) for each in counts))
+    for status in sorted({status for statuses in counts for status in statuses}):
+        table.add_row(status, *(str(statuses.get(status, 0)) for statuses in counts))
     tables.terminal_console().print(table)
-    if found["startup_s"] is not None:
+    if result["startup_s"] is not None:
         tables.terminal_console().print(
-            f"took   {found['wall_s']:.1f} s, {found['startup_s']:.1f} s of it to start"
+            f"took   {result['wall_s']:.1f} s, {result['startup_s']:.1f} s of it to start"
         )
-    tables.terminal_console().print(f"table  {escape(found['table'])}", soft_wrap=True)
+    tables.terminal_console().print(f"table  {escape(result['table'])}", soft_wrap=True)
 
 
 def _spread(figure: dict[str, Any]) -> str:
@@ -145,7 +145,7 @@ FACTS = ("scenario", "law", "modelling_error", "load", "hardware", "seed", "stat
 MOST_EVENTS = 12
 
 
-class _Row(NamedTuple):
+class _FigureRow(NamedTuple):
     """A figure of every run."""
 
     label: str
@@ -155,21 +155,21 @@ class _Row(NamedTuple):
 
 
 ROWS = (
-    *(_Row(label, key, "rad", True) for label, key in ERRORS.items()),
-    _Row("overshoot", "overshoot_rad", "rad", True),
-    _Row("settled after", "settling_time_s", "s", True),
-    _Row("largest current", "max_abs_current_A", "A"),
-    _Row("share of ticks at the limit", "saturated_fraction", "1"),
-    _Row("rms torque", "rms_torque_Nm", "N·m"),
-    _Row("variation of the commands", "current_variation_A_s", "A/s"),
-    _Row("copper loss", "copper_loss_J", "J"),
-    _Row("work on the rotor", "mechanical_work_J", "J"),
-    _Row("energy", "energy_J", "J"),
+    *(_FigureRow(label, key, "rad", True) for label, key in ERRORS.items()),
+    _FigureRow("overshoot", "overshoot_rad", "rad", True),
+    _FigureRow("settled after", "settling_time_s", "s", True),
+    _FigureRow("largest current", "max_abs_current_A", "A"),
+    _FigureRow("share of ticks at the limit", "saturated_fraction", "1"),
+    _FigureRow("rms torque", "rms_torque_Nm", "N·m"),
+    _FigureRow("variation of the commands", "current_variation_A_s", "A/s"),
+    _FigureRow("copper loss", "copper_loss_J", "J"),
+    _FigureRow("work on the rotor", "mechanical_work_J", "J"),
+    _FigureRow("energy", "energy_J", "J"),
 )
 
 
 def print_runs(runs: Sequence[dict[str, Any]]) -> None:
-    """Print what was found of runs."""
+    """Print the reports of runs."""
     if len(runs) == 1:
         _print_one(runs[0])
     else:
@@ -193,8 +193,8 @@ def _print_one(run: dict[str, Any]) -> None:
     for row in ROWS:
         if not row.each_axis:
             console.print(f"{row.label} {_figure(run[row.key], row.unit)}")
-    told = [f"{name} {run[name]}" for name in FACTS[2:6]]
-    console.print(escape(", ".join(told) + (f", {run['reason']}" if run["reason"] else "")), soft_wrap=True)
+    facts = [f"{name} {run[name]}" for name in FACTS[2:6]]
+    console.print(escape(", ".join(facts) + (f", {run['reason']}" if run["reason"] else "")), soft_wrap=True)
     for event in run["events"][:MOST_EVENTS]:
         console.print(escape(f"{event['t_s']:8.3f} s  {event['text']}"), soft_wrap=True)
     if (more := len(run["events"]) - MOST_EVENTS) > 0:
@@ -220,9 +220,9 @@ def differences(runs: Sequence[dict[str, Any]]) -> Iterator[list[str]]:
     for row in ROWS:
         for place, axis in enumerate(ANGLES) if row.each_axis else ((None, ""),):
             values = [_entry(run[row.key], place) for run in runs]
-            told = [_figure(values[0], row.unit)]
-            told += [_beside(values[0], each, row.unit) for each in values[1:]]
-            yield [f"{row.label} {axis}".strip(), *told]
+            cells = [_figure(values[0], row.unit)]
+            cells += [_with_difference(values[0], value, row.unit) for value in values[1:]]
+            yield [f"{row.label} {axis}".strip(), *cells]
 
 
 def _entry(value: Any, place: int | None) -> float | None:
@@ -237,7 +237,7 @@ def _figure(value: float | None, unit: str) -> str:
     return f"{three_digits(value)}{'' if unit == '1' else f' {unit}'}"
 
 
-def _beside(first: float | None, value: float | None, unit: str) -> str:
+def _with_difference(first: float | None, value: float | None, unit: str) -> str:
     """A figure, and below it how far it is from the first, absolute and in percent."""
     if first is None or value is None:
         return _figure(value, unit)
@@ -250,13 +250,13 @@ def _beside(first: float | None, value: float | None, unit: str) -> str:
 
 NONE = "–"
 MOST = 15
-"""Of a front that are printed, evenly along it; its table has all."""
+"""Trials of a front that are printed, evenly along it; the table has all."""
 
 
-def print_tuning(name: str, told: dict[str, Any]) -> None:
-    """Print the best trial of each law, or its front, beside the gains that it started with."""
+def print_tuning(name: str, result: dict[str, Any]) -> None:
+    """Print the best trial of each law, or its front, with the gains at the start."""
     console = tables.terminal_console()
-    for law, of_law in told["laws"].items():
+    for law, of_law in result["laws"].items():
         _print_law(f"{name}, {law}: {_counted(of_law)}", of_law)
         if len(of_law["best"]) > MOST:
             console.print(f"{MOST} of {len(of_law['best'])} on the front")
@@ -264,30 +264,32 @@ def print_tuning(name: str, told: dict[str, Any]) -> None:
             console.print(f"lost first: {escape(of_law['lost'])}", soft_wrap=True)
         if len(of_law["best"]) == 1:
             console.print(escape(of_law["best"][0]["command"]), soft_wrap=True)
-    console.print(f"table  {escape(told['table'])}", soft_wrap=True)
+    console.print(f"table  {escape(result['table'])}", soft_wrap=True)
 
 
 def _print_law(title: str, of_law: dict[str, Any]) -> None:
-    chosen = [each for each in (of_law["start"], *of_law["best"]) if each]
+    chosen = [trial for trial in (of_law["start"], *of_law["best"]) if trial]
     if not chosen:
         tables.terminal_console().print(escape(f"{title}: none completed"), soft_wrap=True)
         return
     gains = list(chosen[0]["gains"])
-    values = next((list(each["values"]) for each in chosen if each["values"]), [])
-    is_fresh = any(each["fresh"] or each["fresh_reason"] for each in chosen)
-    fresh = [f"{each}, fresh seeds" for each in values] if is_fresh else []
+    values = next((list(trial["values"]) for trial in chosen if trial["values"]), [])
+    is_fresh = any(trial["fresh"] or trial["fresh_reason"] for trial in chosen)
+    fresh = [f"{name}, fresh seeds" for name in values] if is_fresh else []
     table = tables.new_table(title, "trial", *gains, *values, *fresh)
     rows = [("start", of_law["start"])] if of_law["start"] else []
-    for label, each in rows + [(str(each["trial"]), each) for each in _some(of_law["best"])]:
-        cells = ["off" if value is None else f"{value:.4g}" for value in map(each["gains"].get, gains)]
-        cells += _cells(each["values"], values, each["ended"])
-        cells += _cells(each["fresh"], values, "lost") if is_fresh else []
+    for label, trial in rows + [(str(trial["trial"]), trial) for trial in _some(of_law["best"])]:
+        cells = ["off" if value is None else f"{value:.4g}" for value in map(trial["gains"].get, gains)]
+        cells += _cells(trial["values"], values, trial["ended"])
+        cells += _cells(trial["fresh"], values, "lost") if is_fresh else []
         table.add_row(label, *cells)
     tables.terminal_console().print(table)
 
 
-def _cells(found: dict[str, float] | None, names: list[str], otherwise: str) -> list[str]:
-    return [f"{found[name]:.4g}" for name in names] if found else [otherwise if names else NONE] * len(names)
+def _cells(figures: dict[str, float] | None, names: list[str], otherwise: str) -> list[str]:
+    return (
+        [f"{figures[name]:.4g}" for name in names] if figures else [otherwise if names else NONE] * len(names)
+    )
 
 
 def _some(best: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""How every table looks, and how wide it may be."""
+"""Style and width of all tables."""
 
 from __future__ import annotations
 
@@ -16,42 +16,42 @@ from spheretwin.models.base.checks import Check, broken
 
 WIDTH_WITHOUT_TERMINAL = 100
 LEAST = 1e-3
-"""Smaller figures are written as less than this: all that they say is that they do not matter."""
+"""Smaller figures are written as less than this: they are negligible."""
 
 
 def terminal_console() -> Console:
-    """What is written to stdout: as wide as the terminal; in a pipe or a file as wide as one is read."""
-    told = Console()
-    if told.is_terminal or "COLUMNS" in os.environ:
-        return told
+    """Return a console for stdout: as wide as the terminal; in a pipe or a file of a readable width."""
+    console = Console()
+    if console.is_terminal or "COLUMNS" in os.environ:
+        return console
     return Console(width=WIDTH_WITHOUT_TERMINAL)
 
 
 def new_table(title: str, first: str, *others: str, lines: bool = False) -> Table:
     """A table under its title: what a row is about at the left, figures at the right.
 
-    Where no terminal is, it is Markdown.
+    Without a terminal it is Markdown.
 
     Parameters
     ----------
     title, first, others : str
         As they are, without markup; headings of the columns.
     lines : bool
-        Whether to part the rows, where they have several lines each.
+        Whether to separate the rows, if they have several lines each.
     """
-    told = terminal_console()
-    made = Table(
+    console = terminal_console()
+    table = Table(
         title=escape(title),
         title_justify="left",
-        box=box.HORIZONTALS if told.is_terminal else box.MARKDOWN,
-        pad_edge=not told.is_terminal,
-        show_lines=lines and told.is_terminal,
-        min_width=min(cell_len(title), told.width),  # a title is wrapped to its table
+        box=box.HORIZONTALS if console.is_terminal else box.MARKDOWN,
+        pad_edge=not console.is_terminal,
+        show_lines=lines and console.is_terminal,
+        min_width=min(cell_len(title), console.width),  # a title is wrapped to its table
     )
-    made.add_column(escape(first), overflow="fold")
+    table.add_column(escape(first), overflow="fold")
     for heading in others:
-        made.add_column(escape(heading), justify="right")
-    return made
+        table.add_column(escape(heading), justify="right")
+    return table
 
 
 def three_digits(value: float) -> str:
@@ -65,7 +65,7 @@ def three_digits(value: float) -> str:
 
 
 def print_checks(title: str, checks: Sequence[Check], verbose: bool = False) -> None:
-    """Print a line a check: whether it holds, figure and bound; at length also what each means."""
+    """Print a line for each check: result, figure and bound; with `verbose` also its meaning."""
     console = terminal_console()
     table = new_table(title, "", "value", "bound")
     table.add_column("check")
@@ -82,7 +82,7 @@ def print_checks(title: str, checks: Sequence[Check], verbose: bool = False) -> 
             console.print(f"bound {check.bound_text()}: {escape(check.why)}")
     console.print(f"{len(checks) - len(broken(checks))} of {len(checks)} checks hold")
     if not verbose:
-        console.print("What each compares, and why its bound: --verbose.")
+        console.print("--verbose explains each comparison and its bound.")
 
 
 def _verdict(check: Check) -> str:

@@ -29,7 +29,7 @@ PLANT, WITH_EVENTS, written = shared["PLANT"], shared["WITH_EVENTS"], shared["wr
 LONGEST_LINE = 600
 
 # What a user is told of damage names the place.
-PLACES = ("row group 0", "footer", "entity ", "at byte ", "chunk ", "so damaged that Rerun ends at it")
+PLACES = ("row group 0", "footer", "entity ", "at byte ", "chunk ", "so damaged that Rerun crashes")
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +122,7 @@ def test_every_bit_of_the_footer_counts(files, tmp_path):
         assert not (tmp_path / "out.parquet").exists(), f"bit {bit}"
 
 
-def test_damage_is_told_with_its_row_group_and_column(files, tmp_path):
+def test_damage_is_reported_with_row_group_and_column(files, tmp_path):
     import pyarrow.parquet
 
     content, path = files[0].read_bytes(), tmp_path / "run.parquet"

@@ -1,4 +1,4 @@
-"""A run is the same from either of its files, to the last bit; of a killed one, what is whole is told."""
+"""A run is the same from either of its files, to the last bit; of a killed one, complete rows are read."""
 
 import csv
 import json
@@ -16,7 +16,7 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recovery
-from spheretwin.analysis.recorded_run import export, headings, read
+from spheretwin.analysis.recorded_run import export, read
 from spheretwin.analysis.run_summary import figures
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.parquet import TelemetryFile
@@ -61,7 +61,7 @@ def test_ticks_of_any_period_keep_their_bits(tmp_path, period_s):
     assert recording.table.values.tobytes() == telemetry.table.values.tobytes()
 
 
-def test_a_review_tells_the_figures_of_the_run_itself(files):
+def test_a_review_reports_the_figures_of_the_run(files):
     run = simulate(scenarios.load("hold", WITH_EVENTS))
     told = figures(read(files[0]))
     expected = figures_of(run)
@@ -70,7 +70,7 @@ def test_a_review_tells_the_figures_of_the_run_itself(files):
     assert told["energy_J"] == told["copper_loss_J"] + told["mechanical_work_J"]
 
 
-def test_a_run_whose_law_is_gone_is_still_reviewed(tmp_path):
+def test_a_run_without_its_law_file_is_reviewed(tmp_path):
     law = tmp_path / "mine.py"
     law.write_text(
         "from spheretwin.control.laws.pd import PD\n\nclass Mine(PD):\n    law: str = 'x'\n", encoding="utf-8"
@@ -91,7 +91,7 @@ def test_columns_come_back_bit_for_bit(files, tmp_path, kind):
     assert read(path).table.values.tobytes() == run.table.values.tobytes()
     export(run, path := tmp_path / "columns.csv")
     header, *rows = csv.reader(path.read_text(encoding="utf-8").splitlines())
-    assert header == [name for signal in run.table.signals for name in headings(signal)]
+    assert header == [name for signal in run.table.signals for name in signal.headings()]
     assert np.array(rows, dtype=float).tobytes() == run.table.values.tobytes()
     assert header[:2] == ["t_s", "q_rad[α]"]
 
@@ -107,7 +107,7 @@ def killed_telemetry(folder, rows):
     return file
 
 
-def test_telemetry_of_a_killed_process_is_read_and_made_whole(tmp_path, capsys):
+def test_telemetry_of_a_killed_process_is_read_and_recovered(tmp_path, capsys):
     file = killed_telemetry(tmp_path, 5000)
     path, out = tmp_path / "run.parquet", tmp_path / "whole.parquet"
     run = read(path)
@@ -246,17 +246,17 @@ def test_a_recording_of_something_else_is_refused(tmp_path):
         read(path)
 
 
-def test_a_whole_file_is_not_recovered(files, tmp_path):
+def test_a_complete_file_is_not_recovered(files, tmp_path):
     for path in files:
-        with pytest.raises(InputError, match="received a whole"):
+        with pytest.raises(InputError, match="received a complete"):
             recovery.recover(path, tmp_path / "out")
     assert os.listdir(tmp_path) == []
 
 
-def test_what_several_processes_left_is_not_guessed(tmp_path):
+def test_partial_files_of_several_processes_are_refused(tmp_path):
     for number in "01":
         (tmp_path / f".run.rrd.{number}.part").touch()
-    with pytest.raises(InputError, match="what 2 processes left"):
+    with pytest.raises(InputError, match="partial files of 2 processes"):
         read(tmp_path / "run.rrd")
 
 

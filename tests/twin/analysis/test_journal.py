@@ -1,4 +1,4 @@
-"""An export of a recording says what its telemetry file says: how far it went, what was set on the way."""
+"""An export of a recording has the content of its telemetry file: status and journal."""
 
 import runpy
 from pathlib import Path
@@ -46,7 +46,7 @@ def test_a_recording_says_how_far_the_run_went_and_what_was_set(files):
     assert recording.status == telemetry.status
 
 
-def test_an_export_of_a_recording_is_told_and_replayed_as_the_run(files, tmp_path):
+def test_an_export_of_a_recording_is_reviewed_and_replayed(files, tmp_path):
     telemetry, recording = map(read, files)
     export(recording, out := tmp_path / "out.parquet")
     again = read(out)

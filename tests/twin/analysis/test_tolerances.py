@@ -107,7 +107,7 @@ def test_a_run_that_ends_elsewhere_is_never_within(mine, other):
     assert (place.t_s, place.by) == (0.15, np.inf)
 
 
-def test_what_cannot_be_held_is_refused_by_name():
+def test_signals_without_a_reference_are_refused_by_name():
     with pytest.raises(InputError, match=r"received x_rd; did you mean x_rad\?"):
         exceeded(made_of(WAVE), made_of(WAVE), Tolerances(signals={"x_rd": Tolerance()}))
     with pytest.raises(InputError, match=r"control period of 0\.001 s .* received 0\.002 s"):
@@ -163,20 +163,20 @@ def test_a_shipped_gate_lets_the_same_run_pass_and_stops_another(runs, name, cap
     assert "leaves its tolerance first at" in line
 
 
-def test_without_tolerances_nothing_is_held(runs, capsys):
+def test_without_tolerances_nothing_is_compared(runs, capsys):
     assert cli.main(["review", str(runs["first"][0]), str(runs["far"][0]), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["within_tolerance"] is None
 
 
-def test_people_see_one_run_whole_and_of_two_the_differences(runs, capsys):
+def test_one_run_is_printed_in_full_and_two_as_differences(runs, capsys):
     assert cli.main(["review", str(runs["first"][0])]) == 0
     alone = capsys.readouterr().out
     assert "hold under pd: completed" in alone
     assert "mrad (degrees)" in alone
     assert cli.main(["review", str(runs["first"][0]), str(runs["near"][1]), str(runs["far"][0])]) == 0
-    beside = capsys.readouterr().out
-    assert "the same" in beside
-    assert " %" in beside
+    compared_runs = capsys.readouterr().out
+    assert "the same" in compared_runs
+    assert " %" in compared_runs
 
 
 @pytest.mark.parametrize(

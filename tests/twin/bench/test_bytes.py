@@ -1,4 +1,4 @@
-"""What is recorded at a bench replays to the same bytes, whatever was commanded, refused, or looked at."""
+"""Recordings of a bench replay to the same bytes, for any commands, refusals and readers."""
 
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ def test_any_sequence_of_commands_replays_to_the_same_bytes(tmp_path_factory, se
 @pytest.mark.parametrize(
     "changes", [{}, {"hardware": "prototype", "plant.engine": "mujoco", "watchdog.on": False}], ids=str
 )
-def test_a_recording_that_begins_on_the_way_replays_to_the_same_bytes(tmp_path, changes):
+def test_a_recording_begun_during_a_run_replays_to_the_same_bytes(tmp_path, changes):
     path = tmp_path / "run.parquet"
     with begun(**changes) as made:
         made.advance(111)
@@ -75,7 +75,7 @@ def test_a_recording_that_begins_on_the_way_replays_to_the_same_bytes(tmp_path, 
     assert same_when_replayed(path)
 
 
-def test_what_is_left_of_a_recording_that_was_killed_is_not_replayed_as_a_whole_one(tmp_path):
+def test_a_partial_recording_is_not_replayed_as_a_complete_one(tmp_path):
     path = tmp_path / "run.parquet"
     with begun() as made:
         made.advance(30)
@@ -87,7 +87,7 @@ def test_what_is_left_of_a_recording_that_was_killed_is_not_replayed_as_a_whole_
         replay.read(path)
 
 
-def test_a_reset_and_a_way_back_end_a_recording_which_still_replays(tmp_path):
+def test_reset_and_restore_end_a_recording_which_still_replays(tmp_path):
     first, second = tmp_path / "first.parquet", tmp_path / "second.parquet"
     with begun() as made:
         made.advance(50)
@@ -152,7 +152,7 @@ def test_a_twin_in_a_thread_runs_what_is_commanded_as_one_without(tmp_path):
     assert same_when_replayed(path)
 
 
-def test_back_at_a_snapshot_the_twin_goes_on_as_it_did():
+def test_a_restored_twin_repeats_its_run():
     with begun() as made:
         made.advance(100)
         done(made, "jog", rates_rad_s=[0.1, 0.0, 0.2])

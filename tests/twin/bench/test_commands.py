@@ -1,4 +1,4 @@
-"""What a bench makes of commands: what they do, what is refused in which words, and that nothing ends it."""
+"""Commands of a bench: their effects, their refusals, and that no command ends the bench."""
 
 import json
 import math
@@ -23,7 +23,7 @@ def common():
         yield made
 
 
-def test_time_goes_on_when_it_is_told_to():
+def test_time_runs_after_start():
     with bench() as made:
         assert made.advance(10) == 0
         done(made, "step", ticks=3)
@@ -108,7 +108,7 @@ def test_a_command_that_cannot_be_done_is_refused_in_one_line(common, name, argu
 
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
-def test_what_is_said_of_the_bench_names_every_command_and_its_arguments(command):
+def test_the_documentation_lists_every_command_and_its_arguments(command):
     said_of_it = Bench.__doc__
     assert f"``{command.name}``" in said_of_it
     assert all(argument in said_of_it for argument in command.arguments.model_fields)
@@ -125,7 +125,7 @@ ARGUMENTS = sorted({field for kind in COMMANDS.values() for field in kind.argume
 
 @settings(max_examples=150)
 @given(NAMES, st.dictionaries(st.sampled_from(ARGUMENTS), ANYTHING, max_size=2), ANYTHING)
-def test_whatever_is_said_the_bench_lives(common, name, arguments, field):
+def test_the_bench_survives_any_command(common, name, arguments, field):
     common.command(name, **arguments)
     if isinstance(field, str):
         common.command("set", name=field, value=1.0)
@@ -157,7 +157,7 @@ def test_the_queue_is_bounded():
         assert all(ticket.done for ticket in tickets)
 
 
-def test_what_was_said_last_is_done_last():
+def test_the_last_command_is_executed_last():
     with begun() as made:
         for name in ("hold", "off", "hold"):
             made.command(name)
@@ -281,7 +281,7 @@ def test_a_law_that_raises_is_a_fault_that_says_why(tmp_path):
         assert made.advance(100) == 100
 
 
-def test_a_user_s_law_file_runs_and_what_is_wrong_with_one_is_told(tmp_path):
+def test_a_user_s_law_runs_and_its_errors_are_reported(tmp_path):
     (tmp_path / "law.py").write_text(BROKEN)
     with begun() as made:
         assert "law.py" in said(made, "set", name="controller.law", value=f"{tmp_path / 'law.py'}:Nobody")
@@ -300,7 +300,7 @@ def test_another_scenario_is_loaded_with_overrides():
         assert json.loads(json.dumps(state.pending)) == []
 
 
-def test_a_bench_at_work_is_not_advanced_by_hand():
+def test_advance_is_refused_while_the_thread_runs():
     with bench() as made:
         made.begin()
         with pytest.raises(SpheretwinError, match="received one at work"):

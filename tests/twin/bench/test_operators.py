@@ -34,7 +34,7 @@ def say(bench, command, client, **arguments):
     return ticket.refused
 
 
-def test_the_first_to_come_operates_and_others_watch(shared):
+def test_the_first_client_operates_and_others_watch(shared):
     assert say(shared, "hello", "a") is None
     assert say(shared, "hello", "b") is None
     state = shared.state()
@@ -54,7 +54,7 @@ def test_anyone_may_stop(shared):
     assert shared.state().stopped
 
 
-def test_an_operator_gives_over_to_who_asks(shared):
+def test_an_operator_grants_control(shared):
     say(shared, "hello", "a")
     say(shared, "hello", "b")
     say(shared, "ask", "b")
@@ -94,7 +94,7 @@ def test_the_twin_holds_when_its_operator_is_gone(shared, clock):
 
 
 @pytest.mark.parametrize("mode", ["off", "stop"])
-def test_a_twin_without_currents_is_not_given_any_as_its_operator_goes(shared, clock, mode):
+def test_a_free_rotor_stays_free_when_the_operator_is_gone(shared, clock, mode):
     say(shared, "hello", "a")
     say(shared, mode, "a")
     clock.now += 2 * GONE_s
@@ -106,16 +106,16 @@ def test_clients_say_who_they_are(shared):
     assert "expected hello of a client" in shared.command("hello").refused
 
 
-def test_clients_are_not_without_end(clock):
+def test_the_number_of_clients_is_bounded(clock):
     operators = Operators(clock=clock)
     for i in range(MOST_CLIENTS):
-        operators.see(f"{i}")
+        operators.register(f"{i}")
     with pytest.raises(InputError, match="at most"):
-        operators.see("one more")
+        operators.register("one more")
     clock.now = 2 * GONE_s
-    assert operators.look()
-    assert not operators.look()
-    operators.see("one more")
+    assert operators.check_silence()
+    assert not operators.check_silence()
+    operators.register("one more")
     assert operators.operator == "one more"
 
 

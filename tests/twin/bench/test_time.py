@@ -1,4 +1,4 @@
-"""The loop's own time: STOP, pace, and what it counts; by a clock of the test's where there is one."""
+"""Time of the bench: STOP, pace, and its counts; with a clock of the test if possible."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from tests.twin.bench.test_operators import Clock
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_stop_takes_the_currents_away_with_the_next_tick_until_reset(tmp_path, mode):
+def test_stop_sets_zero_currents_from_the_next_tick_until_reset(tmp_path, mode):
     path = tmp_path / "run.parquet"
     with begun() as made:
         done(made, "record", telemetry=str(path))
@@ -45,7 +45,7 @@ def test_stop_does_not_wait_for_what_is_being_prepared():
         assert made.state().stopped
 
 
-def test_what_was_asked_before_stop_does_not_undo_it():
+def test_commands_before_stop_do_not_undo_it():
     with begun() as made:
         before = [made.command(name) for name in ("pause", "reset", "start")]
         made.command("stop")
@@ -56,7 +56,7 @@ def test_what_was_asked_before_stop_does_not_undo_it():
         assert not made.state().stopped
 
 
-def test_stop_wakes_a_bench_at_work():
+def test_stop_wakes_the_thread():
     """In slow motion, where a chunk is 20 ms of the clock's, and while nothing runs at all."""
     with bench() as made:
         made.begin()
@@ -87,7 +87,7 @@ def run(pace, clock, chunks, took_s=0.001, period_s=1e-3):
         ticks = pace.ticks(period_s)
         t_s += ticks * period_s
         clock.now += took_s
-        pace.ran(ticks, period_s, t_s, took_s)
+        pace.record_chunk(ticks, period_s, t_s, took_s)
     return begins, t_s
 
 
@@ -99,10 +99,10 @@ def test_chunks_keep_the_pace(clock, speed):
     # The first chunks of a faster pace are short, until it is known what a chunk takes.
     assert np.diff(begins).max() == pytest.approx(CHUNK_s, abs=1e-12)
     assert (pace.chunks, pace.missed) == (101, 0)
-    assert pace.reached() == pytest.approx(speed, rel=0.02)  # of 50 chunks, the last one's end
+    assert pace.realtime_factor() == pytest.approx(speed, rel=0.02)  # of 50 chunks, the last one's end
 
 
-def test_late_chunks_are_counted_and_made_up_for_but_not_without_end(clock):
+def test_late_chunks_are_counted_and_made_up_within_a_bound(clock):
     pace = Pace(clock)
     run(pace, clock, 11)
     clock.now += 2.5 * CHUNK_s
@@ -116,17 +116,17 @@ def test_late_chunks_are_counted_and_made_up_for_but_not_without_end(clock):
     assert 0 < made_up_for <= LATE_s / CHUNK_s + 1
 
 
-def test_a_machine_too_slow_for_the_pace_runs_shorter_chunks_so_that_stop_is_heard(clock):
+def test_a_slow_machine_runs_shorter_chunks_so_that_stop_acts(clock):
     pace = Pace(clock)
     pace.speed = 1000.0
     for _ in range(100):
         ticks = pace.ticks(1e-3)
         took_s = 1e-4 * ticks  # ten times real time is all that it can
         clock.now += pace.wait_s() + took_s
-        pace.ran(ticks, 1e-3, clock.now * 10, took_s)
+        pace.record_chunk(ticks, 1e-3, clock.now * 10, took_s)
     assert 1e-4 * pace.ticks(1e-3) <= CHUNK_s
     assert pace.missed_share > 0.9
-    assert pace.reached() == pytest.approx(10, rel=0.1)
+    assert pace.realtime_factor() == pytest.approx(10, rel=0.1)
 
 
 def test_as_fast_as_possible_waits_for_nothing_and_has_no_deadlines(clock):
@@ -136,10 +136,10 @@ def test_as_fast_as_possible_waits_for_nothing_and_has_no_deadlines(clock):
     assert pace.ticks(1e-3) == MOST_TICKS
     assert pace.chunks == 0
     assert clock.now == pytest.approx(0.01)
-    assert pace.reached() == pytest.approx(t_s / 0.01, rel=0.05)
+    assert pace.realtime_factor() == pytest.approx(t_s / 0.01, rel=0.05)
 
 
-def test_the_history_is_thinned_bounded_and_the_same_whatever_the_chunks():
+def test_the_history_is_decimated_bounded_and_independent_of_chunks():
     found = []
     for chunk in (1, 7, 600):
         with begun() as made:
@@ -160,13 +160,13 @@ def test_the_history_is_thinned_bounded_and_the_same_whatever_the_chunks():
         np.testing.assert_allclose(history["t_s"][[0, -1]], [5.0, 14.98], rtol=1e-12)
 
 
-def test_what_was_reached_is_counted_anew_when_time_goes_back():
+def test_the_realtime_factor_restarts_when_time_goes_back():
     clock = Clock()
     pace = Pace(clock)
     for first_s in (5.0, 1.0):
         for chunk in range(1, 11):
             pace.wait_s()
             clock.now += 0.02
-            pace.ran(20, 1e-3, first_s + 0.02 * chunk, 1e-3)
-            assert pace.reached() >= 0.0
-    assert pace.reached() == pytest.approx(1.0, rel=1e-9)
+            pace.record_chunk(20, 1e-3, first_s + 0.02 * chunk, 1e-3)
+            assert pace.realtime_factor() >= 0.0
+    assert pace.realtime_factor() == pytest.approx(1.0, rel=1e-9)

@@ -74,7 +74,7 @@ def test_user_s_curve_is_judged_in_a_table(user_csv):
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert "0.93" in done.stdout
-    assert "left out" in done.stdout
+    assert "leave-one-out" in done.stdout
 
 
 def test_user_s_curve_is_judged_in_json(capsys, user_csv):
@@ -147,7 +147,7 @@ def test_check_prints_a_table(capsys, coarse):
     code, out, err = here(capsys, "check", "--poses", 1)
     assert (code, err) == (0, "")
     assert "0° to 12°" in out
-    assert "Where it comes from" in out
+    assert "Sources of the error" in out
     assert "2 of 2 checks hold" in out
 
 
@@ -271,7 +271,7 @@ def test_bad_input_is_one_line_and_exit_2(capsys, tmp_path, monkeypatch, user_cs
 
 
 def test_missing_matplotlib_is_named_before_the_work(capsys, tmp_path, monkeypatch):
-    for drawing in ("magnetic_plots", "plots"):
+    for drawing in ("torque_maps", "crosscheck"):
         monkeypatch.delitem(sys.modules, f"spheretwin.viz.figures.{drawing}", raising=False)
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     code, _, err = here(capsys, "map", "--out", tmp_path / "figures")

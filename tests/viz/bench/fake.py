@@ -10,7 +10,7 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
-from spheretwin.viz.bench.protocols import Choices, Setting
+from spheretwin.viz.bench.protocols import Choices, FieldSetting
 
 GROUPS = 18
 
@@ -89,11 +89,11 @@ class Bench:
 
 
 SETTINGS = [
-    Setting("controller.law", "afsm", "afsm", "law", ("pd", "afsm")),
-    Setting("controller.stiffness", "4 4 4", "1 1 1", "stiffness, N·m/rad"),
-    Setting("controller.known", "true", "false", "whether"),
-    Setting("disturbance.load", "0", "0", "load"),
-    Setting("plant.step_s", "0.0005", "0.0005", "physics step, s"),
+    FieldSetting("controller.law", "afsm", "afsm", "law", ("pd", "afsm")),
+    FieldSetting("controller.stiffness", "4 4 4", "1 1 1", "stiffness, N·m/rad"),
+    FieldSetting("controller.known", "true", "false", "whether"),
+    FieldSetting("disturbance.load", "0", "0", "load"),
+    FieldSetting("plant.step_s", "0.0005", "0.0005", "physics step, s"),
 ]
 
 
@@ -105,7 +105,7 @@ def read(name, text):
 
 CHOICES = Choices(
     settings=lambda: SETTINGS,
-    shape=lambda name: [Setting("amplitude", "0.2", "0.2", "rad")] if name == "sinusoid" else [],
+    shape=lambda name: [FieldSetting("amplitude", "0.2", "0.2", "rad")] if name == "sinusoid" else [],
     read=read,
     scenarios=("hold", "nutation"),
     shapes=("hold", "sinusoid"),

@@ -1,24 +1,24 @@
-"""Every button is one command with what its fields say, and nothing that is shared moves by itself."""
+"""Every button sends one command with the values of its fields; shared controls do not move by themselves."""
 
 import msgspec
 import pytest
 
-from tests.viz.bench.test_door import CAMERA, changed, handle_of, socket_to, wait_for
+from tests.viz.bench.test_server import CAMERA, changed, handle_of, socket_to, wait_for
 
 BUTTONS = {
     "STOP (space)": ("stop", {}),
-    "Stand": ("hold", {}),
-    "Only this one, at 1 A": ("manual", {"group": 0, "current_A": 1.0}),
-    "Show it": ("replay", {"file": ""}),
-    "Follow this": ("trajectory", {"fields": {"shape": "hold"}}),
+    "Hold": ("hold", {}),
+    "Only this group, at 1 A": ("manual", {"group": 0, "current_A": 1.0}),
+    "Replay": ("replay", {"file": ""}),
+    "Follow this trajectory": ("trajectory", {"fields": {"shape": "hold"}}),
     "Add from now on": ("add_fault", {"fault": {"target": "coil.00", "mode": "open"}}),
     "Clear all": ("clear_faults", {}),
-    "Clear the one at this place": ("clear_faults", {"place": 0}),
+    "Clear the fault at this place": ("clear_faults", {"place": 0}),
     "Record from now on": ("record", {"recording": "bench.rrd", "telemetry": "bench.parquet"}),
-    "End it, and complete the files": ("keep", {}),
-    "Load it": ("load", {"source": "hold"}),
+    "Stop and complete the files": ("keep", {}),
+    "Load": ("load", {"source": "hold"}),
     "Save the present settings": ("save", {"file": "bench.toml"}),
-    "Take one": ("snapshot", {"name": "last"}),
+    "Save a snapshot": ("snapshot", {"name": "last"}),
 }
 
 CHANGES = {
@@ -29,7 +29,7 @@ CHANGES = {
     "rate": ("rate, rad/s", 0.7, ("limits", {"rate_rad_s": 0.7})),
     "law": ("law", "pd", ("set", {"name": "controller.law", "value": "pd"})),
     "step": ("run", "step", ("step", {})),
-    "back to": ("back to", "before", ("restore", {"name": "before"})),
+    "restore": ("restore", "before", ("restore", {"name": "before"})),
     "off": ("mode", "off", ("off", {})),
 }
 
@@ -55,10 +55,10 @@ def test_each_change_is_one_command(page, bench, change):
         wait_for(lambda: bench.commands() == [expected])
 
 
-def test_gains_as_they_come_are_those_that_differ(page, bench):
+def test_reset_of_gains_sets_those_that_differ(page, bench):
     with socket_to(page) as visitor:
         visitor.send(msgspec.msgpack.encode(CAMERA))
-        visitor.send(changed(handle_of(page, "Gains as they come"), value=True))
+        visitor.send(changed(handle_of(page, "Reset gains to defaults"), value=True))
         wait_for(lambda: len(bench.commands()) == 2)
         assert bench.commands() == [
             ("set", {"name": "controller.stiffness", "value": "1 1 1"}),
@@ -66,7 +66,7 @@ def test_gains_as_they_come_are_those_that_differ(page, bench):
         ]
 
 
-def test_what_a_page_that_watches_writes_is_taken_back(page, bench):
+def test_changes_of_a_watching_page_are_undone(page, bench):
     bench.now.operator = "another"
     name = handle_of(page, "save as")
     with socket_to(page) as visitor:
@@ -78,7 +78,7 @@ def test_what_a_page_that_watches_writes_is_taken_back(page, bench):
     assert page._server.gui._gui_input_handle_from_uuid[name].value == "bench.toml"
 
 
-def test_the_page_of_itself_commands_nothing(page, bench):
+def test_the_page_sends_no_command_without_an_event(page, bench):
     """Sliders follow the twin, forms what is in force: none of it is a person's."""
     with socket_to(page) as visitor:
         visitor.send(msgspec.msgpack.encode(CAMERA))

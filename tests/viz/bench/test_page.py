@@ -1,4 +1,4 @@
-"""The page in a browser: a touch is a command, the state is what is shown, nothing leaves the machine."""
+"""The page in a browser: controls send commands, the status is shown, no request leaves the machine."""
 
 import time
 
@@ -37,7 +37,7 @@ def tip(bench, q_rad):
     return rotation(np.array(q_rad)) @ bench.actuator.shaft_tip_m
 
 
-def test_a_touch_is_a_command(browser):
+def test_each_control_sends_a_command(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:
         tab = opened(browser, page)
@@ -76,7 +76,7 @@ def test_the_tip_is_dragged_where_the_pointer_is(browser):
         tab.close()
 
 
-def test_a_coil_that_is_clicked_gets_a_current_of_its_own_by_hand_only(browser):
+def test_a_clicked_coil_gets_a_current_in_manual_mode_only(browser):
     bench = fake.Bench()
     actuator = bench.actuator
     with fake.shown(bench) as page:
@@ -99,7 +99,7 @@ def test_a_coil_that_is_clicked_gets_a_current_of_its_own_by_hand_only(browser):
         tab.close()
 
 
-def test_what_is_wrong_is_said_in_words_and_harms_nothing(browser):
+def test_invalid_commands_are_refused_without_effect(browser):
     bench = fake.Bench(
         mode="fault", status="failsafe", reason="<img src=x onerror=alert(1)>", saturated=True, stopped=True
     )
@@ -125,7 +125,7 @@ def test_what_is_wrong_is_said_in_words_and_harms_nothing(browser):
         tab.close()
 
 
-def test_a_value_is_refused_beside_its_field(browser):
+def test_a_refusal_is_shown_at_its_field(browser):
     bench = fake.Bench(refused={"set": "controller.stiffness: expected a value ≥ 0, received -1"})
     with fake.shown(bench) as page:
         tab = opened(browser, page)
@@ -147,41 +147,41 @@ def test_one_page_operates_and_gives_over(browser):
         first, second = opened(browser, page), opened(browser, page)
         second.wait_for("document.body.innerText.includes('Ask to operate')")
         second.click("text=start")
-        second.wait_for("document.body.innerText.includes('This page watches')")
+        second.wait_for("document.body.innerText.includes('This page is read-only')")
         assert bench.commands() == []
         second.click("text=STOP (space)")
         assert told(bench, 1) == [("stop", {})]
         second.click("text=Ask to operate")
         assert told(bench, 2)[1:] == [("ask", {})]
         bench.now.asking = ("page 1",)
-        first.click("text=Let page 1 operate")
+        first.click("text=Grant control to page 1")
         assert told(bench, 3)[2:] == [("grant", {"to": "page 1"})]
         first.close()
         second.close()
 
 
-def test_where_nobody_operates_it_is_said_how_to_take_over(browser):
+def test_without_an_operator_the_pages_explain_how_to_take_over(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:
         first, second = opened(browser, page), opened(browser, page)
         third = opened(browser, page)
         bench.now.watching = ("page 1", "page 2")
         first.close()
-        third.wait_for(f"{STATUS}.innerText.includes('Nobody operates: press “Take over”.')")
+        third.wait_for(f"{STATUS}.innerText.includes('No client operates: press “Take over”.')")
         third.click("text=start")
-        third.wait_for("document.body.innerText.includes('Nobody operates; take over, above.')")
+        third.wait_for("document.body.innerText.includes('No client operates: press “Take over” above.')")
         assert bench.commands() == []
         third.click("text=Take over")
         assert told(bench, 1) == [("ask", {})]
         bench.now.watching = ("page 1",)
-        third.wait_for(f"!{STATUS}.innerText.includes('Nobody operates')")
+        third.wait_for(f"!{STATUS}.innerText.includes('No client operates')")
         third.click("text=start")
         assert told(bench, 2)[1:] == [("start", {})]
         second.close()
         third.close()
 
 
-def test_a_page_that_is_alone_operates_though_it_came_back_before_it_was_gone(browser):
+def test_a_reloaded_single_page_operates(browser):
     bench = fake.Bench(operator="page 7", watching=("page 0",))
     with fake.shown(bench) as page:
         tab = opened(browser, page)
@@ -193,7 +193,7 @@ def test_a_page_that_is_alone_operates_though_it_came_back_before_it_was_gone(br
         tab.close()
 
 
-def test_who_only_watched_does_not_operate_though_alone(browser, monkeypatch):
+def test_a_single_watching_page_does_not_operate(browser, monkeypatch):
     monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", 0.5)
     bench = fake.Bench(operator="page 7", watching=("page 0",))
     with fake.shown(bench) as page:
@@ -230,7 +230,7 @@ def test_a_coil_has_the_colour_of_its_current(browser, tmp_path):
         tab.close()
 
 
-def test_a_page_comes_back_by_itself(browser):
+def test_a_page_reconnects(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:
         tab = opened(browser, page)
@@ -240,7 +240,7 @@ def test_a_page_comes_back_by_itself(browser):
         tab.close()
 
 
-def test_the_way_of_the_tip_begins_anew_with_another_run():
+def test_the_path_of_the_tip_restarts_with_another_run():
     bench = fake.Bench()
     with fake.shown(bench) as page:
         for t_s in (1.3, 1.4, 1.5):

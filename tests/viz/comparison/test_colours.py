@@ -1,4 +1,4 @@
-"""Colours of runs: by law where that tells them apart, and seen on a dark ground."""
+"""Colours of runs: by law if these are distinct, and visible on a dark ground."""
 
 import math
 
@@ -22,7 +22,7 @@ def test_no_two_runs_of_one_law_have_one_colour_on_any_ground(law, count):
     assert len(set(colours)) == len(set(map(on_dark, colours))) == count
 
 
-def test_all_are_seen_on_a_dark_ground_and_told_apart():
+def test_colours_are_visible_on_a_dark_ground_and_distinct():
     colours = [on_dark(colour) for colour in theme.LAW_COLOURS.values()]
     for place, colour in enumerate(colours):
         # Of 441 from black to white; the nearest two laws differ by 44, the nearest to the ground by 120.

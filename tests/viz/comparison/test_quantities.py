@@ -1,4 +1,4 @@
-"""What is drawn of a run against the definitions of a rotation and of virtual power."""
+"""Quantities of compared runs against the definitions of a rotation and of virtual power."""
 
 import numpy as np
 import pytest
@@ -7,14 +7,14 @@ from spheretwin.models.kinematics import generalised_torque, rotation
 from spheretwin.models.telemetry.signals import ANGLES, Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.quantities import (
-    COMPARED_QUANTITIES,
     ERROR,
     ERROR_ANGLE,
     MARGIN,
-    Rows,
+    SCALAR_QUANTITIES,
+    QuantityRows,
     angle_between,
-    compared_quantities,
     on_the_hinges,
+    scalar_quantities,
 )
 
 RANDOM = np.random.default_rng(0)
@@ -57,32 +57,32 @@ def table(*more):
 
 
 def rows(of, actuator):
-    return Rows(of, of.rows(0, 1), actuator, 8.0)
+    return QuantityRows(of, of.rows(0, 1), actuator, 8.0)
 
 
 def test_only_what_all_runs_have_is_drawn():
     slides = table(Signal("sliding_s", "rad/s", 3, "s", ("α", "β", "γ")))
-    assert compared_quantities([slides, slides]) == list(COMPARED_QUANTITIES)
-    common = compared_quantities([slides, table()])
-    assert {each.group for each in COMPARED_QUANTITIES} - {each.group for each in common} == {"sliding"}
+    assert scalar_quantities([slides, slides]) == list(SCALAR_QUANTITIES)
+    common = scalar_quantities([slides, table()])
+    assert {each.group for each in SCALAR_QUANTITIES} - {each.group for each in common} == {"sliding"}
 
 
 def test_every_quantity_has_a_number_a_row_and_a_name_of_its_own(actuator):
     of = rows(table(Signal("sliding_s", "rad/s", 3, "s", ("α", "β", "γ"))), actuator)
-    for each in COMPARED_QUANTITIES:
-        assert each.of(of).shape == (7,)
+    for each in SCALAR_QUANTITIES:
+        assert each.values(of).shape == (7,)
         assert each.desired is None or each.desired(of).shape == (7,)
         assert each.heading == f"{each.title} [{each.unit}]"
     assert (
-        len({each.name for each in COMPARED_QUANTITIES})
-        == len({each.heading for each in COMPARED_QUANTITIES})
+        len({each.name for each in SCALAR_QUANTITIES})
+        == len({each.heading for each in SCALAR_QUANTITIES})
         == 14
     )
 
 
 def test_what_one_run_s_recording_has_too_is_the_same_number(actuator):
     of = rows(table(), actuator)
-    beside = {each.name: each.of(of) for each in COMPARED_QUANTITIES if "sliding" not in each.name}
+    beside = {each.name: each.values(of) for each in SCALAR_QUANTITIES if "sliding" not in each.name}
     for alone in (ERROR_ANGLE, MARGIN):
         np.testing.assert_array_equal(beside[alone.name], alone.values(of)[:, 0])
     errors = np.stack([beside[f"error_{angle}_mrad"] for angle in ANGLES], axis=1)

@@ -23,10 +23,10 @@ def courses(windows=WINDOWS):
 
 
 def lines():
-    line = over_time.Line("as printed", SIZES, 0.5 * SIZES)
+    line = over_time.ErrorLine("as printed", SIZES, 0.5 * SIZES)
     groups = [
-        over_time.Group("afsm", "AFSM", [line, line], 0.12),
-        over_time.Group("pid", "PID", [line], None),
+        over_time.ErrorGroup("afsm", "AFSM", [line, line], 0.12),
+        over_time.ErrorGroup("pid", "PID", [line], None),
     ]
     return over_time.lines(groups, "largest |error|, degrees", "lines")
 
@@ -47,7 +47,7 @@ def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw
     assert 0.003 < inked.mean() < 0.8
 
 
-def test_courses_show_the_median_in_the_colour_of_the_law():
+def test_error_bands_show_the_median_in_the_colour_of_the_law():
     above, below = courses().axes
     (median,) = [line for line in above.get_lines() if line.get_label() == "AFSM"]
     assert median.get_color() == theme.law_colour("afsm")
@@ -58,7 +58,7 @@ def test_courses_show_the_median_in_the_colour_of_the_law():
     assert set(dotted[0][0].get_ydata()) == {0.12}
 
 
-def test_courses_end_where_the_first_run_has_ended():
+def test_error_bands_end_with_the_first_run():
     ended = WINDOWS.copy()
     ended[1, 25:] = np.nan
     (median,) = [line for line in courses(ended).axes[0].get_lines() if line.get_label() == "AFSM"]

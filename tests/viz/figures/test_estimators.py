@@ -1,4 +1,4 @@
-"""The estimators' figure: measured and derived, behind and not told from none, each named."""
+"""Figure of the estimators: measured and derived values, hidden lags, names."""
 
 import numpy as np
 import pytest

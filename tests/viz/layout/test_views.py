@@ -1,4 +1,4 @@
-"""Views name only what is there, whatever the hardware, the law and the faults."""
+"""Views name existing entities only, for any hardware, law and faults."""
 
 import numpy as np
 import pytest

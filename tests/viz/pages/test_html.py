@@ -1,4 +1,4 @@
-"""A page of Markdown as HTML: its tables, and nothing in it that is obeyed."""
+"""A page of Markdown as HTML: its tables, and all tags escaped."""
 
 from spheretwin.viz.pages import html, markdown
 

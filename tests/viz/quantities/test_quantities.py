@@ -1,4 +1,4 @@
-"""Derived quantities against what they are by definition, computed another way."""
+"""Derived quantities against their definitions, computed in another way."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from spheretwin.viz.quantities import (
     MEASURED_ANGLE,
     QUANTITIES,
     TIP_DISTANCE,
-    Rows,
+    QuantityRows,
     quantities_of,
 )
 
@@ -43,7 +43,7 @@ def rows(actuator):
     table["q_rad"][:, 1] = generator.uniform(-1.2, 1.2, COUNT)
     table["t_s"][:] = 1e-3 * np.arange(COUNT)
     table["allocation_scale"][:] = 1.0
-    return Rows(table, table.rows(0, 1), actuator, LIMIT_A)
+    return QuantityRows(table, table.rows(0, 1), actuator, LIMIT_A)
 
 
 def test_the_error_angle_is_that_of_the_rotation_between_both_poses(rows):
@@ -60,7 +60,7 @@ def test_a_small_error_angle_keeps_its_digits(rows):
     np.testing.assert_allclose(ERROR_ANGLE.values(rows)[:, 0], np.degrees(1e-7), rtol=1e-8)
 
 
-def test_the_tip_is_as_far_off_as_both_rotations_put_it(rows, actuator):
+def test_tip_distance_is_that_of_both_rotations(rows, actuator):
     expected = [
         1e3 * np.linalg.norm((rotation(q) - rotation(desired)) @ actuator.shaft_tip_m)
         for q, desired in zip(rows.table["q_rad"], rows.table["q_ref_rad"], strict=True)
@@ -126,7 +126,7 @@ def test_coupling_of_equal_inertias_is_that_of_the_paper(rows, actuator):
     np.testing.assert_allclose(COUPLING.values(equal), expected, rtol=1e-9, atol=1e-13)  # as above
 
 
-def test_copper_loss_is_of_cold_coils_unless_it_is_told(rows, actuator):
+def test_copper_loss_is_of_cold_coils_without_a_column(rows, actuator):
     expected = [actuator.group.resistance_ohm * current @ current for current in rows.table["current_A"]]
     np.testing.assert_allclose(COPPER_LOSS.values(rows)[:, 0], expected, rtol=1e-13)
     told = Signal("copper_loss_W", "W", 18, "heat of the coils")
@@ -135,7 +135,7 @@ def test_copper_loss_is_of_cold_coils_unless_it_is_told(rows, actuator):
     np.testing.assert_array_equal(COPPER_LOSS.values(rows._replace(table=table))[:, 0], 9.0)
 
 
-def test_errors_are_what_was_taken_for_true_minus_the_truth(rows):
+def test_measurement_errors_are_measured_minus_true(rows):
     table = rows.table
     np.testing.assert_array_equal(ERROR.values(rows), 1e3 * table["error_rad"])
     np.testing.assert_array_equal(

@@ -1,4 +1,4 @@
-"""The pipe between Rerun and a file: what goes wrong at the far end is kept, and holds nobody up."""
+"""Pipe between Rerun and a file: errors of the file are kept, and nothing waits for it."""
 
 import errno
 import io
@@ -37,7 +37,7 @@ def test_all_bytes_reach_the_file(tmp_path):
     assert (tmp_path / "file").read_bytes() == BYTES
 
 
-def test_a_file_that_cannot_be_opened_is_told_at_once(tmp_path):
+def test_a_file_that_cannot_be_opened_is_reported_at_once(tmp_path):
     open_files = len(os.listdir("/dev/fd"))
     with pytest.raises(FileNotFoundError):
         FilePipe(tmp_path / "missing" / "file")

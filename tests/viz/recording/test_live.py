@@ -1,4 +1,4 @@
-"""A run that is watched: 100 rows a second at most, the same telemetry whoever watches, nothing outside."""
+"""Live view of a run: at most 100 rows a second, unchanged telemetry, no request to other machines."""
 
 import os
 import signal

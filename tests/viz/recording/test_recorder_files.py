@@ -1,4 +1,4 @@
-"""Files of recordings: what is left where one cannot be made, written or named, and of links and meshes."""
+"""Files of recordings: what remains if one cannot be made, written or named; links and meshes."""
 
 import json
 import os
@@ -44,7 +44,7 @@ def test_a_fault_while_recording_is_raised_not_lost(tmp_path):
     assert f"{raised.value}".endswith(kept)
 
 
-def test_a_folder_in_the_place_of_a_recording_is_told_with_where_the_recording_is(tmp_path):
+def test_a_folder_at_the_path_is_reported_with_the_place_of_the_recording(tmp_path):
     session, facts = hold_facts()
     recorder = Recorder(session.actuator, session.signals, facts, path=tmp_path / "run.rrd")
     follow(session, session.scenario.ticks, [recorder])

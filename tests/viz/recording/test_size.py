@@ -1,4 +1,4 @@
-"""How much a recording grows with its run: no more than the telemetry itself, as numbers side by side."""
+"""Size of a recording: it grows no faster than the telemetry's numbers."""
 
 import numpy as np
 import pytest

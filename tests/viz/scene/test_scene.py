@@ -273,7 +273,7 @@ def metre_up(line):
     return f"v {x} {y} {float(z) + 1.0}"
 
 
-def test_an_edited_mesh_is_drawn_as_it_is(tmp_path):
+def test_an_edited_mesh_is_read_again(tmp_path):
     shutil.copytree(actuators.FOLDER / "assets", tmp_path / "assets")
     mjcf = Path(shutil.copy(actuators.MJCF_PATH, tmp_path / "mine.xml"))
     mesh = tmp_path / "assets" / "shaft.obj"

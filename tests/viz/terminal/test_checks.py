@@ -1,4 +1,4 @@
-"""Checks and other tables as a person reads them, in a wide terminal and in a narrow one."""
+"""Checks and other tables in a wide and in a narrow terminal."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_a_check_is_a_line_with_its_verdict(printed):
     assert not any("as much as is known" in line for line in lines)
 
 
-def test_at_length_it_says_what_is_compared_and_why(printed):
+def test_verbose_checks_explain_comparison_and_bound(printed):
     lines = printed(verbose=True)
     where = lines.index("mesh [1], 3 states")
     assert lines[where + 1] == "compares: this mesh with that"

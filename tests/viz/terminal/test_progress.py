@@ -1,4 +1,4 @@
-"""Progress: one look for a run, for steps and for parts; nothing at all where nobody watches."""
+"""Progress: one style for runs, steps and parts; nothing without a terminal."""
 
 import re
 from types import SimpleNamespace
@@ -89,7 +89,7 @@ def test_runs_are_counted_as_they_are_done(capsys):
 
 
 @pytest.mark.usefixtures("watched")
-def test_a_run_tells_the_time_it_has_simulated_and_how_it_ended(capsys):
+def test_progress_shows_simulated_time_and_status(capsys):
     follow_a_run()
     assert re.search(
         LOOK.format("hold: completed", "1.98 s simulated "), ESCAPES.sub("", capsys.readouterr().err)

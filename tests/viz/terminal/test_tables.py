@@ -1,4 +1,4 @@
-"""A run's figures as a person reads them: how it ended in the title, errors in mrad and degrees."""
+"""Tables of a run's figures: status in the title, errors in mrad and degrees."""
 
 import math
 
@@ -44,7 +44,7 @@ def piped(monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
-def test_errors_are_told_in_mrad_and_degrees(capsys):
+def test_errors_are_printed_in_mrad_and_degrees(capsys):
     lines = printed(capsys)
     assert lines[0].rstrip() == "hold under pd: completed"
     assert cells(lines, "largest") == ["1260 (72.3°)", "30.1 (1.72°)", "< 0.001 (< 0.001°)"]

@@ -1,4 +1,4 @@
-"""Every number of a review less that of the first."""
+"""Every number of a report minus that of the first run."""
 
 import json
 import runpy

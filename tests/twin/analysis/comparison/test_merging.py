@@ -1,4 +1,4 @@
-"""Runs merged into one recording: every number of each as it was, and a layout that names what is there."""
+"""Runs merged into one recording: every number of each run, and a layout of existing entities only."""
 
 import os
 import runpy
@@ -19,7 +19,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.viz.comparison.ghosts import Ghost
 from spheretwin.viz.layout.view import TIMELINE
-from spheretwin.viz.quantities import COMPARED_QUANTITIES
+from spheretwin.viz.quantities import SCALAR_QUANTITIES
 
 # By its path: the tests are no package.
 written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
@@ -93,7 +93,7 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
     apart = {
         each.name: merged.values(f"/run_2_moved/compare/{each.name}")
         - merged.values(f"/run_1_first/compare/{each.name}")
-        for each in COMPARED_QUANTITIES
+        for each in SCALAR_QUANTITIES
         if f"/run_1_first/compare/{each.name}" in merged.entities
     }
     # Rounding of angles below 1 rad, in mrad.
@@ -104,7 +104,7 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
     assert apart["error_angle_deg"].any()
 
 
-def test_what_was_asked_for_is_there_once(merged):
+def test_the_reference_is_recorded_once(merged):
     leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/what_was_asked/")}
     assert leading == {"run_3_slow"}  # the longest of runs that were asked for the same
     wanted = merged.values("/what_was_asked/run_3_slow/angle_α_rad")
@@ -157,7 +157,7 @@ def test_nothing_but_the_file_is_left(merged):
         (["first"], "out.rrd", "expected two runs or more for --merge, received one"),
         (["first", "slow"], "out.parquet", "expected --merge OUT.rrd"),
         (["first", "slow"], "no folder/out.rrd", "expected a writable path"),
-        (["first", "slow"], "first.rrd", "which is there"),
+        (["first", "slow"], "first.rrd", "which exists"),
         (["first", "missing"], "out.rrd", "expected the file of a run"),
     ],
 )

@@ -111,7 +111,7 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
         says(tab, "OFF", "STOPPED")
         until(bench, lambda state: not np.any(state.current_command_A))
         tab.click("text=keep")
-        tab.click("text=End it, and complete the files")
+        tab.click("text=Stop and complete the files")
         until(bench, lambda state: state.kept == (str(kept),))
         assert errors(tab) == []
         assert tab.outside == []

@@ -25,7 +25,7 @@ def test_a_port_in_use_is_told_in_one_line(capsys):
     assert code == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.startswith(f"spheretwin: bench: expected a port that is free, received {port}")
+    assert err.startswith(f"spheretwin: bench: expected a free port, received {port}")
     assert err.count("\n") == 1
 
 

@@ -13,7 +13,7 @@ HINGES = ("α", "β", "γ")
 
 def series(law, scale, whole=(True, True), paper=None):
     errors = scale * np.array([0.9, 1.0, 1.2])[:, None, None] * np.array([1.0, 2.0])[:, None] * np.ones(3)
-    return conditions.Series(law, np.array([0.0, 1.0]), errors, np.array(whole), paper or {})
+    return conditions.ErrorsByCondition(law, np.array([0.0, 1.0]), errors, np.array(whole), paper or {})
 
 
 def drawn():
@@ -24,7 +24,7 @@ def drawn():
     return conditions.by_condition(by_label, HINGES, "load L", "largest |error|", "title")
 
 
-def test_laws_are_told_apart_without_colour():
+def test_laws_are_distinct_without_colour():
     looks = styles(LAWS)
     assert len({look.colour for look in looks.values()}) == len(LAWS)
     assert len({(look.marker, look.dash) for look in looks.values()}) == len(LAWS)
@@ -61,10 +61,10 @@ def test_what_ended_early_is_hollow():
     assert any(text.get_text() == "ended early" for text in drawn().legends[0].get_texts())
 
 
-def test_a_course_ends_in_a_cross_where_its_run_did():
+def test_a_line_of_an_early_end_has_a_cross():
     by_label = {
-        "PD": over_time.Course("pd", np.full((2, 3, 3), 0.5)),
-        "AFSM": over_time.Course("afsm", np.full((2, 8, 3), 0.01)),
+        "PD": over_time.ErrorBand("pd", np.full((2, 3, 3), 0.5)),
+        "AFSM": over_time.ErrorBand("afsm", np.full((2, 8, 3), 0.01)),
     }
     panel = over_time.errors(by_label, 0.05, HINGES, "title").axes[0]
     (cross,) = [line for line in panel.lines if line.get_marker() == "x" and len(line.get_xdata())]
@@ -76,8 +76,8 @@ def test_paths_are_on_the_same_scales():
     turn = np.linspace(0, 6, 50)
     around = np.stack([90 * np.cos(turn), 20 * np.sin(turn), 100 + turn], axis=1)
     by_label = {
-        "AFSM": paths.Path("afsm", around, around, True),
-        "PD": paths.Path("pd", around[:9], around, False),
+        "AFSM": paths.TipPath("afsm", around, around, True),
+        "PD": paths.TipPath("pd", around[:9], around, False),
     }
     figure = paths.paths(by_label, "title")
     spaces, plans = figure.axes[::2], figure.axes[1::2]

@@ -1,4 +1,4 @@
-"""What a log says of a run: saturation once a spell, and every way to end."""
+"""Log of a run: each time of saturation once, and every way to end."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_a_lost_rank_is_an_event_of_its_own():
     assert ["current limit" in event[2] for event in found] == [True, False, False, True]
 
 
-def test_a_spell_at_the_limit_is_one_event():
+def test_a_time_at_the_limit_is_one_event():
     t_s = np.arange(1000) * 1e-3
     scale = np.ones(1000)
     scale[100:200:3] = 0.5  # chatters at the limit

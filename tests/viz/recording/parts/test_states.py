@@ -1,4 +1,4 @@
-"""States become lanes of a timeline: whatever the chunks, each change once, at its own time, by its name."""
+"""States are lanes of a timeline: each change once, at its time, with its name, for any chunks."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def lanes(whole, cuts):
     ),
     st.sets(st.integers(1, ROWS - 1)),
 )
-def test_each_change_is_told_once_whatever_the_chunks(values, cuts):
+def test_each_change_is_logged_once_for_any_chunks(values, cuts):
     whole = table(np.array(values, dtype=np.float64))
     expected = {}
     for column, entity in enumerate(("states/part/first-one", "states/part/second", "states/alone")):

@@ -1,4 +1,4 @@
-"""A recording that grows: readers get it in order, in memory that is bounded, and none is waited for."""
+"""Broadcast of a growing recording: readers get it in order, memory is bounded, no reader is waited for."""
 
 import itertools
 import threading
@@ -32,7 +32,7 @@ def test_a_reader_gets_all_in_order_to_the_end():
     assert [*begun, *reader] == [b"first", *map(piece, range(30))]
 
 
-def test_who_comes_late_gets_what_every_reader_needs_and_what_is_kept():
+def test_a_late_reader_gets_the_beginning_and_the_kept_pieces():
     broadcast = filled(50, kept_bytes=1000)
     broadcast.end()
     assert list(broadcast.read()) == [b"first", *map(piece, range(40, 50))]
@@ -48,7 +48,7 @@ def test_memory_is_bounded_whatever_readers_do():
     assert number_of(next(stuck)) >= 9990
 
 
-def test_a_reader_that_falls_behind_goes_on_with_the_newest():
+def test_a_slow_reader_continues_with_the_newest():
     broadcast = filled(5, behind_bytes=1000)
     reader = broadcast.read()
     assert [number_of(each) for each in itertools.islice(reader, 1, 6)] == [0, 1, 2, 3, 4]

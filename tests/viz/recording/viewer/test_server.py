@@ -1,4 +1,4 @@
-"""The viewer's server: what it serves, whom it refuses, and that nothing of it outlives its process."""
+"""Server of the viewer: its files, its refusals, and its end with the process."""
 
 import http.client
 import os
@@ -71,7 +71,7 @@ def test_the_browser_is_told_to_refuse_other_hosts(served):
     assert sources <= keywords
 
 
-def test_what_is_not_there_or_is_asked_under_another_name_is_refused(served):
+def test_unknown_paths_and_host_names_are_refused(served):
     assert asked(served, "/../assets.py")[0].status == 404
     assert asked(served, "/re_viewer.js", host="elsewhere.example")[0].status == 403
 
@@ -80,13 +80,13 @@ def test_the_program_that_holds_the_files_keeps_nothing_of_its_own(served, home)
     assert list(home.rglob("*")) == []
 
 
-def test_a_program_that_is_not_there_is_told(monkeypatch, tmp_path):
+def test_a_missing_program_is_reported(monkeypatch, tmp_path):
     monkeypatch.setattr(viewer_server.rerun_cli, "__file__", str(tmp_path / "__init__.py"))
     with pytest.raises(SpheretwinError, match="expected Rerun's viewer at"):
         viewer_server.read_assets()
 
 
-def test_a_program_that_ends_at_once_is_told(monkeypatch, tmp_path):
+def test_a_program_that_ends_at_once_is_reported(monkeypatch, tmp_path):
     (program := tmp_path / "rerun").write_text("#!/bin/sh\nexit 1\n")
     program.chmod(0o755)
     monkeypatch.setattr(viewer_server.rerun_cli, "__file__", str(tmp_path / "__init__.py"))

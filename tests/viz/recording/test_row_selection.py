@@ -1,4 +1,4 @@
-"""What a thinned recording keeps: whole rows, all that stands out, however the rows come in chunks."""
+"""Rows of a decimated recording: complete rows and all extremes, for any chunks."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.outputs import Outputs, check_rate
 from spheretwin.session import Session
 from spheretwin.simulation import follow
-from spheretwin.viz.decimation import WINDOW_S, Firsts, FirstsAndExtremes
+from spheretwin.viz.decimation import WINDOW_S, FirstAndExtremeRows, FirstRows
 from spheretwin.viz.recording.reader import read
 
 SIGNALS = (
@@ -39,8 +39,8 @@ def made(ticks, signals=SIGNALS, first=0):
 
 def thinned(thinning, tables):
     """Rows that are kept of tables that come one after the other."""
-    kept = [each for table in tables for each in thinning.take(table)]
-    return np.concatenate([each.values for each in [*kept, *thinning.rest()]])
+    kept = [each for table in tables for each in thinning.add(table)]
+    return np.concatenate([each.values for each in [*kept, *thinning.flush()]])
 
 
 def slowly(table):
@@ -74,7 +74,7 @@ def long():
 
 @pytest.fixture(scope="module")
 def kept(long):
-    return thinned(FirstsAndExtremes(RATE_Hz), [long])
+    return thinned(FirstAndExtremeRows(RATE_Hz), [long])
 
 
 def test_the_first_rows_of_bins_and_those_that_stand_out_are_kept_and_no_others(long, kept):
@@ -93,15 +93,15 @@ def test_every_window_has_its_extremes(long, kept):
 def test_the_same_rows_however_they_come_in_chunks(long, kept, places):
     ends = sorted({*places, len(long)})
     chunks = [long.rows(first, last) for first, last in zip([0, *ends], ends, strict=False)]
-    assert thinned(FirstsAndExtremes(RATE_Hz), chunks).tobytes() == kept.tobytes()
+    assert thinned(FirstAndExtremeRows(RATE_Hz), chunks).tobytes() == kept.tobytes()
 
 
 def test_a_change_of_columns_ends_a_window():
     others = (*SIGNALS, Signal("sliding_s", "rad/s", 1, "of another law"))
-    thinning, before = FirstsAndExtremes(RATE_Hz), made(4000)
-    assert thinning.take(before) == []
-    (ended,) = thinning.take(made(2000, others, first=4000))
-    (rest,) = thinning.rest()
+    thinning, before = FirstAndExtremeRows(RATE_Hz), made(4000)
+    assert thinning.add(before) == []
+    (ended,) = thinning.add(made(2000, others, first=4000))
+    (rest,) = thinning.flush()
     assert (ended.signals, rest.signals) == (SIGNALS, others)
     assert ended.values.tobytes() == slowly(before).tobytes()
 
@@ -109,7 +109,7 @@ def test_a_change_of_columns_ends_a_window():
 @pytest.mark.parametrize("rate_Hz", [7.3, 60.0, 100.0, 1000.0])
 def test_firsts_are_one_of_each_bin_and_every_row_at_the_rate_of_the_rows(long, rate_Hz):
     chunks = [long.rows(first, first + 37) for first in range(0, len(long), 37)]
-    t_s = thinned(Firsts(rate_Hz), chunks)[:, 0]
+    t_s = thinned(FirstRows(rate_Hz), chunks)[:, 0]
     bins = np.floor(t_s * rate_Hz + 1e-6)
     np.testing.assert_array_equal(bins, np.arange(int(np.floor(25.299 * rate_Hz + 1e-6)) + 1))
     # The first of its bin: the row before it, 1 ms earlier, is of the bin before.
@@ -138,7 +138,7 @@ def both(tmp_path_factory):
     return recorded(folder / "all.rrd"), recorded(folder / "some.rrd", RATE_Hz)
 
 
-def test_a_thinned_recording_has_whole_rows_of_the_run_and_all_of_its_events(both):
+def test_a_decimated_recording_has_complete_rows_and_all_events(both):
     every, some = both
     assert (every.facts["record_rate_Hz"], some.facts["record_rate_Hz"]) == (None, RATE_Hz)
     assert some.events == every.events

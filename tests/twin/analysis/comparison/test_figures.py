@@ -14,10 +14,10 @@ import pytest
 
 from spheretwin import cli
 from spheretwin.analysis import comparison
-from spheretwin.analysis.comparison import beside
+from spheretwin.analysis.comparison import compared_runs
 from spheretwin.analysis.recorded_run import read
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.quantities import compared_quantities
+from spheretwin.viz.quantities import scalar_quantities
 
 # By its path: the tests are no package.
 written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
@@ -116,11 +116,11 @@ def test_the_page_asks_no_host_for_anything(page, drawn_into):
 
 
 def test_every_series_of_every_run_is_on_the_page_to_seven_digits(files, page):
-    runs = beside([read(path) for path in files])
+    runs = compared_runs([read(path) for path in files])
     traces = figures_of(page)["over-time"]["data"]
-    for quantity in compared_quantities([run.table for run in runs]):
+    for quantity in scalar_quantities([run.table for run in runs]):
         for place, run in enumerate(runs):
-            wanted = quantity.of(run.rows)
+            wanted = quantity.values(run.rows)
             found = [
                 trace for trace in traces
                 if trace["meta"] == f"{place}" and trace["type"] == "scatter" and trace["mode"] == "lines"
@@ -170,15 +170,15 @@ def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypat
     assert cli.main(["review", str(files[0]), "--figures", str(tmp_path)]) == 0
     assert len(os.listdir(tmp_path)) == 2 * len(NAMES) + 1
     text = (tmp_path / comparison.PAGE).read_text(encoding="utf-8")
-    assert "drawn by the lowest and the highest" in text
+    assert "drawn by the lowest and highest value" in text
     traces = [each for each in figures_of(Sources(text))["over-time"]["data"] if each["type"] == "scatter"]
     (largest,) = {float(decoded(each["y"]).max()) for each in traces[:1]}
-    quantity = compared_quantities([read(files[0]).table])[0]
-    assert largest == np.float32(quantity.of(beside([read(files[0])])[0].rows).max())
+    quantity = scalar_quantities([read(files[0]).table])[0]
+    assert largest == np.float32(quantity.values(compared_runs([read(files[0])])[0].rows).max())
 
 
 @pytest.mark.parametrize("library", ["matplotlib", "plotly"])
-def test_what_is_not_installed_is_told_on_one_line(files, tmp_path, monkeypatch, library, capsys):
+def test_a_missing_library_is_reported_on_one_line(files, tmp_path, monkeypatch, library, capsys):
     from spheretwin.viz.pages import markdown
 
     present = markdown.find_spec

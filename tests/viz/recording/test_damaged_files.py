@@ -1,4 +1,4 @@
-"""Damage at which Rerun's reader ends its process ends one beside it, and is told on one line."""
+"""Damage that crashes Rerun's reader only ends a separate process, and is reported on one line."""
 
 import os
 import random
@@ -32,12 +32,12 @@ def test_a_reader_that_dies_is_damage(tmp_path, monkeypatch, end):
 
 
 @pytest.mark.parametrize("end", ["os._exit(0)", "os._exit(1)"])
-def test_what_a_reader_lives_through_is_left_to_it(tmp_path, monkeypatch, end):
+def test_errors_that_the_reader_survives_are_left_to_it(tmp_path, monkeypatch, end):
     monkeypatch.setattr(rerun_internals, "PROGRAM", program(tmp_path, end))
     rerun_internals.check_readable(tmp_path / "run.rrd", "run.rrd")
 
 
-def test_a_reader_that_is_not_there_is_told(tmp_path, monkeypatch):
+def test_a_missing_reader_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(rerun_internals, "PROGRAM", tmp_path / "none")
     with pytest.raises(SpheretwinError, match="expected Rerun at"):
         rerun_internals.check_readable(tmp_path / "run.rrd", "run.rrd")

@@ -3,14 +3,14 @@
 import numpy as np
 from rerun.chunk import RrdReader
 
-from spheretwin.viz.comparison.trajectories import Flight, write
+from spheretwin.viz.comparison.trajectories import LawTrajectory, write
 from spheretwin.viz.layout.view import TIMELINE
 
 
 def flight(law, ticks):
     t_s = 0.01 * np.arange(ticks)
     q = np.stack([0.1 * np.sin(t_s), 0.2 * t_s, t_s], axis=1)
-    return Flight(law, t_s, q, q + 1e-3, np.full(ticks, 0.1))
+    return LawTrajectory(law, t_s, q, q + 1e-3, np.full(ticks, 0.1))
 
 
 def test_every_law_has_its_errors_and_its_tip_on_one_timeline(tmp_path, actuator):

@@ -1,6 +1,6 @@
-"""What a legend says of runs: no more than what tells them apart."""
+"""Labels of runs in a legend: only the differing fields."""
 
-from spheretwin.analysis.comparison import differing
+from spheretwin.analysis.comparison import differing_fields
 
 SCENARIO = {
     "name": "tilt",
@@ -21,34 +21,34 @@ def but(**sections):
 
 
 def test_runs_of_one_scenario_differ_in_nothing():
-    assert differing([SCENARIO, SCENARIO]) == [[], []]
+    assert differing_fields([SCENARIO, SCENARIO]) == [[], []]
 
 
 def test_what_the_paper_varies_has_its_names_and_comes_first():
-    told = differing(
+    told = differing_fields(
         [SCENARIO, but(plant={"modelling_error": 0.0, "payload_kg": 0.1}, disturbance={"load": 2.0})]
     )
     assert told == [["m 0.2", "L 0", "plant.payload_kg 0.05"], ["m 0", "L 2", "plant.payload_kg 0.1"]]
 
 
-def test_gains_are_told_of_one_law_alone():
+def test_gains_are_labels_for_runs_of_one_law_only():
     other = but(controller={"stiffness": [3.0, 2.0]})
-    assert differing([SCENARIO, other])[1] == ["controller.stiffness [3.0, 2.0]"]
-    assert differing([SCENARIO, but(controller={"law": "pid", "kp": 1.0})]) == [[], []]
+    assert differing_fields([SCENARIO, other])[1] == ["controller.stiffness [3.0, 2.0]"]
+    assert differing_fields([SCENARIO, but(controller={"law": "pid", "kp": 1.0})]) == [[], []]
 
 
-def test_what_goes_with_the_hardware_is_not_told_beside_it():
+def test_fields_implied_by_the_hardware_are_not_listed():
     other = but(hardware="prototype", sensors={"adc": {"bits": 12}})
-    assert differing([SCENARIO, other]) == [["hardware ideal"], ["hardware prototype"]]
+    assert differing_fields([SCENARIO, other]) == [["hardware ideal"], ["hardware prototype"]]
 
 
 def test_a_field_that_one_lacks_is_none_there():
-    assert differing([SCENARIO, {**SCENARIO, "watch": 1}]) == [["watch none"], ["watch 1"]]
+    assert differing_fields([SCENARIO, {**SCENARIO, "watch": 1}]) == [["watch none"], ["watch 1"]]
 
 
-def test_faults_are_told_by_what_they_name():
+def test_faults_in_labels_have_their_targets():
     faults = [{"target": "coil.07", "mode": "open", "start_s": 1.0}, {"target": "group.3", "mode": "stuck"}]
-    assert differing([{**SCENARIO, "fault": faults}, {**SCENARIO, "fault": []}]) == [
+    assert differing_fields([{**SCENARIO, "fault": faults}, {**SCENARIO, "fault": []}]) == [
         ["fault coil.07 ope…roup.3 stuck"],
         ["fault none"],
     ]

@@ -1,4 +1,4 @@
-"""What is recorded to be looked at: equal to what it is made of, peaks and all, whatever the chunks."""
+"""Plotted data of a recording: equal to their source with all peaks, for any chunks."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from spheretwin.viz import theme
-from spheretwin.viz.decimation import FIRST_S, Bins
-from spheretwin.viz.layout.extents import SPANS, Channel, Survey
+from spheretwin.viz.decimation import FIRST_CHUNK_S, TimeBins
+from spheretwin.viz.layout.extents import SPANS, ExtentTracker, PlotChannel
 from spheretwin.viz.layout.view import CURRENT_BARS, CURRENT_MAP, SUMMARY, TIMELINE, derived
-from spheretwin.viz.quantities import Kept, Rows, quantities_of
+from spheretwin.viz.quantities import Aggregation, QuantityRows, quantities_of
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.viz.recording.status import LEVELS, Spells, Summary
+from spheretwin.viz.recording.status import LEVELS, LimitSpells, Summary
 
 TICK_s = 1e-3
 
@@ -58,18 +58,20 @@ def spans(t_s, rate_Hz):
 
 def test_every_derived_quantity_is_recorded_with_its_peaks(run):
     path, session, table = run
-    given_rows = Rows(table, table.rows(0, 1), session.actuator, 8.0)
+    given_rows = QuantityRows(table, table.rows(0, 1), session.actuator, 8.0)
     bins = spans(table["t_s"], plots.QUANTITY_RATE_Hz)
     for quantity in quantities_of({signal.name for signal in table.signals}):
         whole = quantity.values(given_rows)
         _, drawn = read(path, derived(quantity.name), "Scalars:scalars")
-        if quantity.kept is Kept.BOTH:
+        if quantity.aggregation is Aggregation.BOTH:
             pairs = np.reshape(drawn, (len(bins), 2, quantity.size))
             least, greatest = pairs.min(axis=1), pairs.max(axis=1)
             np.testing.assert_array_equal(least, [whole[rows].min(axis=0) for rows in bins])
             np.testing.assert_array_equal(greatest, [whole[rows].max(axis=0) for rows in bins])
         else:
-            of = {Kept.LEAST: np.min, Kept.GREATEST: np.max, Kept.MEAN: np.mean}[quantity.kept]
+            of = {Aggregation.LEAST: np.min, Aggregation.GREATEST: np.max, Aggregation.MEAN: np.mean}[
+                quantity.aggregation
+            ]
             expected = [of(whole[rows], axis=0) for rows in bins]
             # Means are summed in another order.
             np.testing.assert_allclose(drawn, expected, rtol=1e-12, atol=1e-15)
@@ -103,14 +105,14 @@ ROWS = 400
 
 
 @given(st.integers(0, 2**32 - 1), st.sets(st.integers(1, ROWS - 1)), st.booleans())
-def test_bins_are_the_same_whatever_the_chunks(seed, cuts, at_once):
+def test_bins_are_the_same_whatever_the_chunks(seed, cuts, immediate):
     values = np.random.default_rng(seed).normal(size=(ROWS, 2))
     t_s = TICK_s * np.arange(ROWS)
-    bins, found = Bins(25.0, at_once=at_once), []
+    bins, found = TimeBins(25.0, immediate=immediate), []
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), ROWS], strict=True):
         found.append(bins.add(t_s[first:last], values[first:last]))
-    found.append(bins.rest())
-    assert bins.rest() is None
+    found.append(bins.flush())
+    assert bins.flush() is None
     parts = [each for each in found if each]
     expected = spans(t_s, 25.0)
     for name, of in (("low", np.min), ("high", np.max)):
@@ -122,7 +124,7 @@ def test_bins_are_the_same_whatever_the_chunks(seed, cuts, at_once):
 
 
 def test_chunks_of_bins_grow_and_none_is_held_long():
-    bins, handed_over = Bins(25.0), []
+    bins, handed_over = TimeBins(25.0), []
     for first in range(0, 60_000, 100):
         ready = bins.add(TICK_s * np.arange(first, first + 100), np.zeros((100, 1)))
         if ready:
@@ -131,18 +133,18 @@ def test_chunks_of_bins_grow_and_none_is_held_long():
     last_s = 0.0
     for now_s, _ in handed_over:
         # Within two bins, of 40 ms, and a chunk of 100 ms.
-        assert now_s - last_s <= max(FIRST_S, last_s / 2) + 0.2
+        assert now_s - last_s <= max(FIRST_CHUNK_S, last_s / 2) + 0.2
         last_s = now_s
 
 
 def rising(rows):
     t_s = TICK_s * np.arange(len(rows))
-    whole = Bins(25.0, at_once=True)
-    first, last = whole.add(t_s, rows), whole.rest()
+    whole = TimeBins(25.0, immediate=True)
+    first, last = whole.add(t_s, rows), whole.flush()
     return [np.concatenate(each) for each in zip(first.pairs(), last.pairs(), strict=True)]
 
 
-def test_what_rises_or_falls_steadily_is_drawn_as_it_is():
+def test_a_steady_rise_or_fall_keeps_its_form():
     values = np.stack([np.arange(ROWS), -np.arange(ROWS)], axis=1).astype(np.float64)
     t_s, drawn = rising(values)
     np.testing.assert_allclose(drawn[:, 0], t_s / TICK_s, atol=1e-9)
@@ -175,7 +177,7 @@ def slow_spells(t_s, levels):
 
 
 @given(st.lists(st.tuples(st.integers(1, 290), st.integers(1, 2)), max_size=5), st.sets(st.integers(1, 299)))
-def test_spells_at_a_limit_are_told_once_whatever_the_chunks(limited, cuts):
+def test_times_at_a_limit_are_logged_once_for_any_chunks(limited, cuts):
     table = Table(LIMIT_SIGNALS, np.zeros((300, width(LIMIT_SIGNALS))))
     table["t_s"][:], table["allocation_scale"][:] = TICK_s * np.arange(300), 1.0
     levels = np.zeros(300, dtype=int)
@@ -183,24 +185,24 @@ def test_spells_at_a_limit_are_told_once_whatever_the_chunks(limited, cuts):
         levels[tick : tick + 3] = np.maximum(levels[tick : tick + 3], level)
     table["voltage_limited"][levels == 1, 1] = 0.3
     table["allocation_scale"][levels == 2] = 0.5
-    spells, found = Spells(), []
+    spells, found = LimitSpells(), []
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 300], strict=True):
         found += spells.of(table.rows(first, last))
     assert found == slow_spells(table["t_s"], levels)
 
 
-def test_a_survey_keeps_all_bounds_in_little_memory():
-    survey, generator = Survey({"a": 1, "b": 2}), np.random.default_rng(0)
+def test_the_tracker_keeps_all_bounds_in_bounded_memory():
+    survey, generator = ExtentTracker({"a": 1, "b": 2}), np.random.default_rng(0)
     values = generator.normal(size=(20 * SPANS, 3))
     for first in range(0, len(values), 100):
         part = values[first : first + 100]
         survey.add(0.04 * np.arange(first, first + 100), part - 1, part + 1)
-    seen = survey.seen(None)
+    seen = survey.extents(None)
     assert SPANS <= len(seen.t_s) <= 2 * SPANS
     assert np.all(np.diff(seen.t_s) > 0)
-    low, high = seen.bounds(Channel("b", 1))
+    low, high = seen.bounds(PlotChannel("b", 1))
     assert (low, high) == (values[:, 2].min() - 1, values[:, 2].max() + 1)
-    assert Survey({"a": 1}).seen(None) is None
+    assert ExtentTracker({"a": 1}).extents(None) is None
 
 
 def test_the_line_of_a_run_says_what_it_is_and_how_good(run):

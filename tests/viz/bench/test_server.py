@@ -1,4 +1,4 @@
-"""The page's server: who is let in, and that nothing that is sent to it stops it."""
+"""Server of the page: admission of clients and messages; no message stops it."""
 
 import http.client
 import socket
@@ -15,7 +15,7 @@ from websockets.sync.client import connect
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
-from spheretwin.viz.bench.event_handlers import STEERED_S
+from spheretwin.viz.bench.event_handlers import LATEST_INTERVAL_S
 from tests.viz.bench import fake
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -93,12 +93,12 @@ def test_a_foreign_origin_is_refused(page, origin):
     assert refusal.value.response.status_code == 403
 
 
-def test_its_own_origin_is_let_in(page):
+def test_the_own_origin_is_admitted(page):
     with socket_to(page, origin=f"http://localhost:{port(page)}") as visitor:
         assert visitor.recv(timeout=20)
 
 
-def test_a_page_of_another_age_is_refused_in_silence(page, capfd):
+def test_a_page_of_another_version_is_refused(page, capfd):
     with pytest.raises(InvalidStatus) as refusal:
         socket_to(page, protocol="viser-v0.0.1")
     assert refusal.value.response.status_code == 400
@@ -112,11 +112,11 @@ def test_a_path_gives_the_page_or_nothing(page, path):
 
 
 def test_a_port_in_use_is_refused(page):
-    with pytest.raises(InputError, match=f"expected a port that is free, received {port(page)}"):
+    with pytest.raises(InputError, match=f"expected a free port, received {port(page)}"):
         server.listen(port(page))
 
 
-def test_two_benches_stand_side_by_side(page):
+def test_two_benches_run_at_once(page):
     one = page
     with fake.shown(fake.Bench()) as other:
         assert one.address != other.address
@@ -215,7 +215,7 @@ def wait_until_all_is_heard(page, bench, visitor):
     wait_for(lambda: ("limits", {"rate_rad_s": 0.123456}) in bench.commands())
 
 
-def test_whatever_is_sent_it_goes_on(page, bench, capfd):
+def test_the_server_survives_any_message(page, bench, capfd):
     """Bytes, well-formed messages of any content, and messages that are nearly a page's."""
     anything = (
         st.binary(max_size=64)
@@ -246,7 +246,7 @@ def test_whatever_is_sent_it_goes_on(page, bench, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_no_message_takes_stop_away(page, bench):
+def test_no_message_disables_stop(page, bench):
     """viser sets whatever attribute of a handle a message names: that it is gone, what it calls."""
     with socket_to(page) as visitor:
         visitor.send(msgspec.msgpack.encode(CAMERA))
@@ -258,10 +258,10 @@ def test_no_message_takes_stop_away(page, bench):
         wait_for(lambda: bench.commands() == [("stop", {})])
 
 
-def test_only_what_a_page_sends_passes():
+def test_only_messages_of_a_page_pass():
     value = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": True}}
-    assert server._is_a_pages(msgspec.msgpack.encode(value))
-    assert server._is_a_pages(msgspec.msgpack.encode(CAMERA))
+    assert server._is_page_message(msgspec.msgpack.encode(value))
+    assert server._is_page_message(msgspec.msgpack.encode(CAMERA))
     for other in (
         {**value, "updates": {"removed": True}},
         {**value, "updates": {"value": True, "removed": True}},
@@ -271,10 +271,10 @@ def test_only_what_a_page_sends_passes():
         {"type": "ShareUrlRequest"},
         {"type": "GuiUpdateMessage"},
     ):
-        assert not server._is_a_pages(msgspec.msgpack.encode(other))
+        assert not server._is_page_message(msgspec.msgpack.encode(other))
 
 
-def test_fifty_pages_come_and_go(page):
+def test_fifty_pages_connect_and_disconnect(page):
     pages = [socket_to(page) for _ in range(50)]
     for visitor in pages:
         visitor.send(msgspec.msgpack.encode(CAMERA))
@@ -308,7 +308,7 @@ def test_a_flood_waits_in_its_own_socket(page, bench):
         assert is_alive(page)
         waited_s = time.monotonic() - begun
         # Of what is steered, the bench is told ten times a second; of who is there, now and then.
-        assert len(bench.commands()) - before <= 2 + (waited_s + sending_s) / STEERED_S
+        assert len(bench.commands()) - before <= 2 + (waited_s + sending_s) / LATEST_INTERVAL_S
         # Of messages, a second's worth is taken at once and the rest at its rate: the moves count themselves.
         moves = page._server.gui._gui_input_handle_from_uuid[name].value / 0.01
         assert 0 < moves <= 1 + server.MOST_MESSAGES_PER_S * (1 + time.monotonic() - begun + sending_s)
@@ -327,5 +327,5 @@ def test_a_press_comes_after_what_was_moved_before_it(page, bench):
         assert last == ("hold", {})
         assert before == "point"
         assert given["pose_rad"][0] == pytest.approx(np.radians(30.0), rel=1e-12)
-        time.sleep(2 * STEERED_S)
+        time.sleep(2 * LATEST_INTERVAL_S)
         assert bench.commands()[-1] == last

@@ -1,27 +1,27 @@
-"""Ranges and titles made of what a run has shown."""
+"""Ranges and titles from the extents of a run."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.viz.layout.extents import CLIPPED_FROM, LABELLED, MARGIN, Channel, Seen, labelled, nice
+from spheretwin.viz.layout.extents import CLIPPED_FROM, LABELLED, MARGIN, Extents, PlotChannel, labelled, nice
 
 T_s = np.arange(100) * 0.1
-ERROR = Channel("error")
+ERROR = PlotChannel("error")
 
 
 def seen(values, ended_s=None):
     """A run whose only channel is within ± these values."""
     high = np.asarray(values, dtype=np.float64).reshape(len(T_s), -1)
-    return Seen(T_s, {"error": -high}, {"error": high}, ended_s)
+    return Extents(T_s, {"error": -high}, {"error": high}, ended_s)
 
 
 def with_transient(peak, settled, spans):
     return np.where(np.arange(len(T_s)) < spans, peak, settled)
 
 
-def test_a_settled_error_is_legible_beside_its_transient():
+def test_a_settled_error_is_legible_after_its_transient():
     of = seen(with_transient(31.0, 0.5, 4))
     limit = of.limit(ERROR, least=0.1)
     assert 0.5 < limit <= 1.0
@@ -46,7 +46,7 @@ def test_an_error_of_the_second_half_is_always_drawn():
     assert seen(values).limit(ERROR, least=0.1) > 40.0
 
 
-def test_noise_does_not_look_like_something():
+def test_noise_looks_small():
     of = seen(np.full(len(T_s), 1e-6))
     assert of.limit(ERROR, least=0.1) >= 0.1
     low, high = of.band(ERROR, least=0.1)
@@ -56,7 +56,7 @@ def test_noise_does_not_look_like_something():
 def test_plots_that_are_compared_have_one_range():
     of = seen(np.stack([np.full(len(T_s), 1.0), np.full(len(T_s), 9.0)], axis=1))
     assert of.limit(ERROR, least=0.1) > 9.0
-    assert of.limit(Channel("error", 0), least=0.1) < 2.0
+    assert of.limit(PlotChannel("error", 0), least=0.1) < 2.0
 
 
 def test_what_a_run_did_not_have_all_the_time_bounds_nothing():

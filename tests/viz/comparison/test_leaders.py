@@ -1,4 +1,4 @@
-"""Runs that were asked for the same show it once."""
+"""Runs with the same reference show it once."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def test_the_longest_of_equals_shows_it_at_whatever_rate():
     assert leaders([asked(100, 1e-3), asked(300, 7e-4), asked(50, 2e-3)]) == [1]
 
 
-def test_each_of_those_that_differ_shows_its_own():
+def test_each_distinct_reference_is_shown():
     assert leaders([asked(100, 1e-3), asked(90, 1e-3, 2.0), asked(80, 1e-3), asked(95, 1e-3, 2.0)]) == [0, 3]
 
 

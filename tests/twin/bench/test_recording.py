@@ -1,4 +1,4 @@
-"""Files: recordings of a run, its playing back, and the settings written down."""
+"""Files of a bench: recordings, replay, and saved scenarios."""
 
 import shlex
 
@@ -42,7 +42,7 @@ def test_a_recording_and_a_telemetry_file_hold_the_same_rows_from_then_on(files)
     assert any("trajectory set to" in text for _, _, text in recording.log)
 
 
-def test_a_file_that_begins_on_the_way_can_be_reviewed(files):
+def test_a_file_that_begins_during_a_run_can_be_reviewed(files):
     told = run_summary.figures(reviewed.read(files[1]))
     assert told["rows"] == 500
     assert told["status"] == "completed"
@@ -59,7 +59,7 @@ def test_no_file_is_left_of_a_recording_that_is_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_goes_wrong_with_a_file_is_told_and_the_run_goes_on(tmp_path, monkeypatch):
+def test_an_error_of_a_file_is_reported_and_the_run_continues(tmp_path, monkeypatch):
     def fails(self, rows):
         self.faults.append("the disk is full")
 
@@ -74,7 +74,7 @@ def test_what_goes_wrong_with_a_file_is_told_and_the_run_goes_on(tmp_path, monke
 
 
 @pytest.mark.parametrize("place", [0, 1], ids=["recording", "telemetry"])
-def test_a_recorded_run_is_played_back_while_the_twin_stands_still(files, place):
+def test_a_replay_pauses_the_twin(files, place):
     rows = kept_rows(files[1])
     with begun() as made:
         made.advance(100)
@@ -99,7 +99,7 @@ def test_a_recorded_run_is_played_back_while_the_twin_stands_still(files, place)
         assert made.advance(10) == 10
 
 
-def test_stop_ends_playing_back(files):
+def test_stop_ends_a_replay(files):
     with begun() as made:
         done(made, "replay", file=str(files[1]))
         done(made, "stop")

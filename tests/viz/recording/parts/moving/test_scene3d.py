@@ -1,4 +1,4 @@
-"""What moves in 3D: traces, torques as arrows, where a run failed, and how many bytes all of it takes."""
+"""Moving parts of the 3D scene: traces, torques as arrows, marks of failures, and their bytes."""
 
 import dataclasses
 
@@ -167,7 +167,7 @@ def test_without_load_and_payload_there_is_one_arrow(tmp_path):
     assert len(torques["load"]) == 0
 
 
-def test_the_scale_of_the_arrows_is_told_by_the_axes(loaded):
+def test_the_axes_give_the_scale_of_the_arrows(loaded):
     assert SCALE.endswith("the length of x, y, z is 0.5 N·m")
     np.testing.assert_allclose(0.5 * METRES_PER_Nm, AXES_LENGTH_m, rtol=1e-15)
 

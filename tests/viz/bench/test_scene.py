@@ -7,7 +7,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.bench import scene as colours
 from spheretwin.viz.bench import server as front
-from spheretwin.viz.bench.actuator import parts_of, quaternions_along
+from spheretwin.viz.bench.actuator import actuator_solids, quaternions_along
 from spheretwin.viz.bench.scene import Scene
 from spheretwin.viz.scene import solids
 
@@ -54,14 +54,14 @@ def as_the_page_shows(albedo):
 @pytest.mark.parametrize("current", np.linspace(-1.0, 1.0, 9))
 def test_a_current_is_shown_in_its_own_colour(current):
     meant = theme.current_colours(np.array(current), 1.0)
-    seen = as_the_page_shows(colours.of_instances(meant) / 255)
+    seen = as_the_page_shows(colours.instance_colours(meant) / 255)
     # No colour of a surface makes the curve's blue as deep as the screen's: 14.3 of 255; the others, to 4.
     assert seen == pytest.approx(meant, abs=15 if current == -1.0 else 4)
 
 
 def test_one_solid_is_shown_in_its_own_colour():
     for meant in (theme.TRACE, (150, 156, 166), (70, 76, 86)):
-        encoded = np.array(colours.of_one(meant)) / 255
+        encoded = np.array(colours.mesh_colour(meant)) / 255
         albedo = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
         assert as_the_page_shows(albedo) == pytest.approx(meant, abs=11)  # the trace is nearly all light
 
@@ -81,13 +81,13 @@ def test_a_zone_lies_on_its_sphere_between_its_heights():
 
 @pytest.mark.parametrize("name", ["stator", "outer_ring", "inner_ring", "rotor", "shaft", "coil"])
 def test_every_part_is_closed_and_looks_outward(actuator, name):
-    part = getattr(parts_of(actuator), name)
+    part = getattr(actuator_solids(actuator), name)
     assert is_closed(part)
     assert volume(part) > 0
 
 
 def test_coils_and_poles_have_the_actuators_own_size(actuator):
-    parts, coil, magnet = parts_of(actuator), actuator.coil, actuator.magnet
+    parts, coil, magnet = actuator_solids(actuator), actuator.coil, actuator.magnet
     across = np.linalg.norm(parts.coil.vertices[:, :2], axis=1)
     assert (across.min(), across.max()) == pytest.approx(
         (coil.inner_radius_m, coil.outer_radius_m), rel=SINGLE
@@ -102,7 +102,7 @@ def test_coils_and_poles_have_the_actuators_own_size(actuator):
 
 
 def test_all_of_it_is_few_triangles(actuator):
-    assert parts_of(actuator).triangles(actuator) < MOST_TRIANGLES
+    assert actuator_solids(actuator).triangles(actuator) < MOST_TRIANGLES
 
 
 def test_quaternions_turn_z_to_each_axis(actuator):
@@ -140,7 +140,7 @@ def test_each_hinge_turns_about_its_own_axis(scene, actuator):
     assert not scene.handle.visible
 
 
-def test_what_is_under_the_pointer_is_where_the_tip_goes(scene, actuator):
+def test_the_tip_goes_under_the_pointer(scene, actuator):
     """The inverse of the tip's place, from any eye that sees it."""
     for q in ([0.3, 0.2, 0.5], [-0.4, 0.6, -1.0], [0.0, 0.0, 0.0]):
         tip = rotation(np.array(q)) @ actuator.shaft_tip_m
