@@ -53,16 +53,16 @@ If it is stable a constant load leaves no error, as d̂ is at rest only if angle
 `spheretwin reproduce stability` measures how much of each the loop tolerates.
 
 *Presets.* `ideal` and `fast` are for angles without noise. `ideal` keeps its RMS torque below that of AFSM
-also without load, and tolerates a longer unknown delay than `fast`; with the same variation of the currents the
-search of `rivals_ideal` found gains of smaller errors. `fast` reaches the error that the current limit sets,
-for more torque and more variation; an unknown delay of one control period makes it oscillate, and it passes
-more noise to the currents. `prototype` is for the prototype's angles, with ω_d fixed, and has a governor and
-feed-forward of most of the friction. `robust` is for a prototype whose friction or inertia is larger than the
-nominal one: λ K and ω_o are higher, 1.2 of the nominal friction is fed forward, and a quarter of the nominal
-inertia on top of the law's own torque for the acceleration. It passes more noise to the currents, and is
-worse for a rotor lighter than the nominal one. `spheretwin reproduce rivals` compares the presets with the
-other laws; the study `sensors` measures the effect of each sensor error, `mismatch` the effect of friction,
-inertia and delay that differ from the nominal model.
+also without load, and tolerates a longer unknown delay than `fast`; with the same variation of the currents
+the search of `rivals_ideal` found gains of smaller errors. `fast` reaches the error that the current limit
+sets, for more torque and more variation; an unknown delay of one control period makes it oscillate, and it
+passes more noise to the currents. `prototype` is for the prototype's angles, with ω_d fixed, and has a
+governor and feed-forward of most of the friction. `robust` is for a prototype whose friction or inertia is
+larger than the nominal one: λ K and ω_o are higher, 1.2 of the nominal friction is fed forward, and a quarter
+of the nominal inertia on top of the law's own torque for the acceleration. It passes more noise to the
+currents, and is worse for a rotor lighter than the nominal one. `spheretwin reproduce rivals` compares the
+presets with the other laws; the study `sensors` measures the effect of each sensor error, `mismatch` the
+effect of friction, inertia and delay that differ from the nominal model.
 """
 
 from math import exp

@@ -41,12 +41,16 @@ def _restore(bench_state: BenchState, _: None, name: str) -> None:
     bench_state.resume_after_restore(end)
 
 
-def _open_files(bench_state: BenchState, recording: str | None, telemetry: str | None) -> Callable[[], OpenedFiles]:
+def _open_files(
+    bench_state: BenchState, recording: str | None, telemetry: str | None
+) -> Callable[[], OpenedFiles]:
     paths = [Path(path) if path else None for path in (recording, telemetry)]
     return lambda: OpenedFiles(bench_state.driver.session, *paths)
 
 
-def _record(bench_state: BenchState, files: OpenedFiles, recording: str | None, telemetry: str | None) -> None:
+def _record(
+    bench_state: BenchState, files: OpenedFiles, recording: str | None, telemetry: str | None
+) -> None:
     if bench_state.recording.on or bench_state.driver.reason is not None:
         files.discard()
         raise InputError(

@@ -51,7 +51,9 @@ class FaultInjector:
         if (active, fault_start_s.tobytes()) != self._applied:
             self._applied = active, fault_start_s.tobytes()
             self._fault_start_s[:], self._fault_modes[:] = fault_start_s, self._schedule.mode_numbers(active)
-            mark_faulty_groups(self._groups, self._schedule.reported_groups(active), tick * self._schedule.period_s)
+            mark_faulty_groups(
+                self._groups, self._schedule.reported_groups(active), tick * self._schedule.period_s
+            )
             if self._effects:
                 self._clear()
                 self._schedule.apply(active, self._effects)
