@@ -257,7 +257,7 @@ class Thread:
 
     def begin(self) -> None:
         """Start the thread; until `end`, the interpreter switches threads more often."""
-        import_writers()  # here: during the run it would make the first chunks late
+        import_writers()  # here, during the run it would make the first chunks
         self._switch_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_s)
         self._thread = threading.Thread(target=self._loop, name="bench", daemon=True)
