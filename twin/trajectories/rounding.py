@@ -202,7 +202,7 @@ ACCELERATION_FADE_s = 0.1
 
 # Coefficients of powers 0 to 5 of the time share, (3, 6): polynomials with an angle, a rate or an
 # acceleration
-# of 1 at the start, and all three 0 at the end.
+# acceleration of 1 at the start, and all three 0 at the end.
 FADING = np.array(
     [
         [1.0, 0.0, 0.0, -10.0, 15.0, -6.0],
