@@ -1,4 +1,4 @@
-"""The verbs of the `spheretwin` command, one a file."""
+"""Command line `spheretwin`: one file for each verb."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one verb; returns the exit code."""
-    # What goes wrong in Rerun is raised, or found where its files end: its own log would only repeat it.
+    """Run one verb; return the exit code."""
+    # Errors of Rerun are raised or found at the end of its files: its own log would only repeat them.
     os.environ.setdefault("RUST_LOG", "off")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -63,7 +63,7 @@ def _refused(message: str, code: int) -> int:
 
 
 def _plain(arguments: Sequence[str]) -> Sequence[str]:
-    """Arguments that can be shown, and kept in files that other programs read."""
+    """Return the arguments if they are safe in terminals and in files of other programs."""
     for argument in arguments:
         if not is_plain(argument):
             raise InputError(
@@ -92,12 +92,12 @@ def _is_empty(arguments: Sequence[str], flag: str) -> bool:
 
 
 def _discard_stdout() -> None:
-    """Keep Python from trying to flush, at its exit, what can no longer be written."""
+    """Prevent Python from flushing unwritable output at its exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints are the package's own: one line, exit code 2."""
+    """Parser with the messages of the package: one line, exit code 2."""
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"command line: {message}")

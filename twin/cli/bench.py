@@ -1,4 +1,4 @@
-"""What a bench's page offers: every field of the run, read and shown as the command line does."""
+"""``spheretwin bench``: interactive twin, and the fields that its page offers."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ from spheretwin.viz.terminal import runs
 
 TRAJECTORY = "trajectory"
 
-# What tells the shapes apart, and the way to a shape, which the bench makes.
+# Fields of a shape that the page does not offer: its name, and the approach, which the bench computes.
 NO_SHAPE = ("shape", "approach")
 
 
 def choices_of(bench: Bench) -> Choices:
-    """All that a page of a bench offers."""
+    """Return the choices of the page of a bench."""
     groups = len(bench.actuator.groups)
     return Choices(
         settings=lambda: settings_of(bench.fields()),
@@ -61,13 +61,13 @@ def choices_of(bench: Bench) -> Choices:
 
 
 def settings_of(fields: list[tuple[str, Any, str]]) -> list[FieldSetting]:
-    """Fields of a run, with what they may be."""
+    """Return the fields of a run with their valid values."""
     values = {name: value for name, value, _ in fields}
     return [_setting(name, value, meaning, values) for name, value, meaning in fields]
 
 
 def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
-    """Fields of a shape: those of the present one as they are, of another as they come."""
+    """Return the fields of a shape: present values for the active shape, defaults for another."""
     present = {
         dotted.partition(".")[2]: value
         for dotted, value, _ in bench.fields()
@@ -91,8 +91,8 @@ def shape_settings(name: str, bench: Bench) -> list[FieldSetting]:
 
 
 def written(value: Any) -> str:
-    """A value as the command line takes it, to its last digit; nothing for one that is not given."""
-    if isinstance(value, tuple) and not any(isinstance(each, tuple) for each in value):
+    """Return the text of a value for the command line, with all digits; empty for None."""
+    if isinstance(value, tuple) and not any(isinstance(entry, tuple) for entry in value):
         return " ".join(map(written, value))
     if isinstance(value, tuple | dict | list | bool):
         return json.dumps(value, ensure_ascii=False)
@@ -103,12 +103,12 @@ def written(value: Any) -> str:
 
 
 def read(name: str, text: str) -> Any:
-    """Value of a text, as the command line reads it; None for an empty one.
+    """Return the value of a text, as the command line reads it; None for an empty text.
 
     Raises
     ------
     InputError
-        A quotation is not closed.
+        A quotation mark is not closed.
     """
     text = text.strip()
     if not text:
@@ -123,18 +123,18 @@ def read(name: str, text: str) -> Any:
 
 
 def _gathered(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of a shape, those in lists of tables as one list each."""
-    found: dict[str, Any] = {}
+    """Return the fields of a shape, with each list of tables as one list."""
+    gathered: dict[str, Any] = {}
     for dotted, value in fields.items():
         name, _, inside = dotted.partition(".")
         place, _, last = inside.partition(".")
         if not inside:
-            found[name] = value
+            gathered[name] = value
         elif place.isdigit():
-            rows = found.setdefault(name, [])
+            rows = gathered.setdefault(name, [])
             rows.extend({} for _ in range(int(place) + 1 - len(rows)))
             rows[int(place)][last] = value
-    return found
+    return gathered
 
 
 def _setting(name: str, value: Any, meaning: str, values: Mapping[str, Any]) -> FieldSetting:
@@ -158,14 +158,16 @@ def _anywhere(name: str) -> str:
 
 
 def _field_of(name: str, values: Mapping[str, Any]) -> FieldInfo | None:
-    """Description of a field, of the member of each family that the values say; None for one that is own."""
+    """Return the description of a field for the selected members; None for a field of a user section."""
     members: list[type[BaseModel]] = [Scenario]
     *inside, last = name.split(".")
     prefix, kind = "", None
     for part in inside:
         prefix += f"{part}."
         if not part.isdigit():
-            field = next((each.model_fields[part] for each in members if part in each.model_fields), None)
+            field = next(
+                (member.model_fields[part] for member in members if part in member.model_fields), None
+            )
             kind = kind_of(field) if field else None
         if kind is None:
             return None
@@ -174,7 +176,7 @@ def _field_of(name: str, values: Mapping[str, Any]) -> FieldInfo | None:
         if tag and which and which not in kind.members:
             return None
         members = kind.chosen({tag: which} if tag else {})
-    return next((each.model_fields[last] for each in members if last in each.model_fields), None)
+    return next((member.model_fields[last] for member in members if last in member.model_fields), None)
 
 
 def _default(field: FieldInfo) -> Any:
@@ -208,7 +210,7 @@ def _marks(annotation: Any) -> Iterator[Any]:
 
 def _literals(annotation: Any) -> tuple[str, ...]:
     if get_origin(annotation) is Literal:
-        return tuple(each for each in get_args(annotation) if isinstance(each, str))
+        return tuple(option for option in get_args(annotation) if isinstance(option, str))
     return ()
 
 
@@ -243,25 +245,25 @@ def add_to(verbs: Any) -> None:
         type=_port,
         default=PORT,
         metavar="P",
-        help=f"of the page, on 127.0.0.1; {PORT} unless given, 0 for any that is free",
+        help=f"port of the page, on 127.0.0.1; {PORT} unless given, 0 for any free port",
     )
-    parser.add_argument("--no-browser", action="store_true", help="only say where the page is")
+    parser.add_argument("--no-browser", action="store_true", help="only print the address of the page")
     parser.add_argument(
         "--hold-after",
         type=_seconds,
         default=GONE_s,
         metavar="S",
-        help=f"how long the twin goes on after the page that operates it is gone; {GONE_s:g} s unless given",
+        help=f"time for which the twin continues after its page is closed; {GONE_s:g} s unless given",
     )
     parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="record from the start")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb until it is interrupted; True when what was recorded is whole."""
+    """Run the verb until it is interrupted; return True if all recordings are complete."""
     if find_spec("viser") is None:
         raise InputError(
-            "bench: expected viser, which the extra bench brings: pip install 'spheretwin[bench]'"
+            "bench: expected viser, which the extra bench installs: pip install 'spheretwin[bench]'"
         )
     scenario = scenarios.load(options.scenario, reading.overrides(rest))
     outputs.check([options.record] if options.record else [])
@@ -270,7 +272,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     from spheretwin.viz.bench import server
     from spheretwin.viz.bench.page import Page
 
-    # It warns of what it has to say to pages that are gone.
+    # viser warns of messages to closed pages.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"viser\b")
     listening = server.listen(options.port)  # before anything is compiled
     print(f"bench: preparing {scenario.name}", file=sys.stderr, flush=True)  # it may have to be compiled
@@ -284,7 +286,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         if not options.no_browser:
             webbrowser.open(page.address)
         page.show(stop_requested)
-    return _told(bench)
+    return _report(bench)
 
 
 def _port(text: str) -> int:
@@ -308,8 +310,8 @@ def _record(bench: Bench, recording: Path | None) -> None:
         raise InputError(refused)
 
 
-def _told(bench: Bench) -> bool:
-    """Name what was kept, and say what went wrong with a recording; True where nothing did."""
+def _report(bench: Bench) -> bool:
+    """Print the recorded files and failed recordings; return True if none failed."""
     state = bench.state()
     runs.print_written([Path(file) for file in state.kept])
     if state.recording:

@@ -1,4 +1,4 @@
-"""What the verbs share in telling their user: JSON, warnings, broken bounds, files."""
+"""Common functions of the verbs: JSON, warnings, broken bounds, files, signals."""
 
 from __future__ import annotations
 
@@ -33,46 +33,48 @@ def warn(lines: Iterable[str]) -> None:
 
 
 def warn_about_model(path: Path) -> None:
-    """Print what the engine warns of in a model file."""
+    """Print the warnings of the engine about a model file."""
     warn(mjcf.read(path).warnings)
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:
     """Add the flag of the verbs that have checks."""
     parser.add_argument(
-        "--verbose", action="store_true", help="also say what each check compares, and why its bound"
+        "--verbose",
+        action="store_true",
+        help="also print what each check compares, and the reason of its bound",
     )
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file, whole or not at all."""
+    """Write a file completely or not at all."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def kept(what: str, checks: Iterable[Check]) -> bool:
-    """Whether every check keeps its bound; those that do not are named on stderr."""
+def report_broken(source: str, checks: Iterable[Check]) -> bool:
+    """Print the names of broken checks on stderr; return True if every check is within its bound."""
     names = broken(checks)
     if names:
-        print(f"spheretwin: {what}: broken: {'; '.join(names)}", file=sys.stderr)
+        print(f"spheretwin: {source}: broken: {'; '.join(names)}", file=sys.stderr)
     return not names
 
 
 def _plain(value: Any) -> Any:
-    """What JSON can hold of a value; what is not finite becomes null."""
+    """Return a value in JSON types; values that are not finite become null."""
     if isinstance(value, Check):
         return value.row()
     if hasattr(value, "_asdict"):
         return _plain(value._asdict())
     if isinstance(value, Mapping):
-        return {name: _plain(each) for name, each in value.items()}
+        return {name: _plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
+        return [_plain(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 HINT_s = 1.0
-"""Time after the first signal until a line says what a second one does."""
+"""Time after the first signal until a line explains the effect of a second one."""
 
 SALVAGE_s = 5.0
 """Longest time that the second signal waits for files to be flushed."""
@@ -92,14 +94,14 @@ def interruptible(remark: str = "") -> Iterator[Callable[[], bool]]:
     Parameters
     ----------
     remark : str
-        What else to say then.
+        Additional line of that message.
     """
     requests: list[int] = []
-    # What the parent has it ignore, as nohup a lost terminal, stays ignored.
-    heeded = [number for number in _ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
-    before = {number: signal.signal(number, lambda number, _: requests.append(number)) for number in heeded}
+    # Signals that the parent process ignores, such as SIGHUP with nohup, stay ignored.
+    handled = [number for number in _ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, lambda number, _: requests.append(number)) for number in handled}
     try:
-        with _watched(heeded, remark):
+        with _watched(handled, remark):
             yield lambda: bool(requests)
     finally:
         for number, handler in before.items():
@@ -112,12 +114,12 @@ _ENDINGS = [
 
 
 @contextlib.contextmanager
-def _watched(heeded: Collection[int], remark: str) -> Iterator[None]:
+def _watched(handled: Collection[int], remark: str) -> Iterator[None]:
     """Count signals in a thread, as the main thread runs no Python while it is in compiled code."""
     reading, writing = socket.socketpair()  # on Windows, signals are written to sockets alone
     writing.setblocking(False)
     before = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
-    thread = threading.Thread(target=_watch, args=(reading, heeded, remark), name="signals", daemon=True)
+    thread = threading.Thread(target=_watch, args=(reading, handled, remark), name="signals", daemon=True)
     thread.start()
     try:
         yield
@@ -127,7 +129,7 @@ def _watched(heeded: Collection[int], remark: str) -> Iterator[None]:
         thread.join()
 
 
-def _watch(reading: socket.socket, heeded: Collection[int], remark: str) -> None:
+def _watch(reading: socket.socket, handled: Collection[int], remark: str) -> None:
     """Read the numbers of signals until the other end is closed."""
     count = 0
     with reading:
@@ -140,7 +142,7 @@ def _watch(reading: socket.socket, heeded: Collection[int], remark: str) -> None
                 continue
             if not numbers:
                 return
-            for number in filter(heeded.__contains__, numbers):
+            for number in filter(handled.__contains__, numbers):
                 count += 1
                 if count == 1:
                     reading.settimeout(HINT_s)

@@ -1,4 +1,4 @@
-"""``spheretwin crosscheck``: the engine against the Lagrangian and Pinocchio."""
+"""``spheretwin crosscheck``: comparison of the engine with the Lagrangian and Pinocchio."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from spheretwin.cli.common import add_verbose, kept, print_json, warn_about_model
+from spheretwin.cli.common import add_verbose, print_json, report_broken, warn_about_model
 from spheretwin.crosscheck.part import STATES
 from spheretwin.models import actuator as actuators
 from spheretwin.models.base.errors import InputError
@@ -25,8 +25,8 @@ def add_to(verbs: Any) -> None:
     """Add the verb to the command's parser."""
     parser = verbs.add_parser(
         "crosscheck",
-        help="hold the engine against the Lagrangian and Pinocchio",
-        description="Hold the engine (MuJoCo) against the Lagrangian model and, where it is installed,"
+        help="compare the engine with the Lagrangian and Pinocchio",
+        description="Compare the engine (MuJoCo) with the Lagrangian model and, if it is installed, with"
         " Pinocchio: state by state, along trajectories, without torque, under friction, and in the closed"
         " loop. Exit code 1 when a bound is broken.",
         allow_abbrev=False,
@@ -44,12 +44,12 @@ def add_to(verbs: Any) -> None:
 
 
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; True when every bound is kept."""
+    """Run the verb; return True if every bound is kept."""
     if rest:
         raise InputError(
             f"command line: expected --out, --json, --states, --mjcf or --verbose, received {' '.join(rest)}"
         )
-    actuators.load(options.mjcf)  # a model that cannot be read leaves no folder
+    actuators.load(options.mjcf)  # before the folder is created
     warn_about_model(options.mjcf)
     from spheretwin.crosscheck import suite
     from spheretwin.crosscheck import suite as page  # their libraries are slow to import
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     else:
         print_checks(f"crosscheck, {wall_s:.1f} s", checks, options.verbose)
         runs.print_written(written)
-    return kept("crosscheck", checks)
+    return report_broken("crosscheck", checks)
 
 
 def _count(text: str) -> int:

@@ -1,4 +1,4 @@
-"""``spheretwin magnetics``: the magnetic model by itself."""
+"""``spheretwin magnetics``: analysis of the magnetic model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from spheretwin.cli.common import add_verbose, kept, print_json, warn, warn_about_model, write_text
+from spheretwin.cli.common import add_verbose, print_json, report_broken, warn, warn_about_model, write_text
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
@@ -29,36 +29,36 @@ CURVE = "torque curve from 0 to 180 degrees, columns phi_deg,torque_Nm_per_A"
 
 MOST_POSES = 10_000  # some four hours
 
-# At 90 degrees the shaft's azimuth no longer tells a pose, and the hinges lock.
+# At 90 degrees the azimuth of the shaft no longer determines a pose, and the hinges lock.
 STEEPEST_DEG = 85.0
 
 
 def add_to(verbs: Any) -> None:
     """Add the verb to the command's parser."""
-    parser = verbs.add_parser("magnetics", help="the magnetic model by itself", allow_abbrev=False)
+    parser = verbs.add_parser("magnetics", help="analyse the magnetic model", allow_abbrev=False)
     parts = parser.add_subparsers(metavar="PART", required=True)
     curve = _part(
         parts,
         "curve",
-        "compute the torque curve of a pole and a coil, or judge your own",
+        "compute the torque curve of a pole and a coil, or check another curve",
         "Compute the torque curve f_t(φ) from the geometry of the model file, with magpylib; or compare"
-        " your own finite-element or bench data with it.",
+        " finite-element or measured data with it.",
     )
     curve.add_argument("--out", type=Path, metavar="FILE.csv", help="write the curve here, not to stdout")
-    curve.add_argument("--csv", type=Path, metavar="FILE.csv", help=f"judge this {CURVE}")
+    curve.add_argument("--csv", type=Path, metavar="FILE.csv", help=f"check this {CURVE}")
     curve.set_defaults(run=_run_curve)
 
     check = _part(
         parts,
         "check",
-        "check the torque matrix against the summed field of all poles on all windings",
+        "compare the torque matrix with the summed field of all poles on all windings",
         "Compare G_t(q)·I with the exact field of all magnets on the current of all windings"
         " (magpylib), in random poses and for random currents.",
     )
     _add_curve(check)
     check.add_argument("--poses", type=_count, default=15, metavar="N", help="number of poses (default: 15)")
     check.add_argument(
-        "--seed", type=_seed, default=0, metavar="N", help="of poses and currents (default: 0)"
+        "--seed", type=_seed, default=0, metavar="N", help="seed of poses and currents (default: 0)"
     )
     check.set_defaults(run=_run_check)
 
@@ -72,14 +72,14 @@ def add_to(verbs: Any) -> None:
     _add_curve(capability)
     capability.add_argument("--out", type=Path, metavar="DIR", help="write figures into this folder")
     capability.add_argument(
-        "--need", type=_positive, metavar="NM", help="fail where less torque (N·m) is available"
+        "--need", type=_positive, metavar="NM", help="fail if less torque (N·m) is available at a pose"
     )
     capability.add_argument(
         "--largest-tilt",
         type=_tilt,
         default=LARGEST_TILT_DEG,
         metavar="DEG",
-        help=f"of the shaft, degrees (default: {LARGEST_TILT_DEG:g})",
+        help=f"largest tilt of the shaft, degrees (default: {LARGEST_TILT_DEG:g})",
     )
     capability.set_defaults(run=_run_map)
 
@@ -160,7 +160,7 @@ def _number(text: str) -> float:
 
 
 def run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the part; True when every bound is kept."""
+    """Run the part; return True if every bound is kept."""
     if rest:
         raise InputError(
             "command line: expected --csv, --mjcf, --poses, --seed, --json or --verbose,"
@@ -180,14 +180,14 @@ def run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         warn(
             [
                 f"the torque curve is {distance:.2g} % of its peak away from the model file's geometry:"
-                " `spheretwin magnetics curve` remakes it"
+                " `spheretwin magnetics curve` computes it again"
             ]
         )
-    return kept("magnetics check", verdict.checks)
+    return report_broken("magnetics check", verdict.checks)
 
 
 def run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the part; True when every bound is kept."""
+    """Run the part; return True if every bound is kept."""
     if rest:
         raise InputError(
             f"command line: expected --out, --csv, --mjcf, --json or --verbose, received {' '.join(rest)}"
@@ -225,11 +225,11 @@ def _compute(options: argparse.Namespace) -> bool:
         runs.print_written([options.out])
     else:
         _print_text(computed)
-    return kept("magnetics curve", computed.checks)
+    return report_broken("magnetics curve", computed.checks)
 
 
 def _print_text(computed: ComputedCurve) -> None:
-    """The curve itself on stdout; what there is to say of it beside that, on stderr."""
+    """Print the curve on stdout and its properties on stderr."""
     print(computed.csv, end="")
     print(
         f"peak {computed.peak.peak_Nm_per_A:.5f} N·m/A at {computed.peak.peak_deg:.2f}°;"
@@ -239,7 +239,7 @@ def _print_text(computed: ComputedCurve) -> None:
 
 
 def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
-    """Tell how smooth a user's curve is, and how far it is from the geometry's."""
+    """Report the smoothness of a user curve and its distance from the curve of the geometry."""
     judged = curve_check.judge(torque_curve.read(csv), mjcf, tracked("the geometry's own curve"))
     warn_about_model(mjcf)
     warn(judged.warnings)
@@ -262,11 +262,11 @@ def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
         )
     else:
         magnetics.print_judged_curve(csv, judged)
-    return True  # data is judged by its owner: nothing here is bounded
+    return True  # user data has no bounds here
 
 
 def run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the part; True when every bound is kept."""
+    """Run the part; return True if every bound is kept."""
     if rest:
         raise InputError(
             "command line: expected --csv, --mjcf, --out, --need, --largest-tilt or --json,"
@@ -287,7 +287,7 @@ def run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         magnetics.print_workspace(verdict)
         print_checks("magnetics map", verdict.checks, options.verbose)
         runs.print_written(files)
-    return kept("magnetics map", verdict.checks)
+    return report_broken("magnetics map", verdict.checks)
 
 
 def _plots() -> ModuleType:

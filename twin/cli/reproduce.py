@@ -1,4 +1,4 @@
-"""``spheretwin reproduce``: what the paper shows, run again and set beside it."""
+"""``spheretwin reproduce``: experiments of the paper, run again and compared with the paper."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def add_to(verbs: Any) -> None:
     names = ", ".join(EXPERIMENTS)
     parser = verbs.add_parser(
         "reproduce",
-        help="run what the paper shows, and set it beside the paper",
+        help="run the experiments of the paper and compare the results with the paper",
         description="Run the paper's experiments over several seeds: tables, figures, one page."
-        " Exit code 1 when a run ended as it should not.",
+        " Exit code 1 if a run ended unexpectedly.",
         allow_abbrev=False,
     )
     parser.add_argument("names", metavar="NAME", nargs="+", help=f"{names}, or {ALL}")
@@ -43,20 +43,18 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--seeds", type=_count, default=SEEDS, metavar="N", help=f"runs of each case, {SEEDS} unless given"
     )
-    parser.add_argument(
-        "--limit", type=_count, metavar="N", help="only the first N cases of each, to see how it goes"
-    )
+    parser.add_argument("--limit", type=_count, metavar="N", help="only the first N cases of each experiment")
     parser.add_argument(
         "--plant",
         choices=tuple(ENGINES),
-        help="of rows that do not name theirs; lagrangian where the model allows it unless given, and a"
-        " sample of them on mujoco too",
+        help="engine of rows that do not name one; lagrangian if the model allows it unless given, and a"
+        " sample of the rows also on mujoco",
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; True when every run ended as it should."""
+    """Run the verb; return True if every run ended as expected."""
     if rest:
         raise InputError(
             f"command line: expected --out, --json, --seeds, --limit or --plant, received {' '.join(rest)}"
@@ -71,57 +69,63 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     started = time.perf_counter()
     count = sum(plan.runs + len(sample(plan)) for plan in plans)
     with runs("reproduce", count) as done, timers_stopped():
-        found = [_found(plan, cases, done) for plan, cases in zip(plans, of_cases, strict=True)]
+        results = [_outcomes_of(plan, cases, done) for plan, cases in zip(plans, of_cases, strict=True)]
     wall_s = time.perf_counter() - started
-    told = [
-        rows(plan, outcomes, cases) for plan, cases, (outcomes, _) in zip(plans, of_cases, found, strict=True)
+    rows_by_plan = [
+        rows(plan, outcomes, cases)
+        for plan, cases, (outcomes, _) in zip(plans, of_cases, results, strict=True)
     ]
-    chapters = [_chapter(plan, each, of_plan) for plan, each, of_plan in zip(plans, found, told, strict=True)]
+    chapters = [
+        _chapter(plan, result, plan_rows)
+        for plan, result, plan_rows in zip(plans, results, rows_by_plan, strict=True)
+    ]
     written = page.write(options.out, chapters, _command(options), versions()) if options.out else []
     if options.json:
-        every = [row for of_plan in told for row in of_plan]
+        every = [row for plan_rows in rows_by_plan for row in plan_rows]
         print_json({"rows": every, "seeds": options.seeds, "wall_s": wall_s, "versions": versions()})
     else:
         _print(chapters)
         tables.print_written(written)
     bad = [
-        f"{plan.experiment.name}: {each}"
-        for plan, (outcomes, _) in zip(plans, found, strict=True)
-        for each in failed(plan, outcomes)
+        f"{plan.experiment.name}: {run}"
+        for plan, (outcomes, _) in zip(plans, results, strict=True)
+        for run in failed(plan, outcomes)
     ]
     if bad:
         print(f"spheretwin: reproduce: ended early: {'; '.join(bad)}", file=sys.stderr)
     return not bad
 
 
-def _found(
+def _outcomes_of(
     plan: Plan, of_cases: Mapping[str, Known], done: Callable[[str], None]
 ) -> tuple[Outcomes, list[float]]:
-    """Outcomes of a plan, and how far the sample is apart that ran on both plants."""
+    """Return the outcomes of a plan, and the differences of the sample that ran on both plants."""
     memory = Memory(plan.experiment.name, {name: case.key for name, case in of_cases.items()})
     outcomes = carried_out(plan, done, memory=memory)
     return outcomes, checked(plan, outcomes, done, memory)
 
 
-def _chapter(plan: Plan, found: tuple[Outcomes, list[float]], told: Sequence[Mapping[str, Any]]) -> Chapter:
-    outcomes, apart = found
+def _chapter(
+    plan: Plan, result: tuple[Outcomes, list[float]], printed_rows: Sequence[Mapping[str, Any]]
+) -> Chapter:
+    outcomes, differences = result
     return Chapter(
         plan.experiment,
         plan.experiment.tell(outcomes),
         plan.experiment.findings(outcomes),
-        [row["command"] for row in told],
-        plants_told([row["plant"] for row in told], apart),
+        [row["command"] for row in printed_rows],
+        plants_told([row["plant"] for row in printed_rows], differences),
         plan.experiment.side_by_side(outcomes),
     )
 
 
 def _named(names: Sequence[str]) -> list[str]:
-    """Experiments that are asked for, each once, in the order of the registry.
+    """Return the requested experiments, each once, in the order of the list.
 
     Raises
     ------
     InputError
-        A name is none of an experiment.
+        A name is not that of an experiment.
     """
     for name in names:
         if name != ALL and name not in EXPERIMENTS:
@@ -133,7 +137,7 @@ def _named(names: Sequence[str]) -> list[str]:
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What makes the same page again."""
+    """Return the command that creates the same page again."""
     limit = f" --limit {options.limit}" if options.limit else ""
     plant = f" --plant {options.plant}" if options.plant else ""
     return f"spheretwin reproduce {' '.join(_named(options.names))} --seeds {options.seeds}{limit}{plant}"

@@ -1,4 +1,4 @@
-"""``spheretwin review RUN [RUN ...]``: look at runs again from their files; hold them to the first."""
+"""``spheretwin review RUN [RUN ...]``: facts of runs from their files, compared with the first run."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def add_review(verbs: Any) -> None:
     """Add the verb to the command's parser."""
     parser = verbs.add_parser(
         "review",
-        help="look at runs again from their telemetry or recordings",
-        description="Tell facts, figures and events of runs from their own files alone; of several, their"
-        " differences from the first. Exit code 1 where a run leaves the tolerances.",
+        help="review runs from their telemetry or recordings",
+        description="Print facts, figures and events of runs from their files; with several runs also the"
+        " differences from the first. Exit code 1 if a run exceeds the tolerances.",
         allow_abbrev=False,
     )
     parser.add_argument(
@@ -35,12 +35,12 @@ def add_review(verbs: Any) -> None:
         type=Path,
         nargs="+",
         metavar="RUN",
-        help="telemetry (.parquet) or a recording (.rrd), also one that a killed process left",
+        help="telemetry (.parquet) or a recording (.rrd), also of a killed process",
     )
     parser.add_argument(
         "--tolerance",
         metavar="FILE.toml",
-        help="hold the others against the first, signal by signal; or a shipped one:"
+        help="compare the other runs with the first, signal by signal; a file or a shipped one:"
         f" {', '.join(tolerances.shipped())}",
     )
     parser.add_argument(
@@ -50,39 +50,39 @@ def add_review(verbs: Any) -> None:
         "--merge",
         type=Path,
         metavar="OUT.rrd",
-        help="write all runs side by side as one new recording, with a layout that compares them",
+        help="write all runs into one new recording, with a layout for comparison",
     )
     parser.add_argument(
         "--figures",
         type=Path,
         metavar="DIR",
-        help="draw all runs: PNG, SVG and one page with plots to zoom, which needs no viewer and no network",
+        help="draw all runs: PNG, SVG and one page with interactive plots, without viewer or network",
     )
-    parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON, alone on stdout")
     parser.set_defaults(run=run_review)
 
 
 def run_review(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; True when all runs are within the tolerances, if there are any."""
+    """Run the verb; return True if all runs are within the tolerances, if any are given."""
     if rest:
         expected = "--tolerance, --export, --merge, --figures or --json"
         raise InputError(f"command line: expected {expected}, received {' '.join(rest)}")
     _check(options)
     reviewed = review(*options.runs, tolerance=options.tolerance)
-    runs, told, over = reviewed.runs, reviewed.figures, reviewed.exceeded
+    runs, summaries, over = reviewed.runs, reviewed.figures, reviewed.exceeded
     if options.export:
         recorded_run.export(runs[0], options.export)
     if options.merge:
         comparison.merge(runs, options.merge)
-    page = comparison.write_figures(runs, told, options.figures) if options.figures else None
+    page = comparison.write_figures(runs, summaries, options.figures) if options.figures else None
     if options.json:
         _print_json(reviewed, held=options.tolerance is not None)
     else:
-        reviews.print_runs(told)
+        reviews.print_runs(summaries)
         tables.print_written([path for path in (options.export, options.merge, page) if path])
-    warn(f"{each.path} {NO_CHECKSUMS}" for each in runs if not each.checked)
-    warn(_recovered(each) for each in runs if not each.whole)
-    warn(_thinned(each) for each in runs if each.rate_Hz)
+    warn(f"{run.path} {NO_CHECKSUMS}" for run in runs if not run.checked)
+    warn(_recovered(run) for run in runs if not run.whole)
+    warn(_thinned(run) for run in runs if run.rate_Hz)
     for places in filter(None, over):
         print(f"spheretwin: review: {_first(places)}", file=sys.stderr)
     return not any(over)
@@ -113,21 +113,21 @@ def _print_json(reviewed: Review, *, held: bool) -> None:
             "runs": reviewed.figures,
             "differences": reviewed.differences,
             "within_tolerance": within,
-            "exceeded": [place for each in reviewed.exceeded for place in each],
+            "exceeded": [place for places in reviewed.exceeded for place in places],
         }
     )
 
 
-def _recovered(each: Reviewed) -> str:
+def _recovered(run: Reviewed) -> str:
     return (
-        f"{each.path} was not closed: {len(each.table)} rows, {each.simulated_s:.3f} s of the run,"
+        f"{run.path} was not closed: {len(run.table)} rows, {run.simulated_s:.3f} s of the run,"
         " were recovered"
     )
 
 
-def _thinned(each: Reviewed) -> str:
+def _thinned(run: Reviewed) -> str:
     return (
-        f"{each.path} keeps {each.rate_Hz:g} rows a second and those that stand out: extremes and events are"
+        f"{run.path} keeps {run.rate_Hz:g} rows a second and those that stand out: extremes and events are"
         " those of the run; all other figures are of these rows, each held until the next, and the variation"
         " of the commands is too low"
     )
@@ -147,22 +147,22 @@ def add_recover(verbs: Any) -> None:
     """Add the verb to the command's parser."""
     parser = verbs.add_parser(
         "recover",
-        help="make a whole file of what a killed run left",
-        description="Make a whole file of what a killed process left of its telemetry or recording.",
+        help="recover a complete file from a killed run",
+        description="Recover a complete file from the partial telemetry or recording of a killed process.",
         allow_abbrev=False,
     )
     parser.add_argument(
         "file",
         type=Path,
         metavar="FILE",
-        help="what was left, or the name that the file was to have: RUN.parquet, RUN.rrd",
+        help="partial file, or the intended name of the file: RUN.parquet, RUN.rrd",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", required=True, help="where to write it whole")
+    parser.add_argument("--out", type=Path, metavar="FILE", required=True, help="path of the complete file")
     parser.set_defaults(run=run_recover)
 
 
 def run_recover(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; True when the file is written."""
+    """Run the verb; return True if the file is written."""
     if rest:
         raise InputError(f"command line: expected FILE and --out, received {' '.join(rest)}")
     check_writable(options.out)

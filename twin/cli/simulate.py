@@ -36,17 +36,17 @@ from spheretwin.viz.terminal.progress import Progress
 
 
 class UserMetrics:
-    """Keeps what functions of the user's are to be handed, and asks them when the run is over.
+    """User metrics: stores the telemetry of a run and calls the functions at its end.
 
     Parameters
     ----------
     specs : sequence of str
-        Each ``path/to/file.py:name``; the name is that of the figure too.
+        Each ``path/to/file.py:name``; the name is also the name of the figure.
 
     Attributes
     ----------
     faults : list of str
-        Why a figure is missing; one line each.
+        Reasons for missing figures, one line each.
 
     Raises
     ------
@@ -56,36 +56,38 @@ class UserMetrics:
 
     def __init__(self, specs: Sequence[str]) -> None:
         self._functions: dict[str, UserMetric] = {}
-        self._kept: TelemetryBuffer | None = None
+        self._telemetry: TelemetryBuffer | None = None
         self.faults: list[str] = []
         for spec in specs:
             name = spec.rpartition(":")[2]
             if name in self._functions:
-                raise InputError(f"metric: expected a name of its own for each, received {name} twice")
+                raise InputError(
+                    f"metric: expected a different name for each function, received {name} twice"
+                )
             self._functions[name] = load_function(spec, f"metric {name}")
         check_names(self._functions)
 
     def sinks(self, session: Session, ticks: int) -> list[TelemetryBuffer]:
-        """What is to follow a run of so many ticks: nothing where there is no function.
+        """Return the sinks of a run of a number of ticks; none without a function.
 
         Raises
         ------
         InputError
             The telemetry does not fit in memory.
         """
-        self._kept = TelemetryBuffer(session.signals, ticks) if self._functions else None
-        return [self._kept] if self._kept else []
+        self._telemetry = TelemetryBuffer(session.signals, ticks) if self._functions else None
+        return [self._telemetry] if self._telemetry else []
 
     def values(self, session: Session, status: Status) -> dict[str, Any]:
-        """Figure by name; None where a function failed: the run's other figures must not be lost by it."""
-        if self._kept is None:
+        """Return the figures by name; None if a function failed, so that the other figures are not lost."""
+        if self._telemetry is None:
             return {}
-        run = Run(session.begun_as, status, self._kept.table, session.loop_s, session.actuator)
+        run = Run(session.begun_as, status, self._telemetry.table, session.loop_s, session.actuator)
         return {name: self._value(name, metric, run) for name, metric in self._functions.items()}
 
     def _value(self, name: str, metric: UserMetric, run: Run) -> Any:
         try:
-            with contextlib.redirect_stdout(sys.stderr):  # stdout is for the figures alone
+            with contextlib.redirect_stdout(sys.stderr):  # stdout is only for the figures
                 return own_value(name, metric, run)
         except InputError as error:
             self.faults.append(f"{error}")
@@ -112,8 +114,8 @@ def add_to(verbs: Any) -> None:
         "--record-rate",
         type=outputs.rate_Hz,
         metavar="HZ",
-        help="rows a second that the recording keeps, and besides all that stand out in any 20 s; every one"
-        " unless given",
+        help="rows per second of the recording, in addition to the extremes of any 20 s; every row unless"
+        " given",
     )
     parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
     parser.add_argument(
@@ -125,7 +127,7 @@ def add_to(verbs: Any) -> None:
         help=f"the tab of the recording that is open at first; {OVERVIEW} unless given",
     )
     parser.add_argument(
-        "--replay", type=Path, metavar="RUN.parquet", help="run again what a telemetry file says of itself"
+        "--replay", type=Path, metavar="RUN.parquet", help="replay the run of a telemetry file"
     )
     parser.add_argument(
         "--metric",
@@ -141,7 +143,7 @@ def add_to(verbs: Any) -> None:
 
 
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; True when the run completed."""
+    """Run the verb; return True if the run completed."""
     if options.help:
         options.parser.print_help()
         scenario = scenarios.load(options.scenario or EXAMPLE, reading.overrides(rest))
@@ -182,8 +184,8 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
                 )
             values = own.values(session, status)
             warnings = [*session.warnings(), *figures.warnings(), *own.faults]
-            told = summary(session, status, {**figures.values(), **values}, warnings)
-            _report(session, plan, status, told, tuple(values), options.json)
+            run_summary = summary(session, status, {**figures.values(), **values}, warnings)
+            _report(session, plan, status, run_summary, tuple(values), options.json)
             if options.live and sys.stderr.isatty():
                 print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
                 while not stop_requested():
@@ -195,13 +197,13 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
 
 
 def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Whether nothing was given but the verb."""
+    """True if no argument was given."""
     chosen = (options.record, options.telemetry, options.replay, options.metric, options.live, options.json)
     return options.scenario is None and not any(chosen) and not rest
 
 
 def _planned(options: argparse.Namespace, rest: Sequence[str]) -> RunPlan:
-    """What to run, from a scenario and flags or from a run's own file."""
+    """Return the run plan, from a scenario and flags or from the file of a run."""
     if options.replay:
         if options.scenario or rest:
             received = " ".join([*filter(None, [options.scenario]), *rest])
@@ -219,21 +221,26 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> RunPlan:
 
 
 def _report(
-    session: Session, plan: RunPlan, status: Status, told: dict[str, Any], own: Sequence[str], as_json: bool
+    session: Session,
+    plan: RunPlan,
+    status: Status,
+    run_summary: dict[str, Any],
+    own: Sequence[str],
+    as_json: bool,
 ) -> None:
-    """Print the figures, and how the run ended where it did not complete."""
+    """Print the figures, and the reason if the run did not complete."""
     scenario = session.begun_as
     planned_s = plan.ticks * scenario.controller.period_s
     if as_json:
-        print_json(told)
+        print_json(run_summary)
     else:
-        runs.print_run(scenario.controller.law, planned_s, told, own)
+        runs.print_run(scenario.controller.law, planned_s, run_summary, own)
     if status != Status.COMPLETED:
         print(f"spheretwin: {_ending(session, status, planned_s)}", file=sys.stderr, flush=True)
 
 
 def _report_files(files: Outputs, faults: Sequence[SpheretwinError], as_json: bool) -> None:
-    """Print where the files are that were written whole, and why others were not."""
+    """Print the paths of the complete files and the errors of the others."""
     if not as_json:
         runs.print_files(files.record, files.telemetry)
     for fault in faults:
@@ -242,7 +249,7 @@ def _report_files(files: Outputs, faults: Sequence[SpheretwinError], as_json: bo
 
 @contextlib.contextmanager
 def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
-    """Tell on one line what a plain law of the user's raises; keep what it prints away from the JSON."""
+    """Report an exception of a plain user law on one line; redirect its output away from the JSON."""
     try:
         with contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext():
             yield

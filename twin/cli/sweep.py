@@ -1,4 +1,4 @@
-"""``spheretwin sweep STUDY``: many runs over all cores, interrupted and resumed, as one table."""
+"""``spheretwin sweep STUDY``: many runs on all cores, resumable, with one table as the result."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from spheretwin.study.statistics import summary
 from spheretwin.study.study import Study, load, shipped
 from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
-from spheretwin.study.tuning.report import told as told_of_tuning
+from spheretwin.study.tuning.report import told as tuning_summary
 from spheretwin.study.tuning.tuning import tuned
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import counted
 
 MOST_THREADS = 1024
 
-GO_ON = "sweep: finished rows are kept; the same command goes on from there"
+GO_ON = "sweep: finished rows are stored; the same command continues from there"
 
 
 def add_to(verbs: Any) -> None:
@@ -41,8 +41,8 @@ def add_to(verbs: Any) -> None:
     parser = verbs.add_parser(
         "sweep",
         help="run a study: many runs, one table",
-        description="Run a study over all cores. What its journal has already is not run again: an"
-        " interrupted study goes on where it ended. Exit code 1 if it is not complete, or if a row ended as"
+        description="Run a study on all cores. Rows in its journal are not run again: an interrupted"
+        " study continues. Exit code 1 if it is not complete, or if a row ended as"
         " failsafe or by an exception of a law or a metric.",
         allow_abbrev=False,
     )
@@ -69,19 +69,21 @@ def add_to(verbs: Any) -> None:
         "--limit",
         type=_count,
         metavar="ROWS",
-        help="run only the first rows; finished ones behind them stay in the table",
+        help="run only the first rows; finished later rows stay in the table",
     )
-    parser.add_argument("--row", metavar="KEY", help="run the row of this key alone, and print its figures")
+    parser.add_argument("--row", metavar="KEY", help="run only the row of this key, and print its figures")
     parser.add_argument(
-        "--optimise", action="store_true", help="look for the gains that the study's [optimise] names"
+        "--optimise",
+        action="store_true",
+        help="tune the gains that the section [optimise] of the study names",
     )
-    parser.add_argument("--trials", type=_count, metavar="N", help="of each law, with --optimise")
-    parser.add_argument("--json", action="store_true", help="print what was found as JSON, alone on stdout")
+    parser.add_argument("--trials", type=_count, metavar="N", help="trials of each law, with --optimise")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON, alone on stdout")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; True if all requested rows are finished and none has failed."""
+    """Run the verb; return True if all requested rows are finished and none has failed."""
     if rest:
         raise InputError(
             "command line: expected --out, --engine, --address, --threads, --limit, --row, --optimise,"
@@ -101,9 +103,9 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
         interruptible(GO_ON) as stop_requested,
         counted(study.name) as done,
         timers_stopped(),
-        contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
+        contextlib.redirect_stdout(sys.stderr),  # the output of user code is not part of the figures
     ):
-        found = run_study(
+        outcome = run_study(
             study,
             options.out,
             engine=options.engine,
@@ -113,41 +115,41 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             done=done,
             stop_requested=stop_requested,
         )
-    rows = statistics.read(found.table)
-    told = summary(rows)
-    written = _report(found, rows, told, options.study)
+    rows = statistics.read(outcome.table)
+    printed = summary(rows)
+    written = _report(outcome, rows, printed, options.study)
     if options.json:
-        print_json({**_told(found), "summary": told, "versions": versions()})
+        print_json({**_outcome_json(outcome), "summary": printed, "versions": versions()})
     else:
-        runs.print_study(study.name, _told(found), told)
+        runs.print_study(study.name, _outcome_json(outcome), printed)
         runs.print_written(written)
-    if found.torn:
+    if outcome.torn:
         print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
-    if found.damaged:
+    if outcome.damaged:
         print(
-            f"spheretwin: sweep: {found.damaged} damaged lines of the journal were passed over,"
+            f"spheretwin: sweep: {outcome.damaged} damaged lines of the journal were skipped,"
             " and their rows run again",
             file=sys.stderr,
         )
-    if found.rows < found.of:
+    if outcome.rows < outcome.of:
         print(
-            f"spheretwin: sweep: interrupted after {found.rows} of {found.of} rows;"
-            " the same command goes on from there",
+            f"spheretwin: sweep: interrupted after {outcome.rows} of {outcome.of} rows;"
+            " the same command continues from there",
             file=sys.stderr,
         )
     failures = rows.failures
     if len(failures):
         first = failures[0]
         print(
-            f"spheretwin: sweep: {len(failures)} of {found.rows} rows failed, the first with key"
+            f"spheretwin: sweep: {len(failures)} of {outcome.rows} rows failed, the first with key"
             f" {rows.keys[first]}: {rows.statuses[first]}, {rows.complaints[first]}",
             file=sys.stderr,
         )
-    return found.rows >= found.of and not len(failures)
+    return outcome.rows >= outcome.of and not len(failures)
 
 
 def _optimised(study: Study, options: argparse.Namespace) -> bool:
-    """Look for gains; True when all trials that were wanted are finished."""
+    """Tune gains; return True if all requested trials are finished."""
     if options.row or options.limit:
         raise InputError("command line: expected --optimise without --row and --limit")
     objectives = section_of(study).objective
@@ -156,9 +158,9 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         interruptible(GO_ON) as stop_requested,
         counted(study.name, "trials") as done,
         timers_stopped(),
-        contextlib.redirect_stdout(sys.stderr),  # what code of the user's prints is none of the figures
+        contextlib.redirect_stdout(sys.stderr),  # the output of user code is not part of the figures
     ):
-        found = tuned(
+        outcome = tuned(
             study,
             folder,
             trials=options.trials,
@@ -168,51 +170,53 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         )
     trials = f" --trials {options.trials}" if options.trials else ""
     command = f"spheretwin sweep {shlex.quote(options.study)} --optimise{trials}"
-    written = tuning_page.write(folder, study, found, command, versions())
+    written = tuning_page.write(folder, study, outcome, command, versions())
     if find_spec("matplotlib") is None:
         print("spheretwin: sweep: no figures without the extra `spheretwin[plots]`", file=sys.stderr)
-    told = told_of_tuning(found, objectives)
+    printed = tuning_summary(outcome, objectives)
     if options.json:
-        print_json({**told, "versions": versions()})
+        print_json({**printed, "versions": versions()})
     else:
-        runs.print_tuning(study.name, told)
+        runs.print_tuning(study.name, printed)
         runs.print_written(written)
-    if found.trials < found.of:
+    if outcome.trials < outcome.of:
         print(
-            f"spheretwin: sweep: interrupted after {found.trials} of {found.of} trials;"
-            " the same command goes on from there",
+            f"spheretwin: sweep: interrupted after {outcome.trials} of {outcome.of} trials;"
+            " the same command continues from there",
             file=sys.stderr,
         )
-    return found.trials >= found.of
+    return outcome.trials >= outcome.of
 
 
-def _told(found: Found) -> dict[str, Any]:
+def _outcome_json(outcome: Found) -> dict[str, Any]:
     return {
-        "rows": found.rows,
-        "of": found.of,
-        "failed": found.failed,
-        "resumed": found.resumed,
-        "checked": found.checked,
-        "wall_s": found.wall_s,
-        "startup_s": found.startup_s,
-        "table": str(found.table),
+        "rows": outcome.rows,
+        "of": outcome.of,
+        "failed": outcome.failed,
+        "resumed": outcome.resumed,
+        "checked": outcome.checked,
+        "wall_s": outcome.wall_s,
+        "startup_s": outcome.startup_s,
+        "table": str(outcome.table),
     }
 
 
-def _report(found: Found, rows: statistics.Rows, told: dict[str, Any], source: str) -> list[Path]:
-    """Write the page beside the table, where it can be drawn."""
+def _report(outcome: Found, rows: statistics.Rows, printed: dict[str, Any], source: str) -> list[Path]:
+    """Write the page next to the table if figures can be drawn."""
     if report.can_be_drawn():
-        return report.write(found.table.parent, rows, told, (found.of, found.study_rows), source, versions())
-    print("spheretwin: sweep: no report was written: it takes the extra `spheretwin[plots]`", file=sys.stderr)
+        return report.write(
+            outcome.table.parent, rows, printed, (outcome.of, outcome.study_rows), source, versions()
+        )
+    print("spheretwin: sweep: no report was written: it needs the extra `spheretwin[plots]`", file=sys.stderr)
     return []
 
 
 def _one(study: Study, key: str, as_json: bool) -> bool:
-    """Run one row, and print what it was and what it gave."""
+    """Run one row, and print its values and its figures."""
     with contextlib.redirect_stdout(sys.stderr), timers_stopped():
         rows, row = Rows(study), Grid(study).of(key)
         result = rows.carried_out(row)
-    told = {
+    printed = {
         "row": row.number,
         "key": row.key,
         "seed": row.seed,
@@ -225,14 +229,14 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
         **result.figures,
     }
     if as_json:
-        print_json(told)
+        print_json(printed)
     else:
-        runs.print_rows(f"row {row.number} of {study.name}", ("", "value"), _pairs(told), 2)
+        runs.print_rows(f"row {row.number} of {study.name}", ("", "value"), _pairs(printed), 2)
     return result.status == Status.COMPLETED and result.error is None
 
 
-def _pairs(told: dict[str, Any]) -> list[tuple[str, ...]]:
-    return [(name, str(value)) for name, value in told.items()]
+def _pairs(printed: dict[str, Any]) -> list[tuple[str, ...]]:
+    return [(name, str(value)) for name, value in printed.items()]
 
 
 def _threads(text: str) -> int:

@@ -146,7 +146,7 @@ def test_rows_that_never_return_end_by_the_second_signal_and_the_study_goes_on(l
     )
     command = ["sweep", source, "--out", tmp_path / "out", "--threads", "2"]
     lines = ended(started(*command), signal.SIGTERM)
-    assert lines == ["spheretwin: sweep: finished rows are kept; the same command goes on from there"]
+    assert lines == ["spheretwin: sweep: finished rows are stored; the same command continues from there"]
     kept = (tmp_path / "out" / "journal.jsonl").read_bytes().splitlines()[1:]
     assert sorted(json.loads(line)[0] for line in kept) == [0, 1]
 

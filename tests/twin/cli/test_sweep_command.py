@@ -53,13 +53,13 @@ def test_damage_to_the_journal_is_told(source, tmp_path, capsys):
     out, err = capsys.readouterr()
     assert json.loads(out)["resumed"] == 1
     assert "the journal ended in a torn line, which was dropped" in err
-    assert "1 damaged lines of the journal were passed over, and their rows run again" in err
+    assert "1 damaged lines of the journal were skipped, and their rows run again" in err
 
 
 def test_without_matplotlib_there_is_a_table_and_a_word(source, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(report, "can_be_drawn", lambda: False)
     assert cli.main(["sweep", source, "--out", str(tmp_path / "out")]) == cli.DONE
-    assert "no report was written: it takes the extra `spheretwin[plots]`" in capsys.readouterr().err
+    assert "no report was written: it needs the extra `spheretwin[plots]`" in capsys.readouterr().err
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"journal.jsonl", "table.parquet"}
 
 

@@ -151,7 +151,7 @@ def test_a_replayed_run_shows_the_columns_that_came_on_its_way(file, tmp_path, c
         (["mine.py"], "expected path/to/file.py:name"),
         (
             ["mine.py:largest", "mine.py:largest"],
-            "expected a name of its own for each, received largest twice",
+            "expected a different name for each function, received largest twice",
         ),
         (["other.py:status"], "expected another name than max_abs_error_rad"),
     ],

@@ -85,7 +85,7 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(tmp_pa
     assert process.returncode == cli.FAILED
     told = json.loads(out)
     assert 4 <= told["rows"] == journal_lines(folder) - 1 == len(rows_of(folder)) < told["of"] == len(LOADS)
-    assert f"interrupted after {told['rows']} of 60 rows; the same command goes on from there" in err
+    assert f"interrupted after {told['rows']} of 60 rows; the same command continues from there" in err
     assert "Traceback" not in err
     assert gone_on_with(command, folder, whole)["resumed"] == told["rows"]
 

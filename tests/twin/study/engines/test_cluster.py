@@ -268,7 +268,7 @@ def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, wanted
     os.killpg(going.pid, signal.SIGINT)  # as a terminal does it, to all that it runs
     told = going.communicate()[1]
     assert going.returncode == 1
-    assert "the same command goes on from there" in told
+    assert "the same command continues from there" in told
     assert "Traceback" not in told
     before = (tmp_path / "out" / journal.NAME).read_bytes()
     found = studies.run(study, tmp_path / "out")

@@ -226,7 +226,9 @@ def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkey
     out, err = capsys.readouterr()
     found = json.loads(out)["trials"]
     assert 4 <= found < 16
-    told = f"spheretwin: sweep: interrupted after {found} of 16 trials; the same command goes on from there\n"
+    told = (
+        f"spheretwin: sweep: interrupted after {found} of 16 trials; the same command continues from there\n"
+    )
     assert err == told
     assert cli.main(arguments) == cli.DONE
     assert json.loads(capsys.readouterr().out)["resumed"] == found
