@@ -93,7 +93,7 @@ def _lagrangian_rotor(scenario: ResolvedScenario, files: Files) -> LagrangianRot
 Array = NDArray[np.float64]
 
 # Step of fourth-order differences: with a tenth of it slopes differ by 3e-10 of the largest, with ten times
-# it by by 6e-7, as the steps then extend over knots of the spline of the curve.
+# it by 6e-7, as the steps then extend over knots of the spline of the curve.
 DIFFERENCE_rad = 1e-4
 
 
