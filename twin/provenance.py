@@ -17,7 +17,7 @@ from spheretwin.session import Session
 
 
 def facts_of(scenario: ResolvedScenario) -> RunFacts:
-    """What is known of a run from its start.
+    """Return the facts of a run that are known at its start.
 
     Parameters
     ----------
@@ -37,16 +37,16 @@ def facts_of(scenario: ResolvedScenario) -> RunFacts:
 
 
 def record_of(session: Session, before: RunRecord | None = None, first_tick: int = 0) -> RunRecord:
-    """What a run says of itself in its telemetry file, but for how it ended.
+    """Return the record of a run for its telemetry file, without the final status.
 
     Parameters
     ----------
     session : Session
-        The run. Paths are told as they are from the root, so that it can be replayed from any folder.
+        Session of the run. Paths become absolute, so that the run can be replayed from any folder.
     before : RunRecord, optional
-        Record of the same run when it began: what its files held then is what counts.
+        Record of the same run at its start: its digests of the files apply.
     first_tick : int
-        Tick from which on the rows are kept.
+        Tick of the first row of the file.
     """
     scenario = reading.resolve_paths(os.getcwd(), session.begun_as.model_dump(mode="json"))
     if session.law_reference and isinstance(session.begun_as.controller, UserController):
@@ -60,33 +60,33 @@ def record_of(session: Session, before: RunRecord | None = None, first_tick: int
 
 
 def files_of(scenario: dict[str, Any], journal: Iterable[Change]) -> Iterator[tuple[str, str]]:
-    """Files that a run names at its start or on its way, each with the dotted name of its field."""
+    """Yield the files that a run names at its start or in its changes, each with the name of its field."""
     yield from reading.named_files(scenario)
     for change in journal:
         yield from reading.named_files(reading.single_field(change.name, change.value))
 
 
 def digest(dotted: str, path: str) -> str | None:
-    """What tells a file from another, for a model with all that it names; None where it cannot be read."""
+    """Return the digest of a file, for a model with all its files; None if it cannot be read."""
     try:
         if dotted == "plant.mjcf":
             return mjcf.contents_digest(Path(path))
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    except OSError:  # a run that is over must not lose its telemetry by it
+    except OSError:  # a finished run must not lose its telemetry for this reason
         return None
 
 
 def _from_root(change: Change) -> Change:
-    """A change whose paths, if it holds any, begin at the root."""
+    """Return a change with absolute paths."""
     return change._replace(value=reading.resolve_value_paths(os.getcwd(), change.name, change.value))
 
 
 def _sections(fields: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Values by section, what stands outside of any under ``run``; name and description are told apart."""
+    """Return the values by section; fields outside a section are in ``run``, without name and description."""
     outside = {key: value for key, value in fields.items() if not isinstance(value, Mapping)}
     inside = {key: dict(value) for key, value in fields.items() if isinstance(value, Mapping)}
-    told_apart = ("name", "description")
-    return {"run": {key: outside[key] for key in outside if key not in told_apart}, **inside}
+    excluded = ("name", "description")
+    return {"run": {key: outside[key] for key in outside if key not in excluded}, **inside}
 
 
 def change_text(change: Change) -> str:

@@ -150,8 +150,8 @@ def convert(dac: Dac, command: NDArray[np.float64], setpoint: NDArray[np.float64
             setpoint[j] = command[j]
         return
     for j in range(command.shape[0]):
-        held = min(max(command[j], -dac.span_A), dac.span_A)  # keeps the quotients finite
-        code = np.rint(held / dac.transconductance_A_V / dac.lsb_V)
+        limited = min(max(command[j], -dac.span_A), dac.span_A)  # keeps the quotients finite
+        code = np.rint(limited / dac.transconductance_A_V / dac.lsb_V)
         code = min(max(code, dac.lowest), dac.highest)
         inl = _inl(dac.inl_lsb[j], (2.0 * code + 1.0) / (dac.highest - dac.lowest))
         volts = dac.lsb_V * (code * dac.gain[j] + inl) + dac.offset_V[j]
