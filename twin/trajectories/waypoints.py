@@ -53,7 +53,7 @@ class WaypointPath:
         self._polynomials = polynomials  # of the share of a segment done: (powers, segments, 3)
 
     def __eq__(self, other: object) -> bool:
-        return self._key == other._known_by if isinstance(other, WaypointPath) else NotImplemented
+        return self._key == other._key if isinstance(other, WaypointPath) else NotImplemented
 
     def __hash__(self) -> int:
         return hash(self._key)

@@ -105,7 +105,7 @@ def test_a_law_whose_step_is_made_by_its_build_goes_on_through_other_changes(fil
         # One more tick of an error of at most 0.3 rad over 1 ms.
         np.testing.assert_allclose(after, before, rtol=0, atol=3.1e-4)
         assert (
-            session.snapshot().machine.parts["the law's parameters"][0] == 51.0
+            session.snapshot().runtime.parts["the law's parameters"][0] == 51.0
         )  # what it made of its parameters stays
 
 
@@ -121,7 +121,7 @@ def test_a_memory_of_another_size_begins_anew(file):
         session.advance(10)
         session.set("controller.order", 5)
         session.advance(10)
-        np.testing.assert_array_equal(session.snapshot().machine.parts["the law's memory"][3:], 0.0)
+        np.testing.assert_array_equal(session.snapshot().runtime.parts["the law's memory"][3:], 0.0)
 
 
 def test_who_does_not_ask_is_told_nothing_after_one_who_did(file):

@@ -64,7 +64,7 @@ def test_another_law_of_the_same_name_begins_with_its_own_memory(name):
     session.advance(8)
     session.set("controller.law", own(name, calls=100.0))
     session.advance(1)
-    assert session.snapshot().machine.parts["the law's memory"][0] == 101.0
+    assert session.snapshot().runtime.parts["the law's memory"][0] == 101.0
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 400])

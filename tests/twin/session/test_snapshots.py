@@ -225,12 +225,12 @@ def test_every_part_s_numbers_are_counted_before_anything_is_restored():
     assert len(machine.parts) > 10
     for name, state in wrong:
         with pytest.raises(InputError, match=f"expected a snapshot with .* numbers of {name}, received"):
-            mine.restore(dataclasses.replace(taken, machine=state))
+            mine.restore(dataclasses.replace(taken, runtime=state))
     for part, state in (
         ("the engine's state", machine._replace(rotor=machine.rotor[1:])),
         ("the last command", machine._replace(last=machine.last._replace(command=np.zeros(3)))),
         ("the last pose", machine._replace(last=machine.last._replace(q=np.zeros(2)))),
     ):
         with pytest.raises(InputError, match=part):
-            mine.restore(dataclasses.replace(taken, machine=state))
+            mine.restore(dataclasses.replace(taken, runtime=state))
     assert rows(mine.advance(20)) == expected
