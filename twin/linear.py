@@ -323,7 +323,7 @@ def _rotor_matrices(data: LinearisationData, q: Array, pull: Array) -> tuple[Arr
     Rates are 0 at rest, and so are the first-order terms of the Coriolis torques, which are quadratic in
     them. The derivative of M is multiplied by accelerations that are 0.
     """
-    per_torque = np.linalg.inv(inertia_matrix(q, data.inertia))
+    per_torque: Array = np.linalg.inv(inertia_matrix(q, data.inertia)).astype(np.float64)
     stiffness = gravity_stiffness(q, data.weight_moment) - pull
     A = np.zeros((6, 6))
     A[:3, 3:] = np.eye(3)

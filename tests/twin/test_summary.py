@@ -8,7 +8,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.models.base.errors import InputError
-from spheretwin.run import BESIDE, Figures, figures_of, summary
+from spheretwin.run import OTHER_KEYS, Figures, figures_of, summary
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 
@@ -28,7 +28,7 @@ def followed(ticks):
 
 def test_a_summary_has_the_metrics_and_what_stands_beside_them(run):
     told = followed(200)
-    assert set(told) == {*METRICS, *BESIDE}
+    assert set(told) == {*METRICS, *OTHER_KEYS}
     assert (told["status"], told["simulated_s"]) == ("completed", 0.2)
     figures = figures_of(run)
     assert {name: told[name] for name in METRICS} == figures  # followed or kept, it is one run

@@ -20,8 +20,8 @@ from spheretwin.control.supervision.fault_detector import (
     detect_faults,
     detector,
 )
-from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, flow
-from spheretwin.electronics.coil import CoilSection, coil
+from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, zero_flow
+from spheretwin.electronics.coil import CoilSection, group_coils
 from spheretwin.electronics.converters import convert, dac
 from spheretwin.electronics.data_sheet import drive_sheet
 from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
@@ -109,9 +109,9 @@ def test_a_healthy_current_looks_like_none_for_fewer_ticks(
     stage = amplifier(
         AmplifierSection(supply_V=swing_V, bandwidth_rad_s=bandwidth_rad_s), 8.0, period_s, 1, 0
     )  # fmt: skip
-    winding = coil(CoilSection(), resistance_ohm, inductance_H, period_s, 1)
+    winding = group_coils(CoilSection(), resistance_ohm, inductance_H, period_s, 1)
     reach = min(8.0, swing_V / resistance_ohm)
-    current, sums, silent = np.array([-reach]), flow(1), 0
+    current, sums, silent = np.array([-reach]), zero_flow(1), 0
     for _ in range(200):
         drive_coils(stage, winding, np.array([8.0]), np.zeros(1), current, sums)
         silent += abs(current[0]) <= watcher.threshold_A
