@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from numba.core.ccallback import CFunc
 from numba.core.dispatcher import Dispatcher
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
@@ -264,6 +264,11 @@ def _line_of(error: Exception, function: Callable[..., Any]) -> int | None:
             return int(place["line"])
     location = getattr(error, "loc", None)
     return location.line if location and Path(location.filename).name == file else None
+
+
+def implements(function: Callable[..., Any], *, inline: bool = False) -> Callable[[F], F]:
+    """Decorate the function that returns the implementation of `function` for given types, or None."""
+    return cast("Callable[[F], F]", overload(function, inline="always" if inline else "never"))
 
 
 def compilable(function: F) -> F:

@@ -23,9 +23,11 @@ def library() -> ctypes.CDLL:
     raise EngineError(f"engine: expected MuJoCo's shared library in {folder}, found none")
 
 
-@ctypes.CFUNCTYPE(None, ctypes.c_char_p)
-def _quiet(_: bytes) -> None:
+def _ignore(_: bytes) -> None:
     """Ignore a warning; MuJoCo counts it in `mjData.warning`, which a run reads."""
+
+
+_quiet = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(_ignore)
 
 
 @contextmanager

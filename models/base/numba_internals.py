@@ -28,7 +28,7 @@ from spheretwin.models.base import cache
 _REGISTERED = hashing, function_type
 
 
-class MachineCode(NullCache):
+class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types
     """Cache of the machine code of one function, one entry for each signature.
 
     Numba's own cache takes its folder from a setting that all packages share, and an entry that is damaged or
@@ -101,8 +101,7 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
     """
     function_type = types.FunctionType(signature)
 
-    @intrinsic
-    def from_address(typing_context: Any, address: Any) -> Any:
+    def build_from_address(typing_context: Any, address: Any) -> Any:
         if not isinstance(address, types.Integer):
             return None
 
@@ -114,11 +113,12 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
 
         return function_type(types.intp), build
 
+    from_address: Any = intrinsic(build_from_address)
+
     def at(function: Any) -> Callable[..., Any]:
         return function
 
-    @overload(at)
-    def _compiled_at(function: Any) -> Callable[[Any], Any] | None:
+    def compiled_at(function: Any) -> Callable[[Any], Any] | None:
         if not isinstance(function, types.Integer):
             return None
 
@@ -127,4 +127,5 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
 
         return call
 
+    overload(at)(compiled_at)
     return at

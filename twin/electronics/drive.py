@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from spheretwin.electronics import drive_chain as chain
@@ -21,7 +20,7 @@ from spheretwin.electronics.drive_chain import (
     current_lag,
     drive_chain,
 )
-from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.compiled import implements, part_of_its_caller
 
 
 class LagDrive(NamedTuple):
@@ -120,7 +119,7 @@ def _of_kind(table: dict[type, Any], drive: Any) -> Any:
     return table.get(getattr(drive, "instance_class", object))
 
 
-@overload(begin, inline="always")
+@implements(begin, inline=True)
 def _compiled_begin(drive: Any, command: Any) -> Callable[..., Any] | None:
     implementation = _of_kind(_BEGIN, drive)
 
@@ -130,7 +129,7 @@ def _compiled_begin(drive: Any, command: Any) -> Callable[..., Any] | None:
     return call if implementation else None
 
 
-@overload(advance_currents, inline="always")
+@implements(advance_currents, inline=True)
 def _compiled_advance(
     drive: Any, command: Any, substep: Any, q: Any, qdot: Any, G: Any, gain: Any, current: Any, mean: Any
 ) -> Callable[..., Any] | None:
@@ -152,7 +151,7 @@ def _compiled_advance(
     return call if implementation else None
 
 
-@overload(end, inline="always")
+@implements(end, inline=True)
 def _compiled_end(drive: Any) -> Callable[..., Any] | None:
     implementation = _of_kind(_END, drive)
 
@@ -162,7 +161,7 @@ def _compiled_end(drive: Any) -> Callable[..., Any] | None:
     return call if implementation else None
 
 
-@overload(write_telemetry, inline="always")
+@implements(write_telemetry, inline=True)
 def _compiled_write_telemetry(drive: Any, row: Any) -> Callable[..., Any] | None:
     implementation = _of_kind(_WRITE_TELEMETRY, drive)
 

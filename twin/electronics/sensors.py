@@ -10,7 +10,6 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from spheretwin.electronics import sensor_chain as chain
@@ -22,7 +21,7 @@ from spheretwin.electronics.sensor_chain import (
     noise_streams,
     sensor_chain,
 )
-from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.compiled import implements, part_of_its_caller
 
 
 class IdealSensors(NamedTuple):
@@ -80,7 +79,7 @@ def sense(sensors: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measureme
     return bool(_SENSE[type(sensors)](sensors, q, qdot, noise, measurement))
 
 
-@overload(sense, inline="always")
+@implements(sense, inline=True)
 def _compiled_sense(
     sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any
 ) -> Callable[..., Any] | None:

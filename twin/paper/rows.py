@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from spheretwin.paper.cases import Known, Plan, command_line, known
 from spheretwin.paper.experiment import Case, Outcome, Outcomes
 from spheretwin.study.agreement import BOUND
 
-ERRORS = {
+ERRORS: dict[str, Callable[[Outcome], Any]] = {
     "max_abs_error": lambda outcome: outcome.max_abs_error,
     "measured_max_abs_error": lambda outcome: outcome.measured_max_abs_error,
     "rms_error": lambda outcome: outcome.rms_error,

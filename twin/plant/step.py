@@ -6,12 +6,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from spheretwin.electronics.drive import DriveModel, advance_currents, begin, end
 from spheretwin.electronics.transducers import CurrentSensors
-from spheretwin.models.base.compiled import copy_into, part_of_its_caller
+from spheretwin.models.base.compiled import copy_into, implements, part_of_its_caller
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
@@ -35,7 +34,7 @@ def step(rotor: Any) -> None:
     _STEPS[type(rotor)](rotor)
 
 
-@overload(step)
+@implements(step)
 def _compiled_step(rotor: Any) -> Callable[[Any], None] | None:
     """Select the step for numba by the class of the named tuple."""
     kind: Any = getattr(rotor, "instance_class", None)

@@ -168,8 +168,7 @@ class EventHandlers:
         """
         accepted = line.value
 
-        @line.on_update
-        async def _(event: Event) -> None:
+        async def update(event: Event) -> None:
             nonlocal accepted
             if event.client_id is not None and not self._operates(event):
                 line.value = accepted
@@ -178,6 +177,8 @@ class EventHandlers:
             accepted = line.value
             if act and event.client_id is not None:
                 act(event)
+
+        line.on_update(update)
 
     def _operates(self, event: Event) -> bool:
         state, name = self._bench.state(), client_name(event.client_id)
@@ -202,10 +203,11 @@ ANYONES = ("stop", "ask", "hello", "leave", "beat")
 def on_press(button: Any, act: Callable[[Event], object]) -> None:
     """Call a function at each press of a button, on the server's own thread, in order."""
 
-    @button.on_click
-    async def _(event: Event) -> None:
+    async def press(event: Event) -> None:
         if event.client_id is not None:
             act(event)
+
+    button.on_click(press)
 
 
 def client_name(number: int) -> str:
