@@ -156,7 +156,7 @@ def test_a_law_that_no_file_holds_is_saved_but_not_replayed(own, tmp_path, capsy
     run = st.simulate("hold", SHORT, law=own.make(3.0))
     path = run.save(tmp_path / "run.parquet")
     assert cli.main(["simulate", "--replay", str(path)]) == 2
-    assert "received one under made, a law that its file does not hold" in capsys.readouterr().err
+    assert "received one under made, a law that its file does not contain" in capsys.readouterr().err
     again = st.read(path)
     same(again.telemetry, run.telemetry)
     assert again.scenario.controller.law == "made"

@@ -112,7 +112,7 @@ INPUTS = {
     "on their way": lambda machine: machine._plant.drive.delay.ring.ravel(),
     "held": lambda machine: machine._plant.drive.stage("dac").line.table[:, LAST],
     "group gain": lambda machine: machine._plant.group_gain,
-    "estimate": lambda machine: machine._controller.estimates.memory,
+    "estimate": lambda machine: machine._controller.estimator_state.memory,
     "law": lambda machine: machine._controller.memory,
     "belief": lambda machine: machine._controller.applied_torque.current,
     "detector": lambda machine: machine._controller.supervision.detector.shorted_A,
