@@ -96,7 +96,7 @@ LARGEST = Channel(lambda groups: LARGEST_SIGNALS, lambda scenario: True, write_l
         "twin/channels.py",
         ("    DRIVE,\n", "    DRIVE,\n    LARGEST,\n"),
     ),
-    "plant": Addition(
+    "physics engine": Addition(
         "twin/plant/stiff.py",
         """
 from typing import NamedTuple
@@ -397,7 +397,7 @@ FILTER = Target("filter", FILTER_MODES, each_group=True)
         "twin/faults/targets.py",
         ("        SUPPLY,\n", "        SUPPLY,\n        FILTER,\n"),
     ),
-    "axis": Addition(
+    "study axis": Addition(
         "",
         '''
 class Triangular(DrawnAxis):
