@@ -13,7 +13,6 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.scene.motion import shaft_tip
 
 Array = NDArray[np.float64]
 
@@ -239,6 +238,8 @@ MEASURED_ANGLE = by_axis(
 
 def tip_distance(rows: QuantityRows) -> Array:
     """Distance between the tip and the desired tip, (n, 1) in mm."""
+    from spheretwin.viz.scene.motion import shaft_tip  # Rerun is slow to import
+
     actual = shaft_tip(rows.table["q_rad"], rows.actuator)
     desired = shaft_tip(rows.table["q_ref_rad"], rows.actuator)
     return 1e3 * np.sqrt(np.sum((actual - desired) ** 2, axis=1))[:, None]

@@ -275,7 +275,7 @@ def _runs_text(runs: Sequence[Reviewed]) -> str:
 
 
 if TYPE_CHECKING:
-    from spheretwin.viz.figures.style import Drawing
+    from spheretwin.viz.pages.markdown import Drawing
 
 PAGE = "review.html"
 
@@ -346,7 +346,7 @@ def _drawings(
 ) -> Iterator[Drawing]:
     from spheretwin.viz.figures.comparison import currents, events_figure, over_time
     from spheretwin.viz.figures.comparison import spectra as of_errors
-    from spheretwin.viz.figures.style import Drawing
+    from spheretwin.viz.pages.markdown import Drawing
 
     for group, inside in groupby(quantities, key=lambda quantity: quantity.group):
         title = TITLES[group]

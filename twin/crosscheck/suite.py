@@ -18,9 +18,8 @@ from spheretwin.models import actuator as actuators
 from spheretwin.models.base.checks import Check, broken
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.mjcf import beyond_a_free_rotor, read
-from spheretwin.viz.figures.style import Drawing
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
 
 PARTS = (
     dynamics.PART,

@@ -15,7 +15,7 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.rows import of_axis, spread_deg
 from spheretwin.scenario.sections import HARDWARE
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 PROTOTYPE = HARDWARE["prototype"]
 

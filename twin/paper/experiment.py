@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
 from spheretwin.run import Run
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory

@@ -37,7 +37,7 @@ from spheretwin.paper.fault_cases import (
 from spheretwin.paper.fault_cases import pairs as all_pairs
 from spheretwin.paper.fault_outcomes import TWICE, tracks
 from spheretwin.paper.rows import ended
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 PARTS_METHOD = (
     "The prototype, as nothing else has these parts. There are no groups to leave out, so the ways are"

@@ -28,7 +28,7 @@ from spheretwin.paper.experiment import Array as ExperimentArray
 from spheretwin.paper.rows import ended
 from spheretwin.paper.sinusoid import ENDS, RMS, by_hinge, rms, triple
 from spheretwin.run import Run
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from spheretwin.models import actuator as actuators
 from spheretwin.paper.experiment import Experiment, Finding, Section
-from spheretwin.viz.figures.style import Drawing
 from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory

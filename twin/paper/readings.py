@@ -21,7 +21,7 @@ from spheretwin.paper.experiment import (
     Section,
 )
 from spheretwin.paper.rows import PRINTED_rad, printed_rad
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 SCENARIO = "sinusoid"
 

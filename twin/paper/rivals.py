@@ -10,7 +10,7 @@ from spheretwin.paper import rival_tables
 from spheretwin.paper.experiment import BY_LAW, Experiment, Outcomes, Section
 from spheretwin.paper.rival_conditions import HARDWARE, Condition, Hardware, cases, study
 from spheretwin.paper.rival_results import current_limits_rad, results, start_error
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures.fronts import FrontPanel

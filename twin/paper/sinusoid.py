@@ -25,7 +25,7 @@ from spheretwin.paper.experiment import (
     Section,
 )
 from spheretwin.paper.rows import ended, figures_named, of_axis, printed_rad, spread, spread_mrad
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 SCENARIO = "sinusoid"
 

@@ -24,7 +24,7 @@ from spheretwin.paper.experiment import (
     Section,
 )
 from spheretwin.run import Run
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 SCENARIO = "sinusoid"
 

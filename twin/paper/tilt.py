@@ -12,7 +12,7 @@ from spheretwin.paper.cases import measured_error
 from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.rows import ended, of_axis, spread_deg
 from spheretwin.run import Run
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 
 
 class Compared(NamedTuple):

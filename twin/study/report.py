@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import shown
 from spheretwin.study.statistics import Array, Rows, ranked, strongest
-from spheretwin.viz.figures.style import Drawing
 from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
 
 if TYPE_CHECKING:
     from spheretwin.viz.figures.maps import MapPanel, StudyLine

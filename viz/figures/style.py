@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Drawing(NamedTuple):
-    """Figure of a page, with its file and its caption."""
-
-    file: str
-    caption: str
-    figure: Figure
-
-
 MOST_POINTS = 3000
 """Points of a line: a print of 20 cm has fewer dots."""
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 from typing import NamedTuple
 
-import rerun as rr
-
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 
 OVERVIEW = "overview"
@@ -98,4 +96,6 @@ def component(kind: str, arrival: int) -> str:
 
 def derived(quantity: str) -> str:
     """Return the entity of a derived quantity."""
+    import rerun as rr  # slow to import, and the command needs the names of the views
+
     return f"{DERIVED}/{rr.escape_entity_path_part(quantity)}"

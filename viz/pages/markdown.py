@@ -5,10 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import make_folder, whole_file
-from spheretwin.viz.figures.style import Drawing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Drawing(NamedTuple):
+    """Figure of a page, with its file and its caption."""
+
+    file: str
+    caption: str
+    figure: Figure
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[bool]) -> list[str]:

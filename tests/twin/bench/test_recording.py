@@ -51,7 +51,7 @@ def test_a_file_that_begins_during_a_run_can_be_reviewed(files):
 def test_no_file_is_left_of_a_recording_that_is_refused(tmp_path):
     with begun() as made:
         path = tmp_path / "run.parquet"
-        assert "a path of its own" in said(made, "record", recording=str(path), telemetry=str(path))
+        assert "a separate path" in said(made, "record", recording=str(path), telemetry=str(path))
         assert "writable" in said(
             made, "record", recording=str(tmp_path / "no" / "a.rrd"), telemetry=str(path)
         )

@@ -11,7 +11,7 @@ from spheretwin.paper import page
 from spheretwin.paper.cases import carried_out, planned
 from spheretwin.paper.experiment import Finding
 from spheretwin.paper.page import Chapter
-from spheretwin.viz.figures.style import Drawing
+from spheretwin.viz.pages.markdown import Drawing
 from tests.twin.paper.cases import IDEAL, experiment
 
 

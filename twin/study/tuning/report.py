@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,15 +16,18 @@ from spheretwin.study.study import Study
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.trials import Ended
 from spheretwin.study.tuning.tuning import Chosen, Found, OfLaw
-from spheretwin.viz.figures import fronts
-from spheretwin.viz.figures.style import Drawing
 from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
-from spheretwin.viz.pages.markdown import save_drawings, save_text
+from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
+
+if TYPE_CHECKING:
+    from spheretwin.viz.figures import fronts
 
 
 def drawings(name: str, found: Found, objectives: Sequence[Objective]) -> list[Drawing]:
     """Figures of a tuning; none of one without a trial."""
+    from spheretwin.viz.figures import fronts  # matplotlib is slow to import
+
     by_label = {law.law: _trials(law, objectives) for law in found.laws if law.kept}
     if not by_label:
         return []
@@ -43,6 +46,8 @@ def drawings(name: str, found: Found, objectives: Sequence[Objective]) -> list[D
 
 
 def _trials(law: OfLaw, objectives: Sequence[Objective]) -> fronts.Trials:
+    from spheretwin.viz.figures import fronts
+
     signs = np.array([each.sign for each in objectives])
     best = {each.kept.number for each in law.best}
     lost = [np.nan] * len(objectives)
