@@ -139,7 +139,7 @@ def test_its_state_is_kept_in_snapshots():
         ahead = session.advance(200).values.tobytes()
         session.restore(before)
         assert session.advance(200).values.tobytes() == ahead
-        assert np.any(before.machine.parts["the law's memory"][:3])
+        assert np.any(before.runtime.parts["the law's memory"][:3])
 
 
 def test_it_runs_from_a_file_and_keeps_its_period(tmp_path):
