@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -74,7 +75,7 @@ def simulate(
     """
     scenario = _scenario(scenario, changes or {})
     with Session(scenario, law, trajectory) as session:
-        begun = record_of(session)  # what the files hold when the run starts
+        record = record_of(session)  # with the digests of the files when the run starts
         if scenario.event:  # which may change the columns
             kept = TelemetryBuffer(session.signals, scenario.ticks)
             status = follow(session, scenario.ticks, [kept, *sinks])
@@ -90,7 +91,7 @@ def simulate(
             session.loop_s,
             session.actuator,
             session.law_error,
-            record_of(session, begun),
+            replace(record, ticks=session.tick),
         )
 
 
