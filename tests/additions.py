@@ -407,7 +407,7 @@ class Triangular(DrawnAxis):
     low: Number = Field(description="lower bound, the most frequent")
     width: Number = Field(description="from there to the upper bound")
 
-    def drawn(self, uniform):
+    def quantile(self, uniform):
         return self.low + self.width * (1 - np.sqrt(1 - uniform))
 ''',
         "twin/study/axes.py",

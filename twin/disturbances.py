@@ -97,9 +97,8 @@ class ConstantDisturbance(DisturbanceTerm):
     kind: Literal["constant"] = Field("constant", description="kind of disturbance")
     torque_Nm: Torques = Field(ZERO, description="torque on each axis, N·m")
 
-    def sample(  # noqa: D102
-        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
-    ) -> NDArray[np.float64]:
+    def sample(self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the torque at some times, as `DisturbanceTerm.sample`."""
         return np.tile(self.torque_Nm, (len(t), 1))
 
 
@@ -118,7 +117,8 @@ class RandomDisturbance(DisturbanceTerm):
         "decaying", description="exp(-πt) or, as printed, exp(πt) on the third axis"
     )
 
-    def sample(self, t: Array, draws: Callable[[], Array]) -> Array:  # noqa: D102
+    def sample(self, t: Array, draws: Callable[[], Array]) -> Array:
+        """Return the torque at some times, as `DisturbanceTerm.sample`."""
         return random_torque(t, draws(), np.array(self.bound_Nm), self.gamma_envelope)
 
 
@@ -167,9 +167,8 @@ class SinusoidalDisturbance(DisturbanceTerm):
         (0.0, 0.0, 0.0), description="phase on each axis at 0 s, rad"
     )
 
-    def sample(  # noqa: D102
-        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
-    ) -> NDArray[np.float64]:
+    def sample(self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the torque at some times, as `DisturbanceTerm.sample`."""
         w = 2 * np.pi * np.array(self.frequency_Hz)
         swing: NDArray[np.float64] = np.sin(t[:, None] * w + np.array(self.phase_rad))
         return np.array(self.amplitude_Nm) * swing
@@ -186,9 +185,8 @@ class StepDisturbance(DisturbanceTerm):
         (ZERO,), description="torque on each axis from each of these times on, N·m"
     )
 
-    def sample(  # noqa: D102
-        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
-    ) -> NDArray[np.float64]:
+    def sample(self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the torque at some times, as `DisturbanceTerm.sample`."""
         return TimeSeries(np.array(self.times_s), np.array(self.torques_Nm)).zero_order_hold(t, ZERO)
 
     @model_validator(mode="after")
@@ -227,9 +225,8 @@ class TableDisturbance(DisturbanceTerm):
 
     _torques: TimeSeries = PrivateAttr()
 
-    def sample(  # noqa: D102
-        self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]
-    ) -> NDArray[np.float64]:
+    def sample(self, t: NDArray[np.float64], draws: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Return the torque at some times, as `DisturbanceTerm.sample`."""
         if self.between == "held":
             return self._torques.zero_order_hold(t, self._torques.values[0])
         return self._torques.interpolate(t)

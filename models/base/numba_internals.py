@@ -28,7 +28,8 @@ from spheretwin.models.base import cache
 _REGISTERED = hashing, function_type
 
 
-class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types
+# mypy sees the base class as Any, because numba has no type information.
+class MachineCode(NullCache):  # type: ignore[misc]
     """Cache of the machine code of one function, one entry for each signature.
 
     Numba's own cache takes its folder from a setting that all packages share, and an entry that is damaged or
@@ -65,7 +66,8 @@ class MachineCode(NullCache):  # type: ignore[misc]  # numba has no types
             if signature != sig:  # a different signature with the same text
                 return None
             return CompileResult._rebuild(target_context, *parts)
-        except Exception:  # an unusable entry is compiled again
+        # Unpickling or linking a damaged entry may raise anything; the function is compiled again.
+        except Exception:
             return None
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:

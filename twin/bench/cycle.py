@@ -147,7 +147,8 @@ class CommandProcessor:
             if command.cancelled_by_stop and waiting.ticket.created_s <= self._urgent_s:
                 raise InputError(f"bench: expected {command.name} after STOP, received it before")
             command.action(self._bench_state, prepared(), **waiting.arguments)
-        except Exception as error:  # files and laws of the user may raise any error
+        # A command loads files and laws of the user, which may raise anything: it is refused.
+        except Exception as error:
             refused = f"{error}" if isinstance(error, SpheretwinError) else error_text(error)
             self._bench_state.refused = refused
         self.outcomes.append((waiting.ticket, refused))
@@ -194,7 +195,8 @@ class Cycle:
             self._settle()
             done = run(self._bench_state, ticks)
             self._hold_without_operator()
-        except Exception as error:  # any kind, else the thread would end, and STOP with it
+        # Any error: if the thread ended, STOP would no longer be executed.
+        except Exception as error:
             self._bench_state.driver.fail(error)
             self._bench_state.pause()
         self._settle()
@@ -205,7 +207,8 @@ class Cycle:
         """Update the status; if that fails, the last one reports the fault."""
         try:
             self.state = bench_status(self._bench_state)
-        except Exception as error:  # a page must never show an old state as the present one
+        # Any error of reading the status: pages must show it, not the last status as the present one.
+        except Exception as error:
             self.state = replace(self.state, mode="fault", reason=error_text(error))
 
     def _settle(self) -> None:

@@ -26,7 +26,7 @@ from spheretwin.study.statistics import summary
 from spheretwin.study.study import Study, load, shipped
 from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
-from spheretwin.study.tuning.report import told as tuning_summary
+from spheretwin.study.tuning.report import summary as tuning_summary
 from spheretwin.study.tuning.tuning import tuned
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import counted

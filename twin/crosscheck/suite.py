@@ -117,7 +117,7 @@ def draw_friction(evidence: Evidence) -> Drawing:
     """Friction of a hinge: ours and MuJoCo's."""
     from spheretwin.viz.figures import crosscheck
 
-    def drawn(bearing: Bearing) -> tuple[crosscheck.Ramped, crosscheck.Resting]:
+    def measured(bearing: Bearing) -> tuple[crosscheck.Ramped, crosscheck.Resting]:
         hinge, ramp, coast = bearing.hinge, bearing.ramp, bearing.coast
         level = hinge.coulomb_Nm
         rates = {way: motion.qdot_rad_s for way, motion in coast.motions.items()}
@@ -131,7 +131,7 @@ def draw_friction(evidence: Evidence) -> Drawing:
     bearings = evidence.of(HingeFriction).bearings
     figure = crosscheck.hinge_friction(
         {
-            f"Coulomb {name}, viscous {1e3 * VISCOUS_Nm_s:g} mN·m·s": drawn(bearing)
+            f"Coulomb {name}, viscous {1e3 * VISCOUS_Nm_s:g} mN·m·s": measured(bearing)
             for name, bearing in bearings.items()
         },
         "Friction of one hinge: our stage, and MuJoCo's friction loss and damping",

@@ -79,7 +79,7 @@ SEED = 18
 
 
 @cache
-def drawn() -> tuple[Groups, ...]:
+def random_groups() -> tuple[Groups, ...]:
     """The drawn sets, size after size in turn; no two are the same."""
     random = np.random.default_rng(SEED)
     found: dict[Groups, None] = {}
@@ -160,7 +160,7 @@ def cases() -> list[Case]:
     kinds = [
         [[of_groups(groups, way) for way in OF_GROUPS] for groups in singles()],
         [[of_groups(groups, way) for way in OF_GROUPS] for groups in pairs()],
-        [[of_groups(groups, way) for way in OF_GROUPS] for groups in drawn()],
+        [[of_groups(groups, way) for way in OF_GROUPS] for groups in random_groups()],
         [[of_part(failure, way) for way in OF_PARTS] for failure in failures()],
         [[shorted(groups, DETECTING)] for groups in singles()],
         [[on_other_engine(groups, way) for way in OF_GROUPS] for groups in sample()],
@@ -214,7 +214,7 @@ def of_part(failure: Failure, way: Way) -> Case:
 
 def sets() -> list[Groups]:
     """Every single group, every pair, every drawn set."""
-    return [*singles(), *pairs(), *drawn()]
+    return [*singles(), *pairs(), *random_groups()]
 
 
 def sample() -> list[Groups]:

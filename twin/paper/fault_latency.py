@@ -12,7 +12,16 @@ import numpy as np
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_sections
 from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
-from spheretwin.paper.fault_cases import DETECTING, TOLD, Groups, drawn, of_groups, pairs, shorted, singles
+from spheretwin.paper.fault_cases import (
+    DETECTING,
+    TOLD,
+    Groups,
+    of_groups,
+    pairs,
+    random_groups,
+    shorted,
+    singles,
+)
 from spheretwin.paper.fault_outcomes import tracks
 from spheretwin.paper.fault_sections import percent
 
@@ -70,7 +79,7 @@ def _detections(outcomes: Outcomes) -> dict[str, list[Detection]]:
     sets: Mapping[str, Sequence[str]] = {
         "one open": [of_groups(groups, DETECTING).name for groups in singles()],
         "two open": [of_groups(groups, DETECTING).name for groups in pairs()],
-        "three to nine open": [of_groups(groups, DETECTING).name for groups in drawn()],
+        "three to nine open": [of_groups(groups, DETECTING).name for groups in random_groups()],
         "one shorted": [shorted(groups, DETECTING).name for groups in singles()],
     }
     return {

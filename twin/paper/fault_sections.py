@@ -26,11 +26,11 @@ from spheretwin.paper.fault_cases import (
     Groups,
     Way,
     count,
-    drawn,
     failures,
     of_groups,
     of_part,
     pairs,
+    random_groups,
     sets,
     singles,
 )
@@ -57,7 +57,7 @@ def parts_section(outcomes: Outcomes) -> Section:
     title = "Failures that start at a drawn time: how the runs ended, and their error ratio"
     return Section(
         "Sensors, supply and controller",
-        f"{PARTS_METHOD}{_healthy(outcomes)}{_seen(outcomes, ran)}",
+        f"{PARTS_METHOD}{_healthy(outcomes)}{_detection_text(outcomes, ran)}",
         [ResultTable(title, PARTS_HEAD, rows, len(PARTS_HEAD) - 1)],
     )
 
@@ -88,7 +88,7 @@ def _healthy(outcomes: Outcomes) -> str:
     return f" The largest error of the healthy prototype is {np.median(errors):.2f}° (median over the seeds)."
 
 
-def _seen(outcomes: Outcomes, ran: Sequence[Failure]) -> str:
+def _detection_text(outcomes: Outcomes, ran: Sequence[Failure]) -> str:
     """What the rotor is lost to without a watchdog, what one sees of it, and what it does not."""
     lost = [failure for failure in ran if not _all_track(outcomes, failure)]
     if not lost:
@@ -234,7 +234,7 @@ def found_of(
 def _of_number(number: int) -> Sequence[Groups]:
     if number == 1:
         return singles()
-    return pairs() if number == 2 else [groups for groups in drawn() if len(groups) == number]
+    return pairs() if number == 2 else [groups for groups in random_groups() if len(groups) == number]
 
 
 def _groups_row(

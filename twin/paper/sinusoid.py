@@ -118,19 +118,21 @@ def sizes(at: Condition, outcomes: Outcomes) -> list[Finding]:
     other = [of for of in ran if not near[of] and of not in lost]
     found = []
     if kept:
-        told = _told(kept, ratios)
+        told = _ratios_text(kept, ratios)
         found.append(Finding(True, f"the printed errors {where} within {100 * SIZE:.0f} %: {told} of them"))
     if other:
         held = all(np.all(ratios[of] < 1) for of in other)
         why = "; the printed gains hold the rotor closer than the paper says" if held else ""
-        found.append(Finding(False, f"the printed errors {where}: {_told(other, ratios)} of them{why}"))
+        found.append(
+            Finding(False, f"the printed errors {where}: {_ratios_text(other, ratios)} of them{why}")
+        )
     for of in lost:
-        told = f"{_told([of], ratios)} of them, but {_how_lost(ran[of])}"
+        told = f"{_ratios_text([of], ratios)} of them, but {_how_lost(ran[of])}"
         found.append(Finding(False, f"the printed errors {where}: {told}"))
     return found
 
 
-def _told(laws: Sequence[Compared], ratios: Mapping[Compared, Array]) -> str:
+def _ratios_text(laws: Sequence[Compared], ratios: Mapping[Compared, Array]) -> str:
     return ", ".join(f"{of.label} {ratios[of].min():.2f} to {ratios[of].max():.2f} times" for of in laws)
 
 

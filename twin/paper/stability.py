@@ -183,8 +183,8 @@ class Span(NamedTuple):
     """Share of the ticks."""
 
 
-class Kept(NamedTuple):
-    """What remains of a run."""
+class StabilityMeasures(NamedTuple):
+    """Measures of one run."""
 
     reached_s: float | None
     """First time at which |λe + ė| of every hinge is below `REACHED_rad_s`; None if never."""
@@ -196,7 +196,7 @@ class Kept(NamedTuple):
     descent: Descent | None
 
 
-def keep(run: Run) -> Kept:
+def keep(run: Run) -> StabilityMeasures:
     """Reduce a run."""
     table, period_s = run.telemetry, run.scenario.controller.period_s
     ticks = round(SPAN_s / period_s)
@@ -205,7 +205,7 @@ def keep(run: Run) -> Kept:
     inside = np.flatnonzero(np.all(np.abs(surface) < REACHED_rad_s, axis=1))
     named = {signal.name for signal in table.signals}
     has_gains = {"switching_gain", "bound_gain"} <= named and len(table) > 0
-    return Kept(
+    return StabilityMeasures(
         reached_s=float(table["t_s"][inside[0]]) if len(inside) else None,
         early=_span_of(table, slice(0, ticks), period_s) if is_long else None,
         late=_span_of(table, slice(len(table) - ticks, None), period_s) if is_long else None,

@@ -71,12 +71,12 @@ def case(compared: Compared, condition: str, fields: dict[str, Any], draws: bool
         name=f"{compared.law}: {condition}",
         scenario=SCENARIO,
         fields={"controller.law": compared.law, **compared.fields, **fields},
-        told={"condition": condition, **_told(compared)},
+        told={"condition": condition, **_gains_of(compared)},
         draws=draws,
     )
 
 
-def _told(compared: Compared) -> dict[str, Any]:
+def _gains_of(compared: Compared) -> dict[str, Any]:
     """What the paper prints, for the JSON."""
     if compared.paper_deg is None:
         return {"paper": None}
@@ -355,7 +355,7 @@ def change_section(outcomes: Outcomes) -> Section:
                 "Largest |error| of α in degrees: median over the seeds, and range", CHANGE_HEAD, rows, 3
             )
         ],
-        [lambda: changes(_drawn(outcomes, tried))] if tried else [],
+        [lambda: changes(_scan_outcomes(outcomes, tried))] if tried else [],
     )
 
 
@@ -385,7 +385,7 @@ def _what_reaches(outcomes: Outcomes, tried: Sequence[Change]) -> str:
     return f" What brings a law there on the prototype: {said}." if said else ""
 
 
-def _drawn(
+def _scan_outcomes(
     outcomes: Outcomes, tried: Sequence[Change]
 ) -> list[tuple[Compared, list[tuple[str, Array, Array]]]]:
     """Lines of each law: what is changed, and the errors for each seed."""

@@ -69,8 +69,8 @@ def compare(expected: str, ours: Ending, theirs: Ending, way_out: str) -> float:
     apart = _apart(ours[1], theirs[1]) if ours[0] == theirs[0] == Status.COMPLETED else 0.0
     if ours[0] != theirs[0] or not apart <= BOUND:
         raise SpheretwinError(
-            f"{expected} to be the same on both plants within {BOUND:g}, received {_told(ours)} on the"
-            f" Lagrangian and {_told(theirs)} on MuJoCo; {way_out}"
+            f"{expected} to be the same on both plants within {BOUND:g}, received {_ending_text(ours)} on the"
+            f" Lagrangian and {_ending_text(theirs)} on MuJoCo; {way_out}"
         )
     return apart
 
@@ -88,5 +88,5 @@ def _apart(ours: list[float], theirs: list[float]) -> float:
     return float(np.max(np.abs(np.subtract(ours, theirs))) / largest) if largest > 0 else 0.0
 
 
-def _told(found: Ending) -> str:
+def _ending_text(found: Ending) -> str:
     return f"{found[0]} with {', '.join(f'{each:.6g}' for each in found[1])} rad"

@@ -58,7 +58,7 @@ class DrawnAxis(Axis):
         return True
 
     @abstractmethod
-    def drawn(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
+    def quantile(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n,) of uniform numbers (n,), above 0 and below 1."""
 
 
@@ -101,7 +101,7 @@ class Normal(DrawnAxis):
         3.0, description="where it is cut off, in standard deviations"
     )
 
-    def drawn(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
+    def quantile(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
         """By the inverse of its distribution."""
         from scipy.special import ndtr, ndtri  # slow to import
 
@@ -122,7 +122,7 @@ class Uniform(DrawnAxis):
             raise ValueError(f"expected low below high, received {self.low!r} and {self.high!r}")
         return self
 
-    def drawn(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
+    def quantile(self, uniform: NDArray[np.float64]) -> NDArray[np.float64]:
         """By the inverse of its distribution."""
         return self.low + (self.high - self.low) * uniform
 

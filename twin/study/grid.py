@@ -93,7 +93,7 @@ class Grid:
         values: dict[str, Any] = {}
         for group, place in zip(self._groups, places, strict=True):
             values |= {field: listed[place] for field, listed in group.items()}
-        drawn = zip(self._study.drawn, self._points[point].tolist(), strict=True)
+        drawn = zip(self._study.drawn_axes, self._points[point].tolist(), strict=True)
         values |= {axis.field: value for axis, value in drawn}
         ordered = {axis.field: values[axis.field] for axis in self._study.axis}
         key = _key(ordered, self._laws[law], repeat)
@@ -158,11 +158,11 @@ def _check_values(study: Study, group: Mapping[str, list[Any]]) -> None:
 
 def _points(study: Study) -> NDArray[np.float64]:
     """Values of the drawn axes, (samples, axes); one empty point where there are none."""
-    axes = cast(tuple[DrawnAxis, ...], study.drawn)
+    axes = cast(tuple[DrawnAxis, ...], study.drawn_axes)
     if not axes:
         return np.empty((1, 0))
     uniform = _uniform(study, len(axes), study.samples or 1)
-    return np.stack([axis.drawn(column) for axis, column in zip(axes, uniform.T, strict=True)], axis=1)
+    return np.stack([axis.quantile(column) for axis, column in zip(axes, uniform.T, strict=True)], axis=1)
 
 
 def _uniform(study: Study, axes: int, samples: int) -> NDArray[np.float64]:

@@ -71,7 +71,7 @@ def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
     figure = maps.maps(
         panels,
         (first, second),
-        ([_told(each) for each in down[0]], [_told(each) for each in across[0]]),
+        ([_value_text(each) for each in down[0]], [_value_text(each) for each in across[0]]),
         _quantity(rows),
         f"{rows.study['name']}: {_quantity(rows)}",
     )
@@ -191,7 +191,7 @@ def _line(rows: Rows, law: str, places: NDArray[np.int64], count: int) -> StudyL
     return StudyLine(spread[0], spread[1], spread[2], lost)
 
 
-def _told(value: Any) -> str:
+def _value_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 

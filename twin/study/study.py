@@ -152,7 +152,7 @@ class Study(BaseModel):
         return self.beside(self.scenario) if self.scenario.endswith(".toml") else self.scenario
 
     @property
-    def drawn(self) -> tuple[Axis, ...]:
+    def drawn_axes(self) -> tuple[Axis, ...]:
         """Axes whose values are drawn."""
         return tuple(axis for axis in self.axis if axis.is_drawn)
 

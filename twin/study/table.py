@@ -166,12 +166,12 @@ def _columns(schema: pa.Schema, records: list[dict[str, Any]]) -> dict[str, Any]
     import pyarrow as pa
 
     return {
-        field.name: pa.array([_held(record[field.name], field) for record in records], type=field.type)
+        field.name: pa.array([_cell(record[field.name], field) for record in records], type=field.type)
         for field in schema
     }
 
 
-def _held(value: Any, field: pa.Field) -> Any:
+def _cell(value: Any, field: pa.Field) -> Any:
     """A value as a column holds it."""
     import pyarrow as pa
 

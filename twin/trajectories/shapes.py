@@ -25,7 +25,8 @@ class Chirp(Shape):
         "linear", description="frequency grows by equal differences, or by equal ratios, in equal times"
     )
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         swept, beyond = np.minimum(t, self.sweep_s), np.maximum(t - self.sweep_s, 0.0)
         turns, frequency, growth = self._swept(swept)
         phase = 2 * np.pi * (turns + self.end_frequency_Hz * beyond)
@@ -51,7 +52,8 @@ class Hold(Shape):
     shape: Literal["hold"] = Field("hold", description="kind of trajectory")
     angle_rad: Triple = Field(ZERO, description="pose to hold, rad")
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         samples = np.zeros((len(t), 3, 3))
         samples[:, 0] = self.angle_rad
         return samples
@@ -70,14 +72,16 @@ class Jog(Shape):
         1.3, description="largest angle of α and β, rad; a hinge that starts beyond it may only turn back"
     )
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         samples = np.zeros((len(t), 3, 3))
         moving = t[:, None] < self._ends_s()
         samples[:, 0] = self.start_rad + np.array(self.rate_rad_s) * np.minimum(t[:, None], self._ends_s())
         samples[:, 1] = np.where(moving, self.rate_rad_s, 0.0)
         return samples
 
-    def corners(self) -> Corners:  # noqa: D102
+    def corners(self) -> Corners:
+        """Return the corners of the motion, as `Shape.corners`."""
         ends = self._ends_s()
         axes = [axis for axis in np.argsort(ends, kind="stable") if 0 < ends[axis] < np.inf]
         jumps = np.zeros((len(axes), 3))
@@ -119,7 +123,8 @@ class Multisine(Shape):
         description="sines to be added: amplitude_rad, frequency_Hz and phase_rad of each axis",
     )
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         samples = np.zeros((len(t), 3, 3))
         samples[:, 0] = self.offset_rad
         for component in self.components:
@@ -139,7 +144,8 @@ class Nutation(Shape):
     beta_growth_rad_s: Bounded = Field(0.2, description="growth of the amplitude of β, rad/s")
     spin_rate_rad_s: Bounded = Field(2 * np.pi, description="rate of γ, rad/s")
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         pi, a, b = np.pi, self.alpha_amplitude_rad, self.beta_growth_rad_s
         sine, cosine = np.sin(pi * t), np.cos(pi * t)
         spin = np.full_like(t, self.spin_rate_rad_s)
@@ -158,7 +164,8 @@ class Sinusoid(Shape):
     amplitude_rad: Triple = Field((0.2, 0.2, 0.2), description="amplitude on each axis, rad")
     frequency_Hz: Annotated[float, Field(gt=0, le=LARGEST)] = Field(0.5, description="frequency, Hz")
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         w = 2 * np.pi * self.frequency_Hz
         phase = (w * t)[:, None, None]
         rows = np.concatenate([np.sin(phase), w * np.cos(phase), -(w**2) * np.sin(phase)], axis=1)
@@ -177,14 +184,16 @@ class Steps(Shape):
         ((0.2, -0.1, 0.3),), description="pose from each of these times on, rad"
     )
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         samples = np.zeros((len(t), 3, 3))
         samples[:, 0] = TimeSeries(np.array(self.times_s), np.array(self.angles_rad)).zero_order_hold(
             t, self.start_rad
         )
         return samples
 
-    def corners(self) -> Corners:  # noqa: D102
+    def corners(self) -> Corners:
+        """Return the corners of the motion, as `Shape.corners`."""
         jumps = np.diff(np.array([self.start_rad, *self.angles_rad]), axis=0)
         return Corners(reached(np.array(self.times_s)), jumps, np.zeros_like(jumps))
 
@@ -206,7 +215,8 @@ class Tilt(Shape):
         2.0, description="length of rise, hold and fall each, s"
     )
 
-    def sharp(self, t: NDArray[np.float64]) -> Samples:  # noqa: D102
+    def sharp(self, t: NDArray[np.float64]) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         rising, falling = t < self.phase_s, (t >= 2 * self.phase_s) & (t < 3 * self.phase_s)
         samples = np.zeros((len(t), 3, 3))
         corners = self.phase_s * np.arange(4)
@@ -214,7 +224,8 @@ class Tilt(Shape):
         samples[:, 1, 0] = self.rate_rad_s * (rising.astype(float) - falling)
         return samples
 
-    def corners(self) -> Corners:  # noqa: D102
+    def corners(self) -> Corners:
+        """Return the corners of the motion, as `Shape.corners`."""
         jumps = np.zeros((3, 3))
         jumps[:, 0] = self.rate_rad_s * np.array([-1, -1, 1])
         return Corners(self.phase_s * np.arange(1, 4, dtype=np.float64), np.zeros((3, 3)), jumps)

@@ -123,7 +123,8 @@ class Waypoints(Shape):
 
     _path: WaypointPath = PrivateAttr()
 
-    def sharp(self, t: Array) -> Samples:  # noqa: D102
+    def sharp(self, t: Array) -> Samples:
+        """Return the motion without rounded corners, as `Shape.sharp`."""
         return self._path.sample(t)
 
     def peaks(self) -> tuple[PathPeak, PathPeak]:

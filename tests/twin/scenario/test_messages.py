@@ -63,7 +63,11 @@ def test_overrides(law):
 @pytest.mark.parametrize("value", ["null", "true", "x", "[]", '{"a": 1}', "1.5", "nan", "9" * 5000, "-1e300"])
 def test_flags(value):
     for name in NAMES:
-        line = message(lambda text: scenarios.load("hold", reading.overrides([f"--{name}", text])), value)  # noqa: B023
+
+        def load(text, flag=f"--{name}"):
+            return scenarios.load("hold", reading.overrides([flag, text]))
+
+        line = message(load, value)
         assert line is None or not FORBIDDEN.search(line), line
 
 

@@ -38,7 +38,7 @@ def test_logspace_has_equal_ratios_and_both_ends(first, last, count):
 
 
 def test_uniform_has_its_bounds_and_moments():
-    drawn = Uniform(field=FIELD, low=-1.0, high=3.0).drawn(MIDDLES)
+    drawn = Uniform(field=FIELD, low=-1.0, high=3.0).quantile(MIDDLES)
     assert -1.0 < drawn.min() < drawn.max() < 3.0
     assert drawn.mean() == pytest.approx(1.0, abs=1e-12)
     # The midpoint rule leaves 1/n² of the variance.
@@ -48,11 +48,11 @@ def test_uniform_has_its_bounds_and_moments():
 @pytest.mark.parametrize("most", [0.5, 3.0, 8.0])
 def test_normal_is_the_normal_cut_off(most):
     axis = Normal(field=FIELD, mean=2.0, deviation=0.1, most_deviations=most)
-    drawn = axis.drawn(MIDDLES)
+    drawn = axis.quantile(MIDDLES)
     expected = stats.truncnorm(-most, most, 2.0, 0.1)
     # SciPy's inverse goes by logarithms: it and ours agree to some digits less than eps.
     np.testing.assert_allclose(drawn, expected.ppf(MIDDLES), rtol=0, atol=1e-9)
-    ends = axis.drawn(np.array([np.finfo(float).eps, 1 - np.finfo(float).eps]))
+    ends = axis.quantile(np.array([np.finfo(float).eps, 1 - np.finfo(float).eps]))
     # Two roundings of a value about 2.
     assert np.all(np.abs(ends - 2.0) <= 0.1 * most + 1e-15)
     assert drawn.mean() == pytest.approx(2.0, abs=1e-12)

@@ -109,7 +109,9 @@ def _prepared(job: Job) -> tuple[Grid, Rows]:
         raise SpheretwinError(f"study {study.name}: node {platform.node()}: {error}") from None
     theirs = dict(job.basis)
     if apart := [
-        _told(name, ours, theirs) for name in sorted({*ours, *theirs}) if _differ(name, ours, theirs)
+        _difference_text(name, ours, theirs)
+        for name in sorted({*ours, *theirs})
+        if _differ(name, ours, theirs)
     ]:
         raise SpheretwinError(
             f"study {study.name}: expected node {platform.node()} to have the driver's sources, files and"
@@ -122,7 +124,7 @@ def _differ(name: str, ours: dict[str, str], theirs: dict[str, str]) -> bool:
     return ours.get(name) != theirs.get(name)
 
 
-def _told(name: str, ours: dict[str, str], theirs: dict[str, str]) -> str:
+def _difference_text(name: str, ours: dict[str, str], theirs: dict[str, str]) -> str:
     """What differs: by name alone where it is a digest, which says nothing to anyone."""
     if name in ("study", "files", "sources"):
         return name

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spheretwin.study import optimise as objectives
 from spheretwin.study.optimise import Gain, Optimise
 from spheretwin.study.tuning.gains import numbers
-from spheretwin.study.tuning.trials import Ended, Kept
+from spheretwin.study.tuning.trials import Ended, FinishedTrial
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def proposed(
     optimise: Optimise,
     key: str,
     number: int,
-    earlier: Sequence[Kept],
+    earlier: Sequence[FinishedTrial],
 ) -> dict[str, float]:
     """Values of a trial by name.
 
@@ -46,7 +46,7 @@ def proposed(
         Seed and law: what the random numbers follow from, together with the number of the trial.
     number : int
         Of the trial, from 0 on.
-    earlier : sequence of Kept
+    earlier : sequence of FinishedTrial
         Trials of earlier batches.
     """
     ranges = numbers(gains)
@@ -67,7 +67,7 @@ def proposed(
     }
 
 
-def _start(optimise: Optimise, number: int, earlier: Sequence[Kept]) -> Kept | None:
+def _start(optimise: Optimise, number: int, earlier: Sequence[FinishedTrial]) -> FinishedTrial | None:
     """Trial that is perturbed: the best within the limit whose turn it is, or the nearest to that limit."""
     by_number = {each.number: each for each in earlier}
     completed = {each.number: each.tried.values for each in earlier if each.tried.ended == Ended.COMPLETED}

@@ -69,7 +69,7 @@ KEPT = ("trial", "gains", "fields", "values")
 """What the file of the gains found has of a trial."""
 
 
-def told(found: Found, objectives: Sequence[Objective]) -> dict[str, Any]:
+def summary(found: Found, objectives: Sequence[Objective]) -> dict[str, Any]:
     """What was found: of each law how its trials ended, its start, and its best or its front."""
     return {
         "objectives": [each.model_dump(mode="json") for each in objectives],
@@ -195,7 +195,7 @@ def markdown(
 ) -> str:
     """Text of the page."""
     optimise = section_of(study)
-    whole = told(found, optimise.objective)
+    whole = summary(found, optimise.objective)
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
     lines = [f"# {study.name}", "", study.description, "", *_what(study), ""]
     lines += [pieces.figure(each) for each in drawn]

@@ -21,7 +21,7 @@ from spheretwin.study.journal import lock
 from spheretwin.study.optimise import Gain, Optimise
 from spheretwin.study.tuning.gains import numbers, start_of
 from spheretwin.study.tuning.local_search import proposed
-from spheretwin.study.tuning.trials import Ended, Kept, Tried
+from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
 
 if TYPE_CHECKING:
     from optuna.storages import BaseStorage
@@ -62,7 +62,7 @@ def opened(path: Path) -> Iterator[BaseStorage]:
     verbosity = module.logging.get_verbosity()
     module.logging.set_verbosity(module.logging.WARNING)
     try:
-        with _held(path) as file:
+        with _locked(path) as file:
             _drop_torn_line(file, path)
             yield _read(module, path)
     except OSError as error:
@@ -84,7 +84,7 @@ class _Held:
 
 
 @contextmanager
-def _held(path: Path) -> Iterator[BinaryIO]:
+def _locked(path: Path) -> Iterator[BinaryIO]:
     try:
         file = path.open("r+b" if path.exists() else "x+b")
     except OSError as error:
@@ -195,7 +195,7 @@ class Proposer:
             self._study.enqueue_trial(start)
 
     @property
-    def kept(self) -> list[Kept]:
+    def kept(self) -> list[FinishedTrial]:
         """Finished trials, by number."""
         trials = self._study.get_trials(deepcopy=False)
         return [self._of(trial) for trial in trials if trial.state.is_finished()]
@@ -260,7 +260,7 @@ class Proposer:
     def _signed(self, values: Sequence[float]) -> list[float]:
         return [each.sign * value for each, value in zip(self._optimise.objective, values, strict=True)]
 
-    def _of(self, trial: FrozenTrial) -> Kept:
+    def _of(self, trial: FrozenTrial) -> FinishedTrial:
         attributes: dict[str, Any] = trial.user_attrs
         each = attributes.get(EACH, [])
         values = [
@@ -270,7 +270,7 @@ class Proposer:
         reason = attributes.get(REASON, "" if EACH in attributes else "told of by another program")
         completed = trial.state == self._optuna.trial.TrialState.COMPLETE
         ended = Ended.LOST if reason else Ended.COMPLETED if completed else Ended.PRUNED
-        return Kept(trial.number, trial.params, Tried(ended, reason, values, each))
+        return FinishedTrial(trial.number, trial.params, Tried(ended, reason, values, each))
 
     def _sampler(self, number: int, gain: str = "") -> BaseSampler:
         digest = hashlib.sha256(f"{self._seed} {self._law} {number} {gain}".encode()).digest()

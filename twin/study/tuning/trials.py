@@ -43,7 +43,7 @@ class Tried(NamedTuple):
     each: list[list[float]]
 
 
-class Kept(NamedTuple):
+class FinishedTrial(NamedTuple):
     """A finished trial."""
 
     number: int

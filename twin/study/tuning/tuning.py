@@ -23,7 +23,7 @@ from spheretwin.study.study import Study
 from spheretwin.study.tuning import gains, sampler
 from spheretwin.study.tuning import trials as trial
 from spheretwin.study.tuning.sampler import Proposer
-from spheretwin.study.tuning.trials import Ended, Kept
+from spheretwin.study.tuning.trials import Ended, FinishedTrial
 
 
 class Fresh(NamedTuple):
@@ -87,7 +87,7 @@ def fresh(
 
 NAME = "trials.parquet"
 
-LawTrials = tuple[str, Sequence[Gain], Sequence[Kept], Sequence[int]]
+LawTrials = tuple[str, Sequence[Gain], Sequence[FinishedTrial], Sequence[int]]
 """Name of a law, its gains, its trials, numbers of the best."""
 
 
@@ -126,7 +126,7 @@ def write(path: Path, study: Study, rows: Rows, laws: Sequence[LawTrials]) -> No
             **_head(law, each, best),
             **each.chosen,
             **gains.values(of_law, each.chosen),
-            **_told(objectives, each),
+            **_trial_summary(objectives, each),
         }
         for law, of_law, kept, best in laws
         for each in kept
@@ -141,7 +141,7 @@ def write(path: Path, study: Study, rows: Rows, laws: Sequence[LawTrials]) -> No
     checksums.write_parquet(path, schema, [pa.table(columns, schema=schema)], compression="zstd")
 
 
-def _head(law: str, kept: Kept, best: Sequence[int]) -> dict[str, Any]:
+def _head(law: str, kept: FinishedTrial, best: Sequence[int]) -> dict[str, Any]:
     return {
         "law": law,
         "trial": kept.number,
@@ -152,7 +152,7 @@ def _head(law: str, kept: Kept, best: Sequence[int]) -> dict[str, Any]:
     }
 
 
-def _told(objectives: Sequence[Objective], kept: Kept) -> dict[str, Any]:
+def _trial_summary(objectives: Sequence[Objective], kept: FinishedTrial) -> dict[str, Any]:
     told: dict[str, Any] = {}
     for place, objective in enumerate(objectives):
         lost = kept.tried.ended == Ended.LOST
@@ -167,7 +167,7 @@ Stop = Callable[[], bool]
 class Chosen(NamedTuple):
     """A trial that is told of."""
 
-    kept: Kept
+    kept: FinishedTrial
     fields: Mapping[str, float]
     """Value of each field that its gains set."""
     fresh: Fresh | None
@@ -180,7 +180,7 @@ class OfLaw(NamedTuple):
     """What was found of one law."""
 
     law: str
-    kept: Sequence[Kept]
+    kept: Sequence[FinishedTrial]
     start: Chosen | None
     """The first trial, where the study says what it is."""
     best: Sequence[Chosen]

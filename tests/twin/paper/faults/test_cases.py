@@ -39,18 +39,18 @@ def test_every_group_and_pair_is_there():
 
 
 def test_drawn_sets_are_even_in_size_all_different_and_the_same_each_time():
-    drawn = fault_cases.drawn()
+    drawn = fault_cases.random_groups()
     assert len(drawn) == len(set(drawn)) == 2000
     sizes = Counter(map(len, drawn))
     assert set(sizes) == set(range(3, 10))
     assert max(sizes.values()) - min(sizes.values()) <= 1
     assert all(list(groups) == sorted(set(groups)) and groups[0] >= 0 and groups[-1] < 18 for groups in drawn)
-    fault_cases.drawn.cache_clear()
-    assert fault_cases.drawn() == drawn
+    fault_cases.random_groups.cache_clear()
+    assert fault_cases.random_groups() == drawn
 
 
 def test_drawn_sets_take_every_group_about_as_often():
-    counted = Counter(group for groups in fault_cases.drawn() for group in groups)
+    counted = Counter(group for groups in fault_cases.random_groups() for group in groups)
     # Each group is in a third of the sets, but for six standard deviations of 2,000 coins.
     assert all(abs(counted[group] - 2000 / 3) < 6 * (2000 * 2 / 9) ** 0.5 for group in range(18))
 

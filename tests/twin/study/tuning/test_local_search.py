@@ -5,7 +5,7 @@ import pytest
 
 from spheretwin.study.optimise import Gain, Objective, Optimise
 from spheretwin.study.tuning.local_search import NARROWEST, WIDEST, proposed
-from spheretwin.study.tuning.trials import Ended, Kept, Tried
+from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
 from spheretwin.study.tuning.tuning import tuned
 from tests.twin.study.tuning.cases import TWO, gain, study
 
@@ -31,7 +31,7 @@ FAR = {"controller.stiffness": 1.0, "controller.damping": -1.0, SWITCH: 0.25}
 
 
 def kept(number, chosen, *values, ended=Ended.COMPLETED):
-    return Kept(number, chosen, Tried(ended, "", list(values), []))
+    return FinishedTrial(number, chosen, Tried(ended, "", list(values), []))
 
 
 def places(chosen):
