@@ -1,8 +1,5 @@
 """What is true of the plant: gains, payload, gravity, friction, and the energy of all that."""
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,12 +7,9 @@ from scipy.integrate import solve_ivp
 from spheretwin.models.kinematics import rate_jacobian, rotation, rotor_rate_jacobian
 from spheretwin.models.lagrangian import gravity_torque, loaded_inertia
 from spheretwin.models.magnetics import torque_matrix
+from tests.twin.passive_cases import ASKEW, ENGINES, FREE, PAYLOAD_KG, PD, STILL, session, table
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("still.py")))
-ASKEW, ENGINES, FREE, PAYLOAD_KG, PD, STILL, session, table = (
-    shared[name] for name in ("ASKEW", "ENGINES", "FREE", "PAYLOAD_KG", "PD", "STILL", "session", "table")
-)
 
 
 # --- the true torque

@@ -1,9 +1,6 @@
 """Bounded allocation: all the torque that the limit allows, from the smallest currents that give it."""
 
-import runpy
 from itertools import product
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,9 +12,9 @@ from spheretwin.control.allocation.bounded import SCRATCH_ROWS, STEPS_PER_GROUP,
 from spheretwin.control.allocation.simplex import increase_share
 from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
+from tests.control.allocation import cases
 
 # By its path: the tests are no package.
-cases = SimpleNamespace(**runpy.run_path(str(Path(__file__).with_name("cases.py"))))
 
 LIMIT = cases.LIMIT
 tilts = st.floats(-cases.TILT, cases.TILT)

@@ -1,9 +1,6 @@
 """Levant's differentiator: exact without noise, no chatter, and the noise of its linear likeness."""
 
 import math
-import runpy
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +13,8 @@ from spheretwin.control.estimators import differentiator
 from spheretwin.control.estimators.differentiator import BANDWIDTH, L1, L2, L3, VARIANCE, Differentiator
 from spheretwin.control.estimators.estimator import estimates
 from spheretwin.models.base.errors import InputError
+from tests.control.estimators import cases
 
-cases = SimpleNamespace(**runpy.run_path(str(Path(__file__).with_name("cases.py"))))
 NOISE, PERIOD = cases.NOISE, cases.PERIOD
 built, on_all_axes, sampling = cases.built, cases.on_all_axes, cases.sampling
 

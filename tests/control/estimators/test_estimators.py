@@ -1,10 +1,7 @@
 """Every registered estimator: what all of them promise, and each against a slow copy written here."""
 
 import math
-import runpy
 import sys
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +11,8 @@ from pydantic import BaseModel, ValidationError
 
 from spheretwin.control.estimators import ESTIMATORS, AnyEstimator
 from spheretwin.control.estimators.estimator import LARGEST_ANGLE_rad, Sampling, estimates
+from tests.control.estimators import cases
 
-cases = SimpleNamespace(**runpy.run_path(str(Path(__file__).with_name("cases.py"))))
 NOISE, PERIOD = cases.NOISE, cases.PERIOD
 built, on_all_axes, sampling = cases.built, cases.on_all_axes, cases.sampling
 

@@ -1,9 +1,5 @@
 """The linear estimators against the transfer functions, gains and lags that their docstrings derive."""
 
-import runpy
-from pathlib import Path
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
@@ -13,8 +9,8 @@ from spheretwin.control.estimators import ESTIMATORS
 from spheretwin.control.estimators.estimator import estimates
 from spheretwin.control.estimators.kalman import Kalman, gains
 from spheretwin.models.base.errors import InputError
+from tests.control.estimators import cases
 
-cases = SimpleNamespace(**runpy.run_path(str(Path(__file__).with_name("cases.py"))))
 NOISE, PERIOD = cases.NOISE, cases.PERIOD
 built, on_all_axes, sampling = cases.built, cases.on_all_axes, cases.sampling
 

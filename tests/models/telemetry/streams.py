@@ -1,9 +1,7 @@
 """Tables of random numbers, streamed to files in short parts: what the tests of these files share."""
 
 import numpy as np
-import pytest
 
-from spheretwin.models.telemetry import parquet as telemetry_file
 from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.models.telemetry.signals import Signal, common_signals, width
 from spheretwin.models.telemetry.table import Table
@@ -13,11 +11,6 @@ SIGNALS = common_signals(18)
 PART_ROWS = 64
 GAIN = Signal("gain", "1", 2, "a law's own")
 FACTS = {"scenario": '{"a": 1}', "ticks": "0"}
-
-
-@pytest.fixture(autouse=True)
-def short_parts(monkeypatch):
-    monkeypatch.setattr(telemetry_file, "PART_ROWS", PART_ROWS)
 
 
 def table(rows, signals=SIGNALS, seed=0):

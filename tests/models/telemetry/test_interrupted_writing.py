@@ -3,13 +3,11 @@
 import errno
 import os
 import resource
-import runpy
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet
@@ -20,14 +18,13 @@ from spheretwin.models.telemetry.parquet import join
 from spheretwin.models.telemetry.partial_files import list_of
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
+from tests.models.telemetry.streams import GAIN, PART_ROWS, parts_beside, streamed, table
+
+pytestmark = pytest.mark.usefixtures("short_parts")
 
 SIGNALS = common_signals(18)
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("streams.py")))
-GAIN, PART_ROWS, parts_beside, short_parts, streamed, table = (
-    shared[name] for name in ("GAIN", "PART_ROWS", "parts_beside", "short_parts", "streamed", "table")
-)
 
 
 STREAM = """

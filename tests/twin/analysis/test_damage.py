@@ -2,8 +2,6 @@
 
 import json
 import random
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,10 +18,9 @@ from spheretwin.outputs import Outputs
 from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
+from tests.twin.analysis.runs import PLANT, WITH_EVENTS, written
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("runs.py")))
-PLANT, WITH_EVENTS, written = shared["PLANT"], shared["WITH_EVENTS"], shared["written"]
 
 # The path of a file below the folder of a test, and a sentence.
 LONGEST_LINE = 600

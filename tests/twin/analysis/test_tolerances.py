@@ -1,8 +1,6 @@
 """Runs against tolerances: constructed differences, shifts in time, edges; the shipped gate."""
 
 import json
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +11,9 @@ from spheretwin import cli
 from spheretwin.analysis import tolerances
 from spheretwin.analysis.tolerances import Tolerance, Tolerances, beyond, exceeded
 from spheretwin.models.base.errors import InputError
+from tests.twin.analysis.runs import made_of, named, written
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("runs.py")))
-made_of, named, written = shared["made_of"], shared["named"], shared["written"]
 
 T = np.arange(200) * 1e-3
 WAVE = np.stack([np.sin(40 * T), 2 + np.cos(40 * T)], axis=1)

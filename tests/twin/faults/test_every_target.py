@@ -1,6 +1,6 @@
 """What every kind of part that can fail owes: its modes and no others, in their ranges, from their tick on.
 
-What each mode does is held against a copy in tests/twin/prototype/test_whole_chain.py.
+What each mode does is held against a copy in tests/twin/electronics/test_prototype.py.
 """
 
 import numpy as np

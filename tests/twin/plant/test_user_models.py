@@ -3,9 +3,6 @@
 import contextlib
 import io
 import re
-import runpy
-from pathlib import Path
-from types import SimpleNamespace
 
 import mujoco
 import numba
@@ -24,9 +21,9 @@ from spheretwin.plant.lagrangian_rotor import step as lagrangian_step
 from spheretwin.plant.mujoco_rotor import MujocoRotor, step
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.twin.plant import user_models as models
 
 # By its path: the tests are no package.
-models = SimpleNamespace(**runpy.run_path(str(Path(__file__).with_name("user_models.py"))))
 
 STEP_S = 5e-4
 POSE, RATES = np.array([0.1, -0.05, 0.2]), np.array([0.2, 0.3, -0.5])

@@ -1,77 +1,85 @@
-"""Tables of a run's figures: status in the title, errors in mrad and degrees."""
+"""Checks and other tables in a wide and in a narrow terminal."""
 
-import math
-
+import numpy as np
 import pytest
-from rich.text import Text
 
-from spheretwin.models.telemetry.status import Status
+from spheretwin.models.base.checks import Check
 from spheretwin.viz.terminal import tables
-from spheretwin.viz.terminal.runs import COLOURS, print_run
+from spheretwin.viz.terminal.tables import print_checks
 
-SUMMARY = {
-    "scenario": {"name": "hold"},
-    "status": "completed",
-    "reason": None,
-    "simulated_s": 1.2234,
-    "max_abs_error_rad": [math.radians(72.26), 0.0301, 1e-9],
-    "rms_error_rad": [0.5, 0.01, 0.0],
-    "tail_rms_error_rad": [0.5, 0.01, 0.0],
-    "settling_time_s": [None, 0.276, 0.0],
-    "max_abs_current_A": 8.0,
-    "saturated_fraction": 0.105,
-    "rms_torque_Nm": 0.244,
-    "copper_loss_J": 67.85,
-    "current_variation_A_s": 10.6,
-    "realtime_factor": None,
-    "notes": [],
-    "warnings": [],
-}
+CHECKS = [
+    Check("mesh [1]", "this mesh with that", 3, 1e-6, 5e-3, "as much as is known"),
+    Check("need", "what is wanted over what there is", 7, 2.0, 1.0, "asked for"),
+    Check("trace", "two runs", 5000, np.nan, None, "no bound", unit="rad"),
+]
 
 
-def printed(capsys, **changed):
-    print_run("pd", 10.0, {**SUMMARY, **changed})
-    return capsys.readouterr().out.splitlines()
+@pytest.fixture
+def printed(monkeypatch, capsys):
+    def lines(verbose):
+        monkeypatch.setenv("COLUMNS", "80")
+        print_checks("magnetics check", CHECKS, verbose)
+        return [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+
+    return lines
 
 
-def cells(lines, name):
-    (line,) = (line for line in lines if line.startswith(f"| {name} "))
-    return [cell.strip() for cell in line.strip("|").split("|")][1:]
+def row(lines, name):
+    (line,) = (line for line in lines if line.endswith(f"{name:8} |"))
+    return [cell.strip() for cell in line.strip("|").split("|")]
 
 
-@pytest.fixture(autouse=True)
-def piped(monkeypatch):
+def test_a_check_is_a_line_with_its_verdict(printed):
+    lines = printed(verbose=False)
+    assert lines[0] == "magnetics check"
+    assert row(lines, "mesh [1]") == ["holds", "1.00e-06", "≤ 5.00e-03", "mesh [1]"]
+    assert row(lines, "need") == ["BROKEN", "2", "≤ 1", "need"]
+    assert row(lines, "trace") == ["", "nan rad", "reported", "trace"]
+    assert "2 of 3 checks hold" in lines
+    assert "--verbose" in lines[-1]
+    assert not any("as much as is known" in line for line in lines)
+
+
+def test_verbose_checks_explain_comparison_and_bound(printed):
+    lines = printed(verbose=True)
+    where = lines.index("mesh [1], 3 states")
+    assert lines[where + 1] == "compares: this mesh with that"
+    assert lines[where + 2] == "bound ≤ 5.00e-03: as much as is known"
+    for text in ("what is wanted over what there is", "no bound"):
+        assert any(text in line for line in lines)
+    assert lines[-1] == "2 of 3 checks hold"
+    assert max(map(len, lines)) <= 80
+
+
+def test_a_pipe_gets_plain_text_of_a_width_that_can_be_read(monkeypatch, capsys):
     monkeypatch.delenv("COLUMNS", raising=False)
-
-
-def test_errors_are_printed_in_mrad_and_degrees(capsys):
-    lines = printed(capsys)
-    assert lines[0].rstrip() == "hold under pd: completed"
-    assert cells(lines, "largest") == ["1260 (72.3°)", "30.1 (1.72°)", "< 0.001 (< 0.001°)"]
-    assert cells(lines, "settled after") == ["never", "0.276 s", "0 s"]
+    print_checks("magnetics check", CHECKS)
+    out = capsys.readouterr().out
+    assert "\x1b" not in out
+    assert max(map(len, out.splitlines())) <= tables.WIDTH_WITHOUT_TERMINAL
+    assert set("─━│┃").isdisjoint(out)
 
 
 @pytest.mark.parametrize(
-    ("status", "reason", "title"),
+    ("value", "text"),
     [
-        (Status.LEFT_WORKSPACE, None, "hold under pd: left_workspace at 1.223 s of 10 s"),
-        (
-            Status.FAILSAFE,
-            "a coil is too hot",
-            "hold under pd: failsafe at 1.223 s of 10 s, a coil is too hot",
-        ),
-        (Status.INTERRUPTED, None, "hold under pd: interrupted at 1.223 s of 10 s"),
+        (1261.3, "1260"),
+        (30.24, "30.2"),
+        (0.10451, "0.105"),
+        (0.99951, "1.000"),  # rounding may add a place
+        (-2.5, "-2.50"),
+        (0.0, "0"),
+        (1e-9, "< 0.001"),
+        (np.inf, "–"),
     ],
 )
-def test_the_title_of_a_run_that_failed_says_when_and_why(capsys, status, reason, title):
-    assert printed(capsys, status=str(status), reason=reason)[0].rstrip() == title
+def test_figures_have_three_significant_digits(value, text):
+    assert tables.three_digits(value) == text
 
 
-def test_a_failure_stands_out_in_a_terminal(capsys, monkeypatch):
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("TERM", "xterm")
-    assert COLOURS[Status.LEFT_WORKSPACE.level] == "bold red"
-    first = printed(capsys, status="left_workspace")[0]
-    assert "\x1b[1;31m" in first
-    assert Text.from_ansi(first).plain.startswith("hold under pd: left_workspace")
-    assert tables.terminal_console().is_terminal
+def test_a_title_is_not_wrapped_to_a_narrow_table(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    table = tables.new_table("a title much wider than its table [is]", "a", "b")
+    table.add_row("1", "2")
+    tables.terminal_console().print(table)
+    assert capsys.readouterr().out.splitlines()[0].rstrip() == "a title much wider than its table [is]"

@@ -1,8 +1,6 @@
 """What is set on the way acts from its tick on, or is refused and changes nothing."""
 
 import json
-import runpy
-from pathlib import Path
 
 import numba
 import numpy as np
@@ -14,18 +12,21 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.signals import common_signals
+from tests.twin.session_cases import (
+    ASKEW,
+    ENGINES,
+    OWN,
+    WORN,
+    compiled_law,
+    plain_law,
+    rows,
+    same_future,
+    session,
+)
 
 SIGNALS = common_signals(18)
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
-NAMES = (
-    "ENGINES", "WORN", "ASKEW", "scenario", "session", "rows", "plain_law", "compiled_law", "OWN",
-    "same_future",
-)  # fmt: skip
-ENGINES, WORN, ASKEW, scenario, session, rows, plain_law, compiled_law, OWN, same_future = map(
-    shared.get, NAMES
-)
 
 
 KINDS = [

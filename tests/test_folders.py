@@ -1,4 +1,4 @@
-"""The house: what the `__init__` of a folder is."""
+"""Folders of the package: each with code has an `__init__` of one sentence, which re-exports nothing."""
 
 import ast
 from pathlib import Path
@@ -21,7 +21,7 @@ CACHES = {"__pycache__", ".hypothesis", ".DS_Store"}
 
 
 def files():
-    """Every file of the house but what tools leave behind."""
+    """Every file of the project except those of tools."""
     paths = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.is_file())
     return [path for path in paths if not CACHES & set(path.relative_to(ROOT).parts)]
 
@@ -36,6 +36,11 @@ INITS = [path for path in files() if path.name == "__init__.py"]
 def test_every_folder_of_the_package_with_code_has_an_init():
     code = {folder_of(path) for path in files() if path.suffix == ".py" and "tests" not in path.parts}
     assert code == {folder_of(path) for path in INITS}
+
+
+def test_tests_mirror_the_folders_of_the_package():
+    folders = {folder_of(path).removeprefix("tests/") for path in files() if path.name.startswith("test_")}
+    assert folders <= {folder_of(path) for path in INITS} | {"tests", "benchmarks"}
 
 
 @pytest.mark.parametrize("path", INITS, ids=folder_of)

@@ -1,8 +1,5 @@
 """The same bytes, whatever the chunks."""
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -12,13 +9,9 @@ from spheretwin import scenario as scenarios
 from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
+from tests.twin.session_cases import ASKEW, ENGINES, SHIPPED, WORN, rows, scenario
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
-NAMES = (
-    "SHIPPED", "ENGINES", "WORN", "ASKEW", "scenario", "rows",
-)  # fmt: skip
-SHIPPED, ENGINES, WORN, ASKEW, scenario, rows = map(shared.get, NAMES)
 
 
 LENGTH = 2 * BLOCK_TICKS + 300

@@ -1,8 +1,6 @@
 """What the controller knows may differ from what is true: nominal matrix, inertia and limit, sensors."""
 
-import runpy
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +9,9 @@ from spheretwin.control.law import Law
 from spheretwin.models import actuator as actuators
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
+from tests.twin.passive_cases import ASKEW, ENGINES, OFFSET, PD, STILL, session, table
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("still.py")))
-ASKEW, ENGINES, OFFSET, PD, STILL, session, table = (
-    shared[name] for name in ("ASKEW", "ENGINES", "OFFSET", "PD", "STILL", "session", "table")
-)
 
 
 # --- the nominal torque matrix

@@ -3,12 +3,10 @@
 import csv
 import json
 import os
-import runpy
 import shutil
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,10 +24,9 @@ from spheretwin.provenance import record_of
 from spheretwin.run import figures_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
+from tests.twin.analysis.runs import PLANT, WITH_EVENTS, written
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("runs.py")))
-PLANT, WITH_EVENTS, written = shared["PLANT"], shared["WITH_EVENTS"], shared["written"]
 
 
 @pytest.fixture(scope="module")

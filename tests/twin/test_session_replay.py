@@ -1,8 +1,6 @@
 """A file replays to the same bytes, or says why it does not."""
 
 import json
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,13 +12,9 @@ from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.provenance import record_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
+from tests.twin.session_cases import ENGINES, plain_law, recorded, rows, scenario, session
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
-NAMES = (
-    "ENGINES", "scenario", "session", "rows", "plain_law", "recorded",
-)  # fmt: skip
-ENGINES, scenario, session, rows, plain_law, recorded = map(shared.get, NAMES)
 
 
 CHANGES = [

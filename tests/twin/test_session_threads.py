@@ -1,23 +1,17 @@
 """Sessions on threads, and one that two threads want."""
 
-import runpy
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
-from pathlib import Path
 
 import pytest
 
 from spheretwin.control.law import Law
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.session import Session
+from tests.twin.session_cases import ENGINES, SHIPPED, rows, same_future, scenario, session
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
-NAMES = (
-    "SHIPPED", "ENGINES", "scenario", "session", "rows", "same_future",
-)  # fmt: skip
-SHIPPED, ENGINES, scenario, session, rows, same_future = map(shared.get, NAMES)
 
 
 def test_runs_on_threads_are_those_made_one_after_the_other():

@@ -1,10 +1,8 @@
 """Runs merged into one recording: every number of each run, and a layout of existing entities only."""
 
 import os
-import runpy
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -20,9 +18,9 @@ from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.viz.comparison.ghosts import Ghost
 from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import SCALAR_QUANTITIES
+from tests.twin.analysis.runs import written
 
 # By its path: the tests are no package.
-written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
 
 APART_mrad = 3.0
 

@@ -4,10 +4,8 @@ import base64
 import json
 import os
 import re
-import runpy
 import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,9 +16,9 @@ from spheretwin.analysis.comparison import compared_runs
 from spheretwin.analysis.recorded_run import read
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.quantities import scalar_quantities
+from tests.twin.analysis.runs import written
 
 # By its path: the tests are no package.
-written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
 
 NAMES = ["whole", "error", "angle", "sliding", "effort", "more", "currents", "spectra", "events"]
 LARGEST_BYTES = 6_000_000

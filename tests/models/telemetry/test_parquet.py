@@ -1,8 +1,6 @@
 """Telemetry streamed to a file: the table of the run, in parts while it goes on."""
 
 import os
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -15,15 +13,13 @@ from spheretwin.models.telemetry.checksums import write_parquet
 from spheretwin.models.telemetry.parquet import TelemetryFile, join
 from spheretwin.models.telemetry.signals import Signal, common_signals
 from spheretwin.models.telemetry.table import PARQUET_FORMAT, read_parquet
+from tests.models.telemetry.streams import FACTS, GAIN, PART_ROWS, parts_beside, streamed, table
+
+pytestmark = pytest.mark.usefixtures("short_parts")
 
 SIGNALS = common_signals(18)
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("streams.py")))
-FACTS, GAIN, PART_ROWS, parts_beside, short_parts, streamed, table = (
-    shared[name]
-    for name in ("FACTS", "GAIN", "PART_ROWS", "parts_beside", "short_parts", "streamed", "table")
-)
 
 SLIP = Signal("slip", "m", 1, "another law's own")
 

@@ -1,8 +1,6 @@
 """Parts joined to a file: all their rows, or those before a tear; nothing that is no part."""
 
 import os
-import runpy
-from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet
@@ -13,14 +11,13 @@ from spheretwin.models.telemetry import partial_files as telemetry_parts
 from spheretwin.models.telemetry.parquet import join
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
+from tests.models.telemetry.streams import FACTS, GAIN, parts_beside, streamed, table
+
+pytestmark = pytest.mark.usefixtures("short_parts")
 
 SIGNALS = common_signals(18)
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("streams.py")))
-FACTS, GAIN, parts_beside, short_parts, streamed, table = (
-    shared[name] for name in ("FACTS", "GAIN", "parts_beside", "short_parts", "streamed", "table")
-)
 
 
 def test_parts_are_joined_under_the_first_one_s_facts(tmp_path):

@@ -3,10 +3,8 @@
 import dataclasses
 import importlib
 import pickle
-import runpy
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,16 +12,21 @@ import pytest
 from spheretwin.control.law import Law
 from spheretwin.inputs import BLOCK_TICKS
 from spheretwin.models.base.errors import InputError
+from tests.twin.session_cases import (
+    ASKEW,
+    CALLS,
+    ENGINES,
+    OWN,
+    SHIPPED,
+    WORN,
+    plain_law,
+    proportional,
+    rows,
+    same_future,
+    session,
+)
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
-NAMES = (
-    "SHIPPED", "ENGINES", "WORN", "ASKEW", "scenario", "session", "rows", "proportional", "CALLS",
-    "plain_law", "OWN", "same_future",
-)  # fmt: skip
-SHIPPED, ENGINES, WORN, ASKEW, scenario, session, rows, proportional, CALLS, plain_law, OWN, same_future = (
-    map(shared.get, NAMES)
-)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -1,8 +1,5 @@
 """An export of a recording has the content of its telemetry file: status and journal."""
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,10 +12,9 @@ from spheretwin.models.telemetry.status import Level
 from spheretwin.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
+from tests.twin.analysis.runs import WITH_EVENTS
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("runs.py")))
-PLANT, WITH_EVENTS = shared["PLANT"], shared["WITH_EVENTS"]
 
 BY_HAND = (
     Change(300, "disturbance.load", 1.5),

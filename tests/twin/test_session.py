@@ -1,8 +1,6 @@
 """How a session ends, and what it refuses."""
 
 import json
-import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,13 +11,9 @@ from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.provenance import facts_of
 from spheretwin.simulation import follow, simulate
+from tests.twin.session_cases import ENGINES, SHIPPED, compiled_law, recorded, rows, scenario, session
 
 # By its path: the tests are no package.
-shared = runpy.run_path(str(Path(__file__).with_name("cases.py")))
-NAMES = (
-    "SHIPPED", "ENGINES", "scenario", "session", "rows", "compiled_law", "recorded",
-)  # fmt: skip
-SHIPPED, ENGINES, scenario, session, rows, compiled_law, recorded = map(shared.get, NAMES)
 
 
 def raising(t, reference, measurement, parameters, state, torque):

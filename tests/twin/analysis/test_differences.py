@@ -1,17 +1,15 @@
 """Every number of a report minus that of the first run."""
 
 import json
-import runpy
-from pathlib import Path
 
 import pytest
 
 from spheretwin import cli
 from spheretwin.analysis.comparison import differences
 from spheretwin.metrics import METRICS
+from tests.twin.analysis.runs import written
 
 # By its path: the tests are no package.
-written = runpy.run_path(str(Path(__file__).parents[1] / "runs.py"))["written"]
 
 
 def test_numbers_are_subtracted_one_by_one_and_nothing_else():
