@@ -23,7 +23,7 @@ PLAN = [
     {"target": "amplifier.02", "mode": "noise", "value": 0.2},
     {"target": "pot.alpha", "mode": "noise", "value": 1e-3, "start_s": 0.1},
     {"target": "pot.beta", "mode": "stuck", "start_s": 0.35, "end_s": 0.352},
-    {"target": "coil.04", "mode": "intermittent", "value": 0.011, "known": True},
+    {"target": "coil.04", "mode": "intermittent", "value": 0.011, "reported_to_controller": True},
     {"target": "coil.06", "mode": "open", "start_s": 0.2},
     {"target": "coil.11", "mode": "short", "start_s": 0.4, "end_s": 0.9},
     {"target": "coil.12", "mode": "gain", "value": 0.5, "start_s": 0.6},
@@ -152,7 +152,7 @@ def test_by_hand_or_by_event_is_as_planned(kind, mode, hardware):
 @pytest.mark.parametrize("hardware", ["prototype", "ideal"])
 def test_an_end_by_hand_is_a_planned_end(hardware):
     given = [
-        {"target": "coil.03", "mode": "open", "known": True},
+        {"target": "coil.03", "mode": "open", "reported_to_controller": True},
         {"target": "amplifier.08", "mode": "offset", "value": 0.4},
     ]
     fields = {"hardware": hardware, "detector.detect": False, "duration": 0.2}

@@ -121,7 +121,7 @@ def recorded(path, rate_Hz=None):
     changes = {
         "plant.engine": "lagrangian",
         "duration": 12.3,
-        "fault": [{"target": "coil.07", "mode": "open", "start_s": 0.3, "detect": True}],
+        "fault": [{"target": "coil.07", "mode": "open", "start_s": 0.3, "detection": True}],
         "event": [{"t_s": 4.5, "set": "controller.law", "value": "pd"}],
     }
     with Session(scenarios.load("hold", changes)) as session:

@@ -39,10 +39,16 @@ class Fault(BaseModel):
     start_s: Time = Field(0.0, description="start of the fault, s; at the first control tick from then on")
     end_s: Time | None = Field(None, description="end of the fault, s; the end of the run unless given")
     value: float | None = Field(None, description="size of the fault, as its mode defines it")
-    known: bool = Field(
-        False, description="whether the fault is reported to the allocation, which then leaves the group out"
+    reported_to_controller: bool = Field(
+        False,
+        description="whether the fault is reported to the allocation, which then leaves the group out",
+        json_schema_extra={"former": "known"},
     )
-    detect: bool = Field(False, description="whether the fault detector is on, as with detector.detect")
+    detection: bool = Field(
+        False,
+        description="whether the fault detector is on, as with detector.detect",
+        json_schema_extra={"former": "detect"},
+    )
 
     @model_validator(mode="after")
     def _can_be(self) -> Fault:
@@ -54,7 +60,7 @@ class Fault(BaseModel):
         self._check_value(target.modes[self.mode])
         if self.end_s is not None and not self.end_s > self.start_s:
             raise ValueError(f"expected end_s above start_s, received {self.end_s!r} and {self.start_s!r} s")
-        for name in ("known", "detect"):
+        for name in ("reported_to_controller", "detection"):
             if getattr(self, name) and not target.each_group:
                 groups = ", ".join(kind.name for kind in TARGETS.values() if kind.each_group)
                 raise ValueError(f"expected {name} for a fault of {groups}, received one of {self.target}")

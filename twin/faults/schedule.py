@@ -85,7 +85,7 @@ class FaultSchedule:
         """Return the groups (n,) whose fault is reported to the allocation, which then leaves them out."""
         reported = np.zeros(self._groups, dtype=np.bool_)
         for i in active:
-            if self._scheduled[i].fault.known:
+            if self._scheduled[i].fault.reported_to_controller:
                 reported[self._scheduled[i].fault.place] = True
         return reported
 

@@ -119,9 +119,9 @@ class Way(NamedTuple):
 
 
 NOT_TOLD = Way("not told")
-TOLD = Way("told", {"known": True})
-DETECTING = Way("detecting", {"detect": True})
-BOUNDED = Way("told, bounded", {"known": True}, {"allocation": "bounded"})
+TOLD = Way("told", {"reported_to_controller": True})
+DETECTING = Way("detecting", {"detection": True})
+BOUNDED = Way("told, bounded", {"reported_to_controller": True}, {"allocation": "bounded"})
 
 OF_GROUPS = (NOT_TOLD, TOLD, DETECTING, BOUNDED)
 """For open groups: nobody says so, the allocation is told, or the detector finds them. And told once

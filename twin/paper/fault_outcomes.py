@@ -205,7 +205,7 @@ def keep(run: Run) -> Found:
         numbers=bool(np.isfinite(table.values).all()),
         stopped=stopped,
         stopped_s=stopped_s,
-        told=run.scenario.detects or any(fault.known for fault in run.scenario.fault),
+        told=run.scenario.detects or any(fault.reported_to_controller for fault in run.scenario.fault),
         least_norm=run.scenario.allocation == "least_norm",
         left=left_by(base, failed, first) if failed and first < len(healthy_error_rad) else None,
         found_s=tuple(detected.get(group) for group in failed),

@@ -258,7 +258,7 @@ def _unknown(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
     *above, name = path
     place = place_of(scenario, tuple(above))
     members = place.kind.members.values() if place.kind else ()
-    valid = list(dict.fromkeys(field for member in members for field in member.model_fields))
+    fields = {field: info for member in members for field, info in member.model_fields.items()}
     here = f"{place.dotted}." if place.dotted else ""
     everywhere = (
         dotted
@@ -266,11 +266,21 @@ def _unknown(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:
         if INDEX not in dotted and not (here and dotted.startswith(here))
     )
     elsewhere = next((f"; did you mean {d}?" for d in everywhere if d.endswith(f".{name}")), "")
-    other = _field_of_another(path, scenario)
+    other = new_name(str(name), fields) or _field_of_another(path, scenario)
     return (
-        f"expected one of {', '.join(valid)} in {place.dotted or 'the scenario'},"
-        f" received {name}{other or did_you_mean(str(name), valid) or elsewhere}"
+        f"expected one of {', '.join(fields)} in {place.dotted or 'the scenario'},"
+        f" received {name}{other or did_you_mean(str(name), fields) or elsewhere}"
     )
+
+
+def new_name(former: str, fields: Mapping[str, FieldInfo]) -> str:
+    """Return a hint if a name is the former name of a field, which the mark `former` of the field states."""
+    for dotted, field in fields.items():
+        above, dot, _ = dotted.rpartition(".")
+        extra = field.json_schema_extra
+        if isinstance(extra, dict) and former == f"{above}{dot}{extra.get('former')}":
+            return f", the former name of {dotted.replace(INDEX, '0')}"
+    return ""
 
 
 def _field_of_another(path: tuple[str | int, ...], scenario: type[BaseModel]) -> str:

@@ -364,7 +364,7 @@ class Scenario(_Section):
     @property
     def detects(self) -> bool:
         """True if the fault detector of the controller is on."""
-        return self.detector.detect or any(fault.detect for fault in self.fault)
+        return self.detector.detect or any(fault.detection for fault in self.fault)
 
     @property
     def senses_currents(self) -> bool:

@@ -27,7 +27,7 @@ from spheretwin.provenance import record_of
 from spheretwin.run import Run, UserMetric, check_names, own_value
 from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
-from spheretwin.scenario.fields import INDEX, every_field
+from spheretwin.scenario.fields import INDEX, every_field, new_name
 from spheretwin.scenario.files import Files, files_of, named_files
 from spheretwin.scenario.sections import Scenario, hardware_defaults, scenario_with
 from spheretwin.session import Session
@@ -241,16 +241,16 @@ class Rows:
 
     def _check_axes(self) -> None:
         """Find out before the first row whether each axis names a field."""
-        known = {name for name, _ in every_field(type(self.base))}
+        known = dict(every_field(type(self.base)))
         for law in self.study.law:
             name = self._found({"controller.law": law["law"]})["controller.law"]
-            known |= {name for name, _ in every_field(scenario_with(name))}
+            known |= dict(every_field(scenario_with(name)))
         for axis in self.study.axis:
             name = re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", axis.field)
             if name.removesuffix(f".{INDEX}") not in known:
                 raise InputError(
                     f"study {self.study.name}: expected an axis over a field of a scenario,"
-                    f" received {shown(axis.field)}{did_you_mean(axis.field, known)}"
+                    f" received {shown(axis.field)}{new_name(name, known) or did_you_mean(axis.field, known)}"
                 )
 
     def _fill_list(self, fields: dict[str, Any], dotted: str) -> None:

@@ -35,9 +35,9 @@ class FaultsTab:
         target = gui.add_dropdown("target", list(targets), initial_value=first)
         mode: Any = gui.add_dropdown("mode", list(targets[first]), initial_value=targets[first][0])
         value = gui.add_text("value", "", hint="if the mode has one")
-        detect = gui.add_checkbox("detect", False, hint="the controller detects the fault itself")
-        known = gui.add_checkbox(
-            "report to controller", False, hint="the controller is informed of the fault"
+        detection = gui.add_checkbox("detection", False, hint="the controller detects the fault itself")
+        reported = gui.add_checkbox(
+            "reported to controller", False, hint="the controller receives the fault and its group"
         )
         add = gui.add_button("Add from now on", color="orange")
         note = Note(gui, add.order + 0.5)
@@ -54,11 +54,12 @@ class FaultsTab:
                 except InputError as error:
                     handlers.show_refusal(str(error), note)
                     return
-            fault |= {name: True for name, box in (("detect", detect), ("known", known)) if box.value}
+            boxes = {"detection": detection, "reported_to_controller": reported}
+            fault |= {name: True for name, box in boxes.items() if box.value}
             handlers.send(event, "add_fault", note, fault=fault)
 
         handlers.on_change(target, retarget)
-        for line in (mode, value, detect, known):
+        for line in (mode, value, detection, reported):
             handlers.on_change(line)
         on_press(add, add_fault)
         self._list = gui.add_html("")

@@ -20,7 +20,7 @@ PLANT = {"plant.engine": "lagrangian"}
 WITH_EVENTS = {
     **PLANT,
     "duration": 2.2,
-    "fault": [{"target": "coil.07", "mode": "open", "start_s": 0.3, "detect": True}],
+    "fault": [{"target": "coil.07", "mode": "open", "start_s": 0.3, "detection": True}],
     "event": [{"t_s": 1.5, "set": "controller.law", "value": "pd"}],
 }
 SIGNALS = (Signal("t_s", "s", 1, "time"), Signal("x_rad", "rad", 2, "a pair", ("α", "β")))

@@ -111,7 +111,7 @@ SETTINGS = [
     ("controller.stiffness", [60.0, 70.0, 80.0]),
     ("plant.payload_kg", 0.03),
     ("disturbance.terms", [{"kind": "constant", "torque_Nm": [0.001, 0.0, 0.0]}]),
-    ("fault", [{"target": "coil.02", "mode": "open", "start_s": 0.5, "detect": True}]),
+    ("fault", [{"target": "coil.02", "mode": "open", "start_s": 0.5, "detection": True}]),
     ("trajectory", {"shape": "multisine"}),
     ("name", "mine"),
     ("hardware", "prototype"),

@@ -59,7 +59,7 @@ def test_the_gains_are_those_of_the_law_that_is_in_force():
 
 def test_text_is_read_as_by_the_command_line():
     assert read("controller.stiffness", "1 2.5 -3") == [1, 2.5, -3]
-    assert read("fault.0.known", "true") is True
+    assert read("fault.0.reported_to_controller", "true") is True
     assert read("plant.mjcf", "'a file.xml'") == "a file.xml"
     assert read("trajectory.points", "[[0, 1], [2, 3]]") == [[0, 1], [2, 3]]
     assert read("plant.mjcf", "  ") is None

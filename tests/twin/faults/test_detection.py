@@ -114,7 +114,13 @@ def test_a_supply_that_the_controller_does_not_know_leaves_its_thresholds():
 def test_what_is_known_is_left_out_from_its_tick_on_and_taken_back():
     """All the torque that is wanted comes from the others, by the true torque matrix of an ideal run."""
     faults = [
-        {"target": f"coil.{group:02d}", "mode": "open", "known": True, "start_s": 0.1, "end_s": 0.2}
+        {
+            "target": f"coil.{group:02d}",
+            "mode": "open",
+            "reported_to_controller": True,
+            "start_s": 0.1,
+            "end_s": 0.2,
+        }
         for group in (2, 9)
     ]
     for allocation in ("least_norm", "bounded"):
@@ -158,7 +164,7 @@ def test_a_find_is_told_once_with_its_time():
 
 def test_detect_of_a_fault_is_the_detector():
     fault = {"target": "coil.07", "mode": "open", "start_s": 0.5}
-    by_fault = scenario(fault=[{**fault, "detect": True}], duration=1.0, **{"detector.detect": False})
+    by_fault = scenario(fault=[{**fault, "detection": True}], duration=1.0, **{"detector.detect": False})
     general = scenario(fault=[fault], duration=1.0)
     one, other = simulate(by_fault).telemetry, simulate(general).telemetry
     assert one.values.tobytes() == other.values.tobytes()

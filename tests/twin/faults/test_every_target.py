@@ -81,7 +81,7 @@ def test_no_time_before_it_and_no_end_before_its_start(name):
 @EACH
 def test_only_of_groups_may_the_controller_know_and_only_of_those_that_there_are(name):
     mode, target = next(iter(TARGETS[name].modes)), TARGETS[name]
-    for told in ("known", "detect"):
+    for told in ("reported_to_controller", "detection"):
         if target.each_group:
             planned(fault(name, mode, **{told: True}))
         else:

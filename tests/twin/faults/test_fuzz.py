@@ -41,7 +41,7 @@ def faults(draw):
         ends = [value.least, value.largest, max(value.least, min(0.01, value.largest))]
         made["value"] = float(draw(st.sampled_from(ends) | st.floats(value.least, value.largest)))
     if TARGETS[name].each_group:
-        made |= {"known": draw(st.booleans()), "detect": draw(st.booleans())}
+        made |= {"reported_to_controller": draw(st.booleans()), "detection": draw(st.booleans())}
     return made
 
 

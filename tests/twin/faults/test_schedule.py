@@ -147,7 +147,9 @@ def test_the_last_of_several_on_one_part_is_marked_and_all_act():
     made = plan(coil(), coil(mode="short", start_s=0.01))
     assert made.active(10) == (0, 1)
     assert made.mode_numbers((0, 1))[0] == 1 + MODES.index("short")
-    assert plan(coil(known=True), coil(3)).reported_groups((0, 1)).nonzero()[0].tolist() == [0]
+    assert plan(coil(reported_to_controller=True), coil(3)).reported_groups((0, 1)).nonzero()[0].tolist() == [
+        0
+    ]
 
 
 def test_a_group_s_fault_began_when_the_last_one_did():

@@ -77,7 +77,7 @@ def test_ways_change_nothing_but_what_they_say():
     base = loaded[NOT_TOLD.name]
     assert (base["plant"]["modelling_error"], base["disturbance"]["load"]) == (0.2, 1.0)
     assert [fault["target"] for fault in base["fault"]] == ["coil.03", "coil.11"]
-    for way, field in ((TOLD, "known"), (DETECTING, "detect")):
+    for way, field in ((TOLD, "reported_to_controller"), (DETECTING, "detection")):
         changed = tuple({**fault, field: True} for fault in base["fault"])
         assert loaded[way.name] == {**base, "fault": changed}
     assert loaded[BOUNDED.name] == {**loaded[TOLD.name], "allocation": "bounded"}

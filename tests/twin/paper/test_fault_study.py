@@ -145,7 +145,7 @@ def test_the_detector_s_times_are_told(found):
 
 def opened(group, start_s, end_s=5.0, **changes):
     """One open group in the nutation of the study, with a detector."""
-    fault = {"target": f"coil.{group:02d}", "mode": "open", "start_s": start_s, "detect": True}
+    fault = {"target": f"coil.{group:02d}", "mode": "open", "start_s": start_s, "detection": True}
     return simulate(scenarios.load("nutation", {**BASE, "fault": [fault], "duration": end_s, **changes}))
 
 

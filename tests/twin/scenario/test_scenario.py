@@ -52,6 +52,9 @@ def test_flags_reach_every_field():
     assert {f"--{flag}" for flag in values} < listed
 
 
+OPEN = {"target": "coil.07", "mode": "open"}
+
+
 @pytest.mark.parametrize(
     ("overrides", "parts"),
     [
@@ -80,6 +83,8 @@ def test_flags_reach_every_field():
         ({"seed.deep": 1}, ["seed.deep"]),
         ({"controler.law": "pd"}, ["received controler; did you mean controller?"]),
         ({"plant.modeling_error": 1}, ["received modeling_error; did you mean modelling_error?"]),
+        ({"fault": [OPEN | {"known": True}]}, ["received known, the former name of reported_to_controller"]),
+        ({"fault": [OPEN | {"detect": True}]}, ["received detect, the former name of detection"]),
         ({"law": "pd"}, ["received law; did you mean controller.law?"]),
         ({"controller.law": "afms"}, ["received 'afms'; did you mean afsm?"]),
         (

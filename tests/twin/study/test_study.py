@@ -49,6 +49,11 @@ def refusal(action):
             {},
             "received 'disturbance.laod'; did you mean disturbance.load?",
         ),
+        (
+            [values("fault.0.known", True)],
+            {},
+            "received 'fault.0.known', the former name of fault.0.reported_to_controller",
+        ),
         ([values("plant.modelling_error.3", 1.0)], {}, "expected a section before the dot"),
         ([values("plant.coulomb_Nm.9", 1.0)], {}, "expected a list index from 0 to 3"),
         ([values("plant", 1.0)], {}, "plant: expected a table of fields"),

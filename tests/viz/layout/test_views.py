@@ -23,7 +23,7 @@ from spheretwin.viz.layout.views import VIEWS
 from spheretwin.viz.recording import plots
 from spheretwin.viz.recording.recorder import Recorder
 
-OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detect": True}
+OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.05, "detection": True}
 
 RUNS = {
     "afsm": ("nutation", {}),

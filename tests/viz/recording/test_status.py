@@ -65,7 +65,13 @@ def test_a_recording_has_a_lane_for_what_fails_and_a_line_in_its_log(tmp_path):
         "duration": 0.2,
         "plant.engine": "lagrangian",
         "fault": [
-            {"target": "coil.07", "mode": "open", "start_s": 0.05, "end_s": 0.15, "known": True},
+            {
+                "target": "coil.07",
+                "mode": "open",
+                "start_s": 0.05,
+                "end_s": 0.15,
+                "reported_to_controller": True,
+            },
             {"target": "adc", "mode": "dropout", "start_s": 0.1},
         ],
         "watchdog.on": True,
