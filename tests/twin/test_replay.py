@@ -131,3 +131,15 @@ def test_a_model_with_the_same_contents_is_the_same_model(tmp_path):
         (folder / "a.obj").write_text(mesh)
         digests.append(mjcf.contents_digest(folder / "m.xml"))
     assert digests[0] == digests[1] != digests[2]
+
+
+def test_a_file_that_the_run_could_not_read_and_that_exists_now_is_refused(folder):
+    path = written(folder / "a.parquet")
+    (folder / "p.csv").rename(folder / "later")
+    record = replay.read_parquet(path)[1]
+    files = json.loads(record["files"]) | {str(folder / "p.csv"): None}
+    table, _ = read_parquet(path)
+    table.write_parquet(path, record | {"files": json.dumps(files)})
+    (folder / "later").rename(folder / "p.csv")
+    with pytest.raises(InputError, match=r"plant\.torque_curve .*p\.csv as it was when the run was made"):
+        replay.read(path)

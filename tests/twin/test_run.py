@@ -71,3 +71,8 @@ def test_what_fails_or_is_no_json_is_told_with_its_name(run):
         figures_of(run, {"mine": failing})
     with pytest.raises(InputError, match="metric mine: expected what JSON holds, received <function"):
         figures_of(run, {"mine": lambda run: failing})
+
+
+def test_the_realtime_factor_is_simulated_time_per_wall_time():
+    told = followed(200)
+    assert told["realtime_factor"] == told["simulated_s"] / told["wall_s"]

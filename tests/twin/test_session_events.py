@@ -165,3 +165,21 @@ def test_a_file_that_an_event_names_is_taken_from_where_it_is_written(tmp_path):
     assert scenario.event[0].value == f"{tmp_path}/weak.csv"
     assert Change(100, "plant.torque_curve", f"{tmp_path}/weak.csv").value == scenario.event[0].value
     assert simulate(scenario).status == "completed"
+
+
+@pytest.mark.parametrize("start_s", [0.0, 0.03])
+def test_a_fault_that_an_event_adds_starts_when_it_says(start_s):
+    fault = {"target": "coil.07", "mode": "open", "start_s": start_s}
+    events = [{"t_s": 0.01, "set": "fault", "value": fault}]
+    run = simulate(scenarios.load("nutation", {"duration": 0.05, "event": events}))
+    works = run.telemetry["current_A"][:, 7] != 0
+    assert works.tolist() == [tick < max(10, round(start_s / 1e-3)) for tick in range(50)]
+
+
+def test_events_are_checked_in_the_order_of_their_times():
+    slope = {"t_s": 0.2, "set": "controller.surface_slope", "value": [40.0, 40.0, 40.0]}
+    law = {"t_s": 0.1, "set": "controller.law", "value": "afsm"}
+    base = {"controller": {"law": "pd"}}
+    assert len(scenarios.load("hold", {**base, "event": [slope, law]}).event) == 2
+    with pytest.raises(InputError, match=r"surface_slope.* as event\.1 sets it"):
+        scenarios.load("hold", {**base, "event": [law | {"t_s": 0.3}, slope]})

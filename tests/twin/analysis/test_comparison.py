@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from spheretwin import cli
-from spheretwin.analysis import comparison
+from spheretwin.analysis import comparison, run_summary
 from spheretwin.analysis.comparison import compared_runs
 from spheretwin.analysis.recorded_run import read
+from spheretwin.analysis.run_summary import amplitudes
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.quantities import scalar_quantities
 from tests.twin.analysis.runs import written
@@ -197,3 +198,26 @@ def test_a_run_without_a_tick_is_not_drawn(files, tmp_path):
     run = read(files[0])
     with pytest.raises(InputError, match="at least one tick"):
         comparison.write_figures([replace(run, table=run.table.rows(0, 0))], [{}], tmp_path)
+
+
+def test_the_page_shows_the_spectra_in_mrad(files, page):
+    traces = figures_of(page)["spectra"]["data"]
+    for place, path in enumerate(files):
+        run = read(path)
+        largest_mrad = [amplitudes(1e3 * error, run.period_s)[1].max() for error in run.table["error_rad"].T]
+        shown = [
+            np.max(decoded(trace["y"]))
+            for trace in traces
+            if trace["meta"] == f"{place}" and trace["mode"] == "lines"
+        ]
+        np.testing.assert_allclose(shown, largest_mrad, rtol=1e-6)
+        peaks = run_summary.figures(run)["error_peaks"].values()
+        told = [1e3 * peak["amplitude_rad"] for axis in peaks for peak in axis]
+        tops = np.concatenate(
+            [
+                decoded(trace["y"])
+                for trace in traces
+                if trace["meta"] == f"{place}" and trace["mode"] == "markers"
+            ]
+        )
+        np.testing.assert_allclose(sorted(tops), sorted(told), rtol=1e-6)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import threading
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.bench.command_queue import MOST_WAITING
+from spheretwin.bench.command_queue import MOST_WAITING, Queue, QueuedCommand
 from spheretwin.bench.commands import COMMANDS
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.session import Session
@@ -307,3 +308,46 @@ def test_advance_is_refused_while_the_thread_runs():
             made.advance(1)
     with pytest.raises(SpheretwinError):
         made.advance(1)
+
+
+def test_a_snapshot_can_be_restored_again_with_the_fields_that_waited():
+    with begun() as made:
+        done(made, "set", name="controller.period_s", value=2e-3)
+        done(made, "snapshot")
+        waited = made.state().pending
+        for _ in range(2):
+            done(made, "restore")
+            assert made.state().pending == waited == (("controller.period_s", "0.002"),)
+            done(made, "set", name="plant.engine", value="mujoco")
+            assert len(made.state().pending) == 2
+
+
+@pytest.mark.parametrize("current_A", [0.5, -1.5])
+def test_the_torque_margin_counts_currents_of_both_signs(current_A):
+    with begun() as made:
+        limit_A = made.state().current_limit_A
+        done(made, "manual", group=5, current_A=current_A)
+        made.advance(1)
+        assert made.state().torque_margin == 1 - abs(current_A) / limit_A
+
+
+def test_a_command_waits_while_another_thread_adds_one():
+    queue, waited = Queue(), []
+
+    class Slow(QueuedCommand):
+        """Command that another thread's command overtakes, if it can, while it is added."""
+
+        def __hash__(self):
+            if not waited:
+                waited.append(None)
+                other.start()
+                other.join(0.5)  # with a lock in the way it ends only after this one
+                waited[0] = other.is_alive()
+            return id(self)
+
+    first, second = (kind(COMMANDS["step"], {"ticks": 1}) for kind in (Slow, QueuedCommand))
+    other = threading.Thread(target=queue.put, args=(second,))
+    queue.put(first)
+    other.join()
+    assert waited == [True]
+    assert [queue.next(), queue.next(), queue.next()] == [first, second, None]

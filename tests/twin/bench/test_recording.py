@@ -143,3 +143,16 @@ def test_the_settings_are_written_down_and_read_again_are_the_same(tmp_path):
         done(made, "load", source=str(path))
         assert {name: value for name, value, _ in made.fields()} == known
         assert made.state().scenario == "mine"
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 50])
+def test_a_change_is_logged_at_the_first_tick_on_which_it_acts(tmp_path, chunk):
+    path = tmp_path / "run.rrd"
+    with begun() as made:
+        done(made, "record", recording=str(path))
+        made.advance(chunk)
+        done(made, "set", name="disturbance.load", value=0.5)
+        made.advance(chunk)
+        done(made, "keep")
+    (t_s,) = (t_s for t_s, _, text in reviewed.read(path).log if "disturbance.load" in text)
+    assert t_s == pytest.approx(chunk * 1e-3, abs=1e-9)

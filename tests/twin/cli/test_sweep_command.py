@@ -8,6 +8,8 @@ import pytest
 from spheretwin import cli
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.study import agreement, report
+from spheretwin.study.grid import Grid
+from spheretwin.study.study import load as load_study
 
 
 @pytest.fixture
@@ -95,3 +97,14 @@ def test_bad_input_is_one_line(arguments, told, capsys):
     assert out == ""
     assert told in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("load", "code", "status"), [("1.0", cli.DONE, "completed"), ("-1.0", cli.FAILED, "refused")]
+)
+def test_the_exit_code_of_one_row_is_that_of_its_run(source, tmp_path, capsys, load, code, status):
+    path = Path(source)
+    path.write_text(path.read_text().replace("disturbance.load", "plant.payload_kg").replace("1.0", load))
+    key = Grid(load_study(source))[1].key
+    assert cli.main(["sweep", source, "--row", key, "--json"]) == code
+    assert json.loads(capsys.readouterr().out)["status"] == status

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import spheretwin as tw
 from spheretwin.electronics.random_streams import stream_key
 from spheretwin.faults.fault import MODES, Fault
 from spheretwin.faults.schedule import NEVER, FaultSchedule, part_names, part_of
@@ -156,3 +157,10 @@ def test_a_group_s_fault_began_when_the_last_one_did():
     made = plan(coil(2, start_s=0.01), {"target": "amplifier.02", "mode": "open", "start_s": 0.03})
     assert [made.fault_start_s(tick)[2] for tick in (9, 10, 29, 30, 31)] == [-1.0, 0.01, 0.01, 0.03, 0.03]
     assert np.all(np.delete(made.fault_start_s(31), 2) == -1.0)
+
+
+@pytest.mark.parametrize("values", [(0.1, 0.2), (0.2, 0.1)])
+def test_of_two_faults_that_set_one_signal_the_last_in_the_scenario_acts(values):
+    faults = [{"target": "pot.alpha", "mode": "stuck", "value": value} for value in values]
+    with tw.Session(tw.load("hold", {"fault": faults})) as session:
+        assert np.all(session.advance(5)["q_measured_rad"][:, 0] == values[1])

@@ -58,6 +58,7 @@ def test_rank_correlations_are_scipy_s_where_rows_are_few():
     y = x[0] + 0.5 * np.abs(x[1])
     rank = ranked(list(x), y)
     assert not rank.is_partial
+    assert rank.chance == 1.96 / np.sqrt(20 - 1)
     for place in range(3):
         expected = stats.spearmanr(x[place], y).statistic
         # The same sums in another order.
@@ -69,6 +70,7 @@ def test_what_is_partial_is_the_correlation_of_what_fits_of_the_others_leave():
     y = 9 * x[0] + x[1] + np.abs(x[2])
     rank = ranked(list(x), y)
     assert rank.is_partial
+    assert rank.chance == 1.96 / np.sqrt(200 - 7)  # three values, three distances and the figure
     columns = np.stack([stats.rankdata(each) for each in (*x, *(np.abs(a - np.median(a)) for a in x))])
     for place in range(6):
         others = np.vstack([np.delete(columns, place, axis=0), np.ones(200)]).T

@@ -1,6 +1,7 @@
 """What differs from row to row is what its scenario has; a row run alone gives the same figures."""
 
 import json
+import re
 import shlex
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from spheretwin import cli, scenario
 from spheretwin.metrics import METRICS
+from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.run import figures_of
 from spheretwin.simulation import simulate
@@ -263,3 +265,14 @@ def _inline(value):
     if isinstance(value, list):
         return "[" + ", ".join(map(_inline, value)) + "]"
     return json.dumps(value)
+
+
+def test_each_row_has_the_model_file_of_its_scenario(tmp_path):
+    heavy = tmp_path / "heavy.xml"
+    text = actuators.MJCF_PATH.read_text().replace('meshdir="', f'meshdir="{actuators.FOLDER}/')
+    heavy.write_text(re.sub(r'mass="([^"]+)"', lambda mass: f'mass="{2 * float(mass[1])}"', text))
+    chosen = study(values("plant.mjcf", str(actuators.MJCF_PATH), str(heavy)), fields={"duration": 0.05})
+    rows = found(chosen, tmp_path / "out")
+    alone = [figures_of(simulate(each))["rms_error_rad"] for each in scenarios(chosen)]
+    assert [row["rms_error_rad"] for row in rows] == alone
+    assert alone[0] != alone[1]

@@ -164,6 +164,28 @@ def test_run_that_raises_still_leaves_a_readable_recording(tmp_path):
     assert len(times) == 100
 
 
+def test_a_decimated_recording_of_a_run_that_raises_has_its_last_rows(tmp_path):
+    path, chunks = tmp_path / "run.rrd", []
+    session = Session(scenarios.load("nutation", {"duration": 0.2}))
+
+    def interrupted():
+        facts = facts_of(session.scenario)
+        with Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=60.0) as recorder:
+            for _ in range(4):
+                chunks.append(session.advance(50))
+                recorder.write(chunks[-1])
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    q_rad = np.concatenate([rows["q_rad"] for rows in chunks])
+    times, recorded_q_rad = rows_of(path, TELEMETRY, "values_0", "q_rad")
+    assert times[-1] == 199_000_000
+    np.testing.assert_array_equal(recorded_q_rad[-1], q_rad[-1])
+    np.testing.assert_array_equal(recorded_q_rad.max(axis=0), q_rad.max(axis=0))
+    assert len(times) < 100
+
+
 def busy(recorder):
     """Occupy the recorder's thread until the event that is returned."""
     done = threading.Event()
