@@ -27,6 +27,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from tests.waiting import PATIENCE_S
+
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 # A browser is no Python package: what sets the tests up cannot bring it, and most tests need none.
@@ -56,8 +58,6 @@ HERE = ("127.0.0.1", "localhost", "::1")
 # Addresses of what a page holds itself.
 WITHIN = ("data:", "blob:", "about:")
 
-# What a page may need at most where two cores are shared with the rest of the tests.
-PATIENCE_S = 60.0
 
 _KEYS = {
     " ": ("Space", 32),
@@ -325,6 +325,11 @@ class Page:
         Path(path).write_bytes(base64.b64decode(image))
         return Path(path)
 
+    def draw(self, frames):
+        """Wait until it has drawn some frames more."""
+        self.front()
+        self.evaluate(_DRAWN % frames)
+
     def frames_per_second(self, seconds=2.0):
         """How often it draws, over some seconds."""
         return self.evaluate(_FRAMES % (1000 * seconds))
@@ -382,6 +387,11 @@ _MIDDLE = """(() => {
   const box = element.getBoundingClientRect();
   return [box.x + box.width / 2, box.y + box.height / 2];
 })()"""
+
+_DRAWN = """new Promise((done) => {
+  const draw = (left) => left ? requestAnimationFrame(() => draw(left - 1)) : done(true);
+  draw(%d);
+})"""
 
 _FRAMES = """new Promise((done) => {
   const began = performance.now();

@@ -204,8 +204,8 @@ def folder(tmp_path_factory):
 
 
 def python(folder, script, *arguments):
-    """What a script does where the copy is the package."""
-    environment = {**os.environ, "PYTHONPATH": str(folder), "SPHERETWIN_CACHE_DIR": str(folder / "cache")}
+    """Run a script where the copy is the package; its machine code is cached as that of the package is."""
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
     command = [sys.executable, "-c", script, *map(str, arguments)]
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
 

@@ -6,7 +6,6 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pyarrow as pa
@@ -19,12 +18,11 @@ from spheretwin.models.telemetry.partial_files import list_of
 from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
 from tests.models.telemetry.streams import GAIN, PART_ROWS, parts_beside, streamed, table
+from tests.waiting import PATIENCE_S, wait_for
 
 pytestmark = pytest.mark.usefixtures("short_parts")
 
 SIGNALS = common_signals(18)
-
-# By its path: the tests are no package.
 
 
 STREAM = """
@@ -63,11 +61,11 @@ def kill(process):
 def test_a_process_killed_while_it_writes_leaves_its_first_rows(tmp_path):
     path = tmp_path / "run.parquet"
     process = streaming(path, 64 * 1500)
-    deadline = time.monotonic() + 60
-    while sum(part.stat().st_size for part in tmp_path.glob(".run.parquet.*.parts/*")) < size_of(64 * 6):
-        assert time.monotonic() < deadline, "waited in vain"
-        assert process.poll() is None, process.stderr.read()
-        time.sleep(0.001)
+    wait_for(
+        lambda: (
+            sum(part.stat().st_size for part in tmp_path.glob(".run.parquet.*.parts/*")) >= size_of(64 * 6)
+        )
+    )
     kill(process)
     assert not path.exists()
     rows = join(parts_beside(path), path)
@@ -97,7 +95,7 @@ def full_disk(*_):
 
 
 def refusal(process):
-    _, complaint = process.communicate(timeout=60)
+    _, complaint = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     line = complaint.splitlines()[-1]
     assert line.startswith("spheretwin.models.base.errors.SpheretwinError: output: ")
@@ -162,7 +160,7 @@ def test_two_processes_to_one_path_each_write_a_whole_file(tmp_path):
         assert process.stdout.readline() == "written\n"
     assert len(list(tmp_path.glob(".run.parquet.*.parts"))) == 2
     for process, (rows, seed) in zip(both, ((300, 1), (500, 2)), strict=True):
-        _, complaint = process.communicate(timeout=60)
+        _, complaint = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, complaint
         assert read_parquet(path)[0].values.tobytes() == table(rows, seed=seed).values.tobytes()
     assert os.listdir(tmp_path) == ["run.parquet"]
@@ -174,7 +172,9 @@ def test_two_processes_that_close_together_leave_one_of_the_two(tmp_path):
     for process in both:
         assert process.stdout.readline() == "written\n"
     with ThreadPoolExecutor(2) as pool:
-        complaints = [said[1] for said in pool.map(lambda process: process.communicate(timeout=60), both)]
+        complaints = [
+            said[1] for said in pool.map(lambda process: process.communicate(timeout=PATIENCE_S), both)
+        ]
     assert [process.returncode for process in both] == [0, 0], complaints
     assert os.listdir(tmp_path) == ["run.parquet"]
     either = {table(300, seed=seed).values.tobytes() for seed in (1, 2)}

@@ -10,6 +10,7 @@ import urllib.request
 import pytest
 
 from spheretwin import cli
+from tests.waiting import PATIENCE_S
 
 COMMAND = (sys.executable, "-m", "spheretwin", "bench", "hold", "--plant.engine", "lagrangian")
 
@@ -60,7 +61,7 @@ def test_ctrl_c_ends_it_and_what_was_recorded_is_kept(tmp_path):
         with urllib.request.urlopen(address) as answer:  # it is said once the page answers
             assert answer.status == 200
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=600)
+        out, err = process.communicate(timeout=PATIENCE_S)
     # On a busy machine the end takes a while, and a line says what a second Ctrl-C would do.
     lines = [line for line in err.splitlines() if "a second Ctrl-C" not in line]
     assert (process.returncode, lines) == (0, ["bench: preparing hold"])

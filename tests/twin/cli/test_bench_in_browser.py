@@ -3,7 +3,6 @@
 import contextlib
 import os
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +18,10 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.viz.bench import server
 from spheretwin.viz.bench.page import Page
 from tests.browser import Browser, needs_a_browser
-from tests.viz.bench.on_page import STATUS, choose, errors, on_screen, opened, write
+from tests.viz.bench.on_page import STATUS, at_rest, choose, errors, on_screen, opened, write
+from tests.waiting import wait_for
 
 pytestmark = needs_a_browser
-
-# What is set for the first time may have to be compiled, beside other tests.
-PATIENCE_S = 120.0
 
 
 @contextlib.contextmanager
@@ -46,10 +43,7 @@ def driven(scenario):
 
 
 def until(bench, condition):
-    limit = time.monotonic() + PATIENCE_S
-    while not condition(bench.state()):
-        assert time.monotonic() < limit, bench.state()
-        time.sleep(0.02)
+    wait_for(lambda: condition(bench.state()))
 
 
 def tip_m(bench, q_rad):
@@ -58,7 +52,7 @@ def tip_m(bench, q_rad):
 
 def says(tab, *words):
     for word in words:
-        tab.wait_for(f"{STATUS}.innerText.includes({word!r})", PATIENCE_S)
+        tab.wait_for(f"{STATUS}.innerText.includes({word!r})")
 
 
 def test_a_bench_is_driven_from_a_browser(tmp_path):
@@ -90,7 +84,7 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
         tab.click("text=hold")
         until(bench, lambda state: state.mode == "hold")
         until(bench, lambda state: np.abs(state.qdot_ref_rad_s).max() < 1e-3)
-        time.sleep(0.5)  # the picture has come to rest
+        at_rest(page, tab)
         here = np.array(bench.state().q_ref_rad)
         there = here + [0.35, 0.1, 0.0]
         tab.drag(on_screen(page, tab, tip_m(bench, here)), on_screen(page, tab, tip_m(bench, there)))
@@ -127,7 +121,7 @@ def test_what_is_out_of_range_is_refused_in_the_words_of_the_command_line():
         tab.click("text=law")
         write(tab, "period_s", "-1")
         tab.click("text=Set gains")
-        tab.wait_for("document.body.innerText.includes('controller.period_s: expected')", PATIENCE_S)
+        tab.wait_for("document.body.innerText.includes('controller.period_s: expected')")
         with pytest.raises(InputError) as refusal:
             scenarios.load("hold", {"plant.engine": "lagrangian", "controller.period_s": -1})
         shown = tab.evaluate("document.body.innerText")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from spheretwin.models.telemetry.table import read_parquet
+from tests.waiting import PATIENCE_S
 
 COMMAND = [sys.executable, "-m", "spheretwin"]
 
@@ -88,9 +89,6 @@ def test_left_workspace_exits_1_and_keeps_the_run(tmp_path):
     assert len(read_parquet(path)[0]) > 100
 
 
-LONG_s = 600
-"""Longer than any process takes on a busy machine: a test that waits so long has failed."""
-
 TALKING = """
 import sys
 
@@ -106,20 +104,24 @@ TOLD = []
 """
 
 
+@contextlib.contextmanager
 def running(folder, *arguments):
-    """A run of a minute at the pace of the clock, of which some ticks are done."""
+    """Start a run of a minute at the pace of the clock; wait until some ticks are done."""
     (folder / "law.py").write_text(TALKING)
     law = ["--controller.law", folder / "law.py:talking", "--plant.engine", "lagrangian"]
-    process = started("simulate", "hold", "--live", "--duration", "60", *law, *arguments)
-    assert any("it runs" in line for line in process.stderr)
-    return process
+    with started("simulate", "hold", "--live", "--duration", "60", *law, *arguments) as process:
+        try:
+            assert any("it runs" in line for line in process.stderr)
+            yield process
+        finally:
+            process.kill()
 
 
 def test_ctrl_c_keeps_the_run(tmp_path):
     telemetry, recording = tmp_path / "run.parquet", tmp_path / "run.rrd"
-    process = running(tmp_path, "--telemetry", telemetry, "--record", recording, "--json")
-    process.send_signal(signal.SIGINT)
-    stdout, stderr = process.communicate(timeout=LONG_s)
+    with running(tmp_path, "--telemetry", telemetry, "--record", recording, "--json") as process:
+        process.send_signal(signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert json.loads(stdout)["status"] == "interrupted"
     assert "Traceback" not in stderr
@@ -129,9 +131,9 @@ def test_ctrl_c_keeps_the_run(tmp_path):
 
 def test_termination_keeps_the_run_too(tmp_path):
     telemetry = tmp_path / "run.parquet"
-    process = running(tmp_path, "--telemetry", telemetry)
-    process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=LONG_s)
+    with running(tmp_path, "--telemetry", telemetry) as process:
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert 100 < len(read_parquet(telemetry)[0]) < 60_000
 
@@ -147,7 +149,7 @@ def test_live_serves_on_this_machine_alone_and_answers_when_it_tells_where():
         assert _ports_of(process.pid) == {int(page[1])}
     finally:
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=LONG_s)
+        process.communicate(timeout=PATIENCE_S)
 
 
 def _ports_of(pid):
@@ -175,7 +177,7 @@ def _listening_hosts(port):
 
 def _answers(host, port):
     with socket.socket() as probe:
-        probe.settimeout(1)
+        probe.settimeout(PATIENCE_S)
         return probe.connect_ex((host, port)) == 0
 
 

@@ -5,12 +5,12 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 from spheretwin import cli
 from tests.twin.study.cases import found, rows_of, study, table, values
+from tests.waiting import PATIENCE_S, wait_for
 
 COMMAND = [sys.executable, "-m", "spheretwin", "sweep"]
 LOADS = [0.1 * place for place in range(60)]
@@ -22,7 +22,6 @@ fields = {{duration = 2.0}}
 law = [{{law = "pd"}}]
 axis = [{{field = "disturbance.load", kind = "values", values = {LOADS}}}]
 """
-SOON_s = 60  # what no machine needs for a few rows
 
 
 @pytest.fixture
@@ -43,12 +42,14 @@ def whole(tmp_path_factory):
 def begun(command, folder, **options):
     """A process that has finished some rows, and not all."""
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
-    for _ in range(100 * SOON_s):
-        if journal_lines(folder) > 4:
-            return process
-        time.sleep(0.01)
-    process.kill()
-    raise AssertionError(process.communicate())
+    try:
+        wait_for(lambda: journal_lines(folder) > 4 or process.poll() is not None)
+        assert process.poll() is None, process.communicate()
+    except AssertionError:
+        process.kill()
+        process.communicate()
+        raise
+    return process
 
 
 def journal_lines(folder):
@@ -81,7 +82,7 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(tmp_pa
     folder = tmp_path / "out"
     process = begun([*command, "--threads", "2"], folder)
     process.send_signal(number)
-    out, err = process.communicate(timeout=SOON_s)
+    out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == cli.FAILED
     told = json.loads(out)
     assert 4 <= told["rows"] == journal_lines(folder) - 1 == len(rows_of(folder)) < told["of"] == len(LOADS)
@@ -99,7 +100,7 @@ def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, wh
     assert second.returncode == cli.BAD_INPUT
     assert second.stderr.startswith("spheretwin: study: expected one process at a time")
     assert second.stderr.count("\n") == 1
-    process.communicate(timeout=SOON_s)
+    process.communicate(timeout=PATIENCE_S)
     assert process.returncode == cli.DONE
     assert table(folder) == table(whole)
 

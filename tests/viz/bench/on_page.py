@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from tests.waiting import wait_for
+
 STATUS = "document.querySelector('[data-bench=status]')"
 
 _LINE = "[...document.querySelectorAll('label')].find(each => each.innerText == %r)"
@@ -12,6 +14,13 @@ def opened(browser, page, size=None):
     tab = browser.open(page.address, size)
     tab.wait_for(f"{STATUS} !== null")
     return tab
+
+
+def at_rest(page, tab, frames=20):
+    """Wait until the server has sent some frames more, and the page has drawn as many."""
+    sent = page._frame + frames
+    wait_for(lambda: page._frame >= sent)
+    tab.draw(frames)
 
 
 def errors(tab):

@@ -3,7 +3,8 @@
 import msgspec
 import pytest
 
-from tests.viz.bench.test_server import CAMERA, changed, handle_of, socket_to, wait_for
+from tests.viz.bench.test_server import CAMERA, changed, handle_of, socket_to
+from tests.waiting import wait_for
 
 BUTTONS = {
     "STOP (space)": ("stop", {}),

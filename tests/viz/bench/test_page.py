@@ -8,9 +8,11 @@ from PIL import Image
 
 from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
+from spheretwin.viz.bench.page import FRAMES_A_SETTING
 from tests.browser import Browser, needs_a_browser
 from tests.viz.bench import fake
-from tests.viz.bench.on_page import STATUS, errors, on_screen, opened, write
+from tests.viz.bench.on_page import STATUS, at_rest, errors, on_screen, opened, write
+from tests.waiting import wait_for
 
 # Of two colours, as directions: light and shade change their length. Told as they are, they come out pale:
 # copper 0.982, blue 0.91, red 0.87.
@@ -27,9 +29,7 @@ def browser():
 
 def told(bench, count):
     """All that a bench was told, once it is so much."""
-    until = time.monotonic() + 20.0  # a click crosses two processes on shared cores
-    while len(bench.commands()) < count and time.monotonic() < until:
-        time.sleep(0.02)
+    wait_for(lambda: len(bench.commands()) >= count)
     return bench.commands()
 
 
@@ -50,7 +50,8 @@ def test_each_control_sends_a_command(browser):
         ((name, given),) = told(bench, 3)[2:]
         assert name == "point"
         assert given["pose_rad"] == pytest.approx([0.1 - np.radians(1.0), -0.1, 0.3], abs=1e-12)
-        time.sleep(0.5)
+        tab.click("text=pause")
+        assert told(bench, 4)[3:] == [("pause", {})]
         assert client.camera.position == pytest.approx([0.15, -0.22, 0.15])  # an arrow steers the twin alone
         assert errors(tab) == []
         assert tab.outside == []
@@ -62,17 +63,14 @@ def test_the_tip_is_dragged_where_the_pointer_is(browser):
     bench = fake.Bench()
     with fake.shown(bench) as page:
         tab = opened(browser, page)
-        time.sleep(1.0)  # the picture is drawn, and its camera told
+        at_rest(page, tab)
         wanted = np.array([0.3, 0.2, 0.3])
         tab.drag(
             on_screen(page, tab, tip(bench, bench.now.q_ref_rad)), on_screen(page, tab, tip(bench, wanted))
         )
         # A pixel is 5 mrad of the shaft as the page comes up; it is pointed at to one, from one.
         arrived = [("point", {"pose_rad": pytest.approx(wanted, abs=1e-2)})]
-        until = time.monotonic() + 20.0
-        while bench.commands()[-1:] != arrived and time.monotonic() < until:
-            time.sleep(0.05)
-        assert bench.commands()[-1:] == arrived
+        wait_for(lambda: bench.commands()[-1:] == arrived)
         tab.close()
 
 
@@ -81,7 +79,7 @@ def test_a_clicked_coil_gets_a_current_in_manual_mode_only(browser):
     actuator = bench.actuator
     with fake.shown(bench) as page:
         tab = opened(browser, page)
-        time.sleep(1.0)
+        at_rest(page, tab)
         (client,) = page._server.get_clients().values()
         nearest = int(np.argmax(actuator.coil_axes @ client.camera.position))  # nothing stands before it
         axis, coil = actuator.coil_axes[nearest], actuator.coil
@@ -90,12 +88,12 @@ def test_a_clicked_coil_gets_a_current_in_manual_mode_only(browser):
         middle = (coil.inner_radius_m + coil.outer_radius_m) / 2
         at = on_screen(page, tab, end + middle * beside / np.linalg.norm(beside))
         tab.click(at)
-        time.sleep(0.5)
-        assert bench.commands() == []
+        tab.click("text=start")
+        assert told(bench, 1) == [("start", {})]
         bench.now.mode = "manual"
         tab.click(at)
         (group,) = np.flatnonzero((actuator.groups == nearest).any(axis=1)).tolist()
-        assert told(bench, 1) == [("manual", {"group": group, "current_A": 1.0})]
+        assert told(bench, 2)[1:] == [("manual", {"group": group, "current_A": 1.0})]
         tab.close()
 
 
@@ -185,7 +183,7 @@ def test_a_reloaded_single_page_operates(browser):
     bench = fake.Bench(operator="page 7", watching=("page 0",))
     with fake.shown(bench) as page:
         tab = opened(browser, page)
-        time.sleep(1.5)
+        at_rest(page, tab, 2 * FRAMES_A_SETTING)
         assert bench.commands() == []
         bench.now.operator = None
         assert told(bench, 1) == [("ask", {})]
@@ -198,7 +196,7 @@ def test_a_single_watching_page_does_not_operate(browser, monkeypatch):
     bench = fake.Bench(operator="page 7", watching=("page 0",))
     with fake.shown(bench) as page:
         tab = opened(browser, page)
-        time.sleep(1.0)
+        at_rest(page, tab, 2 * FRAMES_A_SETTING)
         bench.now.operator = None
         tab.wait_for("document.body.innerText.includes('Take over')")
         time.sleep(1.5)  # longer than from one look at the pages to the next
@@ -206,12 +204,18 @@ def test_a_single_watching_page_does_not_operate(browser, monkeypatch):
         tab.close()
 
 
+def likeness(tab, path, at, colour):
+    """Cosine between a colour and that of a pixel of the page."""
+    pixel = np.array(Image.open(tab.screenshot(path)).convert("RGB").getpixel(at), dtype=float)
+    return pixel @ colour / max(np.linalg.norm(pixel) * np.linalg.norm(colour), 1.0)
+
+
 def test_a_coil_has_the_colour_of_its_current(browser, tmp_path):
     bench = fake.Bench(q_ref_rad=(0.0, 0.0, 0.0))
     actuator = bench.actuator
     with fake.shown(bench) as page:
         tab = opened(browser, page)
-        time.sleep(1.0)
+        at_rest(page, tab)
         (client,) = page._server.get_clients().values()
         nearest = int(np.argmax(actuator.coil_axes @ client.camera.position))
         (group,) = np.flatnonzero((actuator.groups == nearest).any(axis=1))
@@ -222,11 +226,8 @@ def test_a_coil_has_the_colour_of_its_current(browser, tmp_path):
         at = tuple(map(int, on_screen(page, tab, end + middle * above / np.linalg.norm(above))))
         for current in (-8.0, 0.0, 8.0):
             bench.now.current_A = (0.0,) * group + (current,) + (0.0,) * (fake.GROUPS - 1 - group)
-            time.sleep(1.5)
-            seen = np.array(Image.open(tab.screenshot(tmp_path / "page.png")).convert("RGB").getpixel(at))
             meant = theme.current_colours(np.array(current), 8.0).astype(float)
-            cosine = seen @ meant / np.linalg.norm(seen) / np.linalg.norm(meant)
-            assert cosine > ALIKE, current
+            wait_for(lambda meant=meant: likeness(tab, tmp_path / "page.png", at, meant) > ALIKE, current)
         tab.close()
 
 
@@ -243,10 +244,8 @@ def test_a_page_reconnects(browser):
 def test_the_path_of_the_tip_restarts_with_another_run():
     bench = fake.Bench()
     with fake.shown(bench) as page:
-        for t_s in (1.3, 1.4, 1.5):
+        for points, t_s in enumerate((1.3, 1.4, 1.5), 1):
             bench.now.t_s = t_s
-            time.sleep(0.5)
-        assert len(page._scene._trail) >= 3
+            wait_for(lambda points=points: len(page._scene._trail) > points)
         bench.now.t_s = 0.0
-        time.sleep(0.5)
-        assert len(page._scene._trail) == 1
+        wait_for(lambda: len(page._scene._trail) == 1)

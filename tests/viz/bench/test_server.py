@@ -17,6 +17,7 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
 from spheretwin.viz.bench.event_handlers import LATEST_INTERVAL_S
 from tests.viz.bench import fake
+from tests.waiting import PATIENCE_S, wait_for
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -40,7 +41,7 @@ def port(page):
 
 def get(page, path="/", **headers):
     """Status, headers and body of an answer; a header that is given takes the place of the usual."""
-    connection = http.client.HTTPConnection("127.0.0.1", port(page), timeout=20)
+    connection = http.client.HTTPConnection("127.0.0.1", port(page), timeout=PATIENCE_S)
     connection.putrequest("GET", path, skip_host="Host" in headers)
     for name, value in headers.items():
         connection.putheader(name, value)
@@ -69,7 +70,7 @@ def is_alive(page):
     """Whether a page that comes now is served, and heard."""
     with socket_to(page) as visitor:
         visitor.send(msgspec.msgpack.encode(CAMERA))
-        return len(visitor.recv(timeout=20)) > 0
+        return len(visitor.recv(timeout=PATIENCE_S)) > 0
 
 
 def test_the_page_is_served_to_this_machine(page):
@@ -95,7 +96,7 @@ def test_a_foreign_origin_is_refused(page, origin):
 
 def test_the_own_origin_is_admitted(page):
     with socket_to(page, origin=f"http://localhost:{port(page)}") as visitor:
-        assert visitor.recv(timeout=20)
+        assert visitor.recv(timeout=PATIENCE_S)
 
 
 def test_a_page_of_another_version_is_refused(page, capfd):
@@ -184,7 +185,7 @@ def nearly(draw, handles):
 
 def read_for_ever(visitor):
     while True:
-        visitor.recv(timeout=20)
+        visitor.recv(timeout=PATIENCE_S)
 
 
 def handles(page):
@@ -200,13 +201,6 @@ def handle_of(page, label):
 
 def changed(name, **updates):
     return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": name, "updates": updates})
-
-
-def wait_for(condition):
-    until = time.monotonic() + 30  # a flood waits for its turn
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.01)
 
 
 def wait_until_all_is_heard(page, bench, visitor):
@@ -278,7 +272,7 @@ def test_fifty_pages_connect_and_disconnect(page):
     pages = [socket_to(page) for _ in range(50)]
     for visitor in pages:
         visitor.send(msgspec.msgpack.encode(CAMERA))
-    assert all(visitor.recv(timeout=30) for visitor in pages)
+    assert all(visitor.recv(timeout=PATIENCE_S) for visitor in pages)
     for visitor in pages[::2]:
         visitor.socket.shutdown(socket.SHUT_RDWR)  # as a process that is killed does
     assert is_alive(page)

@@ -22,6 +22,7 @@ from spheretwin.viz.recording.live import LIVE_RATE_Hz
 from spheretwin.viz.recording.reader import read
 from spheretwin.viz.recording.viewer_server import RECORDING
 from tests.browser import Browser, needs_a_browser
+from tests.waiting import wait_for
 
 CHANGES = {"plant.engine": "lagrangian", "duration": 1.5, "plant.modelling_error": 0.2}
 
@@ -109,10 +110,7 @@ def test_a_killed_run_leaves_no_server():
     asking(parts.geturl()).close()
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    until = time.monotonic() + 30
-    while marked(mark):
-        assert time.monotonic() < until, marked(mark)
-        time.sleep(0.01)
+    wait_for(lambda: not marked(mark))
     with socket.socket() as probe:
         assert probe.connect_ex((parts.hostname, parts.port)) != 0
 

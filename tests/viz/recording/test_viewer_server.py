@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ import pytest
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.viz.recording import viewer_server
 from spheretwin.viz.recording.viewer_server import FILES, HOST, INDEX, RECORDING, Broadcast, ViewerServer
+from tests.waiting import wait_for
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,4 @@ def test_the_program_ends_with_a_process_that_is_killed():
     assert program.exists()
     os.kill(process.pid, signal.SIGKILL)
     process.communicate()
-    until = time.monotonic() + 30
-    while program.exists():
-        assert time.monotonic() < until, "it goes on"
-        time.sleep(0.01)
+    wait_for(lambda: not program.exists())

@@ -1,12 +1,10 @@
 """Sweeps on a Ray cluster of two nodes: the same table, whatever happens to it on the way."""
 
-import contextlib
 import os
 import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -17,6 +15,7 @@ from spheretwin.study import journal
 from spheretwin.study.engines import engine, ray_cluster, ray_worker
 from spheretwin.study.study import Study, load
 from tests.package_copy import copy_package
+from tests.waiting import wait_for
 
 ROOT = Path(__file__).parents[4]
 
@@ -92,37 +91,24 @@ def test_the_table_is_that_of_the_local_engine(study, machines, wanted, tmp_path
     assert kept.name == next((wanted / "telemetry").iterdir()).name
 
 
-SLOWLY_s = 1.0
+def blocked_on(node_id, folder):
+    """Return a runner of batches that never ends on one node; others begin when that one is at work."""
 
-
-def slowly_in(folder):
-    """As a node runs a batch, but longer than it takes to kill it; a file says that one is at work."""
-
-    def slowly(job, numbers):
+    def run_unless_blocked(job, numbers):
         import time
 
         import ray
 
         from spheretwin.study.engines import ray_worker
 
-        at_work = folder / ray.get_runtime_context().get_node_id()
-        at_work.touch()
-        time.sleep(SLOWLY_s)  # in the process of a node
-        at_work.unlink()
+        is_blocked = ray.get_runtime_context().get_node_id() == node_id
+        if is_blocked:
+            (folder / "at_work").touch()
+        while is_blocked or not (folder / "at_work").exists():
+            time.sleep(0.01)
         return ray_worker.carried_out(job, numbers)
 
-    return slowly
-
-
-def has_just_begun(at_work):
-    """Whether a node is in the first half of what takes it so long, now or soon."""
-    until = time.monotonic() + 2 * SLOWLY_s
-    while time.monotonic() < until:
-        with contextlib.suppress(FileNotFoundError):
-            if time.time() - at_work.stat().st_mtime < SLOWLY_s / 2:
-                return True
-        time.sleep(0.02)
-    return False
+    return run_unless_blocked
 
 
 def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, tmp_path, monkeypatch):
@@ -131,13 +117,12 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
     monkeypatch.setattr(
         engine.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
     )
-    (folder := tmp_path / "at_work").mkdir()
-    monkeypatch.setattr(ray_worker, "carried_out", slowly_in(folder))
+    (node,) = machines.worker_nodes
+    monkeypatch.setattr(ray_worker, "carried_out", blocked_on(node.node_id, tmp_path))
     killed = []
 
     def kill(done, of):
-        node = next(iter(machines.worker_nodes), None)
-        if done >= of // 4 and not killed and has_just_begun(folder / node.node_id):
+        if done >= of // 4 and not killed:
             killed.append(done)
             machines.remove_node(node, allow_graceful=False)
 
@@ -256,8 +241,7 @@ def started(source, folder, *options):
     command = [sys.executable, "-c", program, "sweep", str(source), "--out", str(folder), "--engine", "ray"]
     going = subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True, start_new_session=True)
     path = folder / journal.NAME
-    while going.poll() is None and (not path.exists() or path.read_bytes().count(b"\n") <= 10):
-        time.sleep(0.02)
+    wait_for(lambda: going.poll() is not None or (path.exists() and path.read_bytes().count(b"\n") > 10))
     return going
 
 
