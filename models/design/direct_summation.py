@@ -119,7 +119,7 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
     for pole, polarity in zip(poles, actuator.pole_polarity, strict=True):
         near = np.arccos(np.clip(actuator.coil_axes @ pole, -1.0, 1.0)) < near_angle
         for coils, rule in ((near, quadrature.near), (~near, quadrature.far)):
-            magnet = _magnet(actuator, pole, float(polarity), rule.stacked)
+            magnet = pole_magnet(actuator.magnet, pole, float(polarity), rule.stacked)
             torque[coils] -= _torque_on_coils(magnet, actuator.coil_axes[coils], actuator.coil, rule)
     return torque[actuator.groups].sum(axis=1).T
 
@@ -189,8 +189,25 @@ def _standard(magnet: Magnet) -> Quadrature:
     return STANDARD if magnet.front_radius_m else FLAT
 
 
-def _magnet(actuator: Actuator, axis: Array, polarity: float, stacked: int) -> Any:
-    """Return a pole as homogeneously magnetised cylinders of magpylib, in the stator frame."""
+def pole_magnet(magnet: Magnet, axis: Array, polarity: float, stacked: int) -> Any:
+    """Return a pole as homogeneously magnetised cylinders of magpylib, in the stator frame.
+
+    Parameters
+    ----------
+    magnet : Magnet
+        Geometry and remanence.
+    axis : (3,) array
+        Unit vector from the joint centre to the pole.
+    polarity : float
+        1 if it is magnetised outward, -1 if inward.
+    stacked : int
+        Cylinders that stand for a ground magnet; a flat one is one cylinder.
+
+    Raises
+    ------
+    InputError
+        magpylib is not installed.
+    """
     try:
         from magpylib import Collection
         from magpylib.magnet import Cylinder
@@ -203,12 +220,12 @@ def _magnet(actuator: Actuator, axis: Array, polarity: float, stacked: int) -> A
 
     cylinders = [
         Cylinder(
-            polarization=(0.0, 0.0, polarity * actuator.magnet.remanence_T),
+            polarization=(0.0, 0.0, polarity * magnet.remanence_T),
             dimension=(2 * radius, top - bottom),
             position=0.5 * (top + bottom) * axis,
             orientation=Rotation.from_matrix(_frame(axis)),
         )
-        for radius, bottom, top in _cylinders(actuator.magnet, stacked)
+        for radius, bottom, top in _cylinders(magnet, stacked)
     ]
     return Collection(cylinders)
 
@@ -229,21 +246,43 @@ def _cylinders(magnet: Magnet, stacked: int) -> list[tuple[float, float, float]]
     return [(float(r), float(b), float(t)) for r, b, t in zip(edges[1:], lower, heights, strict=True)]
 
 
+def lorentz_force(magnet: Any, position: Array, element: Array) -> Array:
+    """Return the force of a magnet on elements of a conductor with one ampere, (n, 3) in N.
+
+    Parameters
+    ----------
+    magnet : source of magpylib
+        Source of the field.
+    position : (n, 3) array, m
+        Middles of the elements.
+    element : (n, 3) array, m
+        Their lengths along a positive current.
+    """
+    return np.asarray(np.cross(element, magnet.getB(position)))
+
+
 def _torque_on_coils(magnet: Any, axes: Array, coil: CoilGeometry, rule: Rule) -> Array:
     """Return the torque of a magnet on one ampere in each of k coils, about the joint centre: (k, 3), N·m."""
     turned = np.array([_frame(axis).T for axis in axes]).reshape(-1, 3, 3)
-    position, element = ((vectors @ turned).reshape(-1, 3) for vectors in _conductors(coil, rule))
+    position, element = ((vectors @ turned).reshape(-1, 3) for vectors in conductors(coil, rule))
     torque = np.empty_like(position)
     for start in range(0, len(position), BLOCK):
         block = slice(start, start + BLOCK)
-        force = np.cross(element[block], magnet.getB(position[block]))
+        force = lorentz_force(magnet, position[block], element[block])
         torque[block] = np.cross(position[block], force)
-    return torque.reshape(len(axes), len(_conductors(coil, rule)[0]), 3).sum(axis=1)
+    return torque.reshape(len(axes), len(conductors(coil, rule)[0]), 3).sum(axis=1)
 
 
 @lru_cache(maxsize=8)
-def _conductors(coil: CoilGeometry, rule: Rule) -> tuple[Array, Array]:
+def conductors(coil: CoilGeometry, rule: Rule) -> tuple[Array, Array]:
     """Return the conductor elements of a coil whose axis is z.
+
+    Parameters
+    ----------
+    coil : CoilGeometry
+        The coil.
+    rule : Rule
+        Points in its winding.
 
     Returns
     -------

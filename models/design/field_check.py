@@ -1,4 +1,4 @@
-"""Check of the torque matrix against the field of all poles on all windings, in random poses."""
+"""Check of the torque matrix: the field of all poles on all windings, and published numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.models.design import curve_check, direct_summation, geometry_check
+from spheretwin.models.design import curve_check, direct_summation, geometry_check, published_values
 from spheretwin.models.design.direct_summation import Comparison, Errors
 from spheretwin.models.design.pole_torque import compute_curve
 
@@ -59,7 +59,7 @@ class FieldVerdict(NamedTuple):
     @property
     def curve_is_of_another_geometry(self) -> bool:
         """True if the torque exceeds its bound and the curve alone differs as much from the geometry."""
-        torque, _ = self.checks
+        torque = self.checks[0]
         return not torque.ok and self.sources.curve_between_samples_of_peak > TORQUE_BOUND
 
 
@@ -69,7 +69,7 @@ def judge(
     seed: int = 0,
     track: Callable[[range], Iterable[int]] = iter,
 ) -> FieldVerdict:
-    """Compare G_t(q)·I with the exact field of every magnet on every winding.
+    """Compare G_t(q)·I with the field of every magnet on every winding, and the methods with literature.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def judge(
             curve_between_samples_of_peak=_curve_error(actuator),
             lookup_of_peak=curve_check.largest_lookup_error(actuator.torque_curve),
         ),
-        checks=[torque, quadrature],
+        checks=[torque, quadrature, *published_values.checks(actuator)],
         warnings=geometry_check.of_geometry(actuator),
     )
 

@@ -25,7 +25,7 @@ def compared(actuator):
 
 
 def torque_on_coils(actuator, pole, axes, rule):
-    magnet = direct_summation._magnet(actuator, pole, 1.0, rule.stacked)
+    magnet = direct_summation.pole_magnet(actuator.magnet, pole, 1.0, rule.stacked)
     return direct_summation._torque_on_coils(magnet, axes, actuator.coil, rule)
 
 
@@ -87,7 +87,7 @@ def test_a_stack_s_field_tends_to_that_of_the_body(actuator):
     coarse, fine = (drawn_body(magnet, n, n // 4).getB(points) for n in (48, 96))
     body = fine + (fine - coarse) / 3
     off = [
-        np.abs(direct_summation._magnet(actuator, z, 1.0, stacked).getB(points) - body).max()
+        np.abs(direct_summation.pole_magnet(actuator.magnet, z, 1.0, stacked).getB(points) - body).max()
         / np.abs(body).max()
         for stacked in (8, 16, 32)
     ]
@@ -116,7 +116,7 @@ def error_share(compared, actuator):
 
 def test_turns_have_their_length(actuator):
     coil = actuator.coil
-    position, element = direct_summation._conductors(coil, Rule(4, 4, 12))
+    position, element = direct_summation.conductors(coil, Rule(4, 4, 12))
     mean = (coil.inner_radius_m + coil.outer_radius_m) / 2
     assert_allclose(np.linalg.norm(element, axis=1).sum(), coil.turns * 2 * np.pi * mean, rtol=1e-12)
     assert_allclose(np.sum(element * position, axis=1), 0, atol=1e-15)

@@ -25,7 +25,8 @@ def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
     for band in verdict.by_tilt:
         assert band.median_relative_error <= band.largest_relative_error
         assert band.median_relative_error < 5e-4  # measured: 1.7e-4
-    torque, quadrature = verdict.checks
+    torque, quadrature, *published = verdict.checks
+    assert len(published) == 5
     assert torque.value == max(band.largest_error_of_largest_torque for band in verdict.by_tilt)
     assert torque.value < 1e-3  # measured: 2e-4
     assert quadrature.value == verdict.sources.quadrature_of_largest_torque

@@ -102,7 +102,7 @@ def test_computed_curve_is_written_and_judged(capsys, tmp_path):
     out = tmp_path / "curve.csv"
     code, text, err = here(capsys, "curve", "--out", out)
     assert (code, err) == (0, "")
-    assert "2 of 2 checks hold" in text
+    assert "7 of 7 checks hold" in text
     assert len(torque_curve.read(out).phi_rad) == 37
     code, text, err = here(capsys, "curve")
     assert (code, text) == (0, out.read_text())
@@ -148,7 +148,7 @@ def test_check_prints_a_table(capsys, coarse):
     assert (code, err) == (0, "")
     assert "0° to 12°" in out
     assert "Sources of the error" in out
-    assert "2 of 2 checks hold" in out
+    assert "7 of 7 checks hold" in out
 
 
 def test_check_finds_a_wrong_polarity(capsys, coarse, monkeypatch):
