@@ -1,10 +1,11 @@
-"""python-control's systems as laws and as linear models: in a process of its own, elsewhere than here.
+"""Systems of python-control as laws and as linear models, in a process in the root of the repository.
 
-Its name is that of a folder of this repository, which a Python that is started here finds first.
+Its name is that of a folder there, which Python finds first unless it leaves out the working folder (``-P``).
 """
 
 import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -12,6 +13,8 @@ import pytest
 from spheretwin import scenario
 from spheretwin.linear import linearise
 from spheretwin.models.base.errors import InputError
+
+ROOT = Path(__file__).parents[2]
 
 SCRIPT = """
 import control
@@ -98,8 +101,8 @@ np.testing.assert_allclose(run.telemetry["q_rad"][-1], [0.2, -0.1, 0.3], rtol=0.
 """
 
 
-def test_its_systems_are_laws_and_its_designs_run(tmp_path):
-    done = subprocess.run([sys.executable, "-c", SCRIPT], cwd=tmp_path, capture_output=True, text=True)
+def test_its_systems_are_laws_and_its_designs_run():
+    done = subprocess.run([sys.executable, "-P", "-c", SCRIPT], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
 

@@ -1,6 +1,7 @@
 """The command as its users meet it: a process, its exit code, its two streams."""
 
 import contextlib
+import hashlib
 import json
 import os
 import re
@@ -13,13 +14,15 @@ from pathlib import Path
 
 import pytest
 
+from spheretwin.models.base import cache
 from spheretwin.models.telemetry.table import read_parquet
+from tests.package_copy import INSTALLED_AS, ROOT
 from tests.waiting import PATIENCE_S
 
 COMMAND = [sys.executable, "-m", "spheretwin"]
 
 
-def spheretwin(*arguments):
+def run_command(*arguments):
     return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True)
 
 
@@ -41,7 +44,7 @@ def one_line(stderr):
 
 
 def test_run_prints_a_table_and_writes_its_files(tmp_path):
-    done = spheretwin(
+    done = run_command(
         "simulate", "nutation", "--duration", "0.5", "--telemetry", tmp_path / "n.parquet", "--record",
         tmp_path / "n.rrd",
     )  # fmt: skip
@@ -57,7 +60,7 @@ def test_run_prints_a_table_and_writes_its_files(tmp_path):
 
 
 def test_json_stands_alone_on_stdout():
-    done = spheretwin("simulate", "hold", "--json", "--controller.law", "pd", "--duration", "0.2")
+    done = run_command("simulate", "hold", "--json", "--controller.law", "pd", "--duration", "0.2")
     assert done.returncode == 0
     figures = json.loads(done.stdout)
     assert figures["status"] == "completed"
@@ -71,7 +74,7 @@ def test_json_stands_alone_on_stdout():
 def test_same_command_same_bytes_other_seed_other_bytes(tmp_path):
     def written(name, *flags):
         path = tmp_path / name
-        spheretwin("simulate", "nutation", "--duration", "0.3", "--telemetry", path, *flags)
+        run_command("simulate", "nutation", "--duration", "0.3", "--telemetry", path, *flags)
         return path.read_bytes()
 
     first = written("a.parquet", "--seed", "1")
@@ -82,7 +85,7 @@ def test_same_command_same_bytes_other_seed_other_bytes(tmp_path):
 def test_left_workspace_exits_1_and_keeps_the_run(tmp_path):
     path = tmp_path / "run.parquet"
     flags = ["--controller.law", "pd", "--disturbance.load", "5", "--telemetry", path, "--json"]
-    done = spheretwin("simulate", "sinusoid", *flags)
+    done = run_command("simulate", "sinusoid", *flags)
     assert done.returncode == 1
     assert json.loads(done.stdout)["status"] == "left_workspace"
     assert "left_workspace" in one_line(done.stderr)
@@ -194,9 +197,9 @@ def test_a_refused_process_says_so_on_one_line_and_exits_2(command, arguments):
 
 
 def test_help_lists_verbs_options_and_fields():
-    assert "simulate" in spheretwin("--help").stdout
-    assert "--out" in spheretwin("magnetics", "curve", "--help").stdout
-    fields = spheretwin("simulate", "tilt", "--help")
+    assert "simulate" in run_command("--help").stdout
+    assert "--out" in run_command("magnetics", "curve", "--help").stdout
+    fields = run_command("simulate", "tilt", "--help")
     assert fields.returncode == 0
     for flag in ("--record", "--controller.law", "--plant.modelling-error", "--trajectory.rate-rad-s"):
         assert flag in fields.stdout
@@ -214,12 +217,21 @@ def test_console_script_is_this_command():
     assert project["scripts"] == {"spheretwin": "spheretwin.cli:main"}
 
 
+def cache_of_one_run(folder):
+    """Cache that only one command writes: the same one for the same sources, beside the usual one if any."""
+    files = sorted(path for name in INSTALLED_AS for path in (ROOT / name).rglob("*.py"))
+    sources = b"".join(path.read_bytes() for path in files)
+    usual = cache.cache_folder()
+    return (usual.parent if usual else folder) / f"one-run-{hashlib.sha256(sources).hexdigest()[:16]}"
+
+
 def test_what_is_not_chosen_is_not_compiled(tmp_path):
     """The bounded allocation alone would take longer to compile than all the rest."""
-    environment = {**os.environ, "SPHERETWIN_CACHE_DIR": str(tmp_path / "cache")}
+    folder = cache_of_one_run(tmp_path)
+    environment = {**os.environ, "SPHERETWIN_CACHE_DIR": str(folder)}
     command = [*COMMAND, "simulate", "hold", "--duration", "0.01"]
     subprocess.run(command, env=environment, capture_output=True, check=True)
-    entries = [path.name for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    entries = [path.name for path in folder.rglob("*") if path.is_file()]
     assert any("allocate" in name or "allocation" in name for name in entries)
     assert any("mujoco_rotor" in name for name in entries)
     for part in ("bounded", "simplex", "plant-lagrangian"):
