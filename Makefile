@@ -13,9 +13,10 @@ demo: .venv/demo ## run the nutation under AFSM and leave a recording and its te
 	$(BIN)/spheretwin simulate nutation --record nutation.rrd --telemetry nutation.parquet
 	@echo "here:      $(BIN)/rerun nutation.rrd"
 
-# Tests of one file stay together: they share what they have computed.
-test: setup ## pass the tests, side by side
-	$(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile
+# Tests of one file stay together: they share results. The order of the files is that of tests/conftest.py.
+# Bytecode is written: hundreds of processes would compile the sources again.
+test: setup ## run the tests in parallel
+	PYTHONDONTWRITEBYTECODE= $(BIN)/pytest -rs --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: .venv-wheel/installed ## format, lint, types, import layers
 	$(WHEEL)/ruff format --check .

@@ -24,6 +24,23 @@ hypothesis.settings.register_profile("reproducible", derandomize=True, deadline=
 hypothesis.settings.load_profile("reproducible")
 
 
+LONG_FILES = (
+    "test_ray_cluster.py", "test_crosscheck.py", "test_adding.py", "test_cli.py", "test_page.py",
+)  # fmt: skip
+"""Files of few and long tests. They begin first, so that at the end no worker waits for another."""
+
+
+def pytest_collection_modifyitems(items):
+    order = {name: place for place, name in enumerate(LONG_FILES)}
+    items.sort(key=lambda item: order.get(item.path.name, len(order)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """Return one worker more than there are cores: tests that wait for processes leave a core free."""
+    return (os.cpu_count() or 1) + 1
+
+
 @pytest.fixture(scope="session")
 def actuator() -> actuators.Actuator:
     return actuators.load()
