@@ -195,8 +195,8 @@ class Run:
         return f"{self.scenario.name} under {law}, {self.status} after {simulated_s:g} s"
 
     def _rows(self) -> list[tuple[str, str]]:
-        """Metrics as text, those of several axes by the names of the hinges."""
-        return [(name, _text(value)) for name, value in self.figures.items() if value is not None]
+        """Return the metrics that have a value as text, those of several axes by the names of the hinges."""
+        return [(name, _text(value)) for name, value in self.figures.items() if _has_value(value)]
 
     def _columns(self) -> list[tuple[str, Any]]:
         """Every number of every signal but time, by name and label."""
@@ -217,9 +217,15 @@ class Run:
         return sorted([*lines, *FaultMessages().of(self.telemetry)] if len(self.telemetry) else lines)
 
 
+def _has_value(value: Any) -> bool:
+    return any(entry is not None for entry in value) if isinstance(value, list) else value is not None
+
+
 def _text(value: Any) -> str:
+    if value is None:
+        return "none"
     if isinstance(value, list) and len(value) == len(ANGLES):
-        return ", ".join(f"{axis} {_text(each)}" for axis, each in zip(ANGLES, value, strict=True))
+        return ", ".join(f"{axis} {_text(entry)}" for axis, entry in zip(ANGLES, value, strict=True))
     return f"{value:.4g}" if isinstance(value, float) and math.isfinite(value) else str(value)
 
 

@@ -27,21 +27,21 @@ def overview(table: Table, title: str) -> Figure:
     figure = Figure(figsize=(WIDTH_in, 6.0), layout="constrained")
     angles, errors, currents = figure.subplots(3, 1, sharex=True)
     for i, (name, colour) in enumerate(zip(ANGLES, AXES, strict=True)):
-        angles.plot(
-            *_decimated(table, np.degrees(table["q_rad"][:, i])), color=colour, label=name, linewidth=1.1
-        )
+        angle = _decimated(table, np.degrees(table["q_rad"][:, i]))
+        error = _decimated(table, 1e3 * table["error_rad"][:, i])
+        angles.plot(*angle, color=colour, label=name, linewidth=1.1)
+        errors.plot(*error, color=colour, linewidth=1.1)
+    for i in range(len(ANGLES)):
         reference = _decimated(table, np.degrees(table["q_ref_rad"][:, i]))
-        label = "reference" if i == 0 else None
+        label = None if i else "references"
         angles.plot(*reference, color=INK, label=label, linewidth=0.7, linestyle=(0, (4, 3)))
-        errors.plot(
-            *_decimated(table, 1e3 * table["error_rad"][:, i]), color=colour, label=name, linewidth=1.1
-        )
     largest = np.abs(table["current_A"]).max(axis=1)
-    currents.plot(*_decimated(table, largest), color=INK, label="largest of all groups", linewidth=1.1)
-    for panel, heading in ((angles, "angle,\n°"), (errors, "error,\nmrad"), (currents, "current,\nA")):
+    currents.plot(*_decimated(table, largest), color=INK, linewidth=1.1)
+    for panel, heading in ((angles, "angle, °"), (errors, "error, mrad"), (currents, "largest current, A")):
         plain(panel, heading)
-        panel.legend(loc="upper right", fontsize="small", ncols=4)
-    angles.set_title(title, fontsize="medium")
+    figure.suptitle(title, fontsize="medium")
+    lines, labels = angles.get_legend_handles_labels()  # references last
+    figure.legend(lines, labels, loc="outside lower left", ncols=4, frameon=False, fontsize="small")
     currents.set_xlabel("time, s")
     return figure
 
