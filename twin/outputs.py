@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-import math
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -40,17 +38,6 @@ def check(paths: list[Path]) -> None:
         check_writable(path)
     if len({path.resolve() for path in paths}) < len(paths):
         raise InputError(f"output: expected a separate path for each file, received {paths[0]} twice")
-
-
-def rate_Hz(text: str) -> float:
-    """Return a rate from the command line, Hz."""
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = math.nan
-    if not 0 < rate < math.inf:
-        raise argparse.ArgumentTypeError(f"expected a number of Hz above 0, received {text}")
-    return rate
 
 
 def check_rate(rate: float | None, record: Path | None, period_s: float) -> None:

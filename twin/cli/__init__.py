@@ -9,12 +9,11 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from importlib import import_module
 from importlib.metadata import version
 from itertools import pairwise
-from typing import NoReturn
 
-from spheretwin.cli import bench, crosscheck, magnetics, reproduce, review, simulate, sweep
-from spheretwin.cli import review as recover
+from spheretwin.cli.options import Parser
 from spheretwin.models.base.errors import (
     InputError,
     SpheretwinError,
@@ -26,6 +25,18 @@ from spheretwin.models.base.errors import (
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
+VERBS = {
+    "simulate": "run a scenario",
+    "bench": "drive the running twin from a browser",
+    "crosscheck": "compare the engine with the Lagrangian and Pinocchio",
+    "reproduce": "run the experiments of the paper and compare the results with the paper",
+    "sweep": "run a study: many runs, one table",
+    "review": "review runs from their telemetry or recordings",
+    "recover": "recover a complete file from a killed run",
+    "magnetics": "analyse the magnetic model",
+}
+"""Verbs: modules of this folder, and their help. A module is imported only if its verb is called."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; return the exit code."""
@@ -36,9 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")  # a terminal without Greek letters
     try:
         given = _plain(sys.argv[1:] if arguments is None else arguments)
-        options, rest = _parser().parse_known_args(given)
+        options, rest = _parser(given).parse_known_args(given)
+        options.fields = rest
         _check_flags(given, options)
-        succeeded = options.run(options, rest)
+        succeeded = options.run(options)
         sys.stdout.flush()
     except InputError as error:
         return _refused(f"{error}", BAD_INPUT)
@@ -73,7 +85,12 @@ def _plain(arguments: Sequence[str]) -> Sequence[str]:
 
 
 def _check_flags(arguments: Sequence[str], options: argparse.Namespace) -> None:
-    """Refuse a flag that is given twice, unless it is a list, and an empty value of a verb's own flag."""
+    """Refuse an unknown argument, a flag that is given twice, unless it is a list, and an empty value."""
+    if options.fields and not options.has_fields:
+        *names, last = options.parser.expected
+        raise InputError(
+            f"command line: expected {', '.join(names)} or {last}, received {' '.join(options.fields)}"
+        )
     if getattr(options, "help", False):
         return
     flags = [argument.partition("=")[0].replace("_", "-") for argument in arguments if argument[:2] == "--"]
@@ -96,27 +113,16 @@ def _discard_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-class _Parser(argparse.ArgumentParser):
-    """Parser with the messages of the package: one line, exit code 2."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"command line: {message}")
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="spheretwin",
-        description="Digital twin of a permanent-magnet spherical actuator.",
-        allow_abbrev=False,
-    )
+def _parser(arguments: Sequence[str]) -> Parser:
+    """Return the parser of the command, with the arguments of the verb that is called."""
+    parser = Parser(prog="spheretwin", description="Digital twin of a permanent-magnet spherical actuator.")
     parser.add_argument("--version", action="version", version=f"spheretwin {version('spheretwin')}")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    simulate.add_to(verbs)
-    bench.add_to(verbs)
-    crosscheck.add_to(verbs)
-    reproduce.add_to(verbs)
-    sweep.add_to(verbs)
-    review.add_review(verbs)
-    recover.add_recover(verbs)
-    magnetics.add_to(verbs)
+    # `simulate` replaces the option --help by its own.
+    parsers = {
+        name: verbs.add_parser(name, help=text, conflict_handler="resolve") for name, text in VERBS.items()
+    }
+    called = next((argument for argument in arguments if not argument.startswith("-")), None)
+    if called in parsers:
+        import_module(f"spheretwin.cli.{called}").declare(parsers[called])
     return parser

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import math
 import shlex
 import sys
 import warnings
 import webbrowser
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -27,6 +26,7 @@ from spheretwin.bench import Bench
 from spheretwin.bench.modes import Limits
 from spheretwin.bench.operators import GONE_s, Operators
 from spheretwin.cli.common import interruptible
+from spheretwin.cli.options import Parser, number, whole
 from spheretwin.control.laws import LAWS
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models.base.errors import InputError
@@ -224,25 +224,18 @@ LARGEST_PORT = 65_535
 SILENCE_S = 10.0
 
 
-def add_to(verbs: Any) -> None:
-    """Add the verb to the command's parser."""
-    parser = verbs.add_parser(
-        "bench",
-        help="drive the running twin from a browser",
-        description="Drive the running twin from a browser. Any field of the scenario is a flag",
-        usage="spheretwin bench [SCENARIO] [options] [--section.field VALUE ...]",
-        allow_abbrev=False,
-    )
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = "Drive the running twin from a browser. Any field of the scenario is a flag"
+    parser.usage = "spheretwin bench [SCENARIO] [options] [--section.field VALUE ...]"
     parser.add_argument(
         "scenario",
-        metavar="SCENARIO",
-        nargs="?",
         default=EXAMPLE,
         help=f"{', '.join(shipped())}, or a .toml file; {EXAMPLE} unless given",
     )
     parser.add_argument(
         "--port",
-        type=_port,
+        type=whole(LARGEST_PORT, first=0, name="a port"),
         default=PORT,
         metavar="P",
         help=f"port of the page, on 127.0.0.1; {PORT} unless given, 0 for any free port",
@@ -250,25 +243,24 @@ def add_to(verbs: Any) -> None:
     parser.add_argument("--no-browser", action="store_true", help="only print the address of the page")
     parser.add_argument(
         "--hold-after",
-        type=_seconds,
+        type=number("a time from 0 s on", lambda time_s: time_s >= 0),
         default=GONE_s,
         metavar="S",
         help=f"time for which the twin continues after its page is closed; {GONE_s:g} s unless given",
     )
-    parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="record from the start")
-    parser.set_defaults(run=run)
+    parser.add_argument("--record", help="record from the start")
+    parser.set_run(run, has_fields=True)
 
 
-def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run(options: argparse.Namespace) -> bool:
     """Run the verb until it is interrupted; return True if all recordings are complete."""
     if find_spec("viser") is None:
         raise InputError(
             "bench: expected viser, which the extra bench installs: pip install 'spheretwin[bench]'"
         )
-    scenario = scenarios.load(options.scenario, reading.overrides(rest))
+    scenario = scenarios.load(options.scenario, reading.overrides(options.fields))
     outputs.check([options.record] if options.record else [])
-    # Slow to import, and only a bench needs it.
-
+    # viser may be missing.
     from spheretwin.viz.bench import server
     from spheretwin.viz.bench.page import Page
 
@@ -287,22 +279,6 @@ def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
             webbrowser.open(page.address)
         page.show(stop_requested)
     return _report(bench)
-
-
-def _port(text: str) -> int:
-    if not (text.isascii() and text.isdecimal()) or len(text) > 5 or int(text) > LARGEST_PORT:
-        raise argparse.ArgumentTypeError(f"expected a port from 0 to {LARGEST_PORT}, received {text}")
-    return int(text)
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not 0 <= seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"expected a time from 0 s on, received {text}")
-    return seconds
 
 
 def _record(bench: Bench, recording: Path | None) -> None:

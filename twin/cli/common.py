@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import json
 import math
@@ -35,15 +34,6 @@ def warn(lines: Iterable[str]) -> None:
 def warn_about_model(path: Path) -> None:
     """Print the warnings of the engine about a model file."""
     warn(mjcf.read(path).warnings)
-
-
-def add_verbose(parser: argparse.ArgumentParser) -> None:
-    """Add the flag of the verbs that have checks."""
-    parser.add_argument(
-        "--verbose",
-        action="store_true",
-        help="also print what each check compares, and the reason of its bound",
-    )
 
 
 def write_text(path: Path, text: str) -> None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
-from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from spheretwin.cli.common import add_verbose, print_json, report_broken, warn, warn_about_model, write_text
+from spheretwin.cli.common import print_json, report_broken, warn, warn_about_model, write_text
+from spheretwin.cli.options import Parser, number, whole
 from spheretwin.models import actuator as actuators
 from spheretwin.models import torque_curve
 from spheretwin.models.actuator import MJCF_PATH, TORQUE_CURVE_PATH
@@ -33,9 +32,8 @@ MOST_POSES = 10_000  # some four hours
 STEEPEST_DEG = 85.0
 
 
-def add_to(verbs: Any) -> None:
-    """Add the verb to the command's parser."""
-    parser = verbs.add_parser("magnetics", help="analyse the magnetic model", allow_abbrev=False)
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
     parts = parser.add_subparsers(metavar="PART", required=True)
     curve = _part(
         parts,
@@ -44,9 +42,9 @@ def add_to(verbs: Any) -> None:
         "Compute the torque curve f_t(φ) from the geometry of the model file, with magpylib; or compare"
         " finite-element or measured data with it.",
     )
-    curve.add_argument("--out", type=Path, metavar="FILE.csv", help="write the curve here, not to stdout")
+    curve.add_argument("--out", metavar="FILE.csv", help="write the curve here, not to stdout")
     curve.add_argument("--csv", type=Path, metavar="FILE.csv", help=f"check this {CURVE}")
-    curve.set_defaults(run=_run_curve)
+    curve.set_run(run_curve)
 
     check = _part(
         parts,
@@ -56,11 +54,17 @@ def add_to(verbs: Any) -> None:
         " (magpylib), in random poses and for random currents.",
     )
     _add_curve(check)
-    check.add_argument("--poses", type=_count, default=15, metavar="N", help="number of poses (default: 15)")
     check.add_argument(
-        "--seed", type=_seed, default=0, metavar="N", help="seed of poses and currents (default: 0)"
+        "--poses", type=whole(MOST_POSES), default=15, metavar="N", help="number of poses (default: 15)"
     )
-    check.set_defaults(run=_run_check)
+    check.add_argument(
+        "--seed",
+        type=whole(10**18, first=0),
+        default=0,
+        metavar="N",
+        help="seed of poses and currents (default: 0)",
+    )
+    check.set_run(run_check)
 
     capability = _part(
         parts,
@@ -70,49 +74,32 @@ def add_to(verbs: Any) -> None:
         " limit, the torque matrix's smallest singular value and condition number, and the copper loss.",
     )
     _add_curve(capability)
-    capability.add_argument("--out", type=Path, metavar="DIR", help="write figures into this folder")
+    capability.add_argument("--out", help="write figures into this folder")
     capability.add_argument(
-        "--need", type=_positive, metavar="NM", help="fail if less torque (N·m) is available at a pose"
+        "--need",
+        type=number("a number above 0", lambda torque: torque > 0),
+        metavar="NM",
+        help="fail if less torque (N·m) is available at a pose",
     )
     capability.add_argument(
         "--largest-tilt",
-        type=_tilt,
+        type=number(f"degrees from 0 to {STEEPEST_DEG:g}", lambda tilt: 0 <= tilt <= STEEPEST_DEG),
         default=LARGEST_TILT_DEG,
         metavar="DEG",
         help=f"largest tilt of the shaft, degrees (default: {LARGEST_TILT_DEG:g})",
     )
-    capability.set_defaults(run=_run_map)
+    capability.set_run(run_map)
 
 
-# Each part is imported when it runs: numba and scipy are slow to import.
-
-
-def _run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-
-    return run_curve(options, rest)
-
-
-def _run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-
-    return run_check(options, rest)
-
-
-def _run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-
-    return run_map(options, rest)
-
-
-def _part(parts: Any, name: str, summary: str, description: str) -> argparse.ArgumentParser:
-    part: argparse.ArgumentParser = parts.add_parser(
-        name, help=summary, description=description, allow_abbrev=False
-    )
-    part.add_argument("--mjcf", type=Path, default=MJCF_PATH, metavar="FILE.xml", help="model file")
-    part.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
-    add_verbose(part)
+def _part(parts: Any, name: str, summary: str, description: str) -> Parser:
+    part: Parser = parts.add_parser(name, help=summary, description=description)
+    part.add_argument("--mjcf", default=MJCF_PATH)
+    part.add_argument("--json", help="print the figures as JSON, alone on stdout")
+    part.add_argument("--verbose")
     return part
 
 
-def _add_curve(part: argparse.ArgumentParser) -> None:
+def _add_curve(part: Parser) -> None:
     part.add_argument(
         "--csv",
         type=Path,
@@ -122,50 +109,8 @@ def _add_curve(part: argparse.ArgumentParser) -> None:
     )
 
 
-def _count(text: str) -> int:
-    if not _digits(text) or not 1 <= int(text) <= MOST_POSES:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to {MOST_POSES}, received {text}")
-    return int(text)
-
-
-def _seed(text: str) -> int:
-    if not _digits(text):
-        raise argparse.ArgumentTypeError(f"expected a whole number from 0 to 10^18, received {text}")
-    return int(text)
-
-
-def _digits(text: str) -> bool:
-    return text.isdecimal() and len(text) <= 18
-
-
-def _positive(text: str) -> float:
-    value = _number(text)
-    if not (0 < value < math.inf):
-        raise argparse.ArgumentTypeError(f"expected a number above 0, received {text}")
-    return value
-
-
-def _tilt(text: str) -> float:
-    value = _number(text)
-    if not 0 <= value <= STEEPEST_DEG:
-        raise argparse.ArgumentTypeError(f"expected degrees from 0 to {STEEPEST_DEG:g}, received {text}")
-    return value
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-def run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run_check(options: argparse.Namespace) -> bool:
     """Run the part; return True if every bound is kept."""
-    if rest:
-        raise InputError(
-            "command line: expected --csv, --mjcf, --poses, --seed, --json or --verbose,"
-            f" received {' '.join(rest)}"
-        )
     actuator = actuators.load(options.mjcf, options.csv)
     verdict = field_check.judge(actuator, options.poses, options.seed, tracked("direct sums"))
     warn_about_model(options.mjcf)
@@ -186,12 +131,8 @@ def run_check(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     return report_broken("magnetics check", verdict.checks)
 
 
-def run_curve(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run_curve(options: argparse.Namespace) -> bool:
     """Run the part; return True if every bound is kept."""
-    if rest:
-        raise InputError(
-            f"command line: expected --out, --csv, --mjcf, --json or --verbose, received {' '.join(rest)}"
-        )
     if options.csv and options.out:
         raise InputError("command line: expected --out or --csv, received both")
     if options.csv:
@@ -265,13 +206,8 @@ def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
     return True  # user data has no bounds here
 
 
-def run_map(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run_map(options: argparse.Namespace) -> bool:
     """Run the part; return True if every bound is kept."""
-    if rest:
-        raise InputError(
-            "command line: expected --csv, --mjcf, --out, --need, --largest-tilt or --json,"
-            f" received {' '.join(rest)}"
-        )
     plots = _plots() if options.out else None
     actuator = actuators.load(options.mjcf, options.csv)
     if options.out:

@@ -6,10 +6,10 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from spheretwin.cli.common import print_json
+from spheretwin.cli.options import Parser, whole
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
@@ -27,38 +27,36 @@ SEEDS, MOST = 20, 1000
 ALL = "all"
 
 
-def add_to(verbs: Any) -> None:
-    """Add the verb to the command's parser."""
-    names = ", ".join(EXPERIMENTS)
-    parser = verbs.add_parser(
-        "reproduce",
-        help="run the experiments of the paper and compare the results with the paper",
-        description="Run the paper's experiments over several seeds: tables, figures, one page."
-        " Exit code 1 if a run ended unexpectedly.",
-        allow_abbrev=False,
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Run the paper's experiments over several seeds: tables, figures, one page."
+        " Exit code 1 if a run ended unexpectedly."
     )
-    parser.add_argument("names", metavar="NAME", nargs="+", help=f"{names}, or {ALL}")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write a page with figures into this folder")
-    parser.add_argument("--json", action="store_true", help="print the rows as JSON, alone on stdout")
+    parser.add_argument("names", metavar="NAME", nargs="+", help=f"{', '.join(EXPERIMENTS)}, or {ALL}")
+    parser.add_argument("--out", help="write a page with figures into this folder")
+    parser.add_argument("--json", help="print the rows as JSON, alone on stdout")
     parser.add_argument(
-        "--seeds", type=_count, default=SEEDS, metavar="N", help=f"runs of each case, {SEEDS} unless given"
+        "--seeds",
+        type=whole(MOST),
+        default=SEEDS,
+        metavar="N",
+        help=f"runs of each case, {SEEDS} unless given",
     )
-    parser.add_argument("--limit", type=_count, metavar="N", help="only the first N cases of each experiment")
+    parser.add_argument(
+        "--limit", type=whole(MOST), metavar="N", help="only the first N cases of each experiment"
+    )
     parser.add_argument(
         "--plant",
         choices=tuple(ENGINES),
         help="engine of rows that do not name one; lagrangian if the model allows it unless given, and a"
         " sample of the rows also on mujoco",
     )
-    parser.set_defaults(run=run)
+    parser.set_run(run)
 
 
-def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if every run ended as expected."""
-    if rest:
-        raise InputError(
-            f"command line: expected --out, --json, --seeds, --limit or --plant, received {' '.join(rest)}"
-        )
     plans = [
         planned(EXPERIMENTS[name], options.seeds, options.limit, options.plant)
         for name in _named(options.names)
@@ -149,9 +147,3 @@ def _print(chapters: Sequence[Chapter]) -> None:
             for table in section.tables:
                 title = f"{chapter.experiment.name}, {section.title}. {table.title}"
                 tables.print_rows(title, table.head, table.rows, table.texts)
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9 or not 1 <= int(text) <= MOST:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to {MOST}, received {text}")
-    return int(text)

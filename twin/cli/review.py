@@ -6,29 +6,24 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from spheretwin.analysis import comparison, recorded_run, tolerances
 from spheretwin.analysis.recorded_run import Reviewed
-from spheretwin.analysis.recovery import recover
 from spheretwin.analysis.review import Review, review
 from spheretwin.analysis.tolerances import Exceeded
 from spheretwin.cli.common import print_json, warn
+from spheretwin.cli.options import Parser
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS
-from spheretwin.viz.terminal import runs as reviews
 from spheretwin.viz.terminal import runs as tables
 
 
-def add_review(verbs: Any) -> None:
-    """Add the verb to the command's parser."""
-    parser = verbs.add_parser(
-        "review",
-        help="review runs from their telemetry or recordings",
-        description="Print facts, figures and events of runs from their files; with several runs also the"
-        " differences from the first. Exit code 1 if a run exceeds the tolerances.",
-        allow_abbrev=False,
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Print facts, figures and events of runs from their files; with several runs also the"
+        " differences from the first. Exit code 1 if a run exceeds the tolerances."
     )
     parser.add_argument(
         "runs",
@@ -58,15 +53,12 @@ def add_review(verbs: Any) -> None:
         metavar="DIR",
         help="draw all runs: PNG, SVG and one page with interactive plots, without viewer or network",
     )
-    parser.add_argument("--json", action="store_true", help="print the result as JSON, alone on stdout")
-    parser.set_defaults(run=run_review)
+    parser.add_argument("--json", help="print the result as JSON, alone on stdout")
+    parser.set_run(run)
 
 
-def run_review(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if all runs are within the tolerances, if any are given."""
-    if rest:
-        expected = "--tolerance, --export, --merge, --figures or --json"
-        raise InputError(f"command line: expected {expected}, received {' '.join(rest)}")
     _check(options)
     reviewed = review(*options.runs, tolerance=options.tolerance)
     runs, summaries, over = reviewed.runs, reviewed.figures, reviewed.exceeded
@@ -78,7 +70,7 @@ def run_review(options: argparse.Namespace, rest: Sequence[str]) -> bool:
     if options.json:
         _print_json(reviewed, held=options.tolerance is not None)
     else:
-        reviews.print_runs(summaries)
+        tables.print_runs(summaries)
         tables.print_written([path for path in (options.export, options.merge, page) if path])
     warn(f"{run.path} {NO_CHECKSUMS}" for run in runs if not run.checked)
     warn(_recovered(run) for run in runs if not run.whole)
@@ -141,34 +133,3 @@ def _first(places: Sequence[Exceeded]) -> str:
         f"{first.path}: {first.signal}{axis} leaves its tolerance first at {first.t_s:.6g} s,"
         f" by {first.by:.3g}{more}"
     )
-
-
-def add_recover(verbs: Any) -> None:
-    """Add the verb to the command's parser."""
-    parser = verbs.add_parser(
-        "recover",
-        help="recover a complete file from a killed run",
-        description="Recover a complete file from the partial telemetry or recording of a killed process.",
-        allow_abbrev=False,
-    )
-    parser.add_argument(
-        "file",
-        type=Path,
-        metavar="FILE",
-        help="partial file, or the intended name of the file: RUN.parquet, RUN.rrd",
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE", required=True, help="path of the complete file")
-    parser.set_defaults(run=run_recover)
-
-
-def run_recover(options: argparse.Namespace, rest: Sequence[str]) -> bool:
-    """Run the verb; return True if the file is written."""
-    if rest:
-        raise InputError(f"command line: expected FILE and --out, received {' '.join(rest)}")
-    check_writable(options.out)
-    recovered = recover(options.file, options.out)
-    print(f"recovered {recovered.rows} rows, {recovered.seconds:.3f} s of the run")
-    tables.print_written([options.out])
-    if not recovered.checked:
-        warn([f"{options.file} {NO_CHECKSUMS}"])
-    return True

@@ -15,6 +15,7 @@ import numpy as np
 from spheretwin import outputs, replay
 from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, warn
+from spheretwin.cli.options import Parser, number
 from spheretwin.loop import is_user_law
 from spheretwin.metrics import PlannedRun
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
@@ -97,22 +98,15 @@ class UserMetrics:
 EXAMPLE = "nutation"
 
 
-def add_to(verbs: Any) -> None:
-    """Add the verb to the command's parser."""
-    names = ", ".join(shipped())
-    parser = verbs.add_parser(
-        "simulate",
-        help="run a scenario",
-        description="Run a scenario. Any field of it is a flag: --controller.law pd --disturbance.load 1",
-        usage="spheretwin simulate SCENARIO [options] [--section.field VALUE ...]",
-        add_help=False,
-        allow_abbrev=False,
-    )
-    parser.add_argument("scenario", metavar="SCENARIO", nargs="?", help=f"{names}, or a .toml file")
-    parser.add_argument("--record", type=Path, metavar="FILE.rrd", help="write a Rerun recording")
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = "Run a scenario. Any field of it is a flag: --controller.law pd --disturbance.load 1"
+    parser.usage = "spheretwin simulate SCENARIO [options] [--section.field VALUE ...]"
+    parser.add_argument("scenario", help=f"{', '.join(shipped())}, or a .toml file")
+    parser.add_argument("--record", help="write a Rerun recording")
     parser.add_argument(
         "--record-rate",
-        type=outputs.rate_Hz,
+        type=number("a number of Hz above 0", lambda rate_Hz: rate_Hz > 0),
         metavar="HZ",
         help="rows per second of the recording, in addition to the extremes of any 20 s; every row unless"
         " given",
@@ -137,13 +131,14 @@ def add_to(verbs: Any) -> None:
         help="one more figure: a function of the whole run (`spheretwin.simulation.Run`) to what JSON"
         " holds; may be given again; the telemetry is kept in memory for it",
     )
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON, alone on stdout")
+    parser.add_argument("--json", help="print the figures as JSON, alone on stdout")
     parser.add_argument("-h", "--help", action="store_true", help="show this help and the scenario's fields")
-    parser.set_defaults(run=run, parser=parser)
+    parser.set_run(run, has_fields=True)
 
 
-def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if the run completed."""
+    rest: list[str] = options.fields
     if options.help:
         options.parser.print_help()
         scenario = scenarios.load(options.scenario or EXAMPLE, reading.overrides(rest))

@@ -6,12 +6,12 @@ import argparse
 import contextlib
 import shlex
 import sys
-from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from spheretwin.cli.common import interruptible, print_json
+from spheretwin.cli.options import Parser, whole
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
@@ -36,22 +36,20 @@ MOST_THREADS = 1024
 GO_ON = "sweep: finished rows are stored; the same command continues from there"
 
 
-def add_to(verbs: Any) -> None:
-    """Add the verb to the command's parser."""
-    parser = verbs.add_parser(
-        "sweep",
-        help="run a study: many runs, one table",
-        description="Run a study on all cores. Rows in its journal are not run again: an interrupted"
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Run a study on all cores. Rows in its journal are not run again: an interrupted"
         " study continues. Exit code 1 if it is not complete, or if a row ended as"
-        " failsafe or by an exception of a law or a metric.",
-        allow_abbrev=False,
+        " failsafe or by an exception of a law or a metric."
     )
     parser.add_argument("study", metavar="STUDY", help=f"{', '.join(shipped())}, or a .toml file")
+    parser.add_argument("--out", help="folder of journal and table; NAME_study unless given")
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder of journal and table; NAME_study unless given"
-    )
-    parser.add_argument(
-        "--threads", type=_threads, metavar="N", help="as many as there are cores unless given"
+        "--threads",
+        type=whole(MOST_THREADS),
+        metavar="N",
+        help="as many as there are cores unless given",
     )
     parser.add_argument(
         "--engine",
@@ -67,7 +65,7 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument(
         "--limit",
-        type=_count,
+        type=whole(),
         metavar="ROWS",
         help="run only the first rows; finished later rows stay in the table",
     )
@@ -77,19 +75,13 @@ def add_to(verbs: Any) -> None:
         action="store_true",
         help="tune the gains that the section [optimise] of the study names",
     )
-    parser.add_argument("--trials", type=_count, metavar="N", help="trials of each law, with --optimise")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON, alone on stdout")
-    parser.set_defaults(run=run)
+    parser.add_argument("--trials", type=whole(), metavar="N", help="trials of each law, with --optimise")
+    parser.add_argument("--json", help="print the result as JSON, alone on stdout")
+    parser.set_run(run)
 
 
-def run(options: argparse.Namespace, rest: Sequence[str]) -> bool:
+def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if all requested rows are finished and none has failed."""
-    if rest:
-        raise InputError(
-            "command line: expected --out, --engine, --address, --threads, --limit, --row, --optimise,"
-            " --trials or --json,"
-            f" received {' '.join(rest)}"
-        )
     study = load(options.study)
     if options.optimise:
         return _optimised(study, options)
@@ -237,15 +229,3 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
 
 def _pairs(printed: dict[str, Any]) -> list[tuple[str, ...]]:
     return [(name, str(value)) for name, value in printed.items()]
-
-
-def _threads(text: str) -> int:
-    if (count := _count(text)) > MOST_THREADS:
-        raise argparse.ArgumentTypeError(f"expected {MOST_THREADS} threads at most, received {count}")
-    return count
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or len(text) > 12 or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, received {text}")
-    return int(text)

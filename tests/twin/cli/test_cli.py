@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from spheretwin import cli
 from spheretwin.models.base import cache
 from spheretwin.models.telemetry.table import read_parquet
 from tests.package_copy import INSTALLED_AS, ROOT
@@ -241,6 +242,8 @@ def test_what_is_not_chosen_is_not_compiled(tmp_path):
 # What comes with an extra, and what takes long to import though a run needs nothing of it.
 NOT_FOR_A_RUN = (
     "matplotlib magpylib manifold3d trimesh ray optuna pinocchio control scipy.ndimage scipy.linalg rerun"
+    " viser websockets spheretwin.paper spheretwin.study spheretwin.analysis spheretwin.crosscheck"
+    " spheretwin.bench spheretwin.viz.bench spheretwin.viz.recording spheretwin.viz.comparison"
 )
 
 
@@ -253,3 +256,26 @@ def test_a_run_imports_nothing_that_it_does_not_need():
     )
     done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, cwd="/", check=False)
     assert done.stderr.splitlines()[-1] == "0 []"
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_the_command_alone_imports_no_verb(option):
+    script = (
+        "import sys; from spheretwin import cli;"
+        "\ntry: cli.main([sys.argv[1]])"
+        "\nexcept SystemExit: pass"
+        "\nverbs = {f'spheretwin.cli.{verb}' for verb in cli.VERBS};"
+        "\nsys.exit(str(sorted(({'numba', 'mujoco', 'pydantic'} | verbs) & set(sys.modules))))"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", script, option], capture_output=True, text=True, check=False
+    )
+    assert process.stderr == "[]\n"
+    assert "spheretwin" in process.stdout
+
+
+def test_every_verb_has_help_and_a_description():
+    for verb in cli.VERBS:
+        process = run_command(verb, "--help")
+        assert process.returncode == 0, process.stderr
+        assert process.stdout.startswith(f"usage: spheretwin {verb}")

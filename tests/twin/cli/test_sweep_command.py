@@ -80,14 +80,14 @@ def test_plants_that_differ_are_told_in_one_line(source, tmp_path, capsys, monke
     ("arguments", "told"),
     [
         (["papr"], "did you mean paper?"),
-        (["paper", "--threads", "0"], "expected a whole number from 1 on, received 0"),
-        (["paper", "--threads", "5000"], "expected 1024 threads at most, received 5000"),
-        (["paper", "--limit", "x"], "expected a whole number from 1 on, received x"),
+        (["paper", "--threads", "0"], "expected a whole number from 1 to 1024, received 0"),
+        (["paper", "--threads", "5000"], "expected a whole number from 1 to 1024, received 5000"),
+        (["paper", "--limit", "x"], "expected a whole number from 1 to 1000000000000, received x"),
         (["paper", "--row", "0", "--limit", "3"], "expected --row without --out, --threads or --limit"),
         (["paper", "--row", "0"], "expected the key of one of its rows, received 0"),
         (
             ["paper", "--disturbance.load", "1"],
-            "expected --out, --engine, --address, --threads, --limit, --row",
+            "expected STUDY, --out, --threads, --engine, --address, --limit, --row, --optimise, --trials or",
         ),
     ],
 )

@@ -239,7 +239,7 @@ BAD = {
     "with a row": (["tuning", "--optimise", "--row", "abc"], "expected --optimise without --row and --limit"),
     "with a limit": (["tuning", "--optimise", "--limit", "3"], "expected --optimise without --row"),
     "no gains": (["paper", "--optimise"], "study paper: expected [optimise] in a study that is tuned"),
-    "no number": (["tuning", "--optimise", "--trials", "0"], "expected a whole number from 1 on"),
+    "no number": (["tuning", "--optimise", "--trials", "0"], "expected a whole number from 1 to"),
 }
 
 

@@ -1,0 +1,39 @@
+"""``spheretwin recover FILE``: a complete file from the partial file of a killed process."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from spheretwin.analysis.recovery import recover
+from spheretwin.cli.common import warn
+from spheretwin.cli.options import Parser
+from spheretwin.models.base.files import check_writable
+from spheretwin.models.telemetry.checksums import NO_CHECKSUMS
+from spheretwin.viz.terminal import runs
+
+
+def declare(parser: Parser) -> None:
+    """Declare the arguments of the verb."""
+    parser.description = (
+        "Recover a complete file from the partial telemetry or recording of a killed process."
+    )
+    parser.add_argument(
+        "file",
+        type=Path,
+        metavar="FILE",
+        help="partial file, or the intended name of the file: RUN.parquet, RUN.rrd",
+    )
+    parser.add_argument("--out", metavar="FILE", required=True, help="path of the complete file")
+    parser.set_run(run)
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Run the verb; return True if the file is written."""
+    check_writable(options.out)
+    recovered = recover(options.file, options.out)
+    print(f"recovered {recovered.rows} rows, {recovered.seconds:.3f} s of the run")
+    runs.print_written([options.out])
+    if not recovered.checked:
+        warn([f"{options.file} {NO_CHECKSUMS}"])
+    return True
