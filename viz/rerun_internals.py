@@ -1,25 +1,43 @@
-"""Internals of Rerun: the framing of its files (RRF2), the pipe that writes them, and its program."""
+"""Internals of Rerun 0.41 that have no public API; `tests/viz/test_rerun_internals.py` reports a change.
+
+File format (RRF2)
+    Read to find the complete messages of a killed process, and to cut a live stream into messages. If it
+    changes, partial recordings cannot be recovered and a live view shows nothing.
+`rerun.blueprint.Blueprint._log_to_stream`
+    Overridden: layouts have no clock times, and their constant part is encoded once. If it changes, layouts
+    are sent complete and larger, or not at all.
+Program and files of the viewer
+    The program verifies damaged files in a separate process and contains the viewer's page. If its options,
+    its paths or the page change, damaged files may end the process, and a live view has no page, or one that
+    sends requests to other hosts.
+"""
 
 from __future__ import annotations
 
 import os
 import re
-import select
 import shutil
+import socket
 import struct
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+import urllib.error
+import urllib.request
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from io import FileIO
+from copy import copy
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from threading import Lock, Thread
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
+import pyarrow as pa
+import rerun as rr
+import rerun.blueprint as rrb
 import rerun_cli
+from rerun.chunk import Chunk
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 
@@ -154,91 +172,77 @@ def whole_messages(path: Path) -> Iterator[tuple[Path, Extent]]:
         yield copy, result
 
 
-PIPE_PATHS = Path("/dev/fd")
-"""Folder in which a pipe has a path, by its number; Windows has none, and Rerun writes files itself."""
-
-_BLOCK_BYTES = 1 << 20
-
-
-class FilePipe:
-    """Pipe whose content a thread writes to a file.
-
-    Rerun can write files itself, but after a full disk has ended its writer, it waits forever at the
-    next flush, and reports the cause to its own log only. With a pipe it is independent of the disk.
+class LogEncoder:
+    """Stream that encodes what is logged as chunks, which any number of recordings can send.
 
     Parameters
     ----------
-    path : Path
-        File to write.
-
-    Attributes
-    ----------
-    path : Path
-        Path at which Rerun writes to the pipe.
-    error : OSError or None
-        Error of writing or closing the file; later content is dropped.
-
-    Raises
-    ------
-    OSError
-        The file or the pipe cannot be opened.
+    index : rr.TimeColumn, optional
+        Time of what is not static.
     """
 
-    def __init__(self, path: Path) -> None:
-        file = path.open("wb", buffering=0)
-        try:
-            reading, self._writing = os.pipe()
-        except OSError:
-            file.close()
-            raise
-        self.path = PIPE_PATHS / str(self._writing)
-        self.error: OSError | None = None
-        self._block = Lock()
-        self._thread = Thread(target=self._copy, args=(reading, file), name="recording file", daemon=True)
-        self._thread.start()
+    def __init__(self, index: rr.TimeColumn | None = None) -> None:
+        self._index = index
+        self._entities: dict[tuple[str, bool], dict[rr.ComponentDescriptor, pa.Array]] = defaultdict(dict)
 
-    def drain(self, timeout_s: float) -> None:
-        """Wait until the present content of the pipe is in the file, or the time is over."""
-        import fcntl  # not on Windows, which has no such pipe
-        import termios
+    def log(self, entity: str, *values: Any, static: bool = False) -> None:
+        """Log values; a component that the entity has already is replaced."""
+        for value in values:
+            for batch in value if isinstance(value, list) else value.as_component_batches():
+                self._entities[entity, static][batch.component_descriptor()] = batch.as_arrow_array()
 
-        end = time.monotonic() + timeout_s
-        while time.monotonic() < end:
-            with self._block:
-                count = fcntl.ioctl(self._writing, termios.FIONREAD, b"\0" * 4)
-            if not any(count):
-                return
-            time.sleep(0.01)
+    def chunks(self) -> dict[tuple[str, bool], Chunk]:
+        """Return a chunk for each entity, by its path and whether it is static."""
+        return {entity: self._chunk(*entity, components) for entity, components in self._entities.items()}
 
-    def close(self) -> None:
-        """Wait until all that was written to the pipe is in the file."""
-        os.close(self._writing)
-        self._thread.join()
+    def changed(self, values: Mapping[str, Any]) -> dict[tuple[str, bool], Chunk]:
+        """Return chunks of entities with new values; their other components remain."""
+        encoder = LogEncoder(self._index)
+        for entity, value in values.items():
+            encoder._entities[entity, False] |= self._entities.get((entity, False), {})
+            encoder.log(entity, value)
+        return encoder.chunks()
 
-    def _copy(self, reading: int, file: FileIO) -> None:
-        with open(reading, "rb", buffering=0) as pipe:
-            try:
-                with file:
-                    while self._copy_block(pipe, file):
-                        pass
-            except OSError as error:
-                self.error = error
-                while pipe.read(_BLOCK_BYTES):  # else Rerun would wait for room in the pipe
-                    pass
-
-    def _copy_block(self, pipe: FileIO, file: FileIO) -> bool:
-        """Copy a block; False at the end of the pipe."""
-        select.select([pipe], [], [])
-        with self._block:  # content that is no longer in the pipe is in the file when this lock is released
-            block = pipe.read(_BLOCK_BYTES)
-            _write_all(file, block)
-        return bool(block)
+    def _chunk(
+        self, entity: str, static: bool, components: Mapping[rr.ComponentDescriptor, pa.Array]
+    ) -> Chunk:
+        columns = [
+            rr.ComponentColumn(descriptor, _Encoded(array), lengths=[len(array)])
+            for descriptor, array in components.items()
+        ]
+        return Chunk.from_columns(entity, [] if static or not self._index else [self._index], columns)
 
 
-def _write_all(file: FileIO, block: bytes) -> None:
-    rest = memoryview(block)
-    while rest:
-        rest = rest[file.write(rest) :]
+class _Encoded(NamedTuple):
+    """Encoded component."""
+
+    array: pa.Array
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return the array; Rerun calls this."""
+        return self.array
+
+
+class EncodedLayout(rrb.Blueprint):
+    """Layout that is encoded once, for many recordings.
+
+    Its rows have no clock times, which would be a quarter of its bytes.
+    """
+
+    def __init__(self, *parts: rrb.BlueprintPart) -> None:
+        super().__init__(*parts, auto_views=False, auto_layout=False)
+        self._encoder = LogEncoder(rr.TimeColumn("blueprint", sequence=[0]))
+        super()._log_to_stream(self._encoder)  # type: ignore[arg-type]
+        self._chunks = self._encoder.chunks()
+
+    def changed(self, values: Mapping[str, Any]) -> EncodedLayout:
+        """Return the layout with new values at some paths."""
+        layout = copy(self)
+        layout._chunks = self._chunks | self._encoder.changed(values)
+        return layout
+
+    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
+        stream.send_chunks(self._chunks.values())
 
 
 PROGRAM = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
@@ -281,3 +285,95 @@ def check_readable(path: Path, named: Path) -> None:
         raise InputError(
             f"recording {named}: expected one of a run, received one so damaged that Rerun crashes"
         )
+
+
+HOST = "127.0.0.1"
+INDEX = "/index.html"
+FILES = (INDEX, "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/apple-touch-icon.png")
+
+# The program is large, and has to be read from the disk first if the machine's cache is empty.
+_PATIENCE_S = 60.0
+
+# Without this, the viewer asks Rerun's server for the latest release, and reports what is opened.
+_GUARD = """<script>
+      const ask = window.fetch;
+      window.fetch = (what, options) =>
+        new URL(what.url ?? what, location).host === location.host
+          ? ask(what, options)
+          : Promise.resolve(new Response(null, { status: 204 }));
+    </script>
+    """
+_OUTSIDE = re.compile(r"<link\b[^>]*https://[^>]*>\s*")
+
+# Ends the program as soon as the process that needs its files ends, even by SIGKILL: its input ends then.
+_SUPERVISED = """
+import os, subprocess, sys, threading
+program = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
+threading.Thread(target=lambda: (os.read(0, 1), program.kill()), daemon=True).start()
+os._exit(program.wait() != 0)
+"""
+
+
+class Asset(NamedTuple):
+    """A file of the viewer."""
+
+    kind: str
+    """Its media type."""
+    content: bytes
+
+
+def read_assets() -> dict[str, Asset]:
+    """Return the files of the viewer by their paths; the program that contains them runs meanwhile.
+
+    Raises
+    ------
+    SpheretwinError
+        The program is missing or does not serve them.
+    """
+    if not PROGRAM.is_file():
+        raise SpheretwinError(f"viewer: expected Rerun's viewer at {PROGRAM}, received none")
+    port = _free_port()
+    # Without an address of data it would serve some itself.
+    options = ["--serve-web", "--bind", HOST, "--web-viewer-port", str(port), f"rerun+http://{HOST}:1/proxy"]
+    try:
+        with subprocess.Popen(
+            [sys.executable, "-I", "-S", "-c", _SUPERVISED, str(PROGRAM), *options],
+            env={**os.environ, "CI": "1", "RUST_LOG": "off"},  # in a CI it collects no statistics
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) as process:
+            assets = {path: _read(port, path, process) for path in FILES}
+            process.stdin.close()  # type: ignore[union-attr]
+    except OSError as error:
+        raise SpheretwinError(
+            f"viewer: expected the files of Rerun's viewer, {without_breaks(error)}"
+        ) from None
+    return {**assets, INDEX: _without_requests(assets[INDEX])}
+
+
+def _read(port: int, path: str, process: subprocess.Popen[bytes]) -> Asset:
+    """A file, as soon as the program answers."""
+    until = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            with urllib.request.urlopen(f"http://{HOST}:{port}{path}", timeout=_PATIENCE_S) as answer:
+                return Asset(answer.headers["Content-Type"], answer.read())
+        except urllib.error.HTTPError as error:
+            raise OSError(f"{path}: {error}") from None
+        except OSError:
+            if process.poll() is not None or time.monotonic() > until:
+                raise
+            time.sleep(0.01)
+
+
+def _without_requests(index: Asset) -> Asset:
+    """Return the page without fonts of other hosts, and with requests to this host only."""
+    text = _OUTSIDE.sub("", index.content.decode())
+    return index._replace(content=text.replace("<script>", f"{_GUARD}<script>", 1).encode())
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])

@@ -11,7 +11,7 @@ from spheretwin.viz import theme
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.scene3d import Frames, MovingActuator
-from spheretwin.viz.scene.meshes import WORLD, read_meshes
+from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import body_quaternions, shaft_tip
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ class Ghost(RecordingPart):
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the rotor's meshes."""
-        for entity, piece in read_meshes(self.subject.facts.mjcf).others.items():
+        for entity, piece in self.subject.meshes.others.items():
             if entity.startswith(f"{ROTOR}/"):
                 asset, *places = piece.archetypes()
                 tint = rr.Asset3D.from_fields(albedo_factor=[*self._colour, GHOST_ALPHA])
@@ -110,7 +110,7 @@ class Ghost(RecordingPart):
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
         new = self._frames.of(rows)
-        if np.any(new):
+        if len(new):
             pose = rr.Transform3D.columns(quaternion=body_quaternions(rows["q_rad"][new])["rotor"])
             recording.send_columns(ROTOR, time_index(rows["t_s"][new]), pose)
 
@@ -145,7 +145,7 @@ class Tip(RecordingPart):
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
         new = self._frames.of(rows)
-        if np.any(new):
+        if len(new):
             t_s, tips = rows["t_s"][new], shaft_tip(rows[self._signal][new], self.subject.actuator)
             if self._label:
                 send_point(recording, f"{self._entity}/point", t_s, tips)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 from typing import NamedTuple
 
-import rerun as rr
 import rerun.blueprint as rrb
 
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import ROTOR
-from spheretwin.viz.layout.view import EVENTS, STATES, TIMELINE
+from spheretwin.viz.layout.layout import blueprint
+from spheretwin.viz.layout.plots import time_axis, time_range
+from spheretwin.viz.layout.view import EVENTS, STATES
 from spheretwin.viz.layout.views import eye
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import TRAIL_S
@@ -78,32 +79,6 @@ def layout(view: ComparisonView) -> rrb.Blueprint:
     )
 
 
-def blueprint(contents: rrb.Container) -> rrb.Blueprint:
-    """Return the blueprint of a recording of several runs, which plays in a loop."""
-    return rrb.Blueprint(
-        contents,
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="all"),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
-    )
-
-
-def time_axis(duration_s: float) -> rrb.TimeAxis:
-    """Axis that shows all of some runs."""
-    boundary = rrb.TimeRangeBoundary
-    whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=duration_s))
-    return rrb.TimeAxis(view_range=whole)
-
-
-def trail_behind() -> rrb.VisibleTimeRanges:
-    """Return the time range of a path that is visible: its last seconds."""
-    boundary = rrb.TimeRangeBoundary
-    start, end = boundary.cursor_relative(seconds=-TRAIL_S), boundary.cursor_relative()
-    return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
-
-
 def _plots(view: ComparisonView, group: str) -> list[rrb.TimeSeriesView]:
     return [_plot(view, plot, legend=group == NAMED) for plot in view.plots if plot.group == group]
 
@@ -132,7 +107,7 @@ def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
         background=list(theme.BACKGROUND),
         line_grid=False,
         eye_controls=eye(view.size),
-        overrides={f"{tip}/path": trail_behind() for tip in tips},
+        overrides={f"{tip}/path": time_range(TRAIL_S) for tip in tips},
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.chunk import Chunk
 
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.table import Table
@@ -31,12 +32,11 @@ from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.plots import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import ScalarQuantity, scalar_quantities
+from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
-from spheretwin.viz.rerun_internals import PIPE_PATHS, FilePipe
-from spheretwin.viz.scene.meshes import read_meshes
 from spheretwin.viz.scene.static import size_of
 
 
@@ -60,6 +60,12 @@ class SubtreeStream:
     def send_columns(self, entity: str, indexes: Any, columns: Any) -> None:
         """Send many rows below the path."""
         self._recording.send_columns(f"{self._path}/{entity}", indexes, columns)
+
+    def send_chunks(self, chunks: Iterable[Chunk]) -> None:
+        """Send chunks below the path."""
+        self._recording.send_chunks(
+            chunk.with_entity_path(f"{self._path}/{chunk.entity_path.removeprefix('/')}") for chunk in chunks
+        )
 
     def flush(self) -> None:
         """Send pending data."""
@@ -128,7 +134,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
         Writing failed; the previous file is unchanged.
     """
     for subject in subjects:
-        read_meshes(subject.facts.mjcf)  # found missing before there is a file
+        _ = subject.meshes  # a missing one is reported before there is a file
     tables = [run.table for run in runs]
     quantities, leading = scalar_quantities(tables), leaders(tables)
     view = ComparisonView(

@@ -16,11 +16,12 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import send_line, send_path, send_point, style_path, style_point
-from spheretwin.viz.comparison.layout import blueprint, time_axis, trail_behind
 from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.comparison.runs import on_dark
+from spheretwin.viz.layout.layout import blueprint
+from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.scene.meshes import WORLD
-from spheretwin.viz.scene.motion import shaft_tip
+from spheretwin.viz.scene.motion import TRAIL_S, shaft_tip
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,10 @@ def _send_tip(
 
 
 def _layout(trajectories: Mapping[str, LawTrajectory]) -> rrb.Blueprint:
-    last_s, trail = max(float(trajectory.t_s[-1]) for trajectory in trajectories.values()), trail_behind()
+    last_s, trail = (
+        max(float(trajectory.t_s[-1]) for trajectory in trajectories.values()),
+        time_range(TRAIL_S),
+    )
     tips = rrb.Spatial3DView(
         origin=f"/{WORLD}",
         name="the shaft's tip under each law",

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import rerun as rr
 import rerun.blueprint as rrb
 
-from spheretwin.viz.layout import views
 from spheretwin.viz.layout.extents import Extents
 from spheretwin.viz.layout.plots import Plots
 from spheretwin.viz.layout.view import TIMELINE, View
-from spheretwin.viz.layout.views import VIEWS
+from spheretwin.viz.layout.views import VIEWS, run_line
+from spheretwin.viz.rerun_internals import EncodedLayout
 
 # The run in a line takes two lines of text.
 ROW_SHARES = (1, 10)
@@ -27,40 +26,42 @@ def layout(view: View, extents: Extents | None = None) -> rrb.Blueprint:
     extents : Extents, optional
         Extents of the run; ranges and titles follow from them.
     """
-    plots = Plots(view, extents)
-    tabs = [view_function(plots) for view_function in VIEWS.values()]
-    return _blueprint(rrb.Tabs(*tabs, active_tab=list(VIEWS).index(view.shown), name="views"), view)
+    encoded, plots = _encoded(view._replace(run=""))
+    return encoded.changed(plots.changes(extents)) if extents else encoded
 
 
 @lru_cache(maxsize=4)
+def _encoded(view: View) -> tuple[EncodedLayout, Plots]:
+    """Return the layout without extents, and its plots."""
+    plots = Plots(view)
+    tabs = [view_function(plots) for view_function in VIEWS.values()]
+    active = list(VIEWS).index(view.shown)
+    return _with_run_line(rrb.Tabs(*tabs, active_tab=active, name="views"), view), plots
+
+
 def opening_layout(view: View) -> rrb.Blueprint:
     """Blueprint of a recording that is still written.
 
     One that is watched has every view. A file has the one that is shown: a layout takes room, and when the
     run has ended, the complete one with its ranges replaces it.
     """
-    return layout(view) if view.live else _blueprint(VIEWS[view.shown](Plots(view, None)), view)
+    return layout(view) if view.live else _with_run_line(VIEWS[view.shown](Plots(view)), view)
 
 
-class _Small(rrb.Blueprint):
-    """Blueprint without the clock's time in each of its rows, which is a quarter of its bytes."""
-
-    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
-        stream.set_log_time_enabled(False)
-        super()._log_to_stream(stream)
+def _with_run_line(below: rrb.Container | rrb.View, view: View) -> EncodedLayout:
+    return blueprint(rrb.Vertical(run_line(), below, row_shares=ROW_SHARES), live=view.live)
 
 
-def _blueprint(below: rrb.Container | rrb.View, view: View) -> rrb.Blueprint:
-    return _Small(
-        rrb.Vertical(views.run_line(), below, row_shares=ROW_SHARES),
+def blueprint(contents: rrb.Container, *, live: bool = False) -> EncodedLayout:
+    """Return the blueprint of a recording, which plays in a loop or follows a run."""
+    return EncodedLayout(
+        contents,
         rrb.TimePanel(
             state="collapsed",
             timeline=TIMELINE,
-            play_state="following" if view.live else "playing",
-            loop_mode="off" if view.live else "all",
+            play_state="following" if live else "playing",
+            loop_mode="off" if live else "all",
         ),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
     )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
 
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint.archetypes import ViewBlueprint, ViewContents
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 
 from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
@@ -16,6 +19,7 @@ from spheretwin.viz.layout.view import (
     STATES,
     STYLES,
     TELEMETRY,
+    TIMELINE,
     VALUES,
     View,
     component,
@@ -44,6 +48,7 @@ def signal_style(signal: Signal) -> rr.SeriesLines:
     return _style(names, _colours(signal), _width(signal.name))
 
 
+@cache
 def quantity_style(quantity: Quantity) -> rr.SeriesLines:
     """Return names with units, colours and width of a derived quantity's lines."""
     names = _names(_short(quantity.name), quantity.labels, quantity.unit)
@@ -113,6 +118,20 @@ def quantity(of: Quantity) -> PlotLine:
     return PlotLine(derived(of.name), of.name)
 
 
+class Fit(NamedTuple):
+    """Properties of a plot that follow from the extents of a run."""
+
+    title: str
+    band: Range
+
+
+class _Plot(NamedTuple):
+    view: rrb.TimeSeriesView
+    contents: list[str]
+    fit: Callable[[Extents], Fit] | None
+    """None if title and range are known before the run."""
+
+
 class Plots:
     """Makes the plots of one layout.
 
@@ -120,12 +139,13 @@ class Plots:
     ----------
     view : View
         Properties of the run.
-    extents : Extents, optional
-        Extents of the run; without them, ranges follow the data.
     """
 
-    def __init__(self, view: View, extents: Extents | None) -> None:
-        self.view, self.extents = view, extents
+    def __init__(self, view: View) -> None:
+        self.view = view
+        self._plots: list[_Plot] = []
+        self._states: list[rrb.StateTimelineView] = []
+        self._squares: list[tuple[rrb.Spatial2DView, PlotChannel, float]] = []
 
     def about_zero(
         self,
@@ -142,7 +162,7 @@ class Plots:
         ----------
         what, unit : str
             Quantity and its unit.
-        *lines : Line
+        *lines : PlotLine
             The lines.
         least : float
             Half of the range at least.
@@ -156,20 +176,24 @@ class Plots:
         Plots of the other hinges have the same range, so that magnitudes can be compared. The title
         gives the range too: a low plot may have room for one number at its side.
         """
-        if self.extents is None:
-            return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        limit = self.extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
-        suffix = self.extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
-        reach = (1 + ROOM) * limit
-        return self._plot(f"{what} ±{number(limit)} {unit}{suffix}{key}", lines, axis, (-reach, reach))
+
+        def fit(extents: Extents) -> Fit:
+            limit = extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
+            suffix = extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
+            reach = (1 + ROOM) * limit
+            return Fit(f"{what} ±{number(limit)} {unit}{suffix}{key}", (-reach, reach))
+
+        return self._plot(f"{what} [{unit}]{key}", lines, axis, fit)
 
     def above_zero(self, what: str, unit: str, line: PlotLine, *, least: float) -> rrb.TimeSeriesView:
         """Make a plot of a quantity that is never negative, with the range of the settled run."""
-        if self.extents is None:
-            return self._plot(f"{what} [{unit}]", (line,), None, None)
-        limit = self.extents.limit(PlotChannel(line.name), least=least, above_zero=True)
-        suffix = self.extents.largest(limit, PlotChannel(line.name))
-        return self._plot(f"{what} [{unit}]{suffix}", (line,), None, (-ROOM * limit, (1 + ROOM) * limit))
+
+        def fit(extents: Extents) -> Fit:
+            limit = extents.limit(PlotChannel(line.name), least=least, above_zero=True)
+            suffix = extents.largest(limit, PlotChannel(line.name))
+            return Fit(f"{what} [{unit}]{suffix}", (-ROOM * limit, (1 + ROOM) * limit))
+
+        return self._plot(f"{what} [{unit}]", (line,), None, fit)
 
     def whole(
         self,
@@ -181,61 +205,99 @@ class Plots:
         key: str = "",
     ) -> rrb.TimeSeriesView:
         """Make a plot with the full range of some lines, at least twice `least`."""
-        if self.extents is None:
-            return self._plot(f"{what} [{unit}]{key}", lines, axis, None)
-        channels = [PlotChannel(line.name, axis) for line in lines]
-        low, high = self.extents.bounds(*channels)
-        title = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
-        return self._plot(title, lines, axis, self.extents.band(*channels, least=least))
+
+        def fit(extents: Extents) -> Fit:
+            channels = [PlotChannel(line.name, axis) for line in lines]
+            low, high = extents.bounds(*channels)
+            title = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
+            return Fit(title, extents.band(*channels, least=least))
+
+        return self._plot(f"{what} [{unit}]{key}", lines, axis, fit)
 
     def fixed(self, title: str, *lines: PlotLine, low: float, high: float) -> rrb.TimeSeriesView:
         """Make a plot with a range that is known before the run."""
-        return self._plot(title, lines, None, (low, high))
+        return self._plot(title, lines, None, None, rrb.ScalarAxis(range=(low, high)))
 
     def states(self, name: str = "states") -> rrb.StateTimelineView:
         """Make a timeline with the lanes of states."""
-        axis = self._time_axis()
-        return rrb.StateTimelineView(origin=f"/{STATES}", name=name, time_view=axis)
+        view = rrb.StateTimelineView(origin=f"/{STATES}", name=name, time_view=self._time_axis())
+        self._states.append(view)
+        return view
+
+    def square(self, view: rrb.Spatial2DView, channel: PlotChannel, least: float) -> rrb.Spatial2DView:
+        """Let a view show half of the range of a channel to all sides of zero."""
+        self._squares.append((view, channel, least))
+        return view
+
+    def changes(self, extents: Extents) -> dict[str, Any]:
+        """Return what the extents of a run change in the layout, by the path in the layout."""
+        changes: dict[str, Any] = {}
+        axis = None
+        if extents.ended_s is not None:
+            axis = time_axis(shown_until_s(self.view.duration_s, extents.ended_s))
+            changes |= {f"{view.blueprint_path()}/TimeAxis": axis for view in self._states}
+        for view, contents, fit in self._plots:
+            path = view.blueprint_path()
+            if fit:
+                title, band = fit(extents)
+                changes[path] = ViewBlueprint.from_fields(display_name=title)
+                changes[f"{path}/ScalarAxis"] = rrb.ScalarAxis(range=band)
+            if axis:
+                changes[f"{path}/TimeAxis"] = axis
+                changes[f"{path}/ViewContents"] = ViewContents(query=[*contents, f"/{ENDED}"])
+        for square, channel, least in self._squares:
+            size = extents.limit(channel, least=least) / 2
+            bounds = rrb.VisualBounds2D(x_range=[-size, size], y_range=[-size, size])
+            changes[f"{square.blueprint_path()}/VisualBounds2D"] = bounds
+        return changes
 
     def _plot(
         self,
         title: str,
         lines: tuple[PlotLine, ...],
         axis: int | None,
-        band: Range | None,
+        fit: Callable[[Extents], Fit] | None,
+        axis_y: rrb.ScalarAxis | None = None,
     ) -> rrb.TimeSeriesView:
         contents = list(dict.fromkeys(f"/{line.entity}" for line in lines))
-        if band and self.extents and self.extents.ended_s is not None:
-            contents.append(f"/{ENDED}")
         # Drawn in this order, as entities are in that of their names.
         names = sorted(line.name for line in lines if line.entity == TELEMETRY)
         signals = [rr.SeriesLines().visualizer(mappings=_mappings(name)) for name in names]
         one = [place == axis for place in range(len(ANGLES))]
-        return rrb.TimeSeriesView(
+        view = rrb.TimeSeriesView(
             origin="/",
             contents=contents,
             name=title,
             axis_x=self._time_axis(),
-            axis_y=rrb.ScalarAxis(range=band) if band else None,
+            axis_y=axis_y,
             plot_legend=_NO_LEGEND,
             defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
             overrides={f"/{TELEMETRY}": signals} if signals else None,
         )
+        self._plots.append(_Plot(view, contents, fit))
+        return view
 
     def _time_axis(self) -> rrb.TimeAxis | None:
-        """Return an axis over the planned time in a live view, or until after an early end.
+        """Return an axis over the planned time in a live view.
 
         Otherwise None: the axis is as long as the data, and needs no room in the file.
         """
-        if self.extents and self.extents.ended_s is not None:
-            last_s = shown_until_s(self.view.duration_s, self.extents.ended_s)
-        elif self.view.live:
-            last_s = self.view.duration_s
-        else:
-            return None
-        boundary = rrb.TimeRangeBoundary
-        whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=last_s))
-        return rrb.TimeAxis(view_range=whole)
+        return time_axis(self.view.duration_s) if self.view.live else None
+
+
+def time_axis(until_s: float) -> rrb.TimeAxis:
+    """Time axis from 0 to a time."""
+    boundary = rrb.TimeRangeBoundary
+    whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=until_s))
+    return rrb.TimeAxis(view_range=whole)
+
+
+def time_range(oldest_s: float, newest_s: float = 0.0) -> rrb.VisibleTimeRanges:
+    """Return the range of the data that a view shows, by their ages at the cursor."""
+    boundary = rrb.TimeRangeBoundary
+    start = boundary.cursor_relative(seconds=-oldest_s)
+    end = boundary.cursor_relative(seconds=-newest_s)
+    return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
 
 
 def _mappings(name: str) -> list[VisualizerComponentMapping]:

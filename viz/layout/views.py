@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.viz.layout.extents import PlotChannel
-from spheretwin.viz.layout.plots import PlotLine, Plots, quantity, signal
+from spheretwin.viz.layout.plots import PlotLine, Plots, quantity, signal, time_range
 from spheretwin.viz.layout.view import (
     CURRENT_BARS,
     CURRENT_MAP,
@@ -16,7 +16,6 @@ from spheretwin.viz.layout.view import (
     PHASE_PLANE,
     SCENARIO,
     SUMMARY,
-    TIMELINE,
 )
 from spheretwin.viz.quantities import (
     COPPER_LOSS,
@@ -31,7 +30,7 @@ from spheretwin.viz.quantities import (
     TIP_DISTANCE,
 )
 from spheretwin.viz.scene import meshes as scene
-from spheretwin.viz.scene.motion import SCALE, TRACES, TipTrace
+from spheretwin.viz.scene.motion import SCALE, TRACES
 
 LEAST_rad, LEAST_rad_s = 0.02, 0.05
 
@@ -97,22 +96,12 @@ def current_bars(plots: Plots) -> rrb.Spatial2DView:
 
 def phase_plane(plots: Plots) -> rrb.Spatial2DView:
     """Rate of the error over what of the sliding variable is the error's, with its last second."""
-    boundary = rrb.TimeRangeBoundary
-    trail = rrb.VisibleTimeRanges(
-        timeline=TIMELINE,
-        start=boundary.cursor_relative(seconds=-PHASE_TRAIL_S),
-        end=boundary.cursor_relative(),
-    )
-    bounds = None
-    if plots.extents:
-        size = plots.extents.limit(PlotChannel("sliding_s"), least=0.1) / 2
-        bounds = rrb.VisualBounds2D(x_range=[-size, size], y_range=[-size, size])
-    return rrb.Spatial2DView(
+    view = rrb.Spatial2DView(
         origin=f"/{PHASE_PLANE}",
         name="phase plane: ė up, s - ė right; line s = 0",
-        visual_bounds=bounds,
-        time_ranges=trail,
+        time_ranges=time_range(PHASE_TRAIL_S),
     )
+    return plots.square(view, PlotChannel(SLIDING), least=0.1)
 
 
 def log() -> rrb.TextLogView:
@@ -252,16 +241,7 @@ def actuator_view(size: float) -> rrb.Spatial3DView:
         name=f"actuator; {SCALE}",
         line_grid=False,
         eye_controls=eye(size),
-        overrides={f"/{trace.entity}": _ages(trace) for trace in TRACES},
-    )
-
-
-def _ages(trace: TipTrace) -> rrb.VisibleTimeRanges:
-    boundary = rrb.TimeRangeBoundary
-    return rrb.VisibleTimeRanges(
-        timeline=TIMELINE,
-        start=boundary.cursor_relative(seconds=-trace.oldest_s),
-        end=boundary.cursor_relative(seconds=-trace.newest_s),
+        overrides={f"/{trace.entity}": time_range(trace.oldest_s, trace.newest_s) for trace in TRACES},
     )
 
 

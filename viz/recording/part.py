@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, NamedTuple
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +19,7 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.view import CHECKSUM, OVERVIEW, TIMELINE, TOTAL, View
+from spheretwin.viz.scene.meshes import Meshes, read_meshes
 from spheretwin.viz.scene.static import size_of
 
 
@@ -29,7 +32,8 @@ class RowSet(Enum):
     """Rows that the recording keeps, whole; with a reduced rate they are known some seconds later."""
 
 
-class RecordingSubject(NamedTuple):
+@dataclass(frozen=True)
+class RecordingSubject:
     """Run to record, and options of the recording."""
 
     actuator: Actuator
@@ -45,6 +49,17 @@ class RecordingSubject(NamedTuple):
     """Identity of this recording."""
     rate_Hz: float | None = None
     """Rate of the rows that are kept besides the extremes; None for every row."""
+
+    @cached_property
+    def meshes(self) -> Meshes:
+        """Meshes of the model, which a run does not need.
+
+        Raises
+        ------
+        InputError
+            A mesh is missing or damaged.
+        """
+        return read_meshes(self.facts.mjcf)
 
     @property
     def view(self) -> View:
@@ -168,10 +183,16 @@ def no_vectors(rows: int, size: int) -> pa.Array:
     return pa.nulls(rows, pa.list_(pa.float64(), size))
 
 
+_STRIPS = {
+    2: rr.components.LineStrip2DBatch([]).as_arrow_array().type,
+    3: rr.components.LineStrip3DBatch([]).as_arrow_array().type,
+}
+
+
 def strips(segments: NDArray[np.float64]) -> pa.Array:
-    """Arrow form of equally long line strips (n, points, 3); Rerun's own conversion takes them one by one."""
-    kind = rr.components.LineStrip3DBatch([]).as_arrow_array().type
+    """Arrow form of equally long line strips (n, points, 2 or 3); Rerun's own conversion is slow."""
+    dimensions = segments.shape[2]
     flat = pa.array(segments.ravel().astype(np.float32))
-    points = pa.FixedSizeListArray.from_arrays(flat, type=kind.value_type)
+    points = pa.FixedSizeListArray.from_arrays(flat, type=_STRIPS[dimensions].value_type)
     starts = np.arange(len(segments) + 1, dtype=np.int32) * segments.shape[1]
-    return pa.ListArray.from_arrays(pa.array(starts), points, type=kind)
+    return pa.ListArray.from_arrays(pa.array(starts), points, type=_STRIPS[dimensions])

@@ -27,7 +27,7 @@ from spheretwin.viz.layout.view import (
     derived,
 )
 from spheretwin.viz.quantities import ERROR_ANGLE, Aggregation, QuantityRows, quantities_of
-from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
 from spheretwin.viz.recording.status import Summary
 
 PHASE_PLANE_RATE_Hz = 20.0
@@ -259,13 +259,10 @@ class Currents(RecordingPart):
 
     def _bars(self, share: Array) -> pa.Array:
         """A bar for each current, up from the middle for a positive one: a 2D view's y points down."""
-        ends = np.zeros((*share.shape, 2, 2), dtype=np.float32)
+        ends = np.zeros((*share.shape, 2, 2))
         ends[..., 0] = self._places()[:, None]
         ends[..., 1, 1] = -0.5 * share
-        kind = rr.components.LineStrip2DBatch([]).as_arrow_array().type
-        points = pa.FixedSizeListArray.from_arrays(pa.array(ends.ravel()), type=kind.value_type)
-        starts = pa.array(2 * np.arange(share.size + 1, dtype=np.int32))
-        return pa.ListArray.from_arrays(starts, points, type=kind)
+        return strips(ends.reshape(-1, 2, 2))
 
 
 def _packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:

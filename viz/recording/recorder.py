@@ -14,9 +14,9 @@ from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.viz.decimation import FirstAndExtremeRows, RowSelection
 from spheretwin.viz.layout.view import OVERVIEW
+from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.stream import Stream
-from spheretwin.viz.rerun_internals import PIPE_PATHS, FilePipe
 
 # Rerun keeps some bytes of each chunk until the end of a recording. Chunks therefore grow, up to this.
 MOST_ROWS = 12_288
@@ -92,8 +92,7 @@ class Recorder(Stream):
         return min(self.rows_handed_over // 4, MOST_ROWS)
 
     def send(self) -> None:
-        """Encode the recorded data now, in this thread, rather than all at the end."""
-        self.recording.flush()
+        """Leave the recorded data to Rerun's threads, which encode them meanwhile."""
 
     def complete(self) -> None:
         """Complete the file and give it its name.

@@ -24,7 +24,7 @@ from spheretwin.viz.scene.motion import (
     load_torque,
     shaft_tip,
 )
-from spheretwin.viz.scene.static import labels, log_static, size_of
+from spheretwin.viz.scene.static import labels, size_of, static_scene
 
 FRAME_RATE_Hz = 60.0
 
@@ -45,17 +45,17 @@ class Frames:
         self._rate_Hz = rate_Hz
         self._next = 0
 
-    def of(self, rows: Table) -> NDArray[np.bool_]:
-        """Return True for each row of a chunk that is drawn."""
+    def of(self, rows: Table) -> NDArray[np.intp]:
+        """Return the places of the rows of a chunk that are drawn."""
         frame = np.floor(rows["t_s"] * self._rate_Hz + 1e-6).astype(np.int64)
-        new = frame >= np.concatenate([[self._next], frame[:-1] + 1])
+        new = np.flatnonzero(frame >= np.concatenate([[self._next], frame[:-1] + 1]))
         self._next = max(self._next, int(frame[-1]) + 1)
-        return new & posed(rows)
+        return new[posed(rows["q_rad"][new])]
 
 
-def posed(rows: Table) -> NDArray[np.bool_]:
-    """Return True for each row that has a pose; the last of a run that diverged may have none."""
-    small: NDArray[np.bool_] = np.all(np.abs(rows["q_rad"]) < LARGEST_rad, axis=1)
+def posed(q: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return True for each pose; the last rows of a run that diverged may have none."""
+    small: NDArray[np.bool_] = np.all(np.abs(q) < LARGEST_rad, axis=1)
     return small
 
 
@@ -68,12 +68,14 @@ class MovingActuator(RecordingPart):
 
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log the static parts."""
-        log_static(recording, self.subject.actuator, self.subject.facts)
+        facts, payload = self.subject.facts, self.subject.facts.payload_kg > 0
+        scene = static_scene(self.subject.meshes, self.subject.actuator, facts.current_limit_A, payload)
+        recording.send_chunks(scene)
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
         new = self._frames.of(rows)
-        if not np.any(new):
+        if not len(new):
             return
         index = time_index(rows["t_s"][new])
         for body, quaternion in body_quaternions(rows["q_rad"][new]).items():
@@ -103,7 +105,7 @@ class Ending(RecordingPart):
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Keep the last pose; of a run that diverged, the last that is one."""
         self._t_s = float(rows["t_s"][-1])
-        poses = rows["q_rad"][posed(rows)]
+        poses = rows["q_rad"][posed(rows["q_rad"])]
         if len(poses):
             self._q_rad = poses[-1:]
 
@@ -151,7 +153,7 @@ class Torques(RecordingPart):
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the ticks that fall on a frame."""
         new = self._frames.of(rows)
-        if not np.any(new):
+        if not len(new):
             return
         q, load_Nm = rows["q_rad"][new], rows["disturbance_Nm"][new]
         torques = [rows["torque_Nm"][new]]
@@ -202,7 +204,7 @@ class Traces(RecordingPart):
         """Record the ticks that fall on a frame."""
         for trace, frames in self._frames.items():
             new = frames.of(rows)
-            if np.any(new):
+            if len(new):
                 self._send(recording, trace, rows["t_s"][new], rows[trace.signal][new])
 
     def _send(

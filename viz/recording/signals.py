@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import lru_cache
 
 import numpy as np
 import pyarrow as pa
@@ -143,10 +144,16 @@ class Signals(RecordingPart):
             return
         arrival = len(self._arrived)
         self._arrived.append(new)
-        styles = StructComponent({signal.name: _style(signal) for signal in new if signal.name != TIME})
-        style_batch = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
-        recording.log(TELEMETRY, [*signals_as_json(arrival, new), style_batch], static=True)
+        recording.log(TELEMETRY, _description(arrival, tuple(new)), static=True)
         recording.flush()  # before their rows: partial files describe their signals
+
+
+@lru_cache(maxsize=16)
+def _description(arrival: int, signals: tuple[Signal, ...]) -> list[rr.DescribedComponentBatch]:
+    """Return what readers and viewers need to know of signals that arrived together."""
+    styles = StructComponent({signal.name: _style(signal) for signal in signals if signal.name != TIME})
+    style_batch = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
+    return [*signals_as_json(arrival, signals), style_batch]
 
 
 def _values(rows: Table, signals: list[Signal], names: set[str]) -> StructComponent:

@@ -23,7 +23,6 @@ from spheretwin.viz.recording.plots import Currents, PhasePlane, Quantities
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
 from spheretwin.viz.recording.signals import ScenarioText, Signals
 from spheretwin.viz.recording.status import LimitLanes, Log, StateLanes
-from spheretwin.viz.scene.meshes import read_meshes
 
 PARTS: tuple[type[RecordingPart], ...] = (
     ScenarioText,
@@ -78,9 +77,7 @@ class Stream(ABC):
 
     def __init__(self, subject: RecordingSubject, row_selection: RowSelection) -> None:
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
-        read_meshes(
-            subject.facts.mjcf
-        )  # a run needs no mesh, and would find out only now that one is missing
+        _ = subject.meshes  # a run needs none; a missing one is reported before there is a file
         self.view = subject.view
         self.recording = rr.RecordingStream(application(self.view))
         self.recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
@@ -170,9 +167,8 @@ class Stream(ABC):
             if not self._waiting:
                 return
             waiting, self._waiting = self._waiting, []
-            rows = Table(waiting[0].signals, np.concatenate([table.values for table in waiting]))
-            self.rows_handed_over += len(rows)
-            self._submit(self._write, rows)
+            self.rows_handed_over += sum(map(len, waiting))
+            self._submit(self._write, waiting)
 
     def flush(self, timeout_s: float) -> None:
         """Record the rows that wait. For a process that ends at once: any thread may call it."""
@@ -201,7 +197,9 @@ class Stream(ABC):
             part.begin(self.recording)
         self.send()
 
-    def _write(self, rows: Table) -> None:
+    def _write(self, tables: list[Table]) -> None:
+        self.recording.flush()  # Rerun's threads have encoded the chunk before: no more than one waits
+        rows = Table(tables[0].signals, np.concatenate([table.values for table in tables]))
         self._write_selected(self._row_selection.add(rows))
         for part in self._parts:
             if part.rows == RowSet.ALL:
@@ -217,6 +215,7 @@ class Stream(ABC):
         for part in self._parts:
             part.close(self.recording)
         self.send()
+        self.recording.flush()
 
     def _write_selected(self, selected: list[Table]) -> None:
         for rows in selected:

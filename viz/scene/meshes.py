@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from collections import defaultdict
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -186,7 +187,8 @@ class Piece(NamedTuple):
         return one and np.allclose(self.translations, 0.0, rtol=0, atol=ROUNDING)
 
 
-class Meshes(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Meshes:
     """Meshes of a model."""
 
     coils: rr.Mesh3D | None

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
+from rerun.chunk import Chunk
 
 from spheretwin.models.actuator import Actuator
-from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.viz import theme
-from spheretwin.viz.scene.meshes import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROTOR_AXES, WORLD, read_meshes
+from spheretwin.viz.rerun_internals import LogEncoder
+from spheretwin.viz.scene.meshes import AXES, COILS, CURRENT_SCALE, PAYLOAD, ROTOR_AXES, WORLD, Meshes
 
 Array = NDArray[np.float64]
 
@@ -88,15 +90,16 @@ NAMED_AT = 1.15  # of the length: beyond the head
 ROTOR_AXES_HEIGHT, ROTOR_AXES_LENGTH_m = 0.6, 0.025
 
 
-def log_static(recording: rr.RecordingStream, actuator: Actuator, facts: RunFacts) -> None:
-    """Log the static parts: meshes, axes of both frames, the scale of the coils' colours."""
+@lru_cache(maxsize=4)
+def static_scene(meshes: Meshes, actuator: Actuator, current_limit_A: float, payload: bool) -> list[Chunk]:
+    """Return the static parts, encoded: meshes, axes of both frames, the scale of the coils' colours."""
+    recording = LogEncoder()
     recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    meshes = read_meshes(facts.mjcf)
     if meshes.coils:
         recording.log(COILS, meshes.coils, static=True)
     for entity, piece in meshes.others.items():
         recording.log(entity, *piece.archetypes(), static=True)
-    if facts.payload_kg > 0:
+    if payload:
         recording.log(PAYLOAD, _payload(actuator), static=True)
     size = size_of(actuator)
     at, length_m = size * np.array(AXES_AT_m), size * AXES_LENGTH_m
@@ -106,8 +109,9 @@ def log_static(recording: rr.RecordingStream, actuator: Actuator, facts: RunFact
     rotor_axes = axes(ROTOR_AXES_HEIGHT * actuator.shaft_tip_m, size * ROTOR_AXES_LENGTH_m)
     recording.log(ROTOR_AXES, rotor_axes, static=True)
     recording.log(CURRENT_SCALE, current_scale(size), static=True)
-    currents = current_scale_labels(facts.current_limit_A, size)
+    currents = current_scale_labels(current_limit_A, size)
     recording.log(f"{CURRENT_SCALE}/labels", currents, static=True)
+    return list(recording.chunks().values())
 
 
 def _payload(actuator: Actuator) -> rr.Cylinders3D:

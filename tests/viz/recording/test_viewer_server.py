@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from spheretwin.models.base.errors import SpheretwinError
-from spheretwin.viz.recording import viewer_server
-from spheretwin.viz.recording.viewer_server import FILES, HOST, INDEX, RECORDING, Broadcast, ViewerServer
+from spheretwin.viz import rerun_internals
+from spheretwin.viz.recording.viewer_server import RECORDING, Broadcast, ViewerServer
+from spheretwin.viz.rerun_internals import FILES, HOST, INDEX
 from tests.waiting import wait_for
 
 
@@ -81,22 +82,22 @@ def test_the_program_that_holds_the_files_keeps_nothing_of_its_own(served, home)
 
 
 def test_a_missing_program_is_reported(monkeypatch, tmp_path):
-    monkeypatch.setattr(viewer_server.rerun_cli, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(rerun_internals, "PROGRAM", tmp_path / "rerun")
     with pytest.raises(SpheretwinError, match="expected Rerun's viewer at"):
-        viewer_server.read_assets()
+        rerun_internals.read_assets()
 
 
 def test_a_program_that_ends_at_once_is_reported(monkeypatch, tmp_path):
     (program := tmp_path / "rerun").write_text("#!/bin/sh\nexit 1\n")
     program.chmod(0o755)
-    monkeypatch.setattr(viewer_server.rerun_cli, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(rerun_internals, "PROGRAM", tmp_path / "rerun")
     with pytest.raises(SpheretwinError, match="expected the files of Rerun's viewer"):
-        viewer_server.read_assets()
+        rerun_internals.read_assets()
 
 
 KILLED = """
 import subprocess, sys
-from spheretwin.viz.recording.viewer_server import _SUPERVISED
+from spheretwin.viz.rerun_internals import _SUPERVISED
 sleeper = [sys.executable, "-c", "import os, time; print(os.getpid(), flush=True); time.sleep(1000)"]
 subprocess.Popen([sys.executable, "-I", "-S", "-c", _SUPERVISED, *sleeper], stdin=subprocess.PIPE).wait()
 """
