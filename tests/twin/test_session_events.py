@@ -183,3 +183,11 @@ def test_events_are_checked_in_the_order_of_their_times():
     assert len(scenarios.load("hold", {**base, "event": [slope, law]}).event) == 2
     with pytest.raises(InputError, match=r"surface_slope.* as event\.1 sets it"):
         scenarios.load("hold", {**base, "event": [law | {"t_s": 0.3}, slope]})
+
+
+@pytest.mark.parametrize(("t_s", "tick"), [(0.01, 10), (0.0102, 11), (0.0108, 11)])
+def test_an_event_between_two_ticks_acts_at_the_later_one(t_s, tick):
+    event = {"t_s": t_s, "set": "disturbance.load", "value": 1.0}
+    with Session(scenarios.load("hold", {"event": [event]})) as session:
+        session.advance(20)
+        assert [change.tick for change in session.events] == [tick]

@@ -15,6 +15,7 @@ from spheretwin.study import journal
 from spheretwin.study.engines import engine, ray_cluster, ray_worker
 from spheretwin.study.study import Study, load
 from tests.package_copy import copy_package
+from tests.twin.study.cases import rows_of
 from tests.waiting import wait_for
 
 ROOT = Path(__file__).parents[4]
@@ -22,10 +23,10 @@ ROOT = Path(__file__).parents[4]
 STUDY = """
 name = "small"
 scenario = "sinusoid"
-samples = 300
+samples = 120
 telemetry = [7]
 [fields]
-duration = 0.5
+duration = 0.1
 hardware = "prototype"
 [[axis]]
 field = "plant.modelling_error"
@@ -38,7 +39,9 @@ kind = "values"
 values = [0.0, 1.0]
 """
 
-ROWS = 600
+ROWS = 240
+LIMIT = 60
+LONG_STUDY = STUDY.replace("samples = 120", "samples = 100_000")  # it does not end before it is stopped
 
 
 @pytest.fixture(scope="module")
@@ -80,15 +83,6 @@ def run(study, folder, machines, **options):
 
 def same_table(folder, wanted):
     return (folder / "table.parquet").read_bytes() == (wanted / "table.parquet").read_bytes()
-
-
-def test_the_table_is_that_of_the_local_engine(study, machines, wanted, tmp_path):
-    found = run(study, tmp_path, machines)
-    assert (found.rows, found.resumed) == (ROWS, 0)
-    assert 0 < found.startup_s < found.wall_s
-    assert same_table(tmp_path, wanted)
-    (kept,) = (tmp_path / "telemetry").iterdir()
-    assert kept.name == next((wanted / "telemetry").iterdir()).name
 
 
 def blocked_on(node_id, folder):
@@ -133,10 +127,13 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
     assert killed
     assert killed[0] < ROWS
     assert lost
-    assert found.rows == ROWS
+    assert (found.rows, found.resumed) == (ROWS, 0)
+    assert 0 < found.startup_s < found.wall_s
     lines = (tmp_path / "study" / journal.NAME).read_text().splitlines()
     assert len(lines) == 1 + ROWS  # its head, and each row once
     assert same_table(tmp_path / "study", wanted)
+    (stored,) = (tmp_path / "study" / "telemetry").iterdir()
+    assert stored.name == next((wanted / "telemetry").iterdir()).name
 
 
 def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
@@ -245,9 +242,18 @@ def started(source, folder, *options):
     return going
 
 
-def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, wanted, tmp_path):
-    source = tmp_path / "small.toml"
-    source.write_text(STUDY)
+def goes_on_locally(source, folder, before):
+    """Run the first rows of a study that was stopped: its results are kept, and the others are added."""
+    found = studies.run(str(source), folder / "out", limit=LIMIT)
+    assert found.resumed >= 10
+    assert (folder / "out" / journal.NAME).read_bytes().startswith(before)
+    studies.run(str(source), folder / "local", limit=LIMIT)
+    assert rows_of(folder / "out")[:LIMIT] == rows_of(folder / "local")
+
+
+def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(tmp_path):
+    source = tmp_path / "long.toml"
+    source.write_text(LONG_STUDY)
     going = started(source, tmp_path / "out", "--threads", "1")
     os.killpg(going.pid, signal.SIGINT)  # as a terminal does it, to all that it runs
     told = going.communicate()[1]
@@ -255,25 +261,17 @@ def test_a_cluster_of_its_own_is_interrupted_and_the_study_goes_on(study, wanted
     assert "the same command continues from there" in told
     assert "Traceback" not in told
     before = (tmp_path / "out" / journal.NAME).read_bytes()
-    found = studies.run(study, tmp_path / "out")
-    assert 10 <= found.resumed < ROWS
-    assert (tmp_path / "out" / journal.NAME).read_bytes().startswith(before)
-    assert same_table(tmp_path / "out", wanted)
+    goes_on_locally(source, tmp_path, before)
 
 
 # The last one: it leaves no cluster.
 def test_a_cluster_that_is_lost_is_told_of_in_one_line(machines, tmp_path):
     source = tmp_path / "long.toml"
-    source.write_text(STUDY.replace("samples = 300", "samples = 100_000"))  # not done before it is missed
+    source.write_text(LONG_STUDY)
     going = started(source, tmp_path / "out", "--threads", "1", "--address", machines.address)
     machines.head_node.kill_gcs_server(check_alive=False)
     told = going.communicate()[1]
     assert going.returncode == 1
     (line,) = told.splitlines()
     assert "expected the cluster to stay, received no answer from it any more" in line
-    before = (tmp_path / "out" / journal.NAME).read_bytes()
-    found = studies.run(str(source), tmp_path / "out", limit=60)
-    assert found.resumed >= 10
-    assert (tmp_path / "out" / journal.NAME).read_bytes().startswith(before)
-    studies.run(str(source), tmp_path / "local", limit=60)
-    assert same_table(tmp_path / "out", tmp_path / "local")
+    goes_on_locally(source, tmp_path, (tmp_path / "out" / journal.NAME).read_bytes())
