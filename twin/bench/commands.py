@@ -17,7 +17,7 @@ from spheretwin.bench.operators import Operators
 from spheretwin.bench.pace import FASTEST, SLOWEST
 from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.files import whole_file
-from spheretwin.outputs import OpenedFiles
+from spheretwin.outputs import Outputs
 from spheretwin.scenario.changes import FAULT, is_fixed
 from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_toml
@@ -43,16 +43,19 @@ def _restore(bench_state: BenchState, _: None, name: str) -> None:
 
 def _open_files(
     bench_state: BenchState, recording: str | None, telemetry: str | None
-) -> Callable[[], OpenedFiles]:
-    paths = [Path(path) if path else None for path in (recording, telemetry)]
-    return lambda: OpenedFiles(bench_state.driver.session, *paths)
+) -> Callable[[], Outputs]:
+    def open_files() -> Outputs:
+        paths = [Path(path) if path else None for path in (recording, telemetry)]
+        if not any(paths):
+            raise InputError("bench: expected a file to record into, received none")
+        return Outputs(bench_state.driver.session, *paths, first_tick=None)
+
+    return open_files
 
 
-def _record(
-    bench_state: BenchState, files: OpenedFiles, recording: str | None, telemetry: str | None
-) -> None:
+def _record(bench_state: BenchState, files: Outputs, recording: str | None, telemetry: str | None) -> None:
     if bench_state.recording.on or bench_state.driver.reason is not None:
-        files.discard()
+        files.close()
         raise InputError(
             "bench: expected keep before the next recording, received record"
             if bench_state.recording.on

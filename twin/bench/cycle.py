@@ -13,9 +13,9 @@ from typing import Any
 
 from spheretwin.bench.bench_state import BenchState, Player
 from spheretwin.bench.command_queue import Command, QueuedCommand, Ticket
+from spheretwin.bench.recording import import_writers
 from spheretwin.bench.status import BenchStatus, bench_status
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, one_line
-from spheretwin.outputs import import_writers
 
 
 def run(bench_state: BenchState, ticks: int) -> int:

@@ -3,13 +3,89 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from threading import Semaphore
 
 from spheretwin.bench.driver import Driver
 from spheretwin.faults.fault_injector import FaultMessages
+from spheretwin.models.base.errors import without_breaks
+from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.outputs import OpenedFiles, RecordingFiles
+from spheretwin.outputs import Outputs
 from spheretwin.provenance import change_text
 from spheretwin.session import Session
+
+# Chunks that may wait to be written; the loop waits for more, so that they do not accumulate in memory.
+PENDING_CHUNKS = 64
+
+
+def import_writers() -> None:
+    """Import the modules of a recording in advance: the import is slow and blocks the interpreter."""
+    for module in ("pyarrow.parquet", "spheretwin.viz.recording.recorder"):
+        import_module(module)
+
+
+class RecordingThread:
+    """Thread that writes the files of one recording, from the next tick on.
+
+    Parameters
+    ----------
+    files : Outputs
+        Opened, but not begun.
+    driver : Driver
+        Runs the session.
+    """
+
+    def __init__(self, files: Outputs, driver: Driver) -> None:
+        self.paths = tuple(str(path) for path in files.paths)
+        files.begin(driver.session.tick, driver.start_record)
+        self._files, self._sinks = files, files.sinks
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
+        self._room = Semaphore(PENDING_CHUNKS)
+        self.faults: list[str] = []
+        """Errors, one line each."""
+
+    def write(self, rows: Table) -> None:
+        """Write the rows of one chunk, which must not change afterwards."""
+        self._submit(lambda: [sink.write(rows) for sink in self._sinks])
+
+    def note(self, t_s: float, text: str) -> None:
+        """Note an event before the tick at `t_s`."""
+        self._submit(lambda: [sink.note(t_s, text) for sink in self._sinks])
+
+    def ending(self, session: Session) -> Callable[[Callable[[RecordingThread], None]], None]:
+        """Return a function that completes the files in the thread and then calls its argument."""
+        status = Status.COMPLETED if session.status == Status.RUNNING else session.status
+        facts = self._files.facts()
+
+        def complete(done: Callable[[RecordingThread], None]) -> None:
+            for sink in self._sinks:
+                sink.finish(status)
+            self.faults.extend(map(str, self._files.close(facts)))
+            done(self)
+
+        def end(done: Callable[[RecordingThread], None]) -> None:
+            self._submit(lambda: complete(done))
+            self._worker.shutdown(wait=False)
+
+        return end
+
+    def join(self) -> None:
+        """Wait until the files are complete."""
+        self._worker.shutdown()
+
+    def _submit(self, work: Callable[[], object]) -> None:
+        self._room.acquire()
+        self._worker.submit(self._perform, work)
+
+    def _perform(self, work: Callable[[], object]) -> None:
+        try:
+            work()
+        except Exception as error:  # of the disk, Arrow or Rerun: the run continues and the error is reported
+            self.faults.append(without_breaks(error) or type(error).__name__)
+        finally:
+            self._room.release()
 
 
 class Recording:
@@ -29,8 +105,8 @@ class Recording:
     def __init__(self, report: Callable[[str | None], None]) -> None:
         self._report = report
         self.completed_files: tuple[str, ...] = ()
-        self._active: RecordingFiles | None = None
-        self._completing: list[RecordingFiles] = []
+        self._active: RecordingThread | None = None
+        self._completing: list[RecordingThread] = []
         self.reset()
 
     @property
@@ -41,7 +117,7 @@ class Recording:
     @property
     def paths(self) -> tuple[str, ...]:
         """Files that are being written."""
-        return tuple(str(path) for path in self._active.paths) if self._active else ()
+        return self._active.paths if self._active else ()
 
     def reset(self) -> None:
         """Reset at the beginning of a run."""
@@ -51,10 +127,10 @@ class Recording:
         """Count the changes until now as written."""
         self._noted = len(session.journal), len(session.events)
 
-    def begin(self, files: OpenedFiles, driver: Driver) -> None:
+    def begin(self, files: Outputs, driver: Driver) -> None:
         """Write opened files from the next tick on."""
         self.note_changes(driver.session)
-        self._active = RecordingFiles(files, driver.session, driver.start_record)
+        self._active = RecordingThread(files, driver)
         self._completing.append(self._active)
 
     def write(self, rows: Table) -> None:
@@ -100,9 +176,8 @@ class Recording:
         for files in list(self._completing):
             files.join()
 
-    def _completed(self, files: RecordingFiles) -> None:
-        self.completed_files = tuple(str(path) for path in files.paths)
+    def _completed(self, files: RecordingThread) -> None:
+        self.completed_files = () if files.faults else files.paths
         if files.faults:
-            self.completed_files = ()
             self._report(files.faults[0])
         self._completing.remove(files)

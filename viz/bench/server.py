@@ -14,17 +14,22 @@ import http
 import io
 import logging
 import socket
-import threading
-from collections.abc import Callable, Iterator
-from typing import Annotated, Any
+from functools import partial
+from typing import Any
 
-import msgspec
 import viser
 import websockets.asyncio.server as servers
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from spheretwin.models.base.errors import InputError, without_breaks
+from spheretwin.viz.bench.viser_internals import (
+    SUBPROTOCOL,
+    ServerArguments,
+    is_page_message,
+    with_guard,
+    with_head,
+)
 
 HOST = "127.0.0.1"
 
@@ -39,19 +44,6 @@ POLICY = (
     "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval'; "
     "connect-src 'self' ws://{host} data: blob:; frame-ancestors 'none'; form-action 'none'"
 )
-
-# A key that is let go over a button would press it, and the space bar is STOP wherever it is pressed.
-# viser's camera listens to keys too, at the document, after its commands: an arrow moves the twin only.
-# Notifications are at the bottom, where they hide nothing.
-HEAD = """<style>.mantine-Notifications-root { top: auto !important; bottom: 8px !important; }</style>
-<script>
-for (const kind of ["keydown", "keyup"]) addEventListener(kind, (event) => {
-  if (event.code == "Space" && !/INPUT|TEXTAREA/.test(event.target.tagName)) event.preventDefault();
-}, true);
-document.documentElement.addEventListener("keydown", (event) => {
-  if (/^(Arrow|Key[WASDQE]$)/.test(event.code)) event.stopPropagation();
-});
-</script>"""
 
 
 def listen(port: int) -> socket.socket:
@@ -88,7 +80,8 @@ def serve(listening: socket.socket, title: str) -> viser.ViserServer:
     title : str
         Title of the page.
     """
-    with _with_guard(listening, title), contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
+    guard = partial(_ConnectionGuard, listening, title)
+    with with_guard(guard), contextlib.redirect_stdout(io.StringIO()):  # viser prints its address
         server = viser.ViserServer(host=HOST, port=listening.getsockname()[1], verbose=False)
     server.get_event_loop().set_exception_handler(_ignore_exception)
     return server
@@ -106,27 +99,19 @@ def address(server: viser.ViserServer) -> str:
 
 
 class _ConnectionGuard(servers.serve):
-    """Connection guard: replaces the function with which viser makes its server."""
+    """Connection guard: the server that viser starts in place of its own."""
 
-    def __init__(
-        self,
-        listening: socket.socket,
-        title: str,
-        handler: Any,
-        process_request: Callable[[Any, Request], Response | None],
-        subprotocols: Any,
-        select_subprotocol: Any,
-    ) -> None:
+    def __init__(self, listening: socket.socket, title: str, arguments: ServerArguments) -> None:
         port = listening.getsockname()[1]
         self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
-        self._title, self._serve_file = title, process_request
+        self._title, self._serve_file = title, arguments.process_request
         self._pages = 0
         super().__init__(
-            self._counted(handler),
+            self._counted(arguments.handler),
             sock=listening,
             process_request=self._answer,
-            subprotocols=subprotocols,
-            select_subprotocol=select_subprotocol,
+            subprotocols=arguments.subprotocols,
+            select_subprotocol=arguments.select_subprotocol,
             create_connection=_PageConnection,
             max_size=LARGEST_MESSAGE,
             compression=None,
@@ -162,7 +147,7 @@ class _ConnectionGuard(servers.serve):
 
     def _admission(self, request: Request) -> Response | None:
         """Return a refusal, or None if a socket is admitted: its page must have the version of the server."""
-        if request.headers.get_all("Sec-WebSocket-Protocol") != [f"viser-v{viser.__version__}"]:
+        if request.headers.get_all("Sec-WebSocket-Protocol") != [SUBPROTOCOL]:
             return _refusal(http.HTTPStatus.BAD_REQUEST)
         return _refusal(http.HTTPStatus.SERVICE_UNAVAILABLE) if self._pages >= MOST_PAGES else None
 
@@ -175,8 +160,7 @@ class _ConnectionGuard(servers.serve):
         if response is None or response.status_code != http.HTTPStatus.OK:
             return _refusal(http.HTTPStatus.NOT_FOUND)
         if response.headers["Content-Type"].startswith("text/html"):
-            head = f"<head><title>{self._title}</title>{HEAD}".encode()
-            response.body = response.body.replace(b"<title>Viser</title>", b"").replace(b"<head>", head, 1)
+            response.body = with_head(response.body, self._title)
             del response.headers["Content-Length"]
             response.headers["Content-Length"] = str(len(response.body))
         response.headers["Content-Security-Policy"] = POLICY.format(host=host)
@@ -187,7 +171,7 @@ class _ConnectionGuard(servers.serve):
 
 
 class _PageConnection(servers.ServerConnection):
-    """Socket of a page: it passes only messages of the forms below, at a limited rate."""
+    """Socket of a page: it passes only messages of the forms of a page, at a limited rate."""
 
     _due = 0.0
 
@@ -198,94 +182,8 @@ class _PageConnection(servers.ServerConnection):
             self._due = max(self._due + 1 / MOST_MESSAGES_PER_S, now - 1.0)
             if self._due > now:
                 await asyncio.sleep(self._due - now)
-            if isinstance(raw, bytes) and _is_page_message(raw):
+            if isinstance(raw, bytes) and is_page_message(raw):
                 return raw
-
-
-Name = Annotated[str, msgspec.Meta(max_length=256)]
-# Numbers of a page are finite.
-Number = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
-Two = tuple[Number, Number]
-Three = tuple[Number, Number, Number]
-Four = tuple[Number, Number, Number, Number]
-
-
-class _Message(msgspec.Struct, tag_field="type", forbid_unknown_fields=True):
-    pass
-
-
-class _Camera(_Message, tag="ViewerCameraMessage"):
-    wxyz: Four
-    position: Three
-    fov: Number
-    near: Number
-    far: Number
-    image_height: int
-    image_width: int
-    look_at: Three
-    up_direction: Three
-
-
-class _Value(msgspec.Struct, forbid_unknown_fields=True):
-    value: (
-        bool
-        | Number
-        | Annotated[str, msgspec.Meta(max_length=4096)]
-        | Annotated[list[Number], msgspec.Meta(max_length=3)]
-    )
-
-
-class _Update(_Message, tag="GuiUpdateMessage"):
-    uuid: Name
-    updates: _Value
-
-
-class _Command(_Message, tag="CommandTriggerMessage"):
-    uuid: Name
-
-
-class _Submission(_Message, tag="GuiFormSubmitMessage"):
-    uuid: Name
-
-
-class _Edit(_Message, tag="GuiFormDirtyMessage"):
-    uuid: Name
-
-
-class _Click(_Message, tag="SceneNodeClickMessage"):
-    name: Name
-    instance_index: int | None
-    ray_origin: Three
-    ray_direction: Three
-    screen_pos: Two
-    modifier: Name | None
-    owner: Name = ""
-
-
-class _Drag(_Message, tag="SceneNodeDragMessage"):
-    phase: Name
-    name: Name
-    instance_index: int | None
-    start_position: Three
-    start_screen_pos: Two
-    end_position: Three
-    end_screen_pos: Two
-    button: Name
-    modifier: Name | None
-    owner: Name = ""
-
-
-_PAGES: msgspec.msgpack.Decoder[Any] = msgspec.msgpack.Decoder(
-    _Camera | _Update | _Command | _Submission | _Edit | _Click | _Drag
-)
-
-
-def _is_page_message(raw: bytes) -> bool:
-    try:
-        _PAGES.decode(raw)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
-        return False
-    return True
 
 
 def _refusal(status: http.HTTPStatus) -> Response:
@@ -297,32 +195,6 @@ def _refusal(status: http.HTTPStatus) -> Response:
 _SILENT = logging.getLogger("spheretwin.bench")
 _SILENT.addHandler(logging.NullHandler())
 _SILENT.propagate = False
-
-_server_lock = threading.Lock()
-
-
-@contextlib.contextmanager
-def _with_guard(listening: socket.socket, title: str) -> Iterator[None]:
-    """Make viser create its server with the connection guard: viser has no option for it."""
-
-    def guard(
-        handler: Any, host: str, port: int, *, process_request: Any, **options: Any
-    ) -> _ConnectionGuard:
-        return _ConnectionGuard(
-            listening,
-            title,
-            handler,
-            process_request,
-            options["subprotocols"],
-            options["select_subprotocol"],
-        )
-
-    with _server_lock:
-        plain, servers.serve = servers.serve, guard  # type: ignore[misc, assignment]
-        try:
-            yield
-        finally:
-            servers.serve = plain  # type: ignore[misc]
 
 
 def _ignore_exception(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.analysis import recorded_run as reviewed
 from spheretwin.analysis import run_summary
-from spheretwin.outputs import RecordingFiles
+from spheretwin.models.telemetry.parquet import TelemetryFile
 from spheretwin.scenario import reading
 from tests.twin.bench.cases import begun, done, kept_rows, said
 
@@ -61,9 +61,9 @@ def test_no_file_is_left_of_a_recording_that_is_refused(tmp_path):
 
 def test_an_error_of_a_file_is_reported_and_the_run_continues(tmp_path, monkeypatch):
     def fails(self, rows):
-        self.faults.append("the disk is full")
+        raise OSError("the disk is full")
 
-    monkeypatch.setattr(RecordingFiles, "write", fails)
+    monkeypatch.setattr(TelemetryFile, "write", fails)
     with begun() as made:
         done(made, "record", telemetry=str(tmp_path / "run.parquet"))
         assert made.advance(50) == 50

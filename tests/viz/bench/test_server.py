@@ -16,6 +16,7 @@ from websockets.sync.client import connect
 from spheretwin.models.base.errors import InputError
 from spheretwin.viz.bench import server
 from spheretwin.viz.bench.event_handlers import LATEST_INTERVAL_S
+from spheretwin.viz.bench.viser_internals import is_page_message
 from tests.viz.bench import fake
 from tests.waiting import PATIENCE_S, wait_for
 
@@ -254,8 +255,8 @@ def test_no_message_disables_stop(page, bench):
 
 def test_only_messages_of_a_page_pass():
     value = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": True}}
-    assert server._is_page_message(msgspec.msgpack.encode(value))
-    assert server._is_page_message(msgspec.msgpack.encode(CAMERA))
+    assert is_page_message(msgspec.msgpack.encode(value))
+    assert is_page_message(msgspec.msgpack.encode(CAMERA))
     for other in (
         {**value, "updates": {"removed": True}},
         {**value, "updates": {"value": True, "removed": True}},
@@ -265,7 +266,7 @@ def test_only_messages_of_a_page_pass():
         {"type": "ShareUrlRequest"},
         {"type": "GuiUpdateMessage"},
     ):
-        assert not server._is_page_message(msgspec.msgpack.encode(other))
+        assert not is_page_message(msgspec.msgpack.encode(other))
 
 
 def test_fifty_pages_connect_and_disconnect(page):
