@@ -41,16 +41,22 @@ class Note:
 
     def __init__(self, gui: viser.GuiApi, order: float) -> None:
         self._html = gui.add_html("", order=order, visible=False)
+        self._lock, self._removed = threading.Lock(), False
 
     def say(self, text: str | None) -> None:
-        """Show a text, or hide the line."""
-        if text:
-            self._html.content = f'<div style="{_REFUSED}">{escape(text)}</div>'
-        self._html.visible = bool(text)
+        """Show a text, or hide the line; do nothing if the line was removed while its command was pending."""
+        with self._lock:
+            if self._removed:
+                return
+            if text:
+                self._html.content = f'<div style="{_REFUSED}">{escape(text)}</div>'
+            self._html.visible = bool(text)
 
     def remove(self) -> None:
         """Remove the line."""
-        self._html.remove()
+        with self._lock:
+            self._removed = True
+            self._html.remove()
 
 
 _REFUSED = "color:#ff8787;font-size:0.8em;line-height:1.25;padding:0 0.7em 0.3em;overflow-wrap:anywhere"

@@ -3,6 +3,7 @@
 import msgspec
 import pytest
 
+from spheretwin.viz.bench.event_handlers import Note
 from tests.viz.bench.test_server import CAMERA, changed, handle_of, socket_to
 from tests.waiting import wait_for
 
@@ -88,3 +89,10 @@ def test_the_page_sends_no_command_without_an_event(page, bench):
         slider = page._server.gui._gui_input_handle_from_uuid[handle_of(page, "γ, °")]
         wait_for(lambda: slider.value == pytest.approx(-40.1))
     assert bench.commands() == []
+
+
+@pytest.mark.parametrize("text", ["expected a number", None])
+def test_the_outcome_of_a_command_whose_field_was_removed_is_ignored(page, text):
+    note = Note(page._server.gui, 1e6)
+    note.remove()
+    note.say(text)
