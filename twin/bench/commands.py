@@ -45,10 +45,10 @@ def _open_files(
     bench_state: BenchState, recording: str | None, telemetry: str | None
 ) -> Callable[[], Outputs]:
     def open_files() -> Outputs:
-        paths = [Path(path) if path else None for path in (recording, telemetry)]
-        if not any(paths):
+        record, table = (Path(path) if path else None for path in (recording, telemetry))
+        if not (record or table):
             raise InputError("bench: expected a file to record into, received none")
-        return Outputs(bench_state.driver.session, *paths, first_tick=None)
+        return Outputs(bench_state.driver.session, record, table, first_tick=None)
 
     return open_files
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from importlib import import_module
 from threading import Semaphore
 
@@ -16,8 +17,8 @@ from spheretwin.outputs import Outputs
 from spheretwin.provenance import change_text
 from spheretwin.session import Session
 
-# Chunks that may wait to be written; the loop waits for more, so that they do not accumulate in memory.
-PENDING_CHUNKS = 64
+# Writes that may wait; the loop waits for more, so that chunks do not accumulate in memory.
+PENDING_WRITES = 128
 
 
 def import_writers() -> None:
@@ -42,17 +43,19 @@ class RecordingThread:
         files.begin(driver.session.tick, driver.start_record)
         self._files, self._sinks = files, files.sinks
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="recording")
-        self._room = Semaphore(PENDING_CHUNKS)
+        self._room = Semaphore(PENDING_WRITES)
         self.faults: list[str] = []
         """Errors, one line each."""
 
     def write(self, rows: Table) -> None:
         """Write the rows of one chunk, which must not change afterwards."""
-        self._submit(lambda: [sink.write(rows) for sink in self._sinks])
+        for sink in self._sinks:
+            self._submit(partial(sink.write, rows))
 
     def note(self, t_s: float, text: str) -> None:
         """Note an event before the tick at `t_s`."""
-        self._submit(lambda: [sink.note(t_s, text) for sink in self._sinks])
+        for sink in self._sinks:
+            self._submit(partial(sink.note, t_s, text))
 
     def ending(self, session: Session) -> Callable[[Callable[[RecordingThread], None]], None]:
         """Return a function that completes the files in the thread and then calls its argument."""
