@@ -1,5 +1,6 @@
 """What a run says of itself, taken from its scenario."""
 
+import hashlib
 from pathlib import Path
 
 from spheretwin import scenario as scenarios
@@ -53,3 +54,11 @@ def test_a_record_tells_what_was_done_and_not_how_it_ended():
     assert record.scenario["duration"] == 0.02
     assert record.versions == versions()
     assert session.status == Status.RUNNING
+
+
+def test_a_record_has_the_digests_of_files_that_events_name(tmp_path):
+    curve = tmp_path / "curve.csv"
+    curve.write_bytes(actuators.TORQUE_CURVE_PATH.read_bytes())
+    event = {"t_s": 0.01, "set": "nominal.torque_curve", "value": str(curve)}
+    with begun(event=[event]) as session:
+        assert record_of(session).files == {str(curve): hashlib.sha256(curve.read_bytes()).hexdigest()}

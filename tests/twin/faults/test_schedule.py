@@ -154,7 +154,9 @@ def test_the_last_of_several_on_one_part_is_marked_and_all_act():
 
 
 def test_a_group_s_fault_began_when_the_last_one_did():
-    made = plan(coil(2, start_s=0.01), {"target": "amplifier.02", "mode": "open", "start_s": 0.03})
+    faults = coil(2, start_s=0.01), {"target": "amplifier.02", "mode": "open", "start_s": 0.03}
+    made = plan(*faults)
+    assert plan(*faults[::-1]).fault_start_s(31)[2] == 0.03
     assert [made.fault_start_s(tick)[2] for tick in (9, 10, 29, 30, 31)] == [-1.0, 0.01, 0.01, 0.03, 0.03]
     assert np.all(np.delete(made.fault_start_s(31), 2) == -1.0)
 

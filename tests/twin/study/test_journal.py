@@ -210,3 +210,10 @@ def test_of_rows_that_there_may_be_none_takes_memory(tmp_path):
     # Addresses are all that is taken before a row is finished: eight bytes a row, none of them written.
     assert peak < 8 * 10**8 + 10**6
     assert len(Grid(loads())) == 24
+
+
+@pytest.mark.parametrize("rows", [3, 5])
+def test_lines_of_rows_that_the_study_does_not_have_are_damaged(path, rows):
+    with Journal(path, "d", rows) as journal_of_fewer:
+        assert list(dict(journal_of_fewer.results())) == list(range(rows))
+        assert journal_of_fewer.damaged == 6 - rows

@@ -183,3 +183,10 @@ def test_a_damaged_table_is_refused_with_its_place(tmp_path):
             InputError, match=r"(row group 0, rows 0 to 23|the footer).*: the file is damaged|magic"
         ):
             read(path)
+
+
+def test_failures_are_rows_that_a_watchdog_ended_or_in_which_user_code_raised():
+    rows = made(6, {"max_abs_error_rad": np.ones(6)}, {}, lost=(1,))
+    rows.statuses[2:4] = ["failsafe", "failed"]
+    rows.complaints[[1, 4]] = ["end of the range", "the metric raised"]
+    assert rows.failures.tolist() == [2, 3, 4]
