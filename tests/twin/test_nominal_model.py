@@ -11,9 +11,6 @@ from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from tests.twin.passive_cases import ASKEW, ENGINES, OFFSET, PD, STILL, session, table
 
-# By its path: the tests are no package.
-
-
 # --- the nominal torque matrix
 
 

@@ -13,8 +13,6 @@ from spheretwin.provenance import facts_of
 from spheretwin.simulation import follow, simulate
 from tests.twin.session_cases import ENGINES, SHIPPED, compiled_law, recorded, rows, scenario, session
 
-# By its path: the tests are no package.
-
 
 def raising(t, reference, measurement, parameters, state, torque):
     torque[:] = 0.0

@@ -11,9 +11,6 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.session import Session
 from tests.twin.session_cases import ASKEW, ENGINES, SHIPPED, WORN, rows, scenario
 
-# By its path: the tests are no package.
-
-
 LENGTH = 2 * BLOCK_TICKS + 300
 VARIANTS = {"ideal": {}, "worn": WORN, "askew": ASKEW, "both": WORN | ASKEW}
 

@@ -14,9 +14,6 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from tests.twin.session_cases import ENGINES, plain_law, recorded, rows, scenario, session
 
-# By its path: the tests are no package.
-
-
 CHANGES = [
     (0, "disturbance.load", 1.0),
     (100, "controller.surface_slope", 60.0),

@@ -26,8 +26,6 @@ from tests.twin.session_cases import (
 
 SIGNALS = common_signals(18)
 
-# By its path: the tests are no package.
-
 
 KINDS = [
     ("controller.surface_slope", 70.0),

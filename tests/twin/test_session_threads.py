@@ -11,8 +11,6 @@ from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.session import Session
 from tests.twin.session_cases import ENGINES, SHIPPED, rows, same_future, scenario, session
 
-# By its path: the tests are no package.
-
 
 def test_runs_on_threads_are_those_made_one_after_the_other():
     runs = [

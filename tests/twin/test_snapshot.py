@@ -26,8 +26,6 @@ from tests.twin.session_cases import (
     session,
 )
 
-# By its path: the tests are no package.
-
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("law", SHIPPED)

@@ -9,9 +9,6 @@ from spheretwin.models.lagrangian import gravity_torque, loaded_inertia
 from spheretwin.models.magnetics import torque_matrix
 from tests.twin.passive_cases import ASKEW, ENGINES, FREE, PAYLOAD_KG, PD, STILL, session, table
 
-# By its path: the tests are no package.
-
-
 # --- the true torque
 
 

@@ -162,3 +162,12 @@ def test_a_rate_that_no_run_has_the_rows_for_is_refused(tmp_path):
         check_rate(1000.5, tmp_path / "run.rrd", 1e-3)
     with pytest.raises(InputError, match="--record FILE"):
         check_rate(60.0, None, 1e-3)
+
+
+def test_a_saturation_over_the_edge_of_a_window_begins_once():
+    table = made(20_500)
+    scale = table["allocation_scale"]
+    scale[:] = 1.0
+    # Neither row after the edge is the first of a bin; the last one is also the smallest value.
+    scale[[19_980, 20_005, 20_010]] = 0.7, 0.7, 0.6
+    assert thinned(FirstAndExtremeRows(RATE_Hz), [table]).tobytes() == slowly(table).tobytes()

@@ -14,8 +14,6 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.models.magnetics import torque_matrix
 from tests.control.allocation import cases
 
-# By its path: the tests are no package.
-
 LIMIT = cases.LIMIT
 tilts = st.floats(-cases.TILT, cases.TILT)
 poses = st.tuples(tilts, tilts, st.floats(-7, 7)).map(np.array)

@@ -19,8 +19,6 @@ pytestmark = pytest.mark.usefixtures("short_parts")
 
 SIGNALS = common_signals(18)
 
-# By its path: the tests are no package.
-
 SLIP = Signal("slip", "m", 1, "another law's own")
 
 

@@ -17,8 +17,6 @@ pytestmark = pytest.mark.usefixtures("short_parts")
 
 SIGNALS = common_signals(18)
 
-# By its path: the tests are no package.
-
 
 def test_parts_are_joined_under_the_first_one_s_facts(tmp_path):
     whole = table(200)

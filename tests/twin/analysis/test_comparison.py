@@ -19,8 +19,6 @@ from spheretwin.models.base.errors import InputError
 from spheretwin.viz.quantities import scalar_quantities
 from tests.twin.analysis.runs import written
 
-# By its path: the tests are no package.
-
 NAMES = ["whole", "error", "angle", "sliding", "effort", "more", "currents", "spectra", "events"]
 LARGEST_BYTES = 6_000_000
 

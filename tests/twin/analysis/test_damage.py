@@ -20,8 +20,6 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from tests.twin.analysis.runs import PLANT, WITH_EVENTS, written
 
-# By its path: the tests are no package.
-
 # The path of a file below the folder of a test, and a sentence.
 LONGEST_LINE = 600
 

@@ -9,8 +9,6 @@ from spheretwin.analysis.comparison import differences
 from spheretwin.metrics import METRICS
 from tests.twin.analysis.runs import written
 
-# By its path: the tests are no package.
-
 
 def test_numbers_are_subtracted_one_by_one_and_nothing_else():
     first = {

@@ -27,8 +27,6 @@ from spheretwin.simulation import simulate
 from tests.twin.analysis.runs import PLANT, WITH_EVENTS, written
 from tests.waiting import PATIENCE_S
 
-# By its path: the tests are no package.
-
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):

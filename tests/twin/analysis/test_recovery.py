@@ -6,15 +6,16 @@ import pytest
 from spheretwin import cli
 from spheretwin import scenario as scenarios
 from spheretwin.analysis.recorded_run import export, logged, read
+from spheretwin.analysis.recovery import hold_rows
 from spheretwin.analysis.run_summary import figures
 from spheretwin.models.telemetry.run_record import Change
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Level
+from spheretwin.models.telemetry.table import Table
 from spheretwin.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from tests.twin.analysis.runs import WITH_EVENTS
-
-# By its path: the tests are no package.
 
 BY_HAND = (
     Change(300, "disturbance.load", 1.5),
@@ -57,3 +58,11 @@ def test_only_lines_that_are_changes_are_taken():
     lines = ["the run is complete", "coil.07 open", "a set to", "law set to pd", "not a name set to 1"]
     log = [(0.001 * tick, Level.INFO, text) for tick, text in enumerate(lines)]
     assert logged(log, {}, 1e-3, 10) == (Change(3, "law", "pd"),)
+
+
+def test_rows_between_those_that_were_recorded_are_the_latest_ones():
+    signals = (Signal("t_s", "s", 1, "time"), Signal("x", "1", 1, "a number"))
+    some = Table(signals, np.array([[0.002, 7.0], [0.005, 8.0], [0.006, 9.0]]))
+    every = hold_rows(some, 1e-3)
+    np.testing.assert_allclose(every["t_s"], [0.002, 0.003, 0.004, 0.005, 0.006], rtol=1e-15)
+    assert every["x"].tolist() == [7.0, 7.0, 7.0, 8.0, 9.0]

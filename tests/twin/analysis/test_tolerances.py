@@ -13,8 +13,6 @@ from spheretwin.analysis.tolerances import Tolerance, Tolerances, beyond, exceed
 from spheretwin.models.base.errors import InputError
 from tests.twin.analysis.runs import made_of, named, written
 
-# By its path: the tests are no package.
-
 T = np.arange(200) * 1e-3
 WAVE = np.stack([np.sin(40 * T), 2 + np.cos(40 * T)], axis=1)
 
@@ -183,3 +181,12 @@ def test_one_run_is_printed_in_full_and_two_as_differences(runs, capsys):
 def test_what_cannot_be_asked_is_bad_input(runs, arguments, capsys):
     assert cli.main(["review", str(runs["first"][0]), *arguments]) == 2
     assert "expected" in capsys.readouterr().err
+
+
+def test_the_earliest_violation_of_all_signals_comes_first():
+    late, other = WAVE.copy(), made_of(WAVE)
+    late[120:] += 1.0
+    run = named(made_of(late), "other.rrd")
+    run.table["t_s"][50:] += 1e-4
+    allowed = Tolerances(signals={"x_rad": Tolerance(absolute=0.1), "t_s": Tolerance(absolute=1e-6)})
+    assert [place.signal for place in exceeded(other, run, allowed)] == ["t_s", "x_rad"]

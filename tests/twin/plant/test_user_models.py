@@ -23,8 +23,6 @@ from spheretwin.session import Session
 from spheretwin.simulation import simulate
 from tests.twin.plant import user_models as models
 
-# By its path: the tests are no package.
-
 STEP_S = 5e-4
 POSE, RATES = np.array([0.1, -0.05, 0.2]), np.array([0.2, 0.3, -0.5])
 TORQUE_Q = np.array([0.03, -0.01, 0.08])

@@ -20,8 +20,6 @@ from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import SCALAR_QUANTITIES
 from tests.twin.analysis.runs import written
 
-# By its path: the tests are no package.
-
 APART_mrad = 3.0
 
 

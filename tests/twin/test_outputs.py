@@ -3,11 +3,14 @@
 import os
 import signal
 
+import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
+from spheretwin.analysis.recorded_run import read
 from spheretwin.cli.common import interruptible
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.run_record import Change
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.outputs import Outputs
 from spheretwin.session import Session
@@ -52,3 +55,16 @@ def test_signals_that_the_parent_has_ignored_stay_ignored():
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def test_files_that_begin_later_have_the_rows_and_the_log_from_then_on(tmp_path):
+    session = Session(scenarios.load("hold", {"duration": 0.05}))
+    files = Outputs(session, tmp_path / "x.rrd", tmp_path / "x.parquet", live=False, first_tick=20)
+    changes = [Change(tick, "disturbance.load", 1e-3 * tick) for tick in (10, 40)]
+    follow(session, 50, files.sinks, journal=changes)
+    assert files.close() == []
+    recording = read(tmp_path / "x.rrd")
+    for table in (recording.table, read_parquet(tmp_path / "x.parquet")[0]):
+        np.testing.assert_allclose(table["t_s"], np.arange(20, 50) * 1e-3, rtol=1e-12)
+    logged = [t_s for t_s, _, text in recording.log if "disturbance.load" in text]
+    assert logged == [pytest.approx(0.04)]
