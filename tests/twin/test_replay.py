@@ -143,3 +143,13 @@ def test_a_file_that_the_run_could_not_read_and_that_exists_now_is_refused(folde
     (folder / "later").rename(folder / "p.csv")
     with pytest.raises(InputError, match=r"plant\.torque_curve .*p\.csv as it was when the run was made"):
         replay.read(path)
+
+
+def test_a_file_of_the_same_name_beside_the_telemetry_does_not_replace_another(folder):
+    (elsewhere := folder.parent / "elsewhere").mkdir()
+    path = written(elsewhere / "a.parquet")
+    shutil.move(folder / "p.csv", elsewhere / "p.csv")
+    replay.read(path)
+    add_a_comment(elsewhere / "p.csv")
+    with pytest.raises(InputError, match=f"plant.torque_curve {folder / 'p.csv'} as it was"):
+        replay.read(path)

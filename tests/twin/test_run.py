@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
+from spheretwin.analysis.recorded_run import read
 from spheretwin.metrics import METRICS, PlannedRun
 from spheretwin.models.base.errors import InputError
 from spheretwin.run import OTHER_KEYS, Figures, figures_of, summary
@@ -76,3 +77,10 @@ def test_what_fails_or_is_no_json_is_told_with_its_name(run):
 def test_the_realtime_factor_is_simulated_time_per_wall_time():
     told = followed(200)
     assert told["realtime_factor"] == told["simulated_s"] / told["wall_s"]
+
+
+def test_an_event_at_the_end_of_a_run_is_not_in_its_log(tmp_path):
+    events = [{"t_s": t_s, "set": "disturbance.load", "value": t_s} for t_s in (0.02, 0.05)]
+    run = simulate(scenarios.load("hold", {"duration": 0.05, "event": events}))
+    log = read(run.save(tmp_path / "run.rrd")).log
+    assert [t_s for t_s, _, text in log if "disturbance.load" in text] == [pytest.approx(0.02)]
