@@ -220,7 +220,7 @@ from spheretwin.paper.experiment import Case, Experiment, ResultTable, Section
 
 def cases():
     laws = ("pd", "lazy")
-    return [Case(law, "hold", {"controller.law": law, "duration": 0.05}, draws=False) for law in laws]
+    return [Case(law, "hold", {"controller.law": law, "duration": 0.05}, is_random=False) for law in laws]
 
 
 def tell(outcomes):

@@ -72,7 +72,7 @@ def rows_seconds(study: Study, count: int, threads: int) -> Callable[[], float]:
 
     def work() -> None:
         numbered = (grid[number] for number in range(count))
-        landed = list(local.carried_out(numbered, rows.carried_out, threads))
+        landed = list(local.run_each(numbered, rows.run, threads))
         assert all(result.error is None for _, result in landed)
 
     return lambda: seconds_of(work)
@@ -81,7 +81,7 @@ def rows_seconds(study: Study, count: int, threads: int) -> Callable[[], float]:
 def row_seconds(engine: str) -> Callable[[], float]:
     """Time of one whole row on a plant, s."""
     rows, row = Rows(afsm()), Grid(afsm())[0]
-    return lambda: seconds_of(lambda: rows.carried_out(row, engine))
+    return lambda: seconds_of(lambda: rows.run(row, engine))
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from spheretwin.cli.common import print_json
@@ -14,10 +14,9 @@ from spheretwin.models.base.errors import InputError, did_you_mean, shown
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.telemetry.run_record import versions
 from spheretwin.paper import EXPERIMENTS, page
-from spheretwin.paper.cases import Known, Memory, Plan, carried_out, checked, failed, known, planned, sample
-from spheretwin.paper.experiment import Outcomes
-from spheretwin.paper.page import Chapter
-from spheretwin.paper.rows import plants_told, rows
+from spheretwin.paper.page import Chapter, chapter_of
+from spheretwin.paper.rows import rows
+from spheretwin.paper.runner import make_plan, run_with_cache, summarise, unexpected_ends
 from spheretwin.plant.step import ENGINES
 from spheretwin.viz.pages.markdown import prepare
 from spheretwin.viz.terminal import runs as tables
@@ -58,25 +57,21 @@ def declare(parser: Parser) -> None:
 def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if every run ended as expected."""
     plans = [
-        planned(EXPERIMENTS[name], options.seeds, options.limit, options.plant)
+        make_plan(EXPERIMENTS[name], options.seeds, options.limit, options.plant)
         for name in _named(options.names)
     ]
-    of_cases = [known(plan) for plan in plans]
+    summaries = [summarise(plan) for plan in plans]
     if options.out:
         prepare(options.out)
     started = time.perf_counter()
-    count = sum(plan.runs + len(sample(plan)) for plan in plans)
+    count = sum(len(plan.jobs) + len(plan.sample) for plan in plans)
     with runs("reproduce", count) as done, timers_stopped():
-        results = [_outcomes_of(plan, cases, done) for plan, cases in zip(plans, of_cases, strict=True)]
+        results = [
+            run_with_cache(plan, of_plan, done) for plan, of_plan in zip(plans, summaries, strict=True)
+        ]
     wall_s = time.perf_counter() - started
-    rows_by_plan = [
-        rows(plan, outcomes, cases)
-        for plan, cases, (outcomes, _) in zip(plans, of_cases, results, strict=True)
-    ]
-    chapters = [
-        _chapter(plan, result, plan_rows)
-        for plan, result, plan_rows in zip(plans, results, rows_by_plan, strict=True)
-    ]
+    rows_by_plan = [rows(result.plan, result.outcomes, result.summaries) for result in results]
+    chapters = [chapter_of(*both) for both in zip(results, rows_by_plan, strict=True)]
     written = page.write(options.out, chapters, _command(options), versions()) if options.out else []
     if options.json:
         every = [row for plan_rows in rows_by_plan for row in plan_rows]
@@ -85,36 +80,13 @@ def run(options: argparse.Namespace) -> bool:
         _print(chapters)
         tables.print_written(written)
     bad = [
-        f"{plan.experiment.name}: {run}"
-        for plan, (outcomes, _) in zip(plans, results, strict=True)
-        for run in failed(plan, outcomes)
+        f"{result.plan.experiment.name}: {case}"
+        for result in results
+        for case in unexpected_ends(result.plan, result.outcomes)
     ]
     if bad:
         print(f"spheretwin: reproduce: ended early: {'; '.join(bad)}", file=sys.stderr)
     return not bad
-
-
-def _outcomes_of(
-    plan: Plan, of_cases: Mapping[str, Known], done: Callable[[str], None]
-) -> tuple[Outcomes, list[float]]:
-    """Return the outcomes of a plan, and the differences of the sample that ran on both plants."""
-    memory = Memory(plan.experiment.name, {name: case.key for name, case in of_cases.items()})
-    outcomes = carried_out(plan, done, memory=memory)
-    return outcomes, checked(plan, outcomes, done, memory)
-
-
-def _chapter(
-    plan: Plan, result: tuple[Outcomes, list[float]], printed_rows: Sequence[Mapping[str, Any]]
-) -> Chapter:
-    outcomes, differences = result
-    return Chapter(
-        plan.experiment,
-        plan.experiment.tell(outcomes),
-        plan.experiment.findings(outcomes),
-        [row["command"] for row in printed_rows],
-        plants_told([row["plant"] for row in printed_rows], differences),
-        plan.experiment.side_by_side(outcomes),
-    )
 
 
 def _named(names: Sequence[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The error budget of the tilt: what each part of the prototype costs, for every law."""
+"""Error budget of the tilt: cost of each part of the prototype, for every law."""
 
 from __future__ import annotations
 
@@ -7,12 +7,20 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.control.laws import LAWS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
+from spheretwin.paper.experiment import (
+    Array,
+    Case,
+    Experiment,
+    Finding,
+    Outcome,
+    Outcomes,
+    ResultTable,
+    Section,
+)
 from spheretwin.paper.rows import of_axis, spread_deg
 from spheretwin.scenario.sections import HARDWARE
 from spheretwin.viz.pages.markdown import Drawing
@@ -45,15 +53,15 @@ WIDE_rad_s = 1e7  # a ten-thousandth of a control period
 
 
 class Stage(NamedTuple):
-    """Some of the prototype's parts."""
+    """Set of the prototype's parts."""
 
     name: str
     fields: tuple[str, ...] = ()
-    """That have the prototype's value."""
-    beside: Mapping[str, Any] = {}
-    """Fields that this stage needs with another value: none of them is an error."""
-    draws: bool = False
-    """Whether anything in it is drawn from the seed."""
+    """Fields with the prototype's value."""
+    other_fields: Mapping[str, Any] = {}
+    """Fields with another value that the stage needs; none of them is an error."""
+    is_random: bool = False
+    """Whether anything in it depends on the seed."""
 
     @property
     def base(self) -> str:
@@ -68,15 +76,15 @@ class Stage(NamedTuple):
         if self.name == ALL:
             return values  # the set has a data sheet of its own
         return {
-            **_known(),
-            **({} if "drive.supply_V" in {*values, *self.beside} else NO_LAG),
+            **_nominal(),
+            **({} if "drive.supply_V" in {*values, *self.other_fields} else NO_LAG),
             **values,
-            **self.beside,
+            **self.other_fields,
         }
 
 
 @cache
-def _known() -> dict[str, Any]:
+def _nominal() -> dict[str, Any]:
     """Nominal model of a single stage: all is known but the mass on the shaft."""
     inertia = tuple(actuator.load().inertia.tolist())
     return {"nominal.equals_truth": True, "nominal.inertia_kg_m2": inertia}
@@ -84,7 +92,7 @@ def _known() -> dict[str, Any]:
 
 STAGES = (
     Stage(IDEAL),
-    Stage("coil lag L/R, plain", beside={"drive.time_constant_s": None}),
+    Stage("coil lag L/R, plain", other_fields={"drive.time_constant_s": None}),
     Stage("delay", ("drive.delay_s",)),
     Stage(WITH_RATES, ESTIMATOR),
     Stage(
@@ -100,17 +108,17 @@ STAGES = (
             *VOLTS, *ESTIMATOR, "sensors.potentiometer.noise_rad", "sensors.adc.noise_V",
             "sensors.adc.oversampling",
         ),
-        draws=True,
+        is_random=True,
     ),
     Stage(
         "sensor nonlinearity",
         (*VOLTS, *ESTIMATOR, "sensors.potentiometer.nonlinearity_rad"),
-        draws=True,
+        is_random=True,
     ),
     Stage(
         "sensor offset and gain",
         (*VOLTS, *ESTIMATOR, "sensors.adc.offset_V", "sensors.adc.gain_error"),
-        draws=True,
+        is_random=True,
     ),
     Stage(
         "drive offset and gain",
@@ -118,25 +126,25 @@ STAGES = (
             "drive.dac_bits", "drive.dac_range_V", "drive.transconductance_A_V", "drive.dac_offset_V",
             "drive.dac_gain_error", "drive.dac_inl_lsb", "drive.amplifier_offset_V", *COILS,
         ),
-        beside={"drive.supply_V": AMPLE_V, "drive.bandwidth_rad_s": WIDE_rad_s},
-        draws=True,
+        other_fields={"drive.supply_V": AMPLE_V, "drive.bandwidth_rad_s": WIDE_rad_s},
+        is_random=True,
     ),
     Stage("friction", ("plant.coulomb_Nm", "plant.viscous_Nm_s")),
     Stage(
         "voltage limit",
         ("drive.supply_V", "drive.drop_up_V", "drive.drop_down_V", *COILS),
-        beside={"drive.bandwidth_rad_s": WIDE_rad_s},
+        other_fields={"drive.bandwidth_rad_s": WIDE_rad_s},
     ),
     Stage(
         "amplifier bandwidth",
         ("drive.bandwidth_rad_s", *COILS),
-        beside={"drive.supply_V": AMPLE_V},
+        other_fields={"drive.supply_V": AMPLE_V},
     ),
-    Stage(ALL, tuple(PROTOTYPE), draws=True),
+    Stage(ALL, tuple(PROTOTYPE), is_random=True),
 )  # fmt: skip
 
 
-HOW = (
+METHOD = (
     "The largest *true* error, which nothing can hide. *Ideal* is the motion and the mass alone: true angles"
     " and rates, no delay, no friction, and currents that are their commands at once. The plain lag L/R of"
     " the coils, which runs without amplifiers have, is no part of the prototype, whose amplifiers drive the"
@@ -161,17 +169,17 @@ def case(law: str, stage: Stage) -> Case:
         name=f"{law}: {stage.name}",
         scenario="tilt",
         fields={"controller.law": law, **stage.overrides},
-        told={"stage": stage.name, "compared_with": stage.base},
-        draws=stage.draws,
+        details={"stage": stage.name, "compared_with": stage.base},
+        is_random=stage.is_random,
     )
 
 
-def tell(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[Section]:
     """A table for each hinge, and one figure."""
-    laws = [law for law in LAWS if any(case(law, stage).name in outcomes for stage in STAGES)]
+    laws = [law for law in LAWS if any(outcomes.runs(case(law, stage)) for stage in STAGES)]
     tables = [_table(outcomes, laws, axis) for axis in range(len(ANGLES))]
     most = "; ".join(filter(None, (_most(outcomes, law) for law in laws)))
-    text = f"{HOW} By itself changes most: {most}." if most else HOW
+    text = f"{METHOD} By itself changes most: {most}." if most else METHOD
     return [Section("One part at a time", text, tables, [lambda: _drawing(outcomes, laws)])]
 
 
@@ -182,8 +190,8 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 
 def _most(outcomes: Outcomes, law: str) -> str:
-    """The single part that changes the error of any hinge the most; empty where not all were run."""
-    medians = {stage.name: _medians_deg(_found(outcomes, law, stage)) for stage in STAGES}
+    """The single part that changes the error of any hinge the most; empty if not all were run."""
+    medians = {stage.name: _medians_deg(outcomes.runs(case(law, stage))) for stage in STAGES}
     parts = [stage for stage in STAGES if stage.fields and stage.name != ALL]
     changes = np.array([medians[stage.name] - medians[stage.base] for stage in parts])
     if not np.all(np.isfinite(changes)):
@@ -193,24 +201,21 @@ def _most(outcomes: Outcomes, law: str) -> str:
 
 
 def _table(outcomes: Outcomes, laws: Sequence[str], axis: int) -> ResultTable:
-    rows = [(stage.name, *(_cell(_found(outcomes, law, stage), axis) for law in laws)) for stage in STAGES]
+    rows = [(stage.name, *(_cell(outcomes.runs(case(law, stage)), axis) for law in laws)) for stage in STAGES]
     title = f"Largest true |error| of {ANGLES[axis]} in degrees: median over the seeds, and range"
     return ResultTable(title, ("switched on", *laws), rows)
 
 
-def _cell(found: Sequence[Outcome], axis: int) -> str:
-    return spread_deg(of_axis(found, "max_abs_error", axis)) if found else "not run"
-
-
-def _found(outcomes: Outcomes, law: str, stage: Stage) -> Sequence[Outcome]:
-    return outcomes.get(case(law, stage).name, ())
+def _cell(runs: Sequence[Outcome], axis: int) -> str:
+    return spread_deg(of_axis(runs, "max_abs_error", axis)) if runs else "not run"
 
 
 def _drawing(outcomes: Outcomes, laws: Sequence[str]) -> Drawing:
     from spheretwin.viz.figures import maps as figures
 
     by_stage = {
-        stage.name: np.array([_medians_deg(_found(outcomes, law, stage)) for law in laws]) for stage in STAGES
+        stage.name: np.array([_medians_deg(outcomes.runs(case(law, stage))) for law in laws])
+        for stage in STAGES
     }
     values = np.array([by_stage[stage.name] for stage in STAGES])  # (stages, laws, 3)
     changes = values - np.array([by_stage[stage.base] for stage in STAGES])
@@ -227,18 +232,18 @@ def _drawing(outcomes: Outcomes, laws: Sequence[str]) -> Drawing:
     return Drawing("budget.png", caption, figures.heat(panels, names, laws, title, change))
 
 
-def _medians_deg(found: Sequence[Outcome]) -> NDArray[np.float64]:
-    """(3,) in degrees; no numbers where nothing was run."""
-    if not found:
+def _medians_deg(runs: Sequence[Outcome]) -> Array:
+    """(3,) in degrees; NaN without a run."""
+    if not runs:
         return np.full(3, np.nan)
-    return np.degrees(np.median([outcome.max_abs_error for outcome in found], axis=0))
+    return np.degrees(np.median([run.max_abs_error for run in runs], axis=0))
 
 
 EXPERIMENT = Experiment(
     name="budget",
     title="The error budget of the tilt",
-    shows="The motion of figure 11 under every law, with each part of the prototype switched on alone.",
+    summary="The motion of figure 11 under every law, with each part of the prototype switched on alone.",
     cases=cases,
-    tell=tell,
+    sections=sections,
     findings=findings,
 )

@@ -22,7 +22,7 @@ from spheretwin.scenario.sections import Scenario
 COUNT_rad = tau / PROTOTYPE_SENSORS["sensors.encoder.counts"]
 SUPPLY_V = PROTOTYPE_DRIVE["drive.supply_V"]
 
-# What wants a value has one that a laboratory may meet, large beside what the healthy part does.
+# Values that a laboratory may meet, large compared with the healthy part.
 VALUES: dict[tuple[str, str], tuple[float, str]] = {
     ("pot", "offset"): (0.02, " rad"),  # a slip of a degree on the shaft, some 60 times the nonlinearity
     ("pot", "gain"): (0.9, ""),  # a tenth of the supply of the track is gone
@@ -48,7 +48,7 @@ class Failure(NamedTuple):
     part: str
     mode: str
     value: float | None
-    """None where the mode has none, or has one by itself."""
+    """None if the mode has none, or has a default."""
     unit: str
 
     @property
@@ -72,22 +72,22 @@ def failures() -> list[Failure]:
 Groups = tuple[int, ...]
 """Numbers of the open groups, rising."""
 
-DRAWN = 2000
+RANDOM_SETS = 2000
 SIZES = tuple(range(3, 10))
-"""Of the drawn sets; each has as many sets as any other, but for one."""
+"""Sizes of the random sets; each has as many sets as any other, but for one."""
 SEED = 18
 
 
 @cache
 def random_groups() -> tuple[Groups, ...]:
-    """The drawn sets, size after size in turn; no two are the same."""
+    """Random sets, size after size in turn; no two are the same."""
     random = np.random.default_rng(SEED)
-    found: dict[Groups, None] = {}
-    while len(found) < DRAWN:
-        size = SIZES[len(found) % len(SIZES)]
-        chosen = random.choice(count(), size, replace=False)
-        found[tuple(sorted(int(group) for group in chosen))] = None
-    return tuple(found)
+    chosen: dict[Groups, None] = {}
+    while len(chosen) < RANDOM_SETS:
+        size = SIZES[len(chosen) % len(SIZES)]
+        groups = random.choice(count(), size, replace=False)
+        chosen[tuple(sorted(int(group) for group in groups))] = None
+    return tuple(chosen)
 
 
 @cache
@@ -109,7 +109,7 @@ def count() -> int:
 
 
 class Way(NamedTuple):
-    """One way to meet a fault."""
+    """Treatment of a fault: what reports it, and the allocation or watchdog."""
 
     name: str
     of_fault: Mapping[str, Any] = {}
@@ -118,36 +118,36 @@ class Way(NamedTuple):
     """Fields of the scenario."""
 
 
-NOT_TOLD = Way("not told")
-TOLD = Way("told", {"reported_to_controller": True})
+UNREPORTED = Way("not told")
+REPORTED = Way("told", {"reported_to_controller": True})
 DETECTING = Way("detecting", {"detection": True})
 BOUNDED = Way("told, bounded", {"reported_to_controller": True}, {"allocation": "bounded"})
 
-OF_GROUPS = (NOT_TOLD, TOLD, DETECTING, BOUNDED)
-"""For open groups: nobody says so, the allocation is told, or the detector finds them. And told once
-more, with the allocation that uses all that the current limit allows."""
+OF_GROUPS = (UNREPORTED, REPORTED, DETECTING, BOUNDED)
+"""For open groups: they are not reported, reported to the allocation, or detected. The last way reports
+them to the allocation that uses all that the current limit allows."""
 
 ALONE = Way("no watchdog", fields={"watchdog.on": False})
 RELEASE = Way("release", fields={"watchdog.on": True, "watchdog.action": "release"})
 BRAKE = Way("short", fields={"watchdog.on": True, "watchdog.action": "short"})
 
 OF_PARTS = (ALONE, RELEASE, BRAKE)
-"""For parts that all groups share there is nothing to leave out: no watchdog, or one by what it does."""
+"""For parts that all groups share: no watchdog, or one by its action."""
 
 
 SCENARIO = "nutation"
 BASE: dict[str, Any] = {"disturbance.load": 1.0, "plant.engine": "lagrangian"}
 """m = 0.2 is the scenario's own."""
 
-# Sensors, supply and watchdog are there on the prototype alone.
+# Only the prototype has sensors, supply and watchdog.
 PROTOTYPE: dict[str, Any] = {**BASE, "hardware": "prototype"}
 OTHER_ENGINE: dict[str, Any] = {"plant.engine": "mujoco"}
 
 SAMPLE = 100
 """One set in so many runs on MuJoCo too."""
 
-# Every end but that of numbers that are none.
-ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.FAILSAFE)
+# Every status but that of diverged numbers.
+EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.FAILSAFE)
 
 HEALTHY = Case("healthy", SCENARIO, BASE, {"kind": "healthy", "groups": [], "way": None})
 HEALTHY_PROTOTYPE = Case(
@@ -156,7 +156,7 @@ HEALTHY_PROTOTYPE = Case(
 
 
 def cases() -> list[Case]:
-    """The healthy ones, then one of each kind in turn, in all its ways, as long as there are any."""
+    """Healthy cases, then one of each kind in turn, in all its ways."""
     kinds = [
         [[of_groups(groups, way) for way in OF_GROUPS] for groups in singles()],
         [[of_groups(groups, way) for way in OF_GROUPS] for groups in pairs()],
@@ -185,8 +185,8 @@ def on_other_engine(groups: Groups, way: Way) -> Case:
     return case._replace(
         name=f"{case.name}, MuJoCo",
         fields={**case.fields, **OTHER_ENGINE},
-        told={**case.told, "kind": "MuJoCo"},
-        once=True,
+        details={**case.details, "kind": "MuJoCo"},
+        single_run=True,
     )
 
 
@@ -199,7 +199,7 @@ def of_part(failure: Failure, way: Way) -> Case:
         name=f"{failure.name}, {way.name}",
         scenario=SCENARIO,
         fields={**PROTOTYPE, **way.fields, **_planned([fault])},
-        told={
+        details={
             "kind": "part",
             "groups": [],
             "way": way.name,
@@ -207,13 +207,13 @@ def of_part(failure: Failure, way: Way) -> Case:
             "mode": failure.mode,
             "value": failure.value,
         },
-        ends=ENDS,
-        drawn=lambda seed: _starts(1, start_s(failure.name, seed)),
+        expected_statuses=EXPECTED,
+        seeded_fields=lambda seed: _starts(1, start_s(failure.name, seed)),
     )
 
 
 def sets() -> list[Groups]:
-    """Every single group, every pair, every drawn set."""
+    """Every single group, every pair, every random set."""
     return [*singles(), *pairs(), *random_groups()]
 
 
@@ -223,12 +223,13 @@ def sample() -> list[Groups]:
 
 
 def start_s(what: str, seed: int) -> float:
-    """Return the start of a fault: a control tick of the run, drawn evenly from the seed.
+    """Return the start of a fault: a random control tick of the run, uniform.
 
     Parameters
     ----------
     what : str
-        What fails. All ways and both engines share its start, so that they can be compared run by run.
+        Name of the failed part. All ways and both engines share its start, so that runs can be
+        compared one by one.
     seed : int
     """
     scenario = _healthy()
@@ -247,15 +248,15 @@ def _of_coils(groups: Groups, way: Way, mode: str, kind: str) -> Case:
         name=f"{_named(groups)} {mode}, {way.name}",
         scenario=SCENARIO,
         fields={**BASE, **way.fields, **_planned(faults)},
-        told={"kind": kind, "groups": list(groups), "way": way.name},
-        once=kind == "drawn",
-        ends=ENDS,
-        drawn=lambda seed: _starts(len(groups), start_s(_named(groups), seed)),
+        details={"kind": kind, "groups": list(groups), "way": way.name},
+        single_run=kind == "drawn",
+        expected_statuses=EXPECTED,
+        seeded_fields=lambda seed: _starts(len(groups), start_s(_named(groups), seed)),
     )
 
 
 def _planned(faults: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Fields of faults whose starts are drawn."""
+    """Fields of faults without their random starts."""
     return {f"fault.{i}.{name}": value for i, fault in enumerate(faults) for name, value in fault.items()}
 
 
@@ -269,6 +270,6 @@ def _named(groups: Groups) -> str:
 
 
 def _in_turn(kinds: Sequence[Sequence[list[Case]]]) -> Iterator[Case]:
-    """A limit leaves some of each kind."""
+    """Alternate the kinds, so that a limit leaves some of each."""
     for blocks in zip_longest(*kinds, fillvalue=[]):
         yield from chain.from_iterable(blocks)

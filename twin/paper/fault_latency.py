@@ -9,23 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import fault_cases as cases
 from spheretwin.paper import fault_sections
 from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
-from spheretwin.paper.fault_cases import (
-    DETECTING,
-    TOLD,
-    Groups,
-    of_groups,
-    pairs,
-    random_groups,
-    shorted,
-    singles,
-)
 from spheretwin.paper.fault_outcomes import tracks
-from spheretwin.paper.fault_sections import percent
+from spheretwin.paper.fault_sections import percent, runs_by_set
 
-HOW = (
+METHOD = (
     "*Latency* is the time from the start of a fault to the tick from which on the allocation leaves the"
     " group out. Faults that are not detected before the run ends count as infinite in the quantiles. The"
     " *driven ticks* of an open group are the control ticks after the fault at which its commanded current"
@@ -59,16 +49,16 @@ class Detection(NamedTuple):
 
 def section(outcomes: Outcomes) -> Section:
     """Distribution of the latency, its reason, and its cost."""
-    by_kind = {name: found for name, found in _detections(outcomes).items() if found}
-    rows = [_row(name, found) for name, found in by_kind.items()]
-    compared = _compared(outcomes)
-    costs = [row for first, end in _intervals() if (row := _cost_row(compared, first, end))]
+    by_kind = {kind: detections for kind, detections in _detections(outcomes).items() if detections}
+    rows = [_row(kind, detections) for kind, detections in by_kind.items()]
+    pairs = _pairs(outcomes)
+    costs = [row for first, end in _intervals() if (row := _cost_row(pairs, first, end))]
     title = "Detection latency of failed groups"
     cost_title = "One or two open groups: cost of the delay, by the latency of the slower group"
-    curves = {name: [each.latency_s for each in found] for name, found in by_kind.items()}
+    curves = {kind: [one.latency_s for one in detections] for kind, detections in by_kind.items()}
     return Section(
         "Detection latency",
-        f"{HOW}{_why(by_kind)}{_verdict(compared)}",
+        f"{METHOD}{_why(by_kind)}{_verdict(pairs)}",
         [ResultTable(title, HEAD, rows), ResultTable(cost_title, COST, costs)],
         [lambda: fault_sections.latencies(curves)] if curves else [],
     )
@@ -76,41 +66,51 @@ def section(outcomes: Outcomes) -> Section:
 
 def _detections(outcomes: Outcomes) -> dict[str, list[Detection]]:
     """Detections by the kind of fault."""
-    sets: Mapping[str, Sequence[str]] = {
-        "one open": [of_groups(groups, DETECTING).name for groups in singles()],
-        "two open": [of_groups(groups, DETECTING).name for groups in pairs()],
-        "three to nine open": [of_groups(groups, DETECTING).name for groups in random_groups()],
-        "one shorted": [shorted(groups, DETECTING).name for groups in singles()],
+    kinds = {
+        "one open": (cases.singles(), cases.of_groups),
+        "two open": (cases.pairs(), cases.of_groups),
+        "three to nine open": (cases.random_groups(), cases.of_groups),
+        "one shorted": (cases.singles(), cases.shorted),
     }
     return {
-        kind: [each for name in names for run in outcomes.get(name, ()) for each in _of_run(run)]
-        for kind, names in sets.items()
+        kind: [
+            detection
+            for groups in sets
+            for run in outcomes.runs(case(groups, cases.DETECTING))
+            for detection in _of_run(run)
+        ]
+        for kind, (sets, case) in kinds.items()
     }
 
 
 def _of_run(run: Outcome) -> list[Detection]:
     return [
         Detection(inf if latency_s is None else latency_s, ticks)
-        for latency_s, ticks in zip(run.kept.found_s, run.kept.driven_ticks, strict=True)
+        for latency_s, ticks in zip(run.data.latencies_s, run.data.driven_ticks, strict=True)
     ]
 
 
-def _row(name: str, found: Sequence[Detection]) -> tuple[str, ...]:
-    latencies_ms = [1e3 * each.latency_s for each in found]
-    known = [each for each in found if each.latency_s < inf]
-    missed = [each for each in found if each.latency_s == inf]
+def _row(kind: str, detections: Sequence[Detection]) -> tuple[str, ...]:
+    latencies_ms = [1e3 * one.latency_s for one in detections]
+    detected, missed = _split(detections)
     # A shorted group is observed by the current that its back-EMF drives as well.
     ticks = ["–"] * 3
-    if "open" in name and known:
-        driven = [each.driven_ticks for each in known]
+    if "open" in kind and detected:
+        driven = [one.driven_ticks for one in detected]
         ticks[:2] = f"{np.median(driven):.0f}", str(max(driven))
-    if "open" in name and missed:
-        ticks[2] = str(max(each.driven_ticks for each in missed))
+    if "open" in kind and missed:
+        ticks[2] = str(max(one.driven_ticks for one in missed))
     return (
-        name, str(len(found)), *(_ms(value) for value in _quantiles(latencies_ms)),
-        _ms(1e3 * max((each.latency_s for each in known), default=inf)),
-        f"{len(missed)} ({percent([each.latency_s == inf for each in found])})", *ticks,
+        kind, str(len(detections)), *(_ms(value) for value in _quantiles(latencies_ms)),
+        _ms(1e3 * max((one.latency_s for one in detected), default=inf)),
+        f"{len(missed)} ({percent([one.latency_s == inf for one in detections])})", *ticks,
     )  # fmt: skip
+
+
+def _split(detections: Sequence[Detection]) -> tuple[list[Detection], list[Detection]]:
+    """Detected and missed faults."""
+    detected = [one for one in detections if one.latency_s < inf]
+    return detected, [one for one in detections if one.latency_s == inf]
 
 
 def _quantiles(values: Sequence[float]) -> list[float]:
@@ -124,9 +124,8 @@ def _ms(value: float) -> str:
 
 def _why(by_kind: Mapping[str, Sequence[Detection]]) -> str:
     """State how many driven ticks detected and undetected open groups had."""
-    found = [each for name, detections in by_kind.items() if "open" in name for each in detections]
-    known = [each.driven_ticks for each in found if each.latency_s < inf]
-    missed = [each for each in found if each.latency_s == inf]
+    detected, missed = _split([one for kind, ones in by_kind.items() if "open" in kind for one in ones])
+    known = [one.driven_ticks for one in detected]
     if not known:
         return ""
     text = (
@@ -135,21 +134,23 @@ def _why(by_kind: Mapping[str, Sequence[Detection]]) -> str:
     )
     if not missed:
         return text
-    fewer = sum(each.driven_ticks < min(known) for each in missed)
+    fewer = sum(one.driven_ticks < min(known) for one in missed)
     return (
         f"{text} Of the {len(missed)} that were not, {fewer} had fewer than {min(known)} until the run ended."
     )
 
 
-def _compared(outcomes: Outcomes) -> list[tuple[Outcome, Outcome]]:
-    """Completed runs with one or two open groups, detecting and told, with the same seed and start."""
-    groups: list[Groups] = [*singles(), *pairs()]
-    names = [(of_groups(each, DETECTING).name, of_groups(each, TOLD).name) for each in groups]
+def _pairs(outcomes: Outcomes) -> list[tuple[Outcome, Outcome]]:
+    """Completed runs with one or two open groups, detected and reported, with the same seed and start."""
+    detecting, reported = (
+        runs_by_set(outcomes, [*cases.singles(), *cases.pairs()], way)
+        for way in (cases.DETECTING, cases.REPORTED)
+    )
     return [
-        (detecting, told)
-        for one, other in names
-        for detecting, told in zip(outcomes.get(one, ()), outcomes.get(other, ()), strict=False)
-        if detecting.status == told.status == Status.COMPLETED
+        pair
+        for groups, runs in detecting.items()
+        for pair in zip(runs, reported.get(groups, ()), strict=False)
+        if all(run.is_complete for run in pair)
     ]
 
 
@@ -158,27 +159,25 @@ def _intervals() -> list[tuple[float, float]]:
     return [*pairwise(EDGES_ms), (inf, inf), (0.0, inf)]
 
 
-def _cost_row(
-    compared: Sequence[tuple[Outcome, Outcome]], first: float, end: float
-) -> tuple[str, ...] | None:
-    chosen = [pair for pair in compared if _within(1e3 * _slowest_s(pair[0]), first, end)]
+def _cost_row(pairs: Sequence[tuple[Outcome, Outcome]], first: float, end: float) -> tuple[str, ...] | None:
+    chosen = [pair for pair in pairs if _within(1e3 * _slowest_s(pair[0]), first, end)]
     if not chosen:
         return None
     costs = np.quantile([1e3 * cost_rad(*pair) for pair in chosen], [0.5, 0.95, 0.99, 1.0])
-    healthy = np.median([1e3 * detecting.kept.healthy_rad for detecting, _ in chosen])
+    healthy = np.median([1e3 * detecting.data.healthy_rad for detecting, _ in chosen])
     return (
         _named(first, end), str(len(chosen)), *(f"{cost:.3f}" for cost in costs), f"{healthy:.1f}",
         percent([tracks(detecting) for detecting, _ in chosen]),
     )  # fmt: skip
 
 
-def cost_rad(detecting: Outcome, told: Outcome) -> float:
+def cost_rad(detecting: Outcome, reported: Outcome) -> float:
     """Return what the delay of the detection adds to the largest error after the fault."""
-    return float(detecting.kept.after_rad - told.kept.after_rad)
+    return float(detecting.data.after_rad - reported.data.after_rad)
 
 
 def _slowest_s(run: Outcome) -> float:
-    return max(each.latency_s for each in _of_run(run))
+    return max(one.latency_s for one in _of_run(run))
 
 
 def _within(latency_ms: float, first: float, end: float) -> bool:
@@ -195,10 +194,10 @@ def _named(first: float, end: float) -> str:
     return f"up to {end:.0f}" if first == 0.0 else f"above {first:.0f}, up to {end:.0f}"
 
 
-def _verdict(compared: Sequence[tuple[Outcome, Outcome]]) -> str:
-    if not compared:
+def _verdict(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
+    if not pairs:
         return ""
-    costs = [1e3 * cost_rad(*pair) for pair in compared]
+    costs = [1e3 * cost_rad(*pair) for pair in pairs]
     free = sum(cost <= 0 for cost in costs)
     return (
         f" With one or two groups open the delay costs {np.median(costs):.3f} mrad as the median and"

@@ -18,40 +18,39 @@ from spheretwin.control.supervision.watchdog import REASONS, Reason, WatchdogSec
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import compiled
 from spheretwin.models.design.capability import LOST, torque_matrices
-from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper.experiment import Outcome
 from spheretwin.run import Run
 from spheretwin.scenario.sections import Scenario
 from spheretwin.simulation import simulate
 
-# What is asked for to find out what there is: more is not told from it.
+# Multiple of the needed torque that is commanded to find the largest one; larger ratios are not resolved.
 MOST = 1e3
 
 
-class Left(NamedTuple):
-    """The least along a path."""
+class RemainingTorque(NamedTuple):
+    """Smallest values along a path without some groups."""
 
     torque: float
     """Largest torque in the direction that was needed, currents within the limit, over what was needed; 0
     where a direction is lost. At most `MOST`."""
     least_norm: float
     """The same of least-norm currents, scaled as a whole."""
-    comes: float
-    """Of a torque that all groups are asked for, least norm, the share that those left give, in the worst
+    least_share: float
+    """Share of a torque commanded to all groups, least norm, that the remaining groups give, in the worst
     direction."""
     singular_value_Nm_per_A: float
     """The smallest of the torque matrix."""
     rank: int
 
 
-def left(G: Array, torque_S: Array, limit_A: float, opened: Sequence[int]) -> Left:
-    """Find the least of each along a path.
+def remaining_torque(G: Array, torque_S: Array, limit_A: float, opened: Sequence[int]) -> RemainingTorque:
+    """Return the smallest values along a path.
 
     Parameters
     ----------
     G : (n, 3, groups) array, N·m/A
-        Torque matrices of the path's poses, whole.
+        Torque matrices of the path's poses with all groups.
     torque_S : (n, 3) array, N·m
         Torque that was needed at each.
     limit_A : float, A
@@ -65,18 +64,18 @@ def left(G: Array, torque_S: Array, limit_A: float, opened: Sequence[int]) -> Le
     symmetric ``C^-1 G_l G_l^T C^-T`` with ``G G^T = C C^T``: between 0 and 1, and the smallest is the share
     that comes in the worst direction.
     """
-    kept = G.copy()
-    kept[:, :, list(opened)] = 0.0
-    squared = kept @ kept.transpose(0, 2, 1)  # (n, 3, 3)
+    reduced = G.copy()
+    reduced[:, :, list(opened)] = 0.0
+    squared = reduced @ reduced.transpose(0, 2, 1)  # (n, 3, 3)
     sigma = np.sqrt(np.maximum(np.linalg.eigvalsh(squared), 0.0))  # (n, 3) rising
     whole = np.linalg.inv(np.linalg.cholesky(G @ G.transpose(0, 2, 1)))
     comes = np.linalg.eigvalsh(whole @ squared @ whole.transpose(0, 2, 1))[:, 0]
     most, scaled = np.empty(len(G)), np.empty(len(G))
-    _fill_most(kept, np.ascontiguousarray(torque_S), limit_A, most, scaled)
-    return Left(
+    _fill_most(reduced, np.ascontiguousarray(torque_S), limit_A, most, scaled)
+    return RemainingTorque(
         torque=float(most.min()),
         least_norm=float(scaled.min()),
-        comes=float(np.clip(comes.min(), 0.0, 1.0)),
+        least_share=float(np.clip(comes.min(), 0.0, 1.0)),
         singular_value_Nm_per_A=float(sigma[:, 0].min()),
         rank=int(np.sum(sigma > LOST * sigma[:, 2:], axis=1).min()),
     )
@@ -85,11 +84,11 @@ def left(G: Array, torque_S: Array, limit_A: float, opened: Sequence[int]) -> Le
 @compiled
 def _fill_most(G: Array, torque_S: Array, limit: float, most: Array, scaled: Array) -> None:
     groups = G.shape[2]
-    wanted, current, scratch = np.empty(3), np.empty(groups), np.empty((SCRATCH_ROWS, groups))
+    command, current, scratch = np.empty(3), np.empty(groups), np.empty((SCRATCH_ROWS, groups))
     for i in range(G.shape[0]):
-        wanted[:] = MOST * torque_S[i]
-        most[i] = MOST * allocate_bounded(G[i], wanted, limit, current, scratch)
-        scaled[i] = MOST * allocate(G[i], wanted, limit, current)
+        command[:] = MOST * torque_S[i]
+        most[i] = MOST * allocate_bounded(G[i], command, limit, current, scratch)
+        scaled[i] = MOST * allocate(G[i], command, limit, current)
 
 
 Array = NDArray[np.float64]
@@ -133,11 +132,13 @@ def reference(scenario: Scenario) -> Reference:
 
 
 @lru_cache(maxsize=1024)
-def left_by(scenario: Scenario, opened: Sequence[int], first: int) -> Left:
-    """Return what some open groups leave along the path of a healthy scenario, from a tick to the end."""
+def remaining_without(scenario: Scenario, opened: Sequence[int], first: int) -> RemainingTorque:
+    """Return the remaining torque along the path of a healthy scenario, from a tick to the end."""
     path = reference(scenario)
     rows = slice(first, None, PATH_TICKS)
-    return left(torque_matrices(path.q[rows], path.actuator), path.torque_S[rows], path.limit_A, opened)
+    return remaining_torque(
+        torque_matrices(path.q[rows], path.actuator), path.torque_S[rows], path.limit_A, opened
+    )
 
 
 def start_tick(scenario: Scenario) -> int:
@@ -155,7 +156,7 @@ TWICE = 2.0
 """A run tracks if it completes and its error ratio is at most this."""
 
 
-class Found(NamedTuple):
+class FaultData(NamedTuple):
     """Result of a run. Errors are the largest of any hinge from the start of the fault to the run's end."""
 
     start_s: float
@@ -164,25 +165,25 @@ class Found(NamedTuple):
     healthy_rad: float
     """The same error of the healthy run with the same seed, over the same control ticks."""
     ended_s: float
-    numbers: bool
-    """Whether all of its telemetry are numbers."""
-    stopped: Reason
-    """Why the watchdog took the currents away."""
+    is_finite: bool
+    """Whether its telemetry is finite."""
+    stop_reason: Reason
+    """Reason for which the watchdog removed the currents."""
     stopped_s: float
-    """When; no number where it did not."""
-    told: bool
-    """Whether the allocation was told what is open, or could find it."""
+    """Time of the stop; NaN without one."""
+    is_reported: bool
+    """Whether faults were reported to the allocation, or detected."""
     least_norm: bool
     """Whether the allocation is that of least norm."""
-    left: Left | None
-    """None where no groups are open."""
-    found_s: tuple[float | None, ...]
+    left: RemainingTorque | None
+    """None if no groups are open."""
+    latencies_s: tuple[float | None, ...]
     """For each failed group, detection latency: time from fault to detection; None if not detected."""
     driven_ticks: tuple[int, ...]
     """For each failed group, control ticks from the fault to its detection, or to the end of the run, at
     which its command is above the threshold of the detector."""
-    wrongly_found: int
-    """Groups that work, and were found not to."""
+    false_detections: int
+    """Number of working groups that were detected as failed."""
 
     @property
     def ratio(self) -> float:
@@ -190,87 +191,91 @@ class Found(NamedTuple):
         return self.after_rad / self.healthy_rad
 
 
-def keep(run: Run) -> Found:
+def reduce(run: Run) -> FaultData:
     """Reduce a run."""
     base, first, table = healthy(run.scenario), start_tick(run.scenario), run.telemetry
     healthy_error_rad = reference(base).error_rad
     failed = tuple(fault.place for fault in run.scenario.fault if fault.kind.each_group)
     detected = _detected_s(table)
-    stopped, stopped_s = _stopped(table)
-    return Found(
+    stop_reason, stopped_s = _stop(table)
+    return FaultData(
         start_s=first * run.scenario.controller.period_s,
         after_rad=largest(table["error_rad"][first:]),
         healthy_rad=largest(healthy_error_rad[first : len(table)]),
         ended_s=len(table) * run.scenario.controller.period_s,
-        numbers=bool(np.isfinite(table.values).all()),
-        stopped=stopped,
+        is_finite=bool(np.isfinite(table.values).all()),
+        stop_reason=stop_reason,
         stopped_s=stopped_s,
-        told=run.scenario.detects or any(fault.reported_to_controller for fault in run.scenario.fault),
+        is_reported=run.scenario.detects or any(fault.reported_to_controller for fault in run.scenario.fault),
         least_norm=run.scenario.allocation == "least_norm",
-        left=left_by(base, failed, first) if failed and first < len(healthy_error_rad) else None,
-        found_s=tuple(detected.get(group) for group in failed),
+        remaining=remaining_without(base, failed, first)
+        if failed and first < len(healthy_error_rad)
+        else None,
+        latencies_s=tuple(detected.get(group) for group in failed),
         driven_ticks=tuple(_driven_ticks(run, group, first, detected.get(group)) for group in failed),
-        wrongly_found=len(set(detected) - set(failed)),
+        false_detections=len(set(detected) - set(failed)),
     )
 
 
 def tracks(outcome: Outcome) -> bool:
-    """Whether a run completed, and stayed close."""
-    return outcome.status == Status.COMPLETED and outcome.kept.ratio <= TWICE
+    """True if a run completed and its error ratio is at most `TWICE`."""
+    return outcome.is_complete and outcome.data.ratio <= TWICE
 
 
 def reason(outcome: Outcome) -> str | None:
-    """Why a run does not track, or was stopped; None where it tracks, or nothing can be said."""
-    kept: Found = outcome.kept
-    if kept.stopped is not Reason.NONE:
-        return kept.stopped.text
-    if tracks(outcome) or kept.left is None:
+    """Reason for which a run does not track or was stopped; None if it tracks or the reason is unknown."""
+    data: FaultData = outcome.data
+    if data.stop_reason is not Reason.NONE:
+        return data.stop_reason.text
+    if tracks(outcome) or data.remaining is None:
         return None
-    if kept.left.rank < 3:
-        return f"rank {kept.left.rank}"
-    if kept.told:
-        by_least_norm = f", {kept.left.least_norm:.2f} by least norm" if kept.least_norm else ""
-        return f"{kept.left.torque:.2f} of the torque needed is left{by_least_norm}"
-    return f"{kept.left.comes:.3f} of the torque asked for comes"
+    if data.remaining.rank < 3:
+        return f"rank {data.remaining.rank}"
+    if data.is_reported:
+        by_least_norm = f", {data.remaining.least_norm:.2f} by least norm" if data.least_norm else ""
+        return f"{data.remaining.torque:.2f} of the torque needed is left{by_least_norm}"
+    return f"{data.remaining.least_share:.3f} of the torque asked for comes"
 
 
-def more(outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
-    """What the JSON says of a case besides: medians and ranges over the seeds, the least of what is left."""
-    kept: list[Found] = [outcome.kept for outcome in outcomes]
-    sets = [each.left for each in kept if each.left is not None]
+def row_fields(outcomes: Sequence[Outcome]) -> Mapping[str, Any]:
+    """Entries of the JSON: medians and ranges over the seeds, the smallest remaining torque."""
+    data: list[FaultData] = [outcome.data for outcome in outcomes]
+    remaining = [run.remaining for run in data if run.remaining is not None]
     reasons = [why for outcome in outcomes if (why := reason(outcome))]
     return {
         "tracks": [tracks(outcome) for outcome in outcomes].count(True),
         "reason": reasons[0] if reasons else None,
-        "start_s": [each.start_s for each in kept],
-        "error_after_fault_rad": [_plain(each.after_rad) for each in kept],
-        "healthy_error_after_fault_rad": [_plain(each.healthy_rad) for each in kept],
-        "error_ratio": _plain(np.median([each.ratio for each in kept])),
+        "start_s": [run.start_s for run in data],
+        "error_after_fault_rad": [_plain(run.after_rad) for run in data],
+        "healthy_error_after_fault_rad": [_plain(run.healthy_rad) for run in data],
+        "error_ratio": _plain(np.median([run.ratio for run in data])),
         "error_ratio_range": [
-            _plain(min(each.ratio for each in kept)),
-            _plain(max(each.ratio for each in kept)),
+            _plain(min(run.ratio for run in data)),
+            _plain(max(run.ratio for run in data)),
         ],
-        "ended_s": float(np.median([each.ended_s for each in kept])),
-        "time_to_detection_s": [list(each.found_s) for each in kept],
-        "wrongly_found": sum(each.wrongly_found for each in kept),
-        "torque_left_over_needed": min((each.torque for each in sets), default=None),
-        "least_norm_torque_over_needed": min((each.least_norm for each in sets), default=None),
-        "share_that_comes_untold": min((each.comes for each in sets), default=None),
-        "least_singular_value_Nm_per_A": min((each.singular_value_Nm_per_A for each in sets), default=None),
-        "rank": min((each.rank for each in sets), default=None),
+        "ended_s": float(np.median([run.ended_s for run in data])),
+        "time_to_detection_s": [list(run.latencies_s) for run in data],
+        "wrongly_found": sum(run.false_detections for run in data),
+        "torque_left_over_needed": min((least.torque for least in remaining), default=None),
+        "least_norm_torque_over_needed": min((least.least_norm for least in remaining), default=None),
+        "share_that_comes_untold": min((least.least_share for least in remaining), default=None),
+        "least_singular_value_Nm_per_A": min(
+            (least.singular_value_Nm_per_A for least in remaining), default=None
+        ),
+        "rank": min((least.rank for least in remaining), default=None),
     }
 
 
 def _detected_s(table: Table) -> dict[int, float]:
-    """For each group that was found not to follow, time from its fault, s; for one that works, none."""
+    """Time from the fault to the detection of each detected group, s; none for a working one."""
     if not len(table) or "group_out" not in {signal.name for signal in table.signals}:
         return {}
     groups = np.flatnonzero(table["group_out"][-1] > REPORTED)
     return {int(group): float(table["time_to_detection_s"][-1, group]) for group in groups}
 
 
-def _stopped(table: Table) -> tuple[Reason, float]:
-    """Why the watchdog stepped in, and when."""
+def _stop(table: Table) -> tuple[Reason, float]:
+    """Reason and time of the stop by the watchdog."""
     if "failsafe_reason" not in {signal.name for signal in table.signals}:
         return Reason.NONE, nan
     ticks = np.flatnonzero(table["failsafe_reason"])

@@ -1,4 +1,4 @@
-"""Open groups: how many may be open, and what the controller has to know of them."""
+"""Sections of the fault study on open groups and on failures of sensors, supply and controller."""
 
 from __future__ import annotations
 
@@ -9,34 +9,10 @@ from numpy.typing import NDArray
 
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import fault_cases as cases
 from spheretwin.paper.experiment import Outcome, Outcomes, ResultTable, Section
-from spheretwin.paper.fault_cases import (
-    ALONE,
-    BRAKE,
-    DETECTING,
-    DRAWN,
-    HEALTHY_PROTOTYPE,
-    NOT_TOLD,
-    OF_GROUPS,
-    OF_PARTS,
-    RELEASE,
-    SIZES,
-    TOLD,
-    Failure,
-    Groups,
-    Way,
-    count,
-    failures,
-    of_groups,
-    of_part,
-    pairs,
-    random_groups,
-    sets,
-    singles,
-)
-from spheretwin.paper.fault_cases import pairs as all_pairs
 from spheretwin.paper.fault_outcomes import TWICE, tracks
-from spheretwin.paper.rows import ended
+from spheretwin.paper.rows import statuses_text
 from spheretwin.viz.pages.markdown import Drawing
 
 PARTS_METHOD = (
@@ -47,67 +23,67 @@ PARTS_METHOD = (
     " stopped ends there. What is intermittent fails in every other"
     " stretch of 10 ms, by a coin; what is stuck stays where it was."
 )
-PARTS_HEAD = ("part and mode", *(way.name for way in OF_PARTS), "stopped for", "after the fault, ms")
+PARTS_HEAD = ("part and mode", *(way.name for way in cases.OF_PARTS), "stopped for", "after the fault, ms")
 
 
 def parts_section(outcomes: Outcomes) -> Section:
     """How every mode of every part ends in its three ways."""
-    ran = [failure for failure in failures() if of_part(failure, ALONE).name in outcomes]
-    rows = [_parts_row(outcomes, failure) for failure in ran]
+    failures = [failure for failure in cases.failures() if outcomes.runs(cases.of_part(failure, cases.ALONE))]
+    rows = [_parts_row(outcomes, failure) for failure in failures]
     title = "Failures that start at a drawn time: how the runs ended, and their error ratio"
     return Section(
         "Sensors, supply and controller",
-        f"{PARTS_METHOD}{_healthy(outcomes)}{_detection_text(outcomes, ran)}",
+        f"{PARTS_METHOD}{_healthy(outcomes)}{_watchdog_text(outcomes, failures)}",
         [ResultTable(title, PARTS_HEAD, rows, len(PARTS_HEAD) - 1)],
     )
 
 
-def _parts_row(outcomes: Outcomes, failure: Failure) -> tuple[str, ...]:
-    cells = [_cell(outcomes.get(of_part(failure, way).name, ())) for way in OF_PARTS]
-    stopped = _stopped(outcomes.get(of_part(failure, RELEASE).name, ()))
+def _parts_row(outcomes: Outcomes, failure: cases.Failure) -> tuple[str, ...]:
+    cells = [_cell(outcomes.runs(cases.of_part(failure, way))) for way in cases.OF_PARTS]
+    stopped = _stopped(outcomes.runs(cases.of_part(failure, cases.RELEASE)))
     return failure.name, *cells, *stopped
 
 
 def _cell(runs: Sequence[Outcome]) -> str:
-    return f"{ended(runs)}: {np.median([run.kept.ratio for run in runs]):.3g}" if runs else "not run"
+    return f"{statuses_text(runs)}: {np.median([run.data.ratio for run in runs]):.3g}" if runs else "not run"
 
 
 def _stopped(runs: Sequence[Outcome]) -> tuple[str, str]:
-    """Why the watchdog stepped in, and when."""
-    kept = [run.kept for run in runs if run.kept.stopped is not Reason.NONE]
-    if not kept:
+    """Reasons and median time of the stops by the watchdog."""
+    stops = [run.data for run in runs if run.data.stop_reason is not Reason.NONE]
+    if not stops:
         return "–", "–"
-    reasons = dict.fromkeys(each.stopped.text for each in kept)
-    return "; ".join(reasons), f"{np.median([1e3 * (each.stopped_s - each.start_s) for each in kept]):.0f}"
+    reasons = dict.fromkeys(stop.stop_reason.text for stop in stops)
+    return "; ".join(reasons), f"{np.median([1e3 * (stop.stopped_s - stop.start_s) for stop in stops]):.0f}"
 
 
 def _healthy(outcomes: Outcomes) -> str:
-    if HEALTHY_PROTOTYPE.name not in outcomes:
+    errors = [np.degrees(run.data.after_rad) for run in outcomes.runs(cases.HEALTHY_PROTOTYPE)]
+    if not errors:
         return ""
-    errors = [np.degrees(run.kept.after_rad) for run in outcomes[HEALTHY_PROTOTYPE.name]]
     return f" The largest error of the healthy prototype is {np.median(errors):.2f}° (median over the seeds)."
 
 
-def _detection_text(outcomes: Outcomes, ran: Sequence[Failure]) -> str:
-    """What the rotor is lost to without a watchdog, what one sees of it, and what it does not."""
-    lost = [failure for failure in ran if not _all_track(outcomes, failure)]
+def _watchdog_text(outcomes: Outcomes, failures: Sequence[cases.Failure]) -> str:
+    """Count the failures that lose the rotor without a watchdog, and those that the watchdog stops."""
+    lost = [failure for failure in failures if not _all_track(outcomes, failure)]
     if not lost:
         return ""
-    unseen = [failure.name for failure in lost if not _all_stopped(outcomes, failure)]
-    seen = len(lost) - len(unseen)
+    missed = [failure.name for failure in lost if not _all_stopped(outcomes, failure)]
     text = (
-        f"\n\nWithout a watchdog {len(ran) - len(lost)} of {len(ran)} failures leave a rotor that tracks"
-        f" under every seed. Of the {len(lost)} others the watchdog stops {seen} under every seed."
+        f"\n\nWithout a watchdog {len(failures) - len(lost)} of {len(failures)} failures leave a rotor that"
+        f" tracks under every seed. Of the {len(lost)} others the watchdog stops {len(lost) - len(missed)}"
+        " under every seed."
     )
-    return text + (f" What it does not always see: {', '.join(unseen)}." if unseen else "")
+    return text + (f" What it does not always see: {', '.join(missed)}." if missed else "")
 
 
-def _all_track(outcomes: Outcomes, failure: Failure) -> bool:
-    return all(map(tracks, outcomes[of_part(failure, ALONE).name]))
+def _all_track(outcomes: Outcomes, failure: cases.Failure) -> bool:
+    return all(map(tracks, outcomes.runs(cases.of_part(failure, cases.ALONE))))
 
 
-def _all_stopped(outcomes: Outcomes, failure: Failure) -> bool:
-    runs = [run for way in (RELEASE, BRAKE) for run in outcomes.get(of_part(failure, way).name, ())]
+def _all_stopped(outcomes: Outcomes, failure: cases.Failure) -> bool:
+    runs = [run for way in (cases.RELEASE, cases.BRAKE) for run in outcomes.runs(cases.of_part(failure, way))]
     return all(run.status == Status.FAILSAFE for run in runs)
 
 
@@ -130,7 +106,7 @@ def draw_pairs(outcomes: Outcomes) -> Drawing:
     """Error of every pair, and of every single group on the diagonal."""
     from spheretwin.viz.figures import faults as figures
 
-    panels = {way.name: ratios(outcomes, way) for way in (NOT_TOLD, TOLD, DETECTING)}
+    panels = {way.name: ratios(outcomes, way) for way in (cases.UNREPORTED, cases.REPORTED, cases.DETECTING)}
     figure = figures.triangles(panels, "open group", ERROR, TWICE, "Every pair of groups open")
     caption = (
         "Largest error of any hinge after the fault over that of the healthy run over the same window, median"
@@ -139,14 +115,12 @@ def draw_pairs(outcomes: Outcomes) -> Drawing:
     return Drawing("faults_pairs.png", caption, figure)
 
 
-def ratios(outcomes: Outcomes, way: Way) -> NDArray[np.float64]:
-    """(groups, groups) median error of a way over the healthy one; none above the diagonal, or not run."""
-    found = np.full((count(), count()), np.nan)
-    for groups in (*singles(), *all_pairs()):
-        runs = outcomes.get(of_groups(groups, way).name, ())
-        if runs:
-            found[groups[-1], groups[0]] = np.median([run.kept.ratio for run in runs])
-    return found
+def ratios(outcomes: Outcomes, way: cases.Way) -> NDArray[np.float64]:
+    """(groups, groups) median error ratio of a way; NaN above the diagonal or without a run."""
+    medians = np.full((cases.count(), cases.count()), np.nan)
+    for groups, runs in runs_by_set(outcomes, [*cases.singles(), *cases.pairs()], way).items():
+        medians[groups[-1], groups[0]] = np.median([run.data.ratio for run in runs])
+    return medians
 
 
 def latencies(by_kind: Mapping[str, Sequence[float]]) -> Drawing:
@@ -187,7 +161,8 @@ GROUPS_METHOD = (
     " share it. The *error ratio* is the largest error of any hinge from the start of the fault to the end of"
     " the run, divided by the same error of the healthy run with the same seed, allocation and window. A run"
     f" *tracks* if it completes and its error ratio is at most {TWICE:g}.\n\n"
-    f"Every group and every pair runs with every seed; {DRAWN} larger sets, drawn once, run with one each."
+    f"Every group and every pair runs with every seed; {cases.RANDOM_SETS} larger sets, drawn once, run with"
+    " one each."
 )
 GROUPS_HEAD = (
     "open groups", "way", "sets", "runs", "completed", "track",
@@ -201,16 +176,19 @@ INTERVALS_s = ((0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 4.0), (4.0, 5.0))
 
 def groups_section(outcomes: Outcomes) -> Section:
     """Shares that complete and track, pairs, and the smallest torque that is left."""
-    by_number = [(number, _of_number(number)) for number in (1, 2, *SIZES)]
+    by_number = [(number, _of_number(number)) for number in (1, 2, *cases.SIZES)]
     rows = [
         row
         for number, listed in by_number
-        for way in OF_GROUPS
+        for way in cases.OF_GROUPS
         if (row := _groups_row(outcomes, number, listed, way))
     ]
     title = "Open groups by their number and way"
     by_start = [
-        row for interval in INTERVALS_s for way in OF_GROUPS if (row := _started(outcomes, interval, way))
+        row
+        for interval in INTERVALS_s
+        for way in cases.OF_GROUPS
+        if (row := _started(outcomes, interval, way))
     ]
     return Section(
         "Open groups",
@@ -223,47 +201,55 @@ def groups_section(outcomes: Outcomes) -> Section:
     )
 
 
-def found_of(
-    outcomes: Outcomes, listed: Sequence[Groups], way: Way
-) -> list[tuple[Groups, Sequence[Outcome]]]:
-    """Sets that were run in a way, each with its outcomes."""
-    named = [(groups, of_groups(groups, way).name) for groups in listed]
-    return [(groups, outcomes[name]) for groups, name in named if name in outcomes]
+RunsBySet = Mapping[cases.Groups, Sequence[Outcome]]
 
 
-def _of_number(number: int) -> Sequence[Groups]:
+def runs_by_set(outcomes: Outcomes, sets: Sequence[cases.Groups], way: cases.Way) -> RunsBySet:
+    """Outcomes of the sets that were run in a way."""
+    return {groups: runs for groups in sets if (runs := outcomes.runs(cases.of_groups(groups, way)))}
+
+
+def _of_number(number: int) -> Sequence[cases.Groups]:
     if number == 1:
-        return singles()
-    return pairs() if number == 2 else [groups for groups in random_groups() if len(groups) == number]
+        return cases.singles()
+    return (
+        cases.pairs()
+        if number == 2
+        else [groups for groups in cases.random_groups() if len(groups) == number]
+    )
 
 
 def _groups_row(
-    outcomes: Outcomes, number: int, listed: Sequence[Groups], way: Way
+    outcomes: Outcomes, number: int, listed: Sequence[cases.Groups], way: cases.Way
 ) -> tuple[str, ...] | None:
-    found = found_of(outcomes, listed, way)
-    runs = [outcome for _, each in found for outcome in each]
+    by_set = runs_by_set(outcomes, listed, way)
+    runs = [run for of_set in by_set.values() for run in of_set]
     if not runs:
         return None
-    completed = [run.status == Status.COMPLETED for run in runs]
-    return (str(number), way.name, str(len(found)), str(len(runs)), percent(completed), *_tracking(runs))
+    completed = [run.is_complete for run in runs]
+    return (str(number), way.name, str(len(by_set)), str(len(runs)), percent(completed), *_tracking(runs))
 
 
-def _started(outcomes: Outcomes, interval_s: tuple[float, float], way: Way) -> tuple[str, ...] | None:
+def _started(outcomes: Outcomes, interval_s: tuple[float, float], way: cases.Way) -> tuple[str, ...] | None:
     """Row of the faults of one or two groups that start in an interval."""
     first, end = interval_s
-    runs = [run for run in few(outcomes, way) if first <= run.kept.start_s < end]
+    runs = [run for run in few(outcomes, way) if first <= run.data.start_s < end]
     return (f"{first:g} to {end:g}", way.name, str(len(runs)), *_tracking(runs)) if runs else None
 
 
 def _tracking(runs: Sequence[Outcome]) -> tuple[str, ...]:
     """Return the share that tracks, and quantiles of the error ratio."""
-    ratios = np.quantile([run.kept.ratio for run in runs], [0.5, 0.95, 0.99, 1.0])
+    ratios = np.quantile([run.data.ratio for run in runs], [0.5, 0.95, 0.99, 1.0])
     return percent([tracks(run) for run in runs]), *(f"{ratio:.2f}" for ratio in ratios)
 
 
-def few(outcomes: Outcomes, way: Way) -> list[Outcome]:
+def few(outcomes: Outcomes, way: cases.Way) -> list[Outcome]:
     """Return the runs with one or two open groups in a way."""
-    return [run for _, runs in found_of(outcomes, [*singles(), *pairs()], way) for run in runs]
+    return [
+        run
+        for runs in runs_by_set(outcomes, [*cases.singles(), *cases.pairs()], way).values()
+        for run in runs
+    ]
 
 
 def percent(true: Sequence[bool]) -> str:
@@ -273,10 +259,10 @@ def percent(true: Sequence[bool]) -> str:
 
 
 def _numbers(outcomes: Outcomes) -> str:
-    """Whether all runs of the study ended as runs should, whatever failed."""
-    runs = [run for each in outcomes.values() for run in each]
-    broken = sum(not run.kept.numbers or run.status == Status.DIVERGED for run in runs)
-    wrongly = sum(run.kept.wrongly_found for run in runs)
+    """Count the runs without a status or with numbers that are not finite."""
+    runs = [run for of_case in outcomes.values() for run in of_case]
+    broken = sum(not run.data.is_finite or run.status == Status.DIVERGED for run in runs)
+    wrongly = sum(run.data.false_detections for run in runs)
     ended = "each" if not broken else f"all but {broken}"
     return (
         f"Of the {len(runs)} runs of the whole study, {ended} ended with a status and with nothing but"
@@ -285,26 +271,26 @@ def _numbers(outcomes: Outcomes) -> str:
 
 
 def _goal(outcomes: Outcomes) -> str:
-    """Whether every single group and every pair may be open."""
-    told = []
-    for way in (TOLD, DETECTING, NOT_TOLD):
+    """State how many of the runs with one or two open groups track."""
+    texts = []
+    for way in (cases.REPORTED, cases.DETECTING, cases.UNREPORTED):
         runs = few(outcomes, way)
         if runs:
-            ratios = [run.kept.ratio for run in runs]
-            told.append(
+            ratios = [run.data.ratio for run in runs]
+            texts.append(
                 f"{way.name}, {sum(map(tracks, runs))} of {len(runs)} runs track, with a median error ratio"
                 f" of {np.median(ratios):.2f} and at most {max(ratios):.2f}"
             )
-    return f" With one or two groups open: {'; '.join(told)}." if told else ""
+    return f" With one or two groups open: {'; '.join(texts)}." if texts else ""
 
 
 def _shares(outcomes: Outcomes) -> dict[str, dict[int, float]]:
     """By way and number of open groups, share of the runs that track."""
-    return {way.name: _share_by_number(found_of(outcomes, sets(), way)) for way in OF_GROUPS}
+    return {way.name: _share_by_number(runs_by_set(outcomes, cases.sets(), way)) for way in cases.OF_GROUPS}
 
 
-def _share_by_number(found: Sequence[tuple[Groups, Sequence[Outcome]]]) -> dict[int, float]:
+def _share_by_number(by_set: RunsBySet) -> dict[int, float]:
     tracked: dict[int, list[bool]] = {}
-    for groups, runs in found:
+    for groups, runs in by_set.items():
         tracked.setdefault(len(groups), []).extend(tracks(run) for run in runs)
     return {number: float(np.mean(tracked[number])) for number in sorted(tracked)}

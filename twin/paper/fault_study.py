@@ -1,4 +1,4 @@
-"""The nutation with parts that fail in mid-flight, and what controller, detector and watchdog make of it."""
+"""Fault study: the nutation with parts that fail during the run, and the reasons of lost tracking."""
 
 from __future__ import annotations
 
@@ -7,28 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import fault_cases as cases
 from spheretwin.paper import fault_latency, fault_sections
 from spheretwin.paper.experiment import Experiment, Finding, Outcome, Outcomes, ResultTable, Section
-from spheretwin.paper.fault_cases import (
-    BOUNDED,
-    DETECTING,
-    NOT_TOLD,
-    OF_GROUPS,
-    SAMPLE,
-    TOLD,
-    Groups,
-    Way,
-    cases,
-    of_groups,
-    on_other_engine,
-    sample,
-    sets,
-)
-from spheretwin.paper.fault_outcomes import keep, more, tracks
-from spheretwin.paper.fault_sections import few, found_of
+from spheretwin.paper.fault_outcomes import reduce, row_fields, tracks
+from spheretwin.paper.fault_sections import RunsBySet, few, runs_by_set
 
-HOW = (
+METHOD = (
     "Along the path of the healthy run, every 10 ms from the fault on: the *rank* and least singular value of"
     " the torque matrix without the open groups; the *torque left over the torque needed*, that is, the"
     " largest torque that any currents within the limit give in the direction of the torque that the healthy"
@@ -37,52 +22,45 @@ HOW = (
     " least eigenvalue of G_left G_leftᵀ (G Gᵀ)⁻¹). The least along the path is told."
 )
 CAUSES_HEAD = (
-    "way",
-    "figure",
-    "sets",
-    "do not track",
-    "track: least",
-    "do not: largest",
-    "apart at",
-    "told rightly",
-)
+    "way", "figure", "sets", "do not track", "track: least", "do not: largest", "apart at", "told rightly",
+)  # fmt: skip
 SMALL = (
     "open groups", "way", "seeds that do not track", "how the worst ended", "error ratio",
     "rank", "least singular value, N·m/A", "torque left / needed", "by least norm",
 )  # fmt: skip
 JUDGED = (
-    (TOLD, ("torque", "torque left / needed")),
-    (TOLD, ("least_norm", "the same by least norm")),
-    (DETECTING, ("torque", "torque left / needed")),
-    (DETECTING, ("least_norm", "the same by least norm")),
-    (BOUNDED, ("torque", "torque left / needed")),
-    (NOT_TOLD, ("comes", "share that comes")),
+    (cases.REPORTED, ("torque", "torque left / needed")),
+    (cases.REPORTED, ("least_norm", "the same by least norm")),
+    (cases.DETECTING, ("torque", "torque left / needed")),
+    (cases.DETECTING, ("least_norm", "the same by least norm")),
+    (cases.BOUNDED, ("torque", "torque left / needed")),
+    (cases.UNREPORTED, ("least_share", "share that comes")),
 )
-"""Figures that may tell which runs of a way track."""
+"""Figures that may separate the runs of a way that track from the others."""
 
 LISTED = 10
 """Sets of each way in the table of the smallest."""
 
 
 class Split(NamedTuple):
-    """How well a figure tells the runs that track from those that do not."""
+    """Threshold of a figure between the runs that track and the others."""
 
     at: float
     rightly: float
-    """Share of the runs that it tells rightly."""
+    """Share of the runs on the right side of the threshold."""
 
 
 def causes_section(outcomes: Outcomes) -> Section:
-    """How well rank and torque tell the sets that track, and the smallest sets that do not."""
-    by_way = {way.name: found_of(outcomes, sets(), way) for way in OF_GROUPS}
+    """Separation of the sets that track by rank and torque, and the smallest sets that do not track."""
+    by_way = {way.name: runs_by_set(outcomes, cases.sets(), way) for way in cases.OF_GROUPS}
     figures = [(way, *figure) for way, figure in JUDGED if by_way[way.name]]
     rows = [_causes_row(by_way[way.name], way, name, label) for way, name, label in figures]
-    small = [row for way in (TOLD, BOUNDED) for row in _smallest(by_way[way.name], way)]
-    points = {way.name: _points(by_way[way.name]) for way in (TOLD, BOUNDED) if by_way[way.name]}
+    reported = (cases.REPORTED, cases.BOUNDED)
+    small = [row for way in reported for row in _smallest(by_way[way.name], way)]
+    points = {way.name: _points(by_way[way.name]) for way in reported if by_way[way.name]}
     return Section(
         "Why some sets do not track",
-        f"{HOW}{_ranks(by_way)}"
-        f"{_causes_verdict(by_way[TOLD.name], TOLD)}{_causes_verdict(by_way[BOUNDED.name], BOUNDED)}",
+        f"{METHOD}{_ranks(by_way)}{''.join(_causes_verdict(by_way[way.name], way) for way in reported)}",
         [
             ResultTable(
                 "How well one figure tells the sets that track, each with the first seed",
@@ -103,19 +81,17 @@ def split(good: Sequence[float], bad: Sequence[float]) -> Split:
     values = np.concatenate([good, bad])
     order = np.argsort(values, kind="stable")
     is_good = (np.arange(len(values)) < len(good))[order]
-    # With the i lowest called bad: the bad among them are told rightly, and the good beyond.
+    # With the threshold above the i lowest: the bad below and the good above are on the right side.
     bad_below = np.concatenate([[0], np.cumsum(~is_good)])
     good_below = np.concatenate([[0], np.cumsum(is_good)])
     rightly = bad_below + len(good) - good_below
     best = int(np.argmax(rightly))
-    beside = values[order][[max(best - 1, 0), min(best, len(values) - 1)]]
-    return Split(float(beside.mean()), float(rightly[best] / len(values)))
+    neighbours = values[order][[max(best - 1, 0), min(best, len(values) - 1)]]
+    return Split(float(neighbours.mean()), float(rightly[best] / len(values)))
 
 
-def _causes_row(
-    found: Sequence[tuple[Groups, Sequence[Outcome]]], way: Way, figure: str, label: str
-) -> tuple[str, ...]:
-    good, bad = _parted([(groups, runs[:1]) for groups, runs in found], figure)
+def _causes_row(by_set: RunsBySet, way: cases.Way, figure: str, label: str) -> tuple[str, ...]:
+    good, bad = _parted({groups: runs[:1] for groups, runs in by_set.items()}, figure)
     best = split(good, bad)
     return (
         way.name, label, str(len(good) + len(bad)), str(len(bad)),
@@ -124,37 +100,35 @@ def _causes_row(
     )  # fmt: skip
 
 
-def _parted(
-    found: Sequence[tuple[Groups, Sequence[Outcome]]], figure: str
-) -> tuple[list[float], list[float]]:
-    """A figure of what is left, of the runs that track and of those that do not."""
+def _parted(by_set: RunsBySet, figure: str) -> tuple[list[float], list[float]]:
+    """A figure of the runs that track, and of those that do not."""
     good: list[float] = []
     bad: list[float] = []
-    for _, runs in found:
+    for runs in by_set.values():
         for run in runs:
-            (good if tracks(run) else bad).append(getattr(run.kept.left, figure))
+            (good if tracks(run) else bad).append(getattr(run.data.remaining, figure))
     return good, bad
 
 
-def _ranks(by_way: dict[str, list[tuple[Groups, Sequence[Outcome]]]]) -> str:
-    """Whether any set has lost a direction."""
+def _ranks(by_way: dict[str, RunsBySet]) -> str:
+    """Count the sets that lose a direction."""
     lost = {
         groups
-        for found in by_way.values()
-        for groups, runs in found
-        if any(r.kept.left.rank < 3 for r in runs)
+        for by_set in by_way.values()
+        for groups, runs in by_set.items()
+        if any(run.data.remaining.rank < 3 for run in runs)
     }
-    some = {groups for found in by_way.values() for groups, _ in found}
-    if not some:
+    every = {groups for by_set in by_way.values() for groups in by_set}
+    if not every:
         return ""
     if not lost:
-        return f"\n\nAll {len(some)} sets keep rank 3 along the whole path."
-    return f"\n\n{len(lost)} of {len(some)} sets lose a direction on the path."
+        return f"\n\nAll {len(every)} sets keep rank 3 along the whole path."
+    return f"\n\n{len(lost)} of {len(every)} sets lose a direction on the path."
 
 
-def _causes_verdict(found: Sequence[tuple[Groups, Sequence[Outcome]]], way: Way) -> str:
-    """Whether enough torque left is enough."""
-    good, bad = _parted(found, "torque")
+def _causes_verdict(by_set: RunsBySet, way: cases.Way) -> str:
+    """Count the runs that track with at least and with less than the needed torque."""
+    good, bad = _parted(by_set, "torque")
     if not good:
         return ""
     enough = [value >= 1 for value in good].count(True)
@@ -166,26 +140,30 @@ def _causes_verdict(found: Sequence[tuple[Groups, Sequence[Outcome]]], way: Way)
     )
 
 
-def _smallest(found: Sequence[tuple[Groups, Sequence[Outcome]]], way: Way) -> list[tuple[str, ...]]:
-    failing = [(groups, runs) for groups, runs in found if not all(map(tracks, runs))]
-    failing.sort(key=lambda each: (len(each[0]), min(run.kept.left.torque for run in each[1]), each[0]))
+def _smallest(by_set: RunsBySet, way: cases.Way) -> list[tuple[str, ...]]:
+    failing = [(groups, runs) for groups, runs in by_set.items() if not all(map(tracks, runs))]
+    failing.sort(key=lambda one: (len(one[0]), min(run.data.remaining.torque for run in one[1]), one[0]))
     return [_listed(groups, runs, way) for groups, runs in failing[:LISTED]]
 
 
-def _listed(groups: Groups, runs: Sequence[Outcome], way: Way) -> tuple[str, ...]:
+def _listed(groups: cases.Groups, runs: Sequence[Outcome], way: cases.Way) -> tuple[str, ...]:
     bad = [run for run in runs if not tracks(run)]
-    worst = max(bad, key=lambda run: run.kept.ratio)
-    left = worst.kept.left
+    worst = max(bad, key=lambda run: run.data.ratio)
+    left = worst.data.remaining
     return (
         " ".join(map(str, groups)), way.name, f"{len(bad)} of {len(runs)}", str(worst.status),
-        f"{worst.kept.ratio:.2f}", str(left.rank), f"{left.singular_value_Nm_per_A:.4f}",
+        f"{worst.data.ratio:.2f}", str(left.rank), f"{left.singular_value_Nm_per_A:.4f}",
         f"{left.torque:.2f}", f"{left.least_norm:.2f}",
     )  # fmt: skip
 
 
-def _points(found: Sequence[tuple[Groups, Sequence[Outcome]]]) -> list[tuple[float, float, int]]:
+def _points(by_set: RunsBySet) -> list[tuple[float, float, int]]:
     """Torque left, error over the healthy one, and number of open groups, of each run."""
-    return [(run.kept.left.torque, run.kept.ratio, len(groups)) for groups, runs in found for run in runs]
+    return [
+        (run.data.remaining.torque, run.data.ratio, len(groups))
+        for groups, runs in by_set.items()
+        for run in runs
+    ]
 
 
 BOUND_rad = 1e-9
@@ -193,21 +171,16 @@ BOUND_rad = 1e-9
 closed loop holds the difference small."""
 
 ENGINES_HEAD = (
-    "way",
-    "sets",
-    "ended alike",
-    "track alike",
-    "apart where they track, rad",
-    "where they complete, rad",
-)
+    "way", "sets", "ended alike", "track alike", "apart where they track, rad", "where they complete, rad",
+)  # fmt: skip
 
 
 def engines_section(outcomes: Outcomes) -> Section:
-    """How far the engines are apart."""
-    rows = [row for way in OF_GROUPS if (row := _engines_row(outcomes, way))]
+    """Differences between the engines."""
+    rows = [row for way in cases.OF_GROUPS if (row := _engines_row(outcomes, way))]
     text = (
-        f"The study runs by the equations of motion, the faster engine. One set in {SAMPLE} runs on MuJoCo"
-        " too, with the first seed. The largest errors of runs that track are to agree within"
+        f"The study runs by the equations of motion, the faster engine. One set in {cases.SAMPLE} runs on"
+        " MuJoCo too, with the first seed. The largest errors of runs that track are to agree within"
         f" {BOUND_rad:g} rad; of others, that they end alike is all that is asked."
     )
     title = "Largest error of each hinge on the two engines"
@@ -217,7 +190,7 @@ def engines_section(outcomes: Outcomes) -> Section:
 
 
 def agree(one: Outcome, other: Outcome) -> bool:
-    """Whether two runs ended alike, and close where they track."""
+    """True if two runs have the same status, and almost the same error if they track."""
     same = one.status == other.status and tracks(one) == tracks(other)
     return same and (not tracks(one) or difference_rad(one, other) <= BOUND_rad)
 
@@ -225,33 +198,32 @@ def agree(one: Outcome, other: Outcome) -> bool:
 def difference_rad(one: Outcome, other: Outcome) -> float:
     """Between the largest errors of any hinge, of the whole run or after the fault."""
     whole = np.abs(one.max_abs_error - other.max_abs_error).max()
-    return float(max(whole, abs(one.kept.after_rad - other.kept.after_rad)))
+    return float(max(whole, abs(one.data.after_rad - other.data.after_rad)))
 
 
-def compared(outcomes: Outcomes, way: Way) -> list[tuple[Outcome, Outcome]]:
+def engine_pairs(outcomes: Outcomes, way: cases.Way) -> list[tuple[Outcome, Outcome]]:
     """Runs of the sample on both engines, with the first seed."""
-    names = [(of_groups(groups, way).name, on_other_engine(groups, way).name) for groups in sample()]
-    return [
-        (outcomes[one][0], outcomes[other][0])
-        for one, other in names
-        if one in outcomes and other in outcomes
+    pairs = [
+        (outcomes.runs(cases.of_groups(groups, way)), outcomes.runs(cases.on_other_engine(groups, way)))
+        for groups in cases.sample()
     ]
+    return [(one[0], other[0]) for one, other in pairs if one and other]
 
 
 def _engines_verdict(outcomes: Outcomes) -> str:
-    both = [pair for way in OF_GROUPS for pair in compared(outcomes, way)]
+    both = [pair for way in cases.OF_GROUPS for pair in engine_pairs(outcomes, way)]
     if not both:
         return ""
     return f" {sum(agree(*pair) for pair in both)} of {len(both)} do."
 
 
-def _engines_row(outcomes: Outcomes, way: Way) -> tuple[str, ...] | None:
-    both = compared(outcomes, way)
+def _engines_row(outcomes: Outcomes, way: cases.Way) -> tuple[str, ...] | None:
+    both = engine_pairs(outcomes, way)
     if not both:
         return None
     alike = [one.status == other.status for one, other in both]
     tracked = [tracks(one) == tracks(other) for one, other in both]
-    whole = [pair for pair in both if all(run.status == Status.COMPLETED for run in pair)]
+    whole = [pair for pair in both if all(run.is_complete for run in pair)]
     close = [pair for pair in both if all(map(tracks, pair))]
     apart = [
         f"{max(difference_rad(*pair) for pair in pairs):.1e}" if pairs else "–" for pairs in (close, whole)
@@ -259,7 +231,7 @@ def _engines_row(outcomes: Outcomes, way: Way) -> tuple[str, ...] | None:
     return way.name, str(len(both)), str(sum(alike)), str(sum(tracked)), *apart
 
 
-def tell(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[Section]:
     """Open groups, detection, why some sets do not track, all other parts, and the other engine."""
     return [
         fault_sections.groups_section(outcomes),
@@ -271,23 +243,24 @@ def tell(outcomes: Outcomes) -> list[Section]:
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
-    """How many of the runs with one or two open groups track, for each way to meet them."""
-    told = []
-    for way in OF_GROUPS:
+    """Number of the runs with one or two open groups that track, by way."""
+    texts = []
+    for way in cases.OF_GROUPS:
         runs = few(outcomes, way)
         if runs:
-            told.append(f"{way.name} {[tracks(run) for run in runs].count(True)} of {len(runs)}")
-    return [Finding(None, f"runs that track with one or two groups open: {', '.join(told)}")] if told else []
+            texts.append(f"{way.name} {[tracks(run) for run in runs].count(True)} of {len(runs)}")
+    text = f"runs that track with one or two groups open: {', '.join(texts)}"
+    return [Finding(None, text)] if texts else []
 
 
 EXPERIMENT = Experiment(
     name="faults",
     title="Parts that fail in mid-flight",
-    shows="The nutation (59) under AFSM with m = 0.2 and L = 1; from a time on that is drawn over the whole"
+    summary="The nutation (59) under AFSM with m = 0.2 and L = 1; from a time on that is drawn over the whole"
     " run, coil groups are open, or a sensor, the supply or the controller fails.",
-    cases=cases,
-    tell=tell,
-    keep=keep,
-    more=more,
+    cases=cases.cases,
+    sections=sections,
+    reduce=reduce,
+    row_fields=row_fields,
     findings=findings,
 )

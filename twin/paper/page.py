@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from spheretwin.models import actuator as actuators
 from spheretwin.paper.experiment import Experiment, Finding, Section
+from spheretwin.paper.rows import plants_text
+from spheretwin.paper.runner import PlanResult
 from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
@@ -34,11 +36,24 @@ class Chapter(NamedTuple):
     sections: Sequence[Section]
     findings: Sequence[Finding] = ()
     commands: Sequence[str] = ()
-    """That run each of its rows alone, under the first seed."""
-    told: str = ""
-    """On which plant the rows ran, and what says that it may be believed."""
-    flights: Mapping[str, LawTrajectory] = {}
+    """Command that runs each row alone, with the first seed."""
+    plants: str = ""
+    """Plants of the rows, and their differences."""
+    trajectories: Mapping[str, LawTrajectory] = {}
     """Runs for a recording, by the labels of their laws."""
+
+
+def chapter_of(result: PlanResult, rows: Sequence[Mapping[str, Any]]) -> Chapter:
+    """Chapter of an experiment from its outcomes and the rows of its JSON."""
+    experiment, outcomes = result.plan.experiment, result.outcomes
+    return Chapter(
+        experiment,
+        experiment.sections(outcomes),
+        experiment.findings(outcomes),
+        [row["command"] for row in rows],
+        plants_text([row["plant"] for row in rows], result.differences),
+        experiment.trajectories(outcomes),
+    )
 
 
 def write(folder: Path, chapters: Sequence[Chapter], command: str, versions: Mapping[str, str]) -> list[Path]:
@@ -59,14 +74,16 @@ def write(folder: Path, chapters: Sequence[Chapter], command: str, versions: Map
     InputError
         A file cannot be written there.
     """
-    drawn = [[[draw() for draw in section.draw] for section in chapter.sections] for chapter in chapters]
-    every = (drawing for chapter in drawn for section in chapter for drawing in section)
+    drawings = [
+        [[draw() for draw in section.drawings] for section in chapter.sections] for chapter in chapters
+    ]
+    every = (drawing for of_chapter in drawings for of_section in of_chapter for drawing in of_section)
     save_drawings(folder, every, vector=True)
-    recordings = [_recorded(folder, chapter) for chapter in chapters if chapter.flights]
+    recordings = [_recorded(folder, chapter) for chapter in chapters if chapter.trajectories]
     for chapter in chapters:
         if len(chapter.commands) > MOST_COMMANDS:
             save_text(folder / _commands_file(chapter), "\n".join([*chapter.commands, ""]))
-    text = markdown(chapters, drawn, command, versions)
+    text = markdown(chapters, drawings, command, versions)
     return [
         save_text(folder / MARKDOWN, text),
         save_text(folder / HTML, html.page(TITLE, text, folder)),
@@ -84,8 +101,8 @@ def markdown(
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
     lines = [f"# {TITLE}", "", *_first(chapters)]
     for chapter, drawings in zip(chapters, drawn, strict=True):
-        lines += [f"## {chapter.experiment.title}", "", chapter.experiment.shows, ""]
-        lines += [chapter.told, ""] if chapter.told else []
+        lines += [f"## {chapter.experiment.title}", "", chapter.experiment.summary, ""]
+        lines += [chapter.plants, ""] if chapter.plants else []
         for section, of_section in zip(chapter.sections, drawings, strict=True):
             lines += _section(section, of_section)
         lines += _alone(chapter)
@@ -96,8 +113,12 @@ def markdown(
 def _first(chapters: Sequence[Chapter]) -> list[str]:
     """The first page: a line a finding, those on the paper first."""
     findings = [(chapter.experiment.name, finding) for chapter in chapters for finding in chapter.findings]
-    of_paper = [(name, MARKS[each.held], f"{each.text}.") for name, each in findings if each.held is not None]
-    others = [(name, f"{each.text}.") for name, each in findings if each.held is None]
+    of_paper = [
+        (name, MARKS[finding.reproduced], f"{finding.text}.")
+        for name, finding in findings
+        if finding.reproduced is not None
+    ]
+    others = [(name, f"{finding.text}.") for name, finding in findings if finding.reproduced is None]
     lines = []
     if of_paper:
         lines += [
@@ -129,7 +150,7 @@ def _recorded(folder: Path, chapter: Chapter) -> Path:
 
     name = chapter.experiment.name
     return trajectories.write(
-        folder / f"{name}.rrd", chapter.flights, actuators.load(), chapter.experiment.title
+        folder / f"{name}.rrd", chapter.trajectories, actuators.load(), chapter.experiment.title
     )
 
 

@@ -1,4 +1,4 @@
-"""Gains of every law that the searches found, frozen: `make tune-rivals` writes the files again."""
+"""Tuned gains of every law, frozen by `make tune-rivals`, and the conditions that they run under."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class TunedGains(NamedTuple):
     law: str
     limit_A_s: float
     gains: Mapping[str, float | None]
-    """By name; None of an optional one that is off."""
+    """By name; None for an optional one that is off."""
     fields: Mapping[str, Any]
     """Fields of a scenario that they set."""
     objectives: tuple[float, ...]
@@ -39,37 +39,36 @@ class TunedGains(NamedTuple):
 
 @cache
 def study(name: str) -> Study:
-    """Study that found the gains."""
+    """Study that tuned the gains."""
     return load(name)
 
 
 @cache
 def tuned_gains(name: str) -> tuple[TunedGains, ...]:
-    """Gains that a study found, by limit and law; none of a law that nothing brings within a limit."""
+    """Gains that a study tuned, by limit and law; none for a law that no gains bring within a limit."""
     content = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     every = [
-        TunedGains(law, each["limit"], each["gains"], _joined(each["fields"]), tuple(each["values"].values()))
-        for law, best in content["laws"].items()
-        for each in best
+        TunedGains(law, best["limit"], best["gains"], _nested(best["fields"]), tuple(best["values"].values()))
+        for law, of_law in content["laws"].items()
+        for best in of_law
     ]
-    return tuple(sorted(every, key=lambda each: each.limit_A_s))
+    return tuple(sorted(every, key=lambda gains: gains.limit_A_s))
 
 
-def _joined(fields: Mapping[str, float]) -> dict[str, Any]:
+def _nested(fields: Mapping[str, float]) -> dict[str, Any]:
     """Fields with the three entries of a list as one value."""
-    joined: dict[str, Any] = {"controller.law": None}
+    nested: dict[str, Any] = {}
     for name, value in fields.items():
         above, _, last = name.rpartition(".")
         if last.isdecimal():
-            joined.setdefault(above, [0.0, 0.0, 0.0])[int(last)] = value
+            nested.setdefault(above, [0.0, 0.0, 0.0])[int(last)] = value
         else:
-            joined[name] = value
-    del joined["controller.law"]
-    return joined
+            nested[name] = value
+    return nested
 
 
 # A law that loses the rotor under a condition that it was not tuned for is reported, and no failure.
-ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAILSAFE)
+EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED, Status.FAILSAFE)
 
 GROUP_GAIN = 0.03
 """Largest deviation of the torque of a group from its nominal value."""
@@ -78,11 +77,11 @@ STAGE = 977  # of the random stream of the group gains
 
 
 class Condition(NamedTuple):
-    """What a run differs in from the others of its hardware."""
+    """Difference of a run from the others of its hardware."""
 
     name: str
     fields: Mapping[str, Any]
-    drawn: Callable[[int], Mapping[str, Any]] = lambda seed: {}
+    seeded_fields: Callable[[int], Mapping[str, Any]] = lambda seed: {}
     """Fields that depend on the seed."""
     perturbed: bool = False
     """Whether the nominal model is wrong: a column of robustness."""
@@ -94,9 +93,9 @@ class Hardware(NamedTuple):
     name: str
     title: str
     study: str
-    """Name of the study that searched the gains."""
+    """Name of the study that tuned the gains."""
     hinges: tuple[int, ...]
-    """Of which the worst one counts."""
+    """Hinges of which the worst one counts."""
     in_degrees: bool
     conditions: tuple[Condition, ...]
     presets: tuple[str, ...]
@@ -120,10 +119,10 @@ class Hardware(NamedTuple):
 
 
 def group_gains(seed: int) -> dict[str, Any]:
-    """Torque of every group over its nominal value, drawn evenly from 0.97 to 1.03."""
+    """Torque of every group over its nominal value, uniform from 0.97 to 1.03."""
     groups = len(actuator.load().groups)
-    drawn = np.random.default_rng([seed, STAGE]).uniform(-GROUP_GAIN, GROUP_GAIN, groups)
-    return {"plant.group_gain": (1.0 + drawn).tolist()}
+    deviation = np.random.default_rng([seed, STAGE]).uniform(-GROUP_GAIN, GROUP_GAIN, groups)
+    return {"plant.group_gain": (1.0 + deviation).tolist()}
 
 
 def _load(m: float, L: float) -> dict[str, Any]:
@@ -161,7 +160,7 @@ PROTOTYPE = Hardware(
     "prototype",
     "tilt, prototype",
     "rivals_prototype",
-    # The encoder of γ counts in steps that no law sees within.
+    # The encoder of γ has steps that no law can resolve.
     (0, 1),
     True,
     (
@@ -194,7 +193,7 @@ def cases() -> list[Case]:
         for hardware in HARDWARE
         for condition in hardware.conditions
         for case in (
-            *(tuned_case(hardware, condition, each) for each in tuned_gains(hardware.study)),
+            *(tuned_case(hardware, condition, gains) for gains in tuned_gains(hardware.study)),
             *(preset_case(hardware, condition, preset) for preset in hardware.presets),
             *(limit_case(condition, allocation) for allocation in _allocations(hardware, condition)),
         )
@@ -231,9 +230,9 @@ def _case(
         name=f"{hardware.name}, {condition.name}: {name}",
         scenario=hardware.scenario,
         fields={**hardware.fields, **condition.fields, **fields},
-        told={"setting": hardware.name, "condition": condition.name, **reported},
-        ends=ENDS,
+        details={"setting": hardware.name, "condition": condition.name, **reported},
+        expected_statuses=EXPECTED,
         # Beyond its nominal model a loop of high gain may hunt, and then amplifies what rounding leaves.
-        compared=not condition.perturbed,
-        drawn=condition.drawn,
+        comparable=not condition.perturbed,
+        seeded_fields=condition.seeded_fields,
     )

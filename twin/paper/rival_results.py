@@ -7,17 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import BY_LAW, Array, Outcome, Outcomes
-from spheretwin.paper.rival_conditions import (
-    ALLOCATIONS,
-    Condition,
-    Hardware,
-    limit_case,
-    preset_case,
-    tuned_case,
-    tuned_gains,
-)
+from spheretwin.paper import rival_conditions as conditions
+from spheretwin.paper.experiment import Array, Outcome, Outcomes
+from spheretwin.paper.laws import BY_LAW
+from spheretwin.paper.rival_conditions import ALLOCATIONS, Condition, Hardware
 from spheretwin.paper.rows import ERRORS, figures_named
 from spheretwin.run import Run
 
@@ -27,7 +20,7 @@ LEVEL = 1.05
 
 
 class Result(NamedTuple):
-    """A law under one condition: medians; no numbers if any run was lost."""
+    """A law under one condition: medians; NaN if any run was lost."""
 
     law: str
     label: str
@@ -46,38 +39,42 @@ class Result(NamedTuple):
 def results(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> list[Result]:
     """All that ran under a condition: tuned laws by limit, then presets."""
     tuned = [
-        (each.law, BY_LAW[each.law].label, each.limit_A_s, tuned_case(hardware, condition, each))
-        for each in tuned_gains(hardware.study)
+        (
+            gains.law,
+            BY_LAW[gains.law].label,
+            gains.limit_A_s,
+            conditions.tuned_case(hardware, condition, gains),
+        )
+        for gains in conditions.tuned_gains(hardware.study)
     ]
     shipped = [
         (
             OUR_LAW,
             f"{BY_LAW[OUR_LAW].label}, preset `{preset}`",
             None,
-            preset_case(hardware, condition, preset),
+            conditions.preset_case(hardware, condition, preset),
         )
         for preset in hardware.presets
     ]
     return [
-        Result(law, label, limit, *_medians(hardware, outcomes[case.name]))
+        Result(law, label, limit, *_medians(hardware, runs))
         for law, label, limit, case in (*tuned, *shipped)
-        if case.name in outcomes
+        if (runs := outcomes.runs(case))
     ]
 
 
-def within(found: Sequence[Result], limit_A_s: float) -> list[Result]:
+def within(results: Sequence[Result], limit_A_s: float) -> list[Result]:
     """Laws tuned within a limit, the least error first and lost ones last."""
-    chosen = [each for each in found if each.limit_A_s == limit_A_s]
-    return sorted(chosen, key=lambda each: (each.is_lost, each.largest_rad))
+    of_limit = [result for result in results if result.limit_A_s == limit_A_s]
+    return sorted(of_limit, key=lambda result: (result.is_lost, result.largest_rad))
 
 
 def current_limits_rad(condition: Condition, outcomes: Outcomes) -> dict[str, float]:
     """Error at the start under full current, by allocation."""
-    cases = {allocation: limit_case(condition, allocation).name for allocation in ALLOCATIONS}
     return {
-        allocation: float(np.median([np.max(outcome.kept) for outcome in outcomes[name]]))
-        for allocation, name in cases.items()
-        if name in outcomes
+        allocation: float(np.median([np.max(run.data) for run in runs]))
+        for allocation in ALLOCATIONS
+        if (runs := outcomes.runs(conditions.limit_case(condition, allocation)))
     }
 
 
@@ -93,12 +90,12 @@ def start_error(run: Run) -> Array:
     return np.where(until, np.abs(error), 0.0).max(axis=0)
 
 
-def _medians(hardware: Hardware, found: Sequence[Outcome]) -> tuple[float, float, float]:
-    if any(outcome.status != Status.COMPLETED for outcome in found):
+def _medians(hardware: Hardware, runs: Sequence[Outcome]) -> tuple[float, float, float]:
+    if not all(run.is_complete for run in runs):
         return np.nan, np.nan, np.nan
     largest, tail = (
-        np.median([ERRORS[error](outcome)[list(hardware.hinges)].max() for outcome in found])
+        np.median([ERRORS[error](run)[list(hardware.hinges)].max() for run in runs])
         for error in ("max_abs_error", "tail_rms_error")
     )
-    variation = np.median(figures_named(found, "current_variation_A_s"))
+    variation = np.median(figures_named(runs, "current_variation_A_s"))
     return float(largest), float(variation), float(tail)

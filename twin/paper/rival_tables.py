@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spheretwin.paper.experiment import BY_LAW, Finding, Outcomes, ResultTable
+from spheretwin.paper.experiment import NONE, Finding, Outcomes, ResultTable
+from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import HARDWARE, Condition, Hardware, study, tuned_gains
 from spheretwin.paper.rival_results import LEVEL, OUR_LAW, Result, current_limits_rad, results, within
 
-NONE = "–"
 ALLOCATION_LABELS = {
     "least_norm": "full current, least norm",
     "bounded": "full current, bounded allocation",
@@ -35,23 +35,25 @@ def ranges(hardware: Hardware) -> ResultTable:
     return ResultTable(f"Ranges of the search, {hardware.title}", head, rows, 3)
 
 
-def gains(hardware: Hardware) -> ResultTable:
-    """Gains that the search found."""
+def gains_table(hardware: Hardware) -> ResultTable:
+    """Gains of the search."""
     rows: list[tuple[str, ...]] = [
-        (f"{each.limit_A_s:g}", BY_LAW[each.law].label, _as_text(each.gains))
-        for each in tuned_gains(hardware.study)
+        (f"{gains.limit_A_s:g}", BY_LAW[gains.law].label, _as_text(gains.gains))
+        for gains in tuned_gains(hardware.study)
     ]
     return ResultTable(f"Gains found, {hardware.title}", ("limit, A/s", "law", "gains"), rows, 3)
 
 
-def _as_text(found: Mapping[str, float | None]) -> str:
-    named = {name.removeprefix("controller."): value for name, value in found.items()}
-    return ", ".join(f"{name} {'off' if value is None else f'{value:.4g}'}" for name, value in named.items())
+def _as_text(gains: Mapping[str, float | None]) -> str:
+    by_name = {name.removeprefix("controller."): value for name, value in gains.items()}
+    return ", ".join(
+        f"{name} {'off' if value is None else f'{value:.4g}'}" for name, value in by_name.items()
+    )
 
 
 def errors(hardware: Hardware, outcomes: Outcomes) -> ResultTable:
     """Error, variation and tail of every law within each limit, and the limit that the currents set."""
-    conditions = [each for each in hardware.conditions if not each.perturbed]
+    conditions = [condition for condition in hardware.conditions if not condition.perturbed]
     rows = _rows(hardware, conditions, outcomes, with_tail=True)
     if not hardware.in_degrees:
         rows += _current_limits(conditions, outcomes)
@@ -59,36 +61,36 @@ def errors(hardware: Hardware, outcomes: Outcomes) -> ResultTable:
     title = (
         f"{hardware.title}: largest error in {unit} / variation in A/s / tail RMS in {_tail_unit(hardware)}"
     )
-    return ResultTable(title, ("limit, A/s", "law", *(each.name for each in conditions)), rows, 2)
+    return ResultTable(title, ("limit, A/s", "law", *(condition.name for condition in conditions)), rows, 2)
 
 
 def robustness(hardware: Hardware, outcomes: Outcomes) -> ResultTable:
     """Error and variation under a wrong nominal model, with the gains of the table before."""
     first = hardware.conditions[0]
-    conditions = [first, *(each for each in hardware.conditions if each.perturbed)]
+    conditions = [first, *(condition for condition in hardware.conditions if condition.perturbed)]
     rows = _rows(hardware, conditions, outcomes, with_tail=False)
     title = f"{hardware.title}, wrong nominal model: largest error in {_unit(hardware)} / variation in A/s"
-    return ResultTable(title, ("limit, A/s", "law", *(each.name for each in conditions)), rows, 2)
+    return ResultTable(title, ("limit, A/s", "law", *(condition.name for condition in conditions)), rows, 2)
 
 
 def _rows(
     hardware: Hardware, conditions: Sequence[Condition], outcomes: Outcomes, with_tail: bool
 ) -> list[tuple[str, ...]]:
     """A row a law, by limit and, within it, by the error under the first condition."""
-    found = [results(hardware, condition, outcomes) for condition in conditions]
-    by_law = [{(each.limit_A_s, each.label): each for each in of_condition} for of_condition in found]
+    by_condition = [results(hardware, condition, outcomes) for condition in conditions]
+    by_law = [{(result.limit_A_s, result.label): result for result in of_one} for of_one in by_condition]
     rows: list[tuple[str, ...]] = []
     for limit in hardware.limits_A_s:
-        ordered = within(found[0], limit)
-        rows += [_row(hardware, f"{limit:g}", each, by_law, with_tail) for each in ordered]
-        missing = set(BY_LAW) - {each.law for each in ordered} if ordered else set()
+        ordered = within(by_condition[0], limit)
+        rows += [_row(hardware, f"{limit:g}", result, by_law, with_tail) for result in ordered]
+        tuned = {result.law for result in ordered}
         rows += [
-            (f"{limit:g}", label, "none within the limit", *[NONE] * (len(conditions) - 1))
-            for law, label in ((law, BY_LAW[law].label) for law in BY_LAW)
-            if law in missing
+            (f"{limit:g}", law.label, "none within the limit", *[NONE] * (len(conditions) - 1))
+            for name, law in BY_LAW.items()
+            if tuned and name not in tuned
         ]
-    presets = [each for each in found[0] if each.limit_A_s is None]
-    return rows + [_row(hardware, "as shipped", each, by_law, with_tail) for each in presets]
+    presets = [result for result in by_condition[0] if result.limit_A_s is None]
+    return rows + [_row(hardware, "as shipped", result, by_law, with_tail) for result in presets]
 
 
 def _row(
@@ -99,7 +101,7 @@ def _row(
     with_tail: bool,
 ) -> tuple[str, ...]:
     key = of_law.limit_A_s, of_law.label
-    cells = [_cell(hardware, each[key], with_tail) if key in each else NONE for each in by_law]
+    cells = [_cell(hardware, of_one[key], with_tail) if key in of_one else NONE for of_one in by_law]
     return (limit, of_law.label, *cells)
 
 
@@ -126,11 +128,11 @@ def _tail_unit(hardware: Hardware) -> str:
 
 
 def _current_limits(conditions: Sequence[Condition], outcomes: Outcomes) -> list[tuple[str, ...]]:
-    found = [current_limits_rad(condition, outcomes) for condition in conditions]
+    limits = [current_limits_rad(condition, outcomes) for condition in conditions]
     return [
-        ("physical", label, *(f"{1e3 * each[name]:.2f}" if name in each else NONE for each in found))
+        ("physical", label, *(f"{1e3 * limit[name]:.2f}" if name in limit else NONE for limit in limits))
         for name, label in ALLOCATION_LABELS.items()
-        if any(name in each for each in found)
+        if any(name in limit for limit in limits)
     ]
 
 
@@ -145,34 +147,28 @@ def findings(outcomes: Outcomes) -> list[Finding]:
 
 
 def _by_limit(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> list[str]:
-    found = results(hardware, condition, outcomes)
-    completed = {
-        limit: [each for each in within(found, limit) if not each.is_lost] for limit in hardware.limits_A_s
-    }
+    complete = [result for result in results(hardware, condition, outcomes) if not result.is_lost]
     return [
-        f"tuned within {limit:g} A/s {_compared_with_ours(hardware, laws)}"
-        for limit, laws in completed.items()
-        if laws
+        f"tuned within {limit:g} A/s {_comparison(hardware, ordered)}"
+        for limit in hardware.limits_A_s
+        if (ordered := within(complete, limit))
     ]
 
 
-def _compared_with_ours(hardware: Hardware, ordered: Sequence[Result]) -> str:
-    """The order of some laws against our own; the least error first."""
+def _comparison(hardware: Hardware, ordered: Sequence[Result]) -> str:
+    """Order of some laws against our own; the least error first."""
     unit, own_label = _unit(hardware), BY_LAW[OUR_LAW].label
-    told = {each.law: f"{each.label} ({_angle(hardware, each.largest_rad)} {unit})" for each in ordered}
-    ours = next((each for each in ordered if each.law == OUR_LAW), None)
-    if ours is None:
-        return f"{told[ordered[0].law]} is best, and {own_label} lost the rotor or is beyond the limit"
-    rivals = [each for each in ordered if each.law != OUR_LAW]
-    better = [told[each.law] for each in rivals if LEVEL * each.largest_rad < ours.largest_rad]
-    level = [
-        told[each.law]
-        for each in rivals
-        if ours.largest_rad / LEVEL <= each.largest_rad <= LEVEL * ours.largest_rad
-    ]
-    parts = [f"better: {', '.join(better)}"] if better else []
-    parts += [f"level: {', '.join(level)}"] if level else []
+    texts = {
+        result.law: f"{result.label} ({_angle(hardware, result.largest_rad)} {unit})" for result in ordered
+    }
+    if OUR_LAW not in texts:
+        return f"{texts[ordered[0].law]} is best, and {own_label} lost the rotor or is beyond the limit"
+    errors = {result.law: result.largest_rad for result in ordered}
+    ours = errors.pop(OUR_LAW)
+    better = [texts[law] for law, error in errors.items() if LEVEL * error < ours]
+    level = [texts[law] for law, error in errors.items() if ours / LEVEL <= error <= LEVEL * ours]
+    parts = [f"{name}: {', '.join(laws)}" for name, laws in (("better", better), ("level", level)) if laws]
     if not parts:
-        nearest = f", before {told[rivals[0].law]}" if rivals else ""
-        return f"{told[OUR_LAW]} is best{nearest}"
-    return f"{told[OUR_LAW]} is not alone; {'; '.join(parts)}"
+        nearest = f", before {texts[next(iter(errors))]}" if errors else ""
+        return f"{texts[OUR_LAW]} is best{nearest}"
+    return f"{texts[OUR_LAW]} is not alone; {'; '.join(parts)}"

@@ -1,4 +1,4 @@
-"""Comparison of the laws as an experiment."""
+"""Comparison of the tuned laws as an experiment."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from spheretwin.paper import rival_tables
-from spheretwin.paper.experiment import BY_LAW, Experiment, Outcomes, Section
+from spheretwin.paper.experiment import Experiment, Outcomes, Section
+from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import HARDWARE, Condition, Hardware, cases, study
 from spheretwin.paper.rival_results import current_limits_rad, results, start_error
 from spheretwin.viz.pages.markdown import Drawing
@@ -31,32 +32,40 @@ def figure(hardware: Hardware, outcomes: Outcomes) -> Drawing:
         for condition in hardware.conditions
         if not condition.perturbed and results(hardware, condition, outcomes)
     ]
-    drawn = fronts.fronts(
-        panels, {law: compared.label for law, compared in BY_LAW.items()}, "variation of the commands, A/s"
-    )
+    labels = {name: law.label for name, law in BY_LAW.items()}
+    front = fronts.fronts(panels, labels, "variation of the commands, A/s")
     caption = f"{hardware.title}. {CAPTION}{'' if hardware.in_degrees else FULL_CURRENT}"
-    return Drawing(f"rivals_{hardware.name}.png", caption, drawn)
+    return Drawing(f"rivals_{hardware.name}.png", caption, front)
 
 
 def _panel(hardware: Hardware, condition: Condition, outcomes: Outcomes) -> FrontPanel:
     from spheretwin.viz.figures import fronts
 
     scale = np.degrees(1.0) if hardware.in_degrees else 1e3
-    found = [each for each in results(hardware, condition, outcomes) if not each.is_lost]
-    tuned = [each for each in found if each.limit_A_s is not None]
+    complete = [result for result in results(hardware, condition, outcomes) if not result.is_lost]
     points = {
-        law: np.array([(each.variation_A_s, scale * each.largest_rad) for each in tuned if each.law == law])
-        for law in dict.fromkeys(each.law for each in tuned)
+        law: np.array(
+            [
+                (result.variation_A_s, scale * result.largest_rad)
+                for result in complete
+                if result.law == law and result.limit_A_s is not None
+            ]
+        )
+        for law in dict.fromkeys(result.law for result in complete if result.limit_A_s is not None)
     }
-    marked = {
-        each.label.rpartition(" ")[2].strip("`"): (each.law, each.variation_A_s, scale * each.largest_rad)
-        for each in found
-        if each.limit_A_s is None
+    presets = {
+        result.label.rpartition(" ")[2].strip("`"): (
+            result.law,
+            result.variation_A_s,
+            scale * result.largest_rad,
+        )
+        for result in complete
+        if result.limit_A_s is None
     }
     floors = () if hardware.in_degrees else current_limits_rad(condition, outcomes).values()
     unit = "degrees" if hardware.in_degrees else "mrad"
     return fronts.FrontPanel(
-        condition.name, f"largest |error|, {unit}", points, marked, [scale * each for each in floors]
+        condition.name, f"largest |error|, {unit}", points, presets, [scale * floor for floor in floors]
     )
 
 
@@ -109,18 +118,18 @@ def _of_hardware(hardware: Hardware, outcomes: Outcomes) -> list[Section]:
             [lambda: figure(hardware, outcomes)],
         ),
         Section(f"{title}: robustness", ROBUSTNESS, [rival_tables.robustness(hardware, outcomes)]),
-        Section(f"{title}: gains", "", [rival_tables.ranges(hardware), rival_tables.gains(hardware)]),
+        Section(f"{title}: gains", "", [rival_tables.ranges(hardware), rival_tables.gains_table(hardware)]),
     ]
 
 
 EXPERIMENT = Experiment(
     name="rivals",
     title="The laws compared: the same search for all",
-    shows="Every law tuned with the same budget for the sinusoid on ideal hardware and for the tilt on the"
+    summary="Every law tuned with the same budget for the sinusoid on ideal hardware and for the tilt on the"
     " prototype, within limits on the variation of the currents, and run under other seeds and with a wrong"
     " nominal model.",
     cases=cases,
-    tell=_sections,
-    keep=start_error,
+    sections=_sections,
+    reduce=start_error,
     findings=rival_tables.findings,
 )

@@ -1,4 +1,4 @@
-"""Rows of the JSON: a case each, its figures as median and range over the seeds."""
+"""Rows of the JSON: one for each case, with median and range over the seeds; statistics of tables."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.cases import Known, Plan, command_line, known
-from spheretwin.paper.experiment import Case, Outcome, Outcomes
+from spheretwin.paper.experiment import NONE, Array, Case, Outcome, Outcomes
+from spheretwin.paper.runner import CaseSummary, Plan, command_line, summarise
 from spheretwin.study.agreement import BOUND
 
 ERRORS: dict[str, Callable[[Outcome], Any]] = {
@@ -22,153 +21,141 @@ ERRORS: dict[str, Callable[[Outcome], Any]] = {
 }
 """Errors of each hinge; the JSON has their median, and lowest and highest, over the seeds."""
 
-
-NAMES = {"lagrangian": "the Lagrangian", "mujoco": "MuJoCo"}
-
 EFFORT = {
     "rms_torque_Nm": "rms_torque_range_Nm",
     "current_variation_A_s": "current_variation_range_A_s",
 }
-"""Metrics of what a law spends; the JSON has their median, and lowest and highest, over the seeds."""
+"""Metrics of the effort; the JSON has their median, and lowest and highest, over the seeds."""
+
+PLANT_LABELS = {"lagrangian": "the Lagrangian", "mujoco": "MuJoCo"}
 
 
-def rows(plan: Plan, outcomes: Outcomes, of_cases: Mapping[str, Known] | None = None) -> list[dict[str, Any]]:
+def rows(
+    plan: Plan, outcomes: Outcomes, summaries: Mapping[str, CaseSummary] | None = None
+) -> list[dict[str, Any]]:
     """Rows of an experiment, in the order of its cases.
 
     Parameters
     ----------
     plan : Plan
     outcomes : Outcomes
-    of_cases : mapping, optional
-        `known` of the plan, where that was found out already.
+    summaries : mapping, optional
+        `summarise` of the plan, if it is known already.
     """
-    found = of_cases or known(plan)
-    return [_row(plan, case, found[case.name], outcomes[case.name]) for case in plan.cases]
+    summaries = summaries or summarise(plan)
+    return [_row(plan, case, summaries[case.name], outcomes[case.name]) for case in plan.cases]
 
 
-def _row(plan: Plan, case: Case, of_case: Known, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def _row(plan: Plan, case: Case, summary: CaseSummary, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     return {
         "figure": plan.experiment.name,
         "case": case.name,
-        "scenario": of_case.scenario,
-        "controller": of_case.law,
-        "m": of_case.m,
-        "L": of_case.L,
-        "hardware": of_case.hardware,
-        "plant": of_case.plant,
+        **summary.fields,
         "fields": dict(case.fields),
-        "command": command_line(case, of_case.plant),
+        "command": command_line(case, summary.fields["plant"]),
         "seeds": len(outcomes),
         **_errors(outcomes),
         **_effort(outcomes),
         "status": _status(case, outcomes),
         "statuses": dict(sorted(Counter(str(outcome.status) for outcome in outcomes).items())),
         "paper": None,
-        **case.told,
-        **plan.experiment.more(outcomes),
+        **case.details,
+        **plan.experiment.row_fields(outcomes),
     }
 
 
 def _errors(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    told: dict[str, Any] = {}
-    for name, of in ERRORS.items():
-        values = np.array([of(outcome) for outcome in outcomes])
-        told[f"{name}_rad"] = np.median(values, axis=0).tolist()
-        told[f"{name}_range_rad"] = np.stack([values.min(axis=0), values.max(axis=0)], axis=1).tolist()
-    return told
+    fields: dict[str, Any] = {}
+    for name, error in ERRORS.items():
+        values = np.array([error(outcome) for outcome in outcomes])
+        fields[f"{name}_rad"] = np.median(values, axis=0).tolist()
+        fields[f"{name}_range_rad"] = np.stack([values.min(axis=0), values.max(axis=0)], axis=1).tolist()
+    return fields
 
 
 def _effort(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    told: dict[str, Any] = {}
-    for name, of_range in EFFORT.items():
+    fields: dict[str, Any] = {}
+    for name, range_name in EFFORT.items():
         values = figures_named(outcomes, name)
         numbers = values[np.isfinite(values)]
-        told[name] = float(np.median(numbers)) if len(numbers) else None
-        told[of_range] = [float(numbers.min()), float(numbers.max())] if len(numbers) else None
-    return told
+        fields[name] = float(np.median(numbers)) if len(numbers) else None
+        fields[range_name] = [float(numbers.min()), float(numbers.max())] if len(numbers) else None
+    return fields
 
 
 def _status(case: Case, outcomes: Sequence[Outcome]) -> Status:
-    """What any run ended with that should not be, or else what most ended with."""
-    ended = Counter(outcome.status for outcome in outcomes)
-    unwanted = [status for status in ended if status not in case.ends]
-    return unwanted[0] if unwanted else ended.most_common(1)[0][0]
+    """Unexpected status of any run, else the most frequent status."""
+    counts = Counter(outcome.status for outcome in outcomes)
+    unexpected = [status for status in counts if status not in case.expected_statuses]
+    return unexpected[0] if unexpected else counts.most_common(1)[0][0]
 
 
-def spread(values: NDArray[np.float64] | Sequence[float], digits: int) -> str:
-    """Numbers as their median, and lowest to highest where these differ."""
+def spread(values: Array | Sequence[float], digits: int) -> str:
+    """Numbers as their median, and lowest to highest if these differ."""
     if not len(values) or not np.all(np.isfinite(values)):
-        return "–"
+        return NONE
     low, middle, high = (f"{value:.{digits}f}" for value in np.quantile(values, [0, 0.5, 1]))
     return middle if low == high else f"{middle} ({low} to {high})"
 
 
-def spread_deg(values: NDArray[np.float64] | Sequence[float], digits: int = 3) -> str:
-    """Angles in rad as degrees: their median, and lowest to highest where these differ."""
+def spread_deg(values: Array | Sequence[float], digits: int = 3) -> str:
+    """`spread` of angles in rad, as degrees."""
     return spread(np.degrees(values), digits)
 
 
-def spread_mrad(values: NDArray[np.float64] | Sequence[float], digits: int = 1) -> str:
-    """Angles in rad as mrad: their median, and lowest to highest where these differ."""
+def spread_mrad(values: Array | Sequence[float], digits: int = 1) -> str:
+    """`spread` of angles in rad, as mrad."""
     return spread(1e3 * np.asarray(values), digits)
 
 
-def of_axis(outcomes: Sequence[Outcome], error: str, axis: int) -> NDArray[np.float64]:
+def of_axis(outcomes: Sequence[Outcome], error: str, axis: int) -> Array:
     """One of `ERRORS` of one hinge for each seed, rad."""
     return np.array([ERRORS[error](outcome)[axis] for outcome in outcomes])
 
 
-def figures_named(outcomes: Sequence[Outcome], metric: str) -> NDArray[np.float64]:
-    """One metric of each seed; no number where a run has none."""
+def figures_named(outcomes: Sequence[Outcome], metric: str) -> Array:
+    """One metric of each seed; NaN if a run has none."""
     return np.array([outcome.figures.get(metric) for outcome in outcomes], dtype=np.float64)
 
 
-def ended(case_outcomes: Sequence[Outcome]) -> str:
-    """How the runs of a case ended, for a table."""
-    counted: Mapping[Status, int] = Counter(outcome.status for outcome in case_outcomes)
-    if len(counted) == 1:
-        return str(next(iter(counted)))
-    return ", ".join(f"{count} {status}" for status, count in counted.items())
+def statuses_text(outcomes: Sequence[Outcome]) -> str:
+    """Statuses of the runs of a case, for a table."""
+    counts = Counter(outcome.status for outcome in outcomes)
+    if len(counts) == 1:
+        return str(next(iter(counts)))
+    return ", ".join(f"{count} {status}" for status, count in counts.items())
 
 
-def plants_told(plants: Sequence[str], apart: Sequence[float]) -> str:
-    """On which plants rows ran, and how far a sample is apart on both.
+def padded(arrays: Sequence[Array]) -> Array:
+    """Stack arrays (n, k) of runs to (runs, longest n, k); NaN after the end of a run that ended early."""
+    stacked = np.full((len(arrays), max(map(len, arrays)), arrays[0].shape[1]), np.nan)
+    for run, array in zip(stacked, arrays, strict=True):
+        run[: len(array)] = array
+    return stacked
+
+
+def window_maxima(error: Array, window_s: float, period_s: float) -> Array:
+    """Largest absolute value of each column of an error (n, k) within each complete window."""
+    ticks = max(1, round(window_s / period_s))
+    windows = len(error) // ticks
+    return np.abs(error)[: windows * ticks].reshape(windows, ticks, error.shape[1]).max(axis=1)
+
+
+def plants_text(plants: Sequence[str], differences: Sequence[float]) -> str:
+    """Sentence on the plants of the rows, and on the differences of a sample on both plants.
 
     Parameters
     ----------
     plants : sequence of str
-        Of each row.
-    apart : sequence of float
-        Of each run of the sample, as `running.checked` has it.
+        Plant of each row.
+    differences : sequence of float
+        Difference of each run of the sample, from `runner.compare_plants`.
     """
-    counted = Counter(plants)
-    on = " and ".join(f"{count} on {NAMES.get(plant, plant)}" for plant, count in sorted(counted.items()))
-    said = f"Rows: {on}."
-    if not apart:
-        return said
+    counts = sorted(Counter(plants).items())
+    listed = " and ".join(f"{count} on {PLANT_LABELS.get(plant, plant)}" for plant, count in counts)
+    if not differences:
+        return f"Rows: {listed}."
     return (
-        f"{said} {len(apart)} of their runs were made on MuJoCo too: the RMS errors differ by at most"
-        f" {max(apart):.1e} of the largest of a run's three (bound {BOUND:g})."
+        f"Rows: {listed}. {len(differences)} of their runs were made on MuJoCo too: the RMS errors differ by"
+        f" at most {max(differences):.1e} of the largest of a run's three (bound {BOUND:g})."
     )
-
-
-Three = tuple[float, float, float]
-
-PRINTED_rad: Mapping[tuple[float, float], Mapping[str, Three]] = {
-    (0.2, 1.0): {
-        "pd": (0.4376, 0.4121, 0.4687),
-        "adaptive_fuzzy": (0.2505, 0.2822, 0.2669),
-        "afsm": (0.0832, 0.0750, 0.0761),
-    },
-    (0.2, 2.0): {
-        "pd": (1.2560, 1.0560, 1.1500),
-        "adaptive_fuzzy": (0.8954, 0.9856, 1.0100),
-        "afsm": (0.1854, 0.1986, 0.1769),
-    },
-}
-"""By m and L, and by law; of α, β and γ."""
-
-
-def printed_rad(law: str, m: float, L: float) -> Three | None:
-    """Largest errors that are printed of a law under a condition; None where there are none."""
-    return PRINTED_rad.get((round(m, 6), round(L, 6)), {}).get(law)

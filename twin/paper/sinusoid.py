@@ -1,4 +1,4 @@
-"""What figures 6 and 7 vary, and the case of each law under each value."""
+"""Figures 6 and 7: errors of every law on the sinusoid over the modelling error and over the load."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ import numpy as np
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
+from spheretwin.paper import rows
 from spheretwin.paper.experiment import (
-    COMPARED,
-    OF_PAPER,
+    NONE,
     Array,
     Case,
-    Compared,
     Experiment,
     Finding,
     Outcome,
@@ -24,13 +23,13 @@ from spheretwin.paper.experiment import (
     ResultTable,
     Section,
 )
-from spheretwin.paper.rows import ended, figures_named, of_axis, printed_rad, spread, spread_mrad
+from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
 
 SCENARIO = "sinusoid"
 
-ENDS = {"pd": (Status.COMPLETED, Status.LEFT_WORKSPACE)}
-"""Of laws that may end otherwise: PD has no integral and sags under load, out of the workspace at last."""
+EXPECTED = {"pd": (Status.COMPLETED, Status.LEFT_WORKSPACE)}
+"""Statuses of laws that may end otherwise: PD has no integral and leaves the workspace under load."""
 
 
 class Condition(NamedTuple):
@@ -40,202 +39,206 @@ class Condition(NamedTuple):
     L: float
 
 
-class Varied(NamedTuple):
-    """What one figure varies."""
+class Variation(NamedTuple):
+    """Quantity that one figure varies."""
 
     figure: str
     symbol: str
-    what: str
+    quantity: str
     conditions: tuple[Condition, ...]
+    printed: Condition
+    """Condition at which the paper prints numbers."""
 
     def value(self, condition: Condition) -> float:
-        """Of what is varied."""
+        """Value of the quantity under a condition."""
         return float(getattr(condition, self.symbol))
 
 
-FIGURE6 = Varied(
-    "figure6", "m", "modelling error m", tuple(Condition(m, 1.0) for m in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5))
+FIGURE6 = Variation(
+    "figure6",
+    "m",
+    "modelling error m",
+    tuple(Condition(m, 1.0) for m in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)),
+    Condition(0.2, 1.0),
 )
-FIGURE7 = Varied("figure7", "L", "load L", tuple(Condition(0.2, L) for L in (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)))
+FIGURE7 = Variation(
+    "figure7",
+    "L",
+    "load L",
+    tuple(Condition(0.2, L) for L in (0.0, 1.0, 2.0, 3.0, 4.0, 5.0)),
+    Condition(0.2, 2.0),
+)
 
 
-def cases(varied: Varied) -> list[Case]:
+def cases(variation: Variation) -> list[Case]:
     """Every law under every condition, condition by condition."""
-    return [case(compared, condition) for condition in varied.conditions for compared in COMPARED]
+    return [case(law, condition) for condition in variation.conditions for law in COMPARED_LAWS]
 
 
-def case(compared: Compared, condition: Condition) -> Case:
+def case(law: ComparedLaw, condition: Condition) -> Case:
     """A law under a condition."""
-    paper = printed_rad(compared.law, *condition)
+    paper = printed_rad(law.law, *condition)
     return Case(
-        name=f"{compared.law}: m {condition.m:g}, L {condition.L:g}",
+        name=f"{law.law}: m {condition.m:g}, L {condition.L:g}",
         scenario=SCENARIO,
         fields={
-            "controller.law": compared.law,
+            "controller.law": law.law,
             "plant.modelling_error": condition.m,
             "disturbance.load": condition.L,
         },
-        told={"gains": compared.gains, "paper": None if paper is None else list(paper)},
-        ends=ENDS.get(compared.law, (Status.COMPLETED,)),
+        details={"gains": law.gains, "paper": None if paper is None else list(paper)},
+        expected_statuses=EXPECTED.get(law.law, (Status.COMPLETED,)),
     )
 
 
 SIZE = 0.25
-"""A printed number came out again where the median is no further from it, relative to it."""
+"""Largest deviation of a median from a printed number that counts as reproduced, relative to the number."""
 
-NAMES = " > ".join(compared.label for compared in OF_PAPER)
+NAMES = " > ".join(law.label for law in PAPER_LAWS)
 
 
-def order(varied: Varied, outcomes: Outcomes) -> list[Finding]:
-    """Whether the laws are in the paper's order at every point."""
-    points = [at for at in varied.conditions if all(case(of, at).name in outcomes for of in OF_PAPER)]
+def order(variation: Variation, outcomes: Outcomes) -> list[Finding]:
+    """Compare the order of the laws with the paper's at every point."""
+    points = [
+        point for point in variation.conditions if all(outcomes.runs(case(law, point)) for law in PAPER_LAWS)
+    ]
     if not points:
         return []
-    kept, of = 0, 0
-    for at in points:
-        largest = [[run.max_abs_error for run in outcomes[case(law, at).name]] for law in OF_PAPER]
+    right, total = 0, 0
+    for point in points:
+        largest = [[run.max_abs_error for run in outcomes.runs(case(law, point))] for law in PAPER_LAWS]
         for above, below in pairwise(largest):
             count = min(len(above), len(below))
-            kept += int(np.sum(np.array(above[:count]) > np.array(below[:count])))
-            of += 3 * count
-    span = f"{varied.symbol} = {varied.value(points[0]):g} to {varied.value(points[-1]):g}"
-    said = "at every point, hinge and seed" if kept == of else f"in {kept} of {of} comparisons"
-    return [Finding(kept == of, f"the order {NAMES} over {span} holds {said}")]
+            right += int(np.sum(np.array(above[:count]) > np.array(below[:count])))
+            total += 3 * count
+    span = f"{variation.symbol} = {variation.value(points[0]):g} to {variation.value(points[-1]):g}"
+    share = "at every point, hinge and seed" if right == total else f"in {right} of {total} comparisons"
+    return [Finding(right == total, f"the order {NAMES} over {span} holds {share}")]
 
 
-def sizes(at: Condition, outcomes: Outcomes) -> list[Finding]:
-    """How large the errors are beside those that are printed of a condition, law by law."""
-    ran = {
-        compared: outcomes[case(compared, at).name]
-        for compared in OF_PAPER
-        if case(compared, at).name in outcomes and printed_rad(compared.law, *at)
+def sizes(condition: Condition, outcomes: Outcomes) -> list[Finding]:
+    """Compare the errors of each law with the printed ones under a condition."""
+    by_law = {law: outcomes.runs(case(law, condition)) for law in PAPER_LAWS}
+    by_law = {law: runs for law, runs in by_law.items() if runs and printed_rad(law.law, *condition)}
+    ratios = {
+        law: _median_rad(runs) / np.array(printed_rad(law.law, *condition)) for law, runs in by_law.items()
     }
-    ratios = {of: _median_rad(runs) / np.array(printed_rad(of.law, *at)) for of, runs in ran.items()}
-    near = {of: bool(np.all(np.abs(ratio - 1) <= SIZE)) for of, ratio in ratios.items()}
-    where = f"at m = {at.m:g}, L = {at.L:g}"
-    kept = [of for of in ran if near[of] and _whole(ran[of])]
-    lost = [of for of in ran if not _whole(ran[of])]
-    other = [of for of in ran if not near[of] and of not in lost]
-    found = []
-    if kept:
-        told = _ratios_text(kept, ratios)
-        found.append(Finding(True, f"the printed errors {where} within {100 * SIZE:.0f} %: {told} of them"))
-    if other:
-        held = all(np.all(ratios[of] < 1) for of in other)
-        why = "; the printed gains hold the rotor closer than the paper says" if held else ""
-        found.append(
-            Finding(False, f"the printed errors {where}: {_ratios_text(other, ratios)} of them{why}")
+    lost = [law for law, runs in by_law.items() if not _all_complete(runs)]
+    close = [law for law in by_law if law not in lost and np.all(np.abs(ratios[law] - 1) <= SIZE)]
+    other = [law for law in by_law if law not in lost and law not in close]
+    where = f"the printed errors at m = {condition.m:g}, L = {condition.L:g}"
+    findings = []
+    if close:
+        findings.append(
+            Finding(True, f"{where} within {100 * SIZE:.0f} %: {_ratios_text(close, ratios)} of them")
         )
-    for of in lost:
-        told = f"{_ratios_text([of], ratios)} of them, but {_how_lost(ran[of])}"
-        found.append(Finding(False, f"the printed errors {where}: {told}"))
-    return found
+    if other:
+        smaller = all(np.all(ratios[law] < 1) for law in other)
+        why = "; the printed gains hold the rotor closer than the paper says" if smaller else ""
+        findings.append(Finding(False, f"{where}: {_ratios_text(other, ratios)} of them{why}"))
+    for law in lost:
+        text = f"{_ratios_text([law], ratios)} of them, but {_loss_text(by_law[law])}"
+        findings.append(Finding(False, f"{where}: {text}"))
+    return findings
 
 
-def _ratios_text(laws: Sequence[Compared], ratios: Mapping[Compared, Array]) -> str:
-    return ", ".join(f"{of.label} {ratios[of].min():.2f} to {ratios[of].max():.2f} times" for of in laws)
+def _ratios_text(laws: Sequence[ComparedLaw], ratios: Mapping[ComparedLaw, Array]) -> str:
+    return ", ".join(f"{law.label} {ratios[law].min():.2f} to {ratios[law].max():.2f} times" for law in laws)
 
 
-def growth(varied: Varied, outcomes: Outcomes) -> list[Finding]:
-    """Whether AFSM's error grows with the load, which the paper closes with."""
-    afsm = OF_PAPER[-1]
-    points = [at for at in varied.conditions if case(afsm, at).name in outcomes]
+def growth(variation: Variation, outcomes: Outcomes) -> list[Finding]:
+    """Test if AFSM's error grows with the load, as the paper concludes."""
+    afsm = PAPER_LAWS[-1]
+    points = [point for point in variation.conditions if outcomes.runs(case(afsm, point))]
     if len(points) < 2:
         return []
-    medians = np.array([_median_rad(outcomes[case(afsm, at).name]) for at in points])
+    medians = np.array([_median_rad(outcomes.runs(case(afsm, point))) for point in points])
     grows = bool(np.all(np.diff(medians, axis=0) > 0))
-    largest = 1e3 * medians.max(axis=1)
-    said = "grows with the load" if grows else "does not grow with the load throughout"
+    first, last = 1e3 * medians.max(axis=1)[[0, -1]]
+    verdict = "grows with the load" if grows else "does not grow with the load throughout"
     return [
         Finding(
             grows,
-            f"{afsm.label}'s error {said}, from {largest[0]:.0f} mrad at"
-            f" L = {points[0].L:g} to {largest[-1]:.0f} mrad at L = {points[-1].L:g}",
+            f"{afsm.label}'s error {verdict}, from {first:.0f} mrad at L = {points[0].L:g} to {last:.0f} mrad"
+            f" at L = {points[-1].L:g}",
         )
     ]
 
 
-def _how_lost(runs: Sequence[Outcome]) -> str:
-    """How runs that did not come to their end were lost."""
-    lost = [run for run in runs if run.status != Status.COMPLETED]
-    cut = float(np.median([run.figures["saturated_fraction"] or 0.0 for run in lost]))
+def _loss_text(runs: Sequence[Outcome]) -> str:
+    """Describe how runs were lost."""
+    lost = [run for run in runs if not run.is_complete]
+    saturated = float(np.median([run.figures["saturated_fraction"] or 0.0 for run in lost]))
     statuses = ", ".join(sorted({str(run.status) for run in lost}))
     return (
         f"{len(lost)} of {len(runs)} runs ended as {statuses}, the current limit cutting the torque at"
-        f" {100 * cut:.0f} % of their ticks"
+        f" {100 * saturated:.0f} % of their ticks"
     )
 
 
 def _median_rad(runs: Sequence[Outcome]) -> Array:
-    return np.array([np.median(of_axis(runs, "max_abs_error", axis)) for axis in range(3)])
+    return np.array([np.median(rows.of_axis(runs, "max_abs_error", axis)) for axis in range(3)])
 
 
-def _whole(runs: Sequence[Outcome]) -> bool:
-    return all(run.status == Status.COMPLETED for run in runs)
+def _all_complete(runs: Sequence[Outcome]) -> bool:
+    return all(run.is_complete for run in runs)
 
 
 LARGEST = ("law", "how it ended", "printed, mrad", "α, mrad", "β, mrad", "γ, mrad", "in degrees")
-RMS = (
-    "law",
-    "α, mrad",
-    "β, mrad",
-    "γ, mrad",
-    "in degrees",
-    "second half, mrad",
-    "torque, N·m",
+EFFORT_TITLE = "RMS error, and what it costs: RMS torque, and variation of the commands a group and second"
+EFFORT_HEAD = (
+    "law", "α, mrad", "β, mrad", "γ, mrad", "in degrees", "second half, mrad", "torque, N·m",
     "variation, A/s",
-)
-NONE = "–"
+)  # fmt: skip
 
 
-def tables(varied: Varied, outcomes: Outcomes) -> list[ResultTable]:
+def tables(variation: Variation, outcomes: Outcomes) -> list[ResultTable]:
     """Largest errors, then RMS errors and effort."""
-    ran = [
-        (condition, compared, outcomes[case(compared, condition).name])
-        for condition in varied.conditions
-        for compared in COMPARED
-        if case(compared, condition).name in outcomes
+    by_point = [
+        (point, law, runs)
+        for point in variation.conditions
+        for law in COMPARED_LAWS
+        if (runs := outcomes.runs(case(law, point)))
     ]
     return [
         ResultTable(
             "Largest |error|: median over the seeds, and range",
-            (varied.symbol, *LARGEST),
-            [(f"{varied.value(at):g}", *_largest(at, compared, found)) for at, compared, found in ran],
+            (variation.symbol, *LARGEST),
+            [(f"{variation.value(point):g}", *_largest(point, law, runs)) for point, law, runs in by_point],
             4,
         ),
         ResultTable(
-            "RMS error, and what it costs: RMS torque, and variation of the commands a group and second",
-            (varied.symbol, *RMS),
-            [(f"{varied.value(at):g}", *rms(compared, found)) for at, compared, found in ran],
+            EFFORT_TITLE,
+            (variation.symbol, *EFFORT_HEAD),
+            [(f"{variation.value(point):g}", *effort(law, runs)) for point, law, runs in by_point],
             2,
         ),
     ]
 
 
-def _largest(condition: Condition, compared: Compared, found: Sequence[Outcome]) -> tuple[str, ...]:
-    paper = printed_rad(compared.law, *condition)
-    printed = NONE if paper is None else " / ".join(f"{1e3 * each:.1f}" for each in paper)
-    return compared.label, ended(found), printed, *by_hinge(found, "max_abs_error")
+def _largest(condition: Condition, law: ComparedLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
+    paper = printed_rad(law.law, *condition)
+    printed = NONE if paper is None else " / ".join(f"{1e3 * error:.1f}" for error in paper)
+    return law.label, rows.statuses_text(runs), printed, *by_hinge(runs, "max_abs_error")
 
 
-def rms(compared: Compared, found: Sequence[Outcome]) -> tuple[str, ...]:
+def effort(law: ComparedLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
     """Row of RMS errors and effort."""
-    tail = np.median([outcome.tail_rms_error for outcome in found], axis=0)
+    tail = np.median([run.tail_rms_error for run in runs], axis=0)
     return (
-        compared.label,
-        *by_hinge(found, "rms_error", 2),
+        law.label,
+        *by_hinge(runs, "rms_error", 2),
         triple(1e3 * tail, 2),
-        spread(figures_named(found, "rms_torque_Nm"), 3),
-        spread(figures_named(found, "current_variation_A_s"), 1),
+        rows.spread(rows.figures_named(runs, "rms_torque_Nm"), 3),
+        rows.spread(rows.figures_named(runs, "current_variation_A_s"), 1),
     )
 
 
-def by_hinge(found: Sequence[Outcome], error: str, digits: int = 1) -> tuple[str, ...]:
+def by_hinge(runs: Sequence[Outcome], error: str, digits: int = 1) -> tuple[str, ...]:
     """An error of each hinge in mrad, then the medians of all three in degrees."""
-    of_hinges = [of_axis(found, error, axis) for axis in range(3)]
-    return *(spread_mrad(each, digits) for each in of_hinges), triple(
-        np.degrees(np.median(of_hinges, axis=1)), 2
-    )
+    errors = [rows.of_axis(runs, error, axis) for axis in range(3)]
+    medians = triple(np.degrees(np.median(errors, axis=1)), 2)
+    return *(rows.spread_mrad(of_hinge, digits) for of_hinge in errors), medians
 
 
 def triple(values: Array, digits: int) -> str:
@@ -243,7 +246,7 @@ def triple(values: Array, digits: int) -> str:
     return " / ".join(f"{value:.{digits}f}" if np.isfinite(value) else NONE for value in values)
 
 
-HOW = (
+METHOD = (
     "The sinusoid on all three hinges for 10 s, from rest, on ideal hardware: true angles and rates, currents"
     " within ±8 A behind the lag of the coils. The reference starts with a rate, so that every run begins"
     " with an error that no law can avoid. All gains are the laws' own at every point. The paper prints"
@@ -251,65 +254,58 @@ HOW = (
 )
 
 
-PRINTED_IN = {"figure6": Condition(0.2, 1.0), "figure7": Condition(0.2, 2.0)}
-"""Where the paper prints numbers of each figure; the first is a point of the other figure, too."""
+def _sections(variation: Variation, outcomes: Outcomes) -> list[Section]:
+    title = f"Errors over the {variation.quantity}"
+    return [Section(title, METHOD, tables(variation, outcomes), [lambda: _draw(variation, outcomes)])]
 
 
-def _tell(varied: Varied, outcomes: Outcomes) -> list[Section]:
-    return [
-        Section(
-            f"Errors over the {varied.what}",
-            HOW,
-            tables(varied, outcomes),
-            [lambda: _draw(varied, outcomes)],
-        )
-    ]
+def _findings(variation: Variation, outcomes: Outcomes) -> list[Finding]:
+    findings = [*order(variation, outcomes), *sizes(variation.printed, outcomes)]
+    return [*findings, *growth(variation, outcomes)] if variation is FIGURE7 else findings
 
 
-def _findings(varied: Varied, outcomes: Outcomes) -> list[Finding]:
-    found = [*order(varied, outcomes), *sizes(PRINTED_IN[varied.figure], outcomes)]
-    return [*found, *growth(varied, outcomes)] if varied is FIGURE7 else found
-
-
-def _draw(varied: Varied, outcomes: Outcomes) -> Drawing:
+def _draw(variation: Variation, outcomes: Outcomes) -> Drawing:
     from spheretwin.viz.figures import conditions as figures
 
     by_label = {}
-    for compared in COMPARED:
-        if not compared.drawn:
+    for law in filter(lambda law: law.in_figures, COMPARED_LAWS):
+        by_point = {point: outcomes.runs(case(law, point)) for point in variation.conditions}
+        by_point = {point: runs for point, runs in by_point.items() if runs}
+        if not by_point:
             continue
-        points = [at for at in varied.conditions if case(compared, at).name in outcomes]
-        if not points:
-            continue
-        runs = [outcomes[case(compared, at).name] for at in points]
-        errors = [np.quantile([each.max_abs_error for each in some], [0, 0.5, 1], axis=0) for some in runs]
-        by_label[compared.label] = figures.ErrorsByCondition(
-            law=compared.law,
-            values=np.array([varied.value(at) for at in points]),
+        errors = [
+            np.quantile([run.max_abs_error for run in runs], [0, 0.5, 1], axis=0)
+            for runs in by_point.values()
+        ]
+        by_label[law.label] = figures.ErrorsByCondition(
+            law=law.law,
+            values=np.array([variation.value(point) for point in by_point]),
             error_rad=np.stack(errors, axis=1),
-            whole=np.array([all(each.status == Status.COMPLETED for each in some) for some in runs]),
-            paper_rad={varied.value(at): paper for at in points if (paper := printed_rad(compared.law, *at))},
+            whole=np.array([_all_complete(runs) for runs in by_point.values()]),
+            paper_rad={
+                variation.value(point): paper for point in by_point if (paper := printed_rad(law.law, *point))
+            },
         )
-    fixed = "L = 1" if varied is FIGURE6 else "m = 0.2"
-    title = f"Figure {varied.figure.removeprefix('figure')}: sinusoid, {fixed}, largest |error|"
-    figure = figures.by_condition(by_label, ANGLES, varied.what, "largest |error|", title)
+    fixed = "L = 1" if variation is FIGURE6 else "m = 0.2"
+    title = f"Figure {variation.figure.removeprefix('figure')}: sinusoid, {fixed}, largest |error|"
+    figure = figures.by_condition(by_label, ANGLES, variation.quantity, "largest |error|", title)
     caption = (
-        f"Largest |error| of each hinge over the {varied.what}, {fixed}: median over the seeds, range as"
-        " error bars. Wide bars are the numbers that the paper prints, tied to those of the same law; a"
+        f"Largest |error| of each hinge over the {variation.quantity}, {fixed}: median over the seeds, range"
+        " as error bars. Wide bars are the numbers that the paper prints, tied to those of the same law; a"
         " hollow marker is of runs that ended early."
     )
-    return Drawing(f"{varied.figure}_errors.png", caption, figure)
+    return Drawing(f"{variation.figure}_errors.png", caption, figure)
 
 
-def _experiment(varied: Varied, shows: str) -> Experiment:
-    number = varied.figure.removeprefix("figure")
+def _experiment(variation: Variation, summary: str) -> Experiment:
+    number = variation.figure.removeprefix("figure")
     return Experiment(
-        name=varied.figure,
-        title=f"Figure {number}: the sinusoid over the {varied.what}",
-        shows=shows,
-        cases=partial(cases, varied),
-        tell=partial(_tell, varied),
-        findings=partial(_findings, varied),
+        name=variation.figure,
+        title=f"Figure {number}: the sinusoid over the {variation.quantity}",
+        summary=summary,
+        cases=partial(cases, variation),
+        sections=partial(_sections, variation),
+        findings=partial(_findings, variation),
     )
 
 

@@ -1,4 +1,4 @@
-"""What each law is put through: loads, ten minutes, delays, inertias, control rates."""
+"""Stability of the laws: loads, ten minutes, delays, inertias, control rates."""
 
 from __future__ import annotations
 
@@ -7,15 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spheretwin.control.law_components.fuzzy import CENTRES, SHAPE, WIDTH
-from spheretwin.control.laws.afsm import AFSM
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.paper.experiment import (
-    COMPARED,
-    Array,
+    NONE,
     Case,
-    Compared,
     Experiment,
     Finding,
     Outcome,
@@ -23,32 +19,30 @@ from spheretwin.paper.experiment import (
     ResultTable,
     Section,
 )
+from spheretwin.paper.laws import COMPARED_LAWS, ComparedLaw
+from spheretwin.paper.lyapunov import Descent, descent
 from spheretwin.run import Run
 from spheretwin.viz.pages.markdown import Drawing
 
 SCENARIO = "sinusoid"
 
-WATCHED: tuple[Compared, ...] = tuple(
-    compared
-    for compared in COMPARED
-    if compared.law in ("afsm", "pid", "afsm_eso")  # one more joins by its name
-)
+LAWS = tuple(law for law in COMPARED_LAWS if law.law in ("afsm", "pid", "afsm_eso"))
 
 LONG_s = 600.0
 LOADS = (1.0, 5.0)
 STEP_s = 5e-4
 
-# A margin is looked for beyond its end: a run may be lost there.
-ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
+# The steps go beyond the margin: a run may be lost there.
+EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
 
 
 class Margin(NamedTuple):
-    """One thing that is made worse step by step."""
+    """Quantity that is made worse step by step."""
 
     name: str
     unit: str
     steps: tuple[float, ...]
-    """From what is healthy on."""
+    """From the healthy value on."""
 
 
 DELAY = Margin("unknown delay", "ms", (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14))
@@ -60,111 +54,49 @@ MARGINS = (DELAY, HEAVIER, LIGHTER, SLOWER, FASTER)
 
 
 def cases() -> list[Case]:
-    """Everything for every law."""
-    found = [reaching(law, load) for law in WATCHED for load in LOADS]
-    found += [drift(law) for law in WATCHED]
-    by_name = {each.name: each for law in WATCHED for at in MARGINS for each in margin(law, at)}
-    return [*found, *by_name.values()]
+    """Loads, ten minutes and margins for every law."""
+    of_margins = {case.name: case for law in LAWS for quantity in MARGINS for case in margin(law, quantity)}
+    return [
+        *(reaching(law, load) for law in LAWS for load in LOADS),
+        *(drift(law) for law in LAWS),
+        *of_margins.values(),
+    ]
 
 
-def reaching(compared: Compared, load: float) -> Case:
+def reaching(law: ComparedLaw, load: float) -> Case:
     """From rest under a load."""
-    return _case(compared, f"L {load:g}", {"disturbance.load": load}, (Status.COMPLETED,))
+    return _case(law, f"L {load:g}", {"disturbance.load": load}, (Status.COMPLETED,))
 
 
-def drift(compared: Compared) -> Case:
-    """Ten minutes on end."""
-    return _case(compared, f"{LONG_s:g} s", {"duration": LONG_s}, ENDS)
+def drift(law: ComparedLaw) -> Case:
+    """Ten minutes."""
+    return _case(law, f"{LONG_s:g} s", {"duration": LONG_s}, EXPECTED)
 
 
-def margin(compared: Compared, of: Margin) -> list[Case]:
+def margin(law: ComparedLaw, quantity: Margin) -> list[Case]:
     """A law under every step of a margin."""
-    return [_case(compared, *_worse(of, step), ENDS)._replace(compared=False) for step in of.steps]
+    conditions = [_worse(quantity, step) for step in quantity.steps]
+    return [_case(law, *condition, EXPECTED)._replace(comparable=False) for condition in conditions]
 
 
-def _worse(of: Margin, step: float) -> tuple[str, dict[str, Any]]:
-    if of is DELAY:  # of which no law is told
+def _worse(quantity: Margin, step: float) -> tuple[str, dict[str, Any]]:
+    if quantity is DELAY:  # no law knows it
         return f"delay {step:g} ms", {"drive.delay_s": 1e-3 * step, "nominal.delay_s": 0.0}
-    if of in (HEAVIER, LIGHTER):
+    if quantity in (HEAVIER, LIGHTER):
         return f"m {step:g}", {"plant.modelling_error": float(step)}
     period_s = 1 / step
     return f"{step:g} Hz", {"controller.period_s": period_s, "plant.step_s": min(STEP_s, period_s)}
 
 
-def _case(compared: Compared, condition: str, fields: dict[str, Any], ends: tuple[Status, ...]) -> Case:
+def _case(law: ComparedLaw, condition: str, fields: dict[str, Any], expected: tuple[Status, ...]) -> Case:
     return Case(
-        name=f"{compared.law}: {condition}",
+        name=f"{law.law}: {condition}",
         scenario=SCENARIO,
-        fields={"controller.law": compared.law, **fields},
-        told={"condition": condition},
-        once=True,
-        ends=ends,
+        fields={"controller.law": law.law, **fields},
+        details={"condition": condition},
+        single_run=True,
+        expected_statuses=expected,
     )
-
-
-CUT = 1e-3
-"""Of the largest singular value: directions of theta that a run hardly excites are left at 0."""
-
-
-class Descent(NamedTuple):
-    """How V went."""
-
-    rises: float
-    """Share of the ticks at which it rose."""
-    risen: float
-    """Sum of all rises, over V at the start."""
-    fallen: float
-    """What was lost from start to end, over V at the start."""
-    of_parameters: float
-    """Share of V at the start that the parameters' errors make up."""
-
-
-def descent(run: Run) -> Descent | None:
-    """How V of a run went; None of another law, or level, than the proof is of."""
-    gains = run.scenario.controller
-    if not isinstance(gains, AFSM) or gains.level != "acceleration" or len(run.telemetry) < 2:
-        return None
-    axes = [_of_axis(run, gains, axis) for axis in range(3)]
-    total, parameters = np.sum([each[0] for each in axes], axis=0), sum(each[1] for each in axes)
-    steps = np.diff(total)
-    up = steps[steps > 0]
-    return Descent(len(up) / len(steps), float(up.sum() / total[0]), float(1 - total[-1] / total[0]),
-                   float(parameters / total[0]))  # fmt: skip
-
-
-def _of_axis(run: Run, gains: AFSM, axis: int) -> tuple[Array, float]:
-    """V of an axis over the ticks but the last, and what the parameters' errors are of the first."""
-    table, period_s = run.telemetry, gains.period_s
-    s, mass = table["sliding_s"][:, axis], 1 + run.scenario.plant.modelling_error
-    psi = regressor(table["qdot_rad_s"][:, axis], table["q_rad"][:, axis])
-    theta = consequents(psi, s, gains.fuzzy_rate[axis], period_s)
-    v = table["torque_command_Nm"][:-1, axis] / np.array(run.scenario.nominal.inertia_kg_m2)[axis]
-    needed = v - mass * np.diff(s) / period_s
-    best = np.linalg.lstsq(psi[:-1], needed, rcond=CUT)[0]
-    bound = np.abs(needed - psi[:-1] @ best).max()
-    of_theta = np.sum((theta[:-1] - best) ** 2, axis=1) / gains.fuzzy_rate[axis]
-    of_xi = (table["switching_gain"][:-1, axis] - bound) ** 2 / gains.switching_rate[axis]
-    of_zeta = table["bound_gain"][:-1, axis] ** 2 / gains.bound_rate[axis]
-    errors = (of_theta + of_xi + of_zeta) / 2
-    return mass * s[:-1] ** 2 / 2 + errors, float(errors[0])
-
-
-def regressor(rate: Array, angle: Array) -> Array:
-    """(n, 75) regressor Psi of an axis."""
-    of_rate, of_angle = _memberships(rate), _memberships(angle)
-    psi = (of_rate[:, :, None] * of_angle[:, None, :]).reshape(len(rate), -1)
-    return np.hstack([psi, psi * rate[:, None], psi * angle[:, None]])
-
-
-def consequents(psi: Array, s: Array, fuzzy_rate: float, period_s: float) -> Array:
-    """(n, 75) estimates theta at each tick, from 0 on (43)."""
-    steps = -fuzzy_rate * period_s * s[:, None] * psi
-    return np.vstack([np.zeros(psi.shape[1]), np.cumsum(steps, axis=0)[:-1]])
-
-
-def _memberships(x: Array) -> Array:
-    degrees = np.exp(-SHAPE * ((x[:, None] - np.array(CENTRES)) / (2 * WIDTH)) ** 2)
-    return degrees / degrees.sum(axis=1, keepdims=True)
 
 
 REACHED_rad_s, SLOPE = 0.05, 50.0
@@ -190,13 +122,13 @@ class StabilityMeasures(NamedTuple):
     """First time at which |λe + ė| of every hinge is below `REACHED_rad_s`; None if never."""
     early: Span | None
     late: Span | None
-    """First and last minute; None of shorter runs."""
+    """First and last minute; None for shorter runs."""
     gains: tuple[float, float] | None
-    """Largest ξ̂ and ζ̂ at the end; None of laws that have none."""
+    """Largest ξ̂ and ζ̂ at the end; None for laws without them."""
     descent: Descent | None
 
 
-def keep(run: Run) -> StabilityMeasures:
+def reduce(run: Run) -> StabilityMeasures:
     """Reduce a run."""
     table, period_s = run.telemetry, run.scenario.controller.period_s
     ticks = round(SPAN_s / period_s)
@@ -251,116 +183,105 @@ MARGIN = (
 )
 
 
-def tell(outcomes: Outcomes) -> list[Section]:
-    """What was found of each law."""
-    drawn = (
-        [lambda: _draw(outcomes)]
-        if any(_tried(outcomes, law, at) for law in WATCHED for at in MARGINS)
-        else []
-    )
+def sections(outcomes: Outcomes) -> list[Section]:
+    """Descent and reaching, ten minutes, and margins of each law."""
+    drawings = [lambda: _draw(outcomes)] if _tested(outcomes) else []
     return [
         Section("Descent and reaching", REACHING, [_reaching(outcomes)]),
         Section("Ten minutes", DRIFT, [_drift(outcomes)]),
-        Section("Margins", MARGIN, [_margins(outcomes)], drawn),
+        Section("Margins", MARGIN, [_margins(outcomes)], drawings),
     ]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
-    """Whether V falls, and what ten minutes do."""
-    return [*_falls(outcomes), *_drifts(outcomes)]
+    """Course of V, and of the variation over ten minutes."""
+    return [*_descent_findings(outcomes), *_drift_findings(outcomes)]
 
 
 def holds(outcome: Outcome) -> bool:
-    """Whether a law held."""
-    return outcome.status == Status.COMPLETED and bool(np.all(outcome.tail_rms_error < HOLDS_rad))
+    """True if a law holds, as defined by `HOLDS_rad`."""
+    return outcome.is_complete and bool(np.all(outcome.tail_rms_error < HOLDS_rad))
 
 
 def ends_of(held: Sequence[bool]) -> tuple[int | None, int | None]:
-    """Places of the last step at which all held until then, and of the first at which it does not."""
+    """Indices of the last step up to which a law holds at all, and of the first at which it does not."""
     first = held.index(False) if False in held else None
     last = (len(held) if first is None else first) - 1
     return (last if last >= 0 else None), first
 
 
-def _falls(outcomes: Outcomes) -> list[Finding]:
-    found = [
-        (load, run.kept.descent)
-        for law in WATCHED
-        for load in LOADS
-        for run in outcomes.get(reaching(law, load).name, ())
-        if run.kept.descent
+def _reaching_runs(outcomes: Outcomes) -> list[tuple[ComparedLaw, float, StabilityMeasures]]:
+    return [
+        (law, load, run.data) for law in LAWS for load in LOADS for run in outcomes.runs(reaching(law, load))
     ]
-    if not found:
+
+
+def _drift_runs(outcomes: Outcomes) -> list[tuple[ComparedLaw, StabilityMeasures, Span, Span]]:
+    """Runs of ten minutes with their first and last minute."""
+    return [
+        (law, run.data, run.data.early, run.data.late)
+        for law in LAWS
+        for run in outcomes.runs(drift(law))
+        if run.data.early and run.data.late
+    ]
+
+
+def _descent_findings(outcomes: Outcomes) -> list[Finding]:
+    courses = [(load, data.descent) for _, load, data in _reaching_runs(outcomes) if data.descent]
+    if not courses:
         return []
-    told = ", ".join(
-        f"at L = {load:g} it rises at {100 * each.rises:.2g} % of the ticks, by {each.risen:.1e} V₀ in all"
-        for load, each in found
+    texts = ", ".join(
+        f"at L = {load:g} it rises at {100 * course.rises:.2g} % of the ticks, by {course.risen:.1e} V₀"
+        " in all"
+        for load, course in courses
     )
-    least = min(each.of_parameters for _, each in found)
-    falls = all(each.risen < each.fallen for _, each in found)
-    said = (
-        f"V of (44) {'falls' if falls else 'does not fall'} along AFSM's runs ({told}); weak evidence, as"
+    least = min(course.of_parameters for _, course in courses)
+    falls = all(course.risen < course.fallen for _, course in courses)
+    text = (
+        f"V of (44) {'falls' if falls else 'does not fall'} along AFSM's runs ({texts}); weak evidence, as"
         f" {100 * least:.2f} % of V₀ are the parameters' errors"
     )
-    return [Finding(None if falls else False, said)]
+    return [Finding(None if falls else False, text)]
 
 
-def _drifts(outcomes: Outcomes) -> list[Finding]:
-    told = []
-    for law in WATCHED:
-        for run in outcomes.get(drift(law).name, ()):
-            if run.kept.early:
-                early, late = run.kept.early, run.kept.late
-                told.append(f"{law.label} {early.variation_A_s:.0f} to {late.variation_A_s:.0f} A/s")
-    if not told:
+def _drift_findings(outcomes: Outcomes) -> list[Finding]:
+    texts = [
+        f"{law.label} {early.variation_A_s:.0f} to {late.variation_A_s:.0f} A/s"
+        for law, _, early, late in _drift_runs(outcomes)
+    ]
+    if not texts:
         return []
-    return [Finding(None, f"variation of the commands, first to last of ten minutes: {', '.join(told)}")]
+    return [Finding(None, f"variation of the commands, first to last of ten minutes: {', '.join(texts)}")]
 
 
 def _reaching(outcomes: Outcomes) -> ResultTable:
     rows = []
-    for law in WATCHED:
-        for load in LOADS:
-            for run in outcomes.get(reaching(law, load).name, ()):
-                fell, reached = run.kept.descent, run.kept.reached_s
-                said = "not within the run" if reached is None else f"{reached:.2f} s"
-                rows.append((law.label, f"{load:g}", said, *_descent(fell)))
+    for law, load, data in _reaching_runs(outcomes):
+        reached = "not within the run" if data.reached_s is None else f"{data.reached_s:.2f} s"
+        rows.append((law.label, f"{load:g}", reached, *_descent_cells(data.descent)))
     head = (
-        "law",
-        "L",
-        "reached after",
-        "V rises at",
-        "all rises / V₀",
-        "fallen / V₀",
-        "parameters' share of V₀",
-    )
+        "law", "L", "reached after", "V rises at", "all rises / V₀", "fallen / V₀", "parameters' share of V₀",
+    )  # fmt: skip
     return ResultTable("Reaching times, and V of (44) along AFSM's runs", head, rows, 2)
 
 
-def _descent(fell: Descent | None) -> tuple[str, ...]:
-    if fell is None:
-        return ("–",) * 4
-    share = f"{100 * fell.of_parameters:.2f} %"
-    return f"{100 * fell.rises:.2g} %", f"{fell.risen:.1e}", f"{fell.fallen:.1e}", share
+def _descent_cells(course: Descent | None) -> tuple[str, ...]:
+    if course is None:
+        return (NONE,) * 4
+    share = f"{100 * course.of_parameters:.2f} %"
+    return f"{100 * course.rises:.2g} %", f"{course.risen:.1e}", f"{course.fallen:.1e}", share
 
 
 def _drift(outcomes: Outcomes) -> ResultTable:
     rows = []
-    for law in WATCHED:
-        for run in outcomes.get(drift(law).name, ()):
-            gains = "–" if run.kept.gains is None else " / ".join(f"{gain:.0f}" for gain in run.kept.gains)
-            for name, span in (("first", run.kept.early), ("last", run.kept.late)):
-                if span:
-                    rows.append((law.label, name, *_span_cells(span), gains if name == "last" else ""))
+    for law, data, early, late in _drift_runs(outcomes):
+        gains = NONE if data.gains is None else " / ".join(f"{gain:.0f}" for gain in data.gains)
+        rows.append((law.label, "first", *_span_cells(early), ""))
+        rows.append((law.label, "last", *_span_cells(late), gains))
     head = (
-        "law",
-        "minute",
-        "RMS error, mrad",
-        "torque, N·m",
-        "variation, A/s",
-        "at the limit",
+        "law", "minute", "RMS error, mrad", "torque, N·m", "variation, A/s", "at the limit",
         "ξ̂ / ζ̂ at the end",
-    )
+    )  # fmt: skip
     return ResultTable(f"First and last minute of {LONG_s:g} s", head, rows, 2)
 
 
@@ -373,28 +294,38 @@ def _span_cells(span: Span) -> tuple[str, ...]:
     )
 
 
+Steps = list[tuple[float, Outcome]]
+
+
+def _tested(outcomes: Outcomes) -> dict[Margin, dict[ComparedLaw, Steps]]:
+    """Steps with their outcomes, by margin and law, of everything that was run."""
+    by_margin = {
+        quantity: {
+            law: [
+                (step, run)
+                for step, case in zip(quantity.steps, margin(law, quantity), strict=True)
+                for run in outcomes.runs(case)
+            ]
+            for law in LAWS
+        }
+        for quantity in MARGINS
+    }
+    return {quantity: by_law for quantity, by_law in by_margin.items() if any(by_law.values())}
+
+
 def _margins(outcomes: Outcomes) -> ResultTable:
     rows = [
-        (of.name, *(_cell(outcomes, law, of) for law in WATCHED))
-        for of in MARGINS
-        if any(_tried(outcomes, law, of) for law in WATCHED)
+        (quantity.name, *(_cell(quantity, steps) for steps in by_law.values()))
+        for quantity, by_law in _tested(outcomes).items()
     ]
-    head = ("made worse", *(f"{law.label}: last that holds / first that does not" for law in WATCHED))
+    head = ("made worse", *(f"{law.label}: last that holds / first that does not" for law in LAWS))
     return ResultTable("Margins", head, rows)
 
 
-def _cell(outcomes: Outcomes, law: Compared, of: Margin) -> str:
-    tried = _tried(outcomes, law, of)
-    steps = [step for step, _ in tried]
-    last, first = ends_of([holds(run) for _, run in tried])
-    named = [f"{steps[place]:g}" if place is not None else "none tried" for place in (last, first)]
-    return f"{' / '.join(named)} {of.unit}".strip()
-
-
-def _tried(outcomes: Outcomes, law: Compared, of: Margin) -> list[tuple[float, Outcome]]:
-    """Steps of a margin that were run, each with its outcome."""
-    named = zip(of.steps, margin(law, of), strict=True)
-    return [(step, outcomes[each.name][0]) for step, each in named if each.name in outcomes]
+def _cell(quantity: Margin, steps: Steps) -> str:
+    ends = ends_of([holds(run) for _, run in steps])
+    texts = [f"{steps[index][0]:g}" if index is not None else "none tried" for index in ends]
+    return f"{' / '.join(texts)} {quantity.unit}".strip()
 
 
 def _draw(outcomes: Outcomes) -> Drawing:
@@ -402,17 +333,16 @@ def _draw(outcomes: Outcomes) -> Drawing:
 
     panels = [
         figures.MarginPanel(
-            f"{of.name}{f', {of.unit}' if of.unit else ''}",
+            f"{quantity.name}{f', {quantity.unit}' if quantity.unit else ''}",
             {
-                law.law: np.array([(step, run.tail_rms_error.max(), holds(run)) for step, run in tried])
-                for law in WATCHED
-                if (tried := _tried(outcomes, law, of))
+                law.law: np.array([(step, run.tail_rms_error.max(), holds(run)) for step, run in steps])
+                for law, steps in by_law.items()
+                if steps
             },
         )
-        for of in MARGINS
-        if any(_tried(outcomes, law, of) for law in WATCHED)
+        for quantity, by_law in _tested(outcomes).items()
     ]
-    labels = {law.law: law.label for law in WATCHED}
+    labels = {law.law: law.label for law in LAWS}
     figure = figures.margins(
         panels, labels, HOLDS_rad, "RMS error of the worst hinge, second half, mrad", "Margins"
     )
@@ -426,10 +356,10 @@ def _draw(outcomes: Outcomes) -> Drawing:
 EXPERIMENT = Experiment(
     name="stability",
     title="Stability beyond the proof",
-    shows="The sinusoid with m = 0.2 on ideal hardware, one seed: V of (44), reaching times, ten minutes on"
+    summary="The sinusoid with m = 0.2 on ideal hardware, one seed: V of (44), reaching times, ten minutes on"
     " end, and how much delay, inertia and control rate each law bears.",
     cases=cases,
-    tell=tell,
-    keep=keep,
+    sections=sections,
+    reduce=reduce,
     findings=findings,
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ from spheretwin.paper.experiment import (
     Case,
     Experiment,
     Finding,
-    Outcome,
     Outcomes,
     ResultTable,
     Section,
@@ -27,9 +25,9 @@ SAMPLE_s = 0.01
 FINE_s = 1.25e-5
 DEFAULT_s: float = PlantSection.model_fields["step_s"].default
 
-ENDS = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
+EXPECTED = (Status.COMPLETED, Status.LEFT_WORKSPACE, Status.DIVERGED)
 
-HOW = (
+METHOD = (
     "Largest difference of any hinge angle, in mrad, between a run and the same run with a physics step of"
     f" {1e3 * FINE_s:g} ms, compared every {1e3 * SAMPLE_s:g} ms; one seed, the law's default gains. A"
     " physics step cannot be longer than the control period: at 2 ms the control period is 2 ms too, in both"
@@ -54,7 +52,7 @@ class Trace(NamedTuple):
 
 
 class Cost(NamedTuple):
-    """What a step changes in one run."""
+    """Difference of a run from that at the fine step."""
 
     difference_rad: float
     step_s: float
@@ -69,16 +67,14 @@ LONGEST = Step(2e-3, 2e-3)
 def cases() -> list[Case]:
     """Every law in every scenario at every step; the default step first."""
     by_default = sorted((*STEPS, LONGEST), key=lambda step: step.step_s != DEFAULT_s)
-    steps = [each for step in by_default for each in (step, fine(step))]
-    return list(
-        {
-            made.name: made
-            for scenario in SCENARIOS
-            for law in LAWS
-            for step in steps
-            for made in [case(law, scenario, step)]
-        }.values()
-    )
+    every = [
+        case(law, scenario, shorter)
+        for scenario in SCENARIOS
+        for law in LAWS
+        for step in by_default
+        for shorter in (step, fine(step))
+    ]
+    return list({case.name: case for case in every}.values())
 
 
 def fine(step: Step) -> Step:
@@ -96,13 +92,13 @@ def case(law: str, scenario: str, step: Step) -> Case:
             "controller.period_s": step.period_s,
             "plant.step_s": step.step_s,
         },
-        told={"step_s": step.step_s, "period_s": step.period_s},
-        once=True,
-        ends=ENDS,
+        details={"step_s": step.step_s, "period_s": step.period_s},
+        single_run=True,
+        expected_statuses=EXPECTED,
     )
 
 
-def keep(run: Run) -> Trace:
+def reduce(run: Run) -> Trace:
     """Sample the motion of a run."""
     table = run.telemetry
     every = round(SAMPLE_s / run.scenario.controller.period_s)
@@ -110,22 +106,24 @@ def keep(run: Run) -> Trace:
 
 
 def difference_rad(outcomes: Outcomes, law: str, scenario: str, step: Step) -> float:
-    """Largest difference of any hinge angle from the run at the fine step; NaN where either was not run."""
-    names = [case(law, scenario, each).name for each in (step, fine(step))]
-    if not all(name in outcomes for name in names):
+    """Largest difference of any hinge angle from the run at the fine step; NaN if either was not run."""
+    runs = [run for length in (step, fine(step)) for run in outcomes.runs(case(law, scenario, length))]
+    if len(runs) < 2:
         return float("nan")
-    coarse, reference = (outcomes[name][0].kept.q_rad for name in names)
+    coarse, reference = (run.data.q_rad for run in runs)
     rows = min(len(coarse), len(reference))
     return float(np.max(np.abs(coarse[:rows] - reference[:rows]))) if rows else float("nan")
 
 
-def tell(outcomes: Outcomes) -> list[Section]:
+def sections(outcomes: Outcomes) -> list[Section]:
     """A table for each scenario."""
-    return [Section("Error over the physics step", HOW, [_table(outcomes, each) for each in SCENARIOS])]
+    return [
+        Section("Error over the physics step", METHOD, [_table(outcomes, scenario) for scenario in SCENARIOS])
+    ]
 
 
 def findings(outcomes: Outcomes) -> list[Finding]:
-    """What the default step and twice that step cost, in runs that complete."""
+    """Largest difference at the default step and at twice that step, in runs that complete."""
     steps = [step for step in STEPS if step.step_s in (DEFAULT_s, 2 * DEFAULT_s)]
     costs = [cost for step in steps if (cost := _largest(outcomes, step))]
     if len(costs) < len(steps):
@@ -142,13 +140,9 @@ def _largest(outcomes: Outcomes, step: Step) -> Cost | None:
         Cost(difference_rad(outcomes, law, scenario, step), step.step_s, law, scenario)
         for law in LAWS
         for scenario in SCENARIOS
-        if _completed(outcomes.get(case(law, scenario, step).name, ()))
+        if (runs := outcomes.runs(case(law, scenario, step))) and runs[0].is_complete
     ]
     return max((cost for cost in costs if np.isfinite(cost.difference_rad)), default=None)
-
-
-def _completed(runs: Sequence[Outcome]) -> bool:
-    return bool(runs) and all(run.status == Status.COMPLETED for run in runs)
 
 
 def _table(outcomes: Outcomes, scenario: str) -> ResultTable:
@@ -162,7 +156,7 @@ def _table(outcomes: Outcomes, scenario: str) -> ResultTable:
 
 def _row(outcomes: Outcomes, law: str, scenario: str) -> tuple[str, ...]:
     cells = [_cell(outcomes, law, scenario, step) for step in (*STEPS, LONGEST)]
-    runs = outcomes.get(case(law, scenario, Step(DEFAULT_s, STEPS[0].period_s)).name, ())
+    runs = outcomes.runs(case(law, scenario, Step(DEFAULT_s, STEPS[0].period_s)))
     error = f"{1e3 * np.max(runs[0].max_abs_error):.3g}" if runs else "not run"
     return (law, *cells, error)
 
@@ -171,17 +165,17 @@ def _cell(outcomes: Outcomes, law: str, scenario: str, step: Step) -> str:
     difference = difference_rad(outcomes, law, scenario, step)
     if not np.isfinite(difference):
         return "not run"
-    run = outcomes[case(law, scenario, step).name][0]
-    end = "" if run.status == Status.COMPLETED else f" (left at {run.kept.ended_s:.2f} s)"
+    run = outcomes.runs(case(law, scenario, step))[0]
+    end = "" if run.is_complete else f" (left at {run.data.ended_s:.2f} s)"
     return f"{1e3 * difference:.2g}{end}"
 
 
 EXPERIMENT = Experiment(
     name="step_size",
     title="Error over the physics step",
-    shows="Every law in every scenario at physics steps from 0.05 to 2 ms, compared with 0.0125 ms.",
+    summary="Every law in every scenario at physics steps from 0.05 to 2 ms, compared with 0.0125 ms.",
     cases=cases,
-    tell=tell,
-    keep=keep,
+    sections=sections,
+    reduce=reduce,
     findings=findings,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from spheretwin.study.runner import Found, carried_out
+from spheretwin.study.runner import Found, run_study
 from spheretwin.study.study import Study, load
 
 
@@ -55,7 +55,7 @@ def run(
     """
     chosen = load(study) if isinstance(study, str) else study
     folder = Path(out) if out is not None else Path(f"{chosen.name}_study")
-    return carried_out(
+    return run_study(
         chosen,
         folder,
         engine=engine,

@@ -115,8 +115,8 @@ class Rows:
             return template.scenario((row.seed, *row.values.values()))
         return self._validated(self._fields_of(row, engine))
 
-    def carried_out(self, row: Row, engine: str | None = None) -> Result:
-        """Run a row; whatever goes wrong with it is its result."""
+    def run(self, row: Row, engine: str | None = None) -> Result:
+        """Run a row; an error of the row is its result."""
         try:
             scenario = self.scenario(row, engine)
             with self.session(scenario) as session:
@@ -139,7 +139,6 @@ class Rows:
 
     def command(self, row: Row) -> str:
         """Command line that runs a row alone; its values as they are, where they make no scenario."""
-        words = ["spheretwin", "simulate", self.study.source]
         law = {"controller": {**_period(self._fields), **row.law}} if row.law is not None else {}
         named = self._found({**self.study.fields, **law, **row.values})
         named["seed"] = row.seed
@@ -154,8 +153,7 @@ class Rows:
         named = {
             _list_of(dotted): _value_at(whole, _list_of(dotted), value) for dotted, value in named.items()
         }
-        for dotted, value in named.items():
-            words += [f"--{dotted.replace('_', '-')}", *_texts(value)]
+        words = command_words(self.study.source, named)
         for reference in self._references:
             words += ["--metric", reference]
         return shlex.join(words)
@@ -338,7 +336,16 @@ def _own_value(name: str, metric: UserMetric, run: Run, complaints: list[str]) -
         return None
 
 
+def command_words(scenario: str, fields: Mapping[str, Any]) -> list[str]:
+    """Words of the command line that runs a scenario with some fields."""
+    words = ["spheretwin", "simulate", scenario]
+    for dotted, value in fields.items():
+        words += [f"--{dotted.replace('_', '-')}", *_texts(value)]
+    return words
+
+
 def _texts(value: Any) -> list[str]:
-    if isinstance(value, list | tuple) and value and not any(isinstance(each, list | dict) for each in value):
-        return [json.dumps(each) for each in value]
+    is_list = isinstance(value, list | tuple) and len(value) > 0
+    if is_list and not any(isinstance(entry, list | dict) for entry in value):
+        return [json.dumps(entry) for entry in value]
     return [value if isinstance(value, str) else json.dumps(value)]

@@ -105,7 +105,7 @@ class Found(NamedTuple):
     table: Path
 
 
-def carried_out(
+def run_study(
     study: Study,
     folder: Path,
     *,
@@ -168,7 +168,7 @@ def _fill(
     done(finished, wanted)
     first = None
     stopping = order._replace(stop_requested=lambda: bool(work.faults) or asked())
-    with closing(engine.carried_out(stopping)) as results:
+    with closing(engine.run(stopping)) as results:
         for row, result in results:
             first = first or time.perf_counter()
             if result is not None:

@@ -1,18 +1,22 @@
 """Short experiments on the shipped scenarios."""
 
+import numpy as np
+
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import Case, Experiment, ResultTable, Section
+from spheretwin.paper.experiment import Case, Experiment, Outcome, ResultTable, Section
 from spheretwin.paper.rows import of_axis, spread_deg
 
 SHORT = {"duration": 0.2, "plant.engine": "lagrangian"}
-NOISY = Case("noisy", "tilt", {**SHORT, "hardware": "prototype"}, told={"paper": [0.01, None, None]})
-IDEAL = Case("ideal", "tilt", SHORT, draws=False)
+NOISY = Case("noisy", "tilt", {**SHORT, "hardware": "prototype"}, details={"paper": [0.01, None, None]})
+IDEAL = Case("ideal", "tilt", SHORT, is_random=False)
 # 5 N·m: PD cannot hold it, and the rotor leaves its workspace.
-LOST = Case("lost", "hold", {"duration": 1.0, "controller.law": "pd", "disturbance.load": 100.0}, draws=False)
+LOST = Case(
+    "lost", "hold", {"duration": 1.0, "controller.law": "pd", "disturbance.load": 100.0}, is_random=False
+)
 
 
-def tell(outcomes):
-    rows = [(name, spread_deg(of_axis(found, "max_abs_error", 0))) for name, found in outcomes.items()]
+def sections(outcomes):
+    rows = [(name, spread_deg(of_axis(runs, "max_abs_error", 0))) for name, runs in outcomes.items()]
     return [
         Section(
             "What | was found", "In *words*, and <b>no tag</b>.", [ResultTable("Errors", ("case", "α"), rows)]
@@ -20,9 +24,16 @@ def tell(outcomes):
     ]
 
 
+def outcome(error=0.0, status=Status.COMPLETED, data=None, **figures):
+    """Outcome with an error (rad) of all hinges, or of each."""
+    errors = (np.array(error) * np.ones(3)).tolist()
+    names = ("max_abs_error_rad", "rms_error_rad", "tail_rms_error_rad")
+    return Outcome(status, {**dict.fromkeys(names, errors), **figures}, np.array(errors), data)
+
+
 def experiment(*cases, **more):
-    return Experiment("short", "A short one", "It is over soon.", lambda: list(cases), tell, **more)
+    return Experiment("short", "A short one", "It is over soon.", lambda: list(cases), sections, **more)
 
 
 def allowed(case):
-    return case._replace(ends=(Status.COMPLETED, Status.LEFT_WORKSPACE))
+    return case._replace(expected_statuses=(Status.COMPLETED, Status.LEFT_WORKSPACE))

@@ -6,8 +6,8 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.paper import EXPERIMENTS
-from spheretwin.paper.cases import command_line, scenario_of
 from spheretwin.paper.experiment import Case
+from spheretwin.paper.runner import command_line, scenario_of
 from spheretwin.scenario import reading
 
 SOME = 40  # cases of an experiment: the fault study has thousands, of a few kinds

@@ -1,17 +1,17 @@
 """The error budget: its stages are the prototype part by part, and the whole of it."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.electronics.sensor_chain import accuracy
 from spheretwin.paper import error_budget
-from spheretwin.paper.cases import carried_out, planned
 from spheretwin.paper.error_budget import ALL, ESTIMATOR, IDEAL, PROTOTYPE, STAGES, WITH_RATES, WITHOUT_ERROR
+from spheretwin.paper.experiment import Outcomes
+from spheretwin.paper.runner import make_plan, run_plan
 from spheretwin.scenario.sections import PROTOTYPE_NOMINAL
 from spheretwin.simulation import simulate
+from tests.twin.paper.cases import outcome
 
 BY_NAME = {stage.name: stage for stage in STAGES}
 SECTIONS = ("sensors", "estimator", "drive", "plant", "nominal")
@@ -60,14 +60,18 @@ def test_a_stage_is_run_for_each_seed_where_it_draws_and_only_there(stage):
     def rows(seed):
         return simulate(scenario(stage, duration=0.05, seed=seed)).telemetry.values
 
-    assert (rows(0).tobytes() != rows(1).tobytes()) == stage.draws
+    assert (rows(0).tobytes() != rows(1).tobytes()) == stage.is_random
 
 
 @pytest.mark.parametrize("name", ["voltage limit", "amplifier bandwidth", "drive offset and gain"])
 def test_what_a_drive_s_stage_needs_beside_is_no_error(name):
     """Amplifiers of ample voltage and bandwidth are currents at once, but for the offsets of the stage."""
     stage = BY_NAME[name]
-    wide = {**stage.overrides, **BY_NAME["voltage limit"].beside, **BY_NAME["amplifier bandwidth"].beside}
+    wide = {
+        **stage.overrides,
+        **BY_NAME["voltage limit"].other_fields,
+        **BY_NAME["amplifier bandwidth"].other_fields,
+    }
     wide |= {"drive.drop_up_V": 0.0, "drive.drop_down_V": 0.0}
     wide |= {
         f"drive.{each}": 0.0
@@ -89,8 +93,8 @@ def test_single_sensor_errors_are_compared_with_the_estimator():
 
 
 def test_table_has_every_stage_and_law_and_says_what_was_not_run():
-    plan = planned(error_budget.EXPERIMENT, seeds=1, limit=2)
-    (section,) = error_budget.tell(carried_out(plan))
+    plan = make_plan(error_budget.EXPERIMENT, seeds=1, limit=2)
+    (section,) = error_budget.sections(run_plan(plan))
     assert [table.title.split(" in ")[0][-1] for table in section.tables] == ["α", "β", "γ"]
     for table in section.tables:
         assert [row[0] for row in table.rows] == [stage.name for stage in STAGES]
@@ -99,16 +103,14 @@ def test_table_has_every_stage_and_law_and_says_what_was_not_run():
 
 def test_the_part_that_changes_most_is_named():
     """Outcomes made up: the estimator takes 0.01 rad off α, and friction, on β, is the worst by itself."""
-
-    def outcome(error):
-        return [SimpleNamespace(max_abs_error=np.array(error), figures={})]
-
     errors = {stage.name: [0.3, 0.0, 0.0] for stage in STAGES}
     errors["friction"] = [0.3, np.radians(2.0), 0.0]
     errors[ALL] = [1.0, 1.0, 1.0]
     errors[WITH_RATES] = [0.29, 0.0, 0.0]
     errors |= {stage.name: errors[WITH_RATES] for stage in STAGES if stage.base == WITH_RATES}
-    outcomes = {error_budget.case("pd", stage).name: outcome(errors[stage.name]) for stage in STAGES}
+    outcomes = Outcomes(
+        {error_budget.case("pd", stage).name: [outcome(errors[stage.name])] for stage in STAGES}
+    )
     assert error_budget._most(outcomes, "pd") == "pd, friction (β +2.000°)"
     del outcomes["pd: delay"]
     assert error_budget._most(outcomes, "pd") == ""

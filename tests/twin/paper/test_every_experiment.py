@@ -6,9 +6,9 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.paper import EXPERIMENTS, page
-from spheretwin.paper.cases import carried_out, failed, planned
 from spheretwin.paper.page import Chapter
 from spheretwin.paper.rows import rows
+from spheretwin.paper.runner import make_plan, run_plan, unexpected_ends
 
 FACE = {
     "figure", "case", "scenario", "controller", "m", "L", "hardware", "fields", "seeds", "status", "statuses",
@@ -20,11 +20,11 @@ FACE = {
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
-def test_every_experiment_can_be_loaded_and_its_cases_told_apart(name):
+def test_every_experiment_can_be_loaded_and_its_cases_are_different(name):
     experiment = EXPERIMENTS[name]
     assert experiment.name == name
     assert experiment.title
-    assert experiment.shows.endswith(".")
+    assert experiment.summary.endswith(".")
     cases = experiment.cases()
     assert len({case.name for case in cases}) == len(cases) > 0
     assert len({json.dumps([case.scenario, case.fields_of(0)]) for case in cases}) == len(cases)
@@ -33,15 +33,15 @@ def test_every_experiment_can_be_loaded_and_its_cases_told_apart(name):
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
-def test_every_experiment_runs_and_tells_of_what_it_ran(name, tmp_path):
-    plan = planned(EXPERIMENTS[name], seeds=1, limit=2)
-    outcomes = carried_out(plan)
-    assert failed(plan, outcomes) == []
+def test_every_experiment_has_rows_and_a_page(name, tmp_path):
+    plan = make_plan(EXPERIMENTS[name], seeds=1, limit=2)
+    outcomes = run_plan(plan)
+    assert unexpected_ends(plan, outcomes) == []
     told = rows(plan, outcomes)
     json.dumps(told, allow_nan=False)
     assert len(told) == min(2, len(EXPERIMENTS[name].cases()))
     assert all(set(row) >= FACE for row in told)
-    sections = plan.experiment.tell(outcomes)
+    sections = plan.experiment.sections(outcomes)
     assert all(
         len(row) == len(table.head) for section in sections for table in section.tables for row in table.rows
     )

@@ -12,12 +12,12 @@ from spheretwin.paper import fault_cases
 from spheretwin.paper.fault_cases import (
     BOUNDED,
     DETECTING,
-    NOT_TOLD,
     OF_GROUPS,
     OF_PARTS,
+    REPORTED,
     SAMPLE,
     SCENARIO,
-    TOLD,
+    UNREPORTED,
     VALUES,
     cases,
     failures,
@@ -56,7 +56,7 @@ def test_drawn_sets_take_every_group_about_as_often():
 
 
 def test_every_set_has_its_ways_and_a_sample_runs_on_the_other_engine():
-    kinds = Counter(case.told["kind"] for case in ALL)
+    kinds = Counter(case.details["kind"] for case in ALL)
     ways = len(OF_GROUPS)
     assert kinds == {
         "healthy": 2,
@@ -74,13 +74,13 @@ def test_ways_change_nothing_but_what_they_say():
     loaded = {
         way.name: scenarios.load("nutation", of_groups((3, 11), way).fields).model_dump() for way in OF_GROUPS
     }
-    base = loaded[NOT_TOLD.name]
+    base = loaded[UNREPORTED.name]
     assert (base["plant"]["modelling_error"], base["disturbance"]["load"]) == (0.2, 1.0)
     assert [fault["target"] for fault in base["fault"]] == ["coil.03", "coil.11"]
-    for way, field in ((TOLD, "reported_to_controller"), (DETECTING, "detection")):
+    for way, field in ((REPORTED, "reported_to_controller"), (DETECTING, "detection")):
         changed = tuple({**fault, field: True} for fault in base["fault"])
         assert loaded[way.name] == {**base, "fault": changed}
-    assert loaded[BOUNDED.name] == {**loaded[TOLD.name], "allocation": "bounded"}
+    assert loaded[BOUNDED.name] == {**loaded[REPORTED.name], "allocation": "bounded"}
 
 
 def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_one():
@@ -103,10 +103,10 @@ def test_every_mode_of_every_shared_part_is_there_with_a_value_where_it_needs_on
 
 @pytest.mark.parametrize("limit", [25, 60])
 def test_a_limit_leaves_some_of_each_kind(limit):
-    kinds = Counter(case.told["kind"] for case in ALL[:limit])
+    kinds = Counter(case.details["kind"] for case in ALL[:limit])
     assert set(kinds) == {"healthy", "single", "pair", "drawn", "part", "short", "MuJoCo"}
     named = {case.name for case in ALL[:limit]}
-    other = [case.name.removesuffix(", MuJoCo") for case in ALL[:limit] if case.told["kind"] == "MuJoCo"]
+    other = [case.name.removesuffix(", MuJoCo") for case in ALL[:limit] if case.details["kind"] == "MuJoCo"]
     assert named & set(other)
 
 
@@ -142,5 +142,5 @@ def test_all_ways_and_engines_of_a_set_share_the_start_of_a_seed_and_other_seeds
 
 
 def test_only_what_is_drawn_or_a_sample_runs_once():
-    assert {case.told["kind"] for case in ALL if case.once} == {"drawn", "MuJoCo"}
+    assert {case.details["kind"] for case in ALL if case.single_run} == {"drawn", "MuJoCo"}
     assert all(case.draws for case in ALL)  # the disturbance is drawn

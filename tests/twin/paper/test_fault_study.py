@@ -10,8 +10,7 @@ from spheretwin.control.supervision.fault_detector import LEAST_SHARE
 from spheretwin.control.supervision.watchdog import Reason
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import fault_latency, fault_sections, fault_study
-from spheretwin.paper.cases import carried_out, failed, planned, scenario_of
-from spheretwin.paper.experiment import Outcome
+from spheretwin.paper.experiment import Outcome, Outcomes
 from spheretwin.paper.fault_cases import (
     ALONE,
     BASE,
@@ -19,19 +18,20 @@ from spheretwin.paper.fault_cases import (
     DETECTING,
     HEALTHY,
     HEALTHY_PROTOTYPE,
-    NOT_TOLD,
     OF_GROUPS,
     OF_PARTS,
     RELEASE,
-    TOLD,
+    REPORTED,
+    UNREPORTED,
     failures,
     of_groups,
     of_part,
     on_other_engine,
     shorted,
 )
-from spheretwin.paper.fault_outcomes import Found, keep, more, reason, tracks
+from spheretwin.paper.fault_outcomes import FaultData, reason, reduce, row_fields, tracks
 from spheretwin.paper.rows import rows
+from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 
@@ -43,7 +43,7 @@ STUDY = [
     HEALTHY_PROTOTYPE,
     *(of_groups(groups, way) for groups in ((0,), PAIR, MANY) for way in OF_GROUPS),
     *(of_part(DROPOUT, way) for way in OF_PARTS),
-    on_other_engine((0,), TOLD),
+    on_other_engine((0,), REPORTED),
     shorted((0,), DETECTING),
 ]
 EXPERIMENT = fault_study.EXPERIMENT._replace(cases=lambda: STUDY)
@@ -51,8 +51,8 @@ EXPERIMENT = fault_study.EXPERIMENT._replace(cases=lambda: STUDY)
 
 @pytest.fixture(scope="module")
 def found():
-    plan = planned(EXPERIMENT, seeds=2)
-    return plan, carried_out(plan, workers=2)
+    plan = make_plan(EXPERIMENT, seeds=2)
+    return plan, run_plan(plan, threads=2)
 
 
 def row(found, case):
@@ -60,33 +60,33 @@ def row(found, case):
 
 
 def outcome(ratio, status=Status.COMPLETED, **more_of_it):
-    kept = Found(
+    data = FaultData(
         start_s=1.0,
         after_rad=0.01 * ratio,
         healthy_rad=0.01,
         ended_s=5.0,
-        numbers=True,
-        stopped=Reason.NONE,
+        is_finite=True,
+        stop_reason=Reason.NONE,
         stopped_s=float("nan"),
-        told=True,
+        is_reported=True,
         least_norm=True,
-        left=None,
-        found_s=(),
+        remaining=None,
+        latencies_s=(),
         driven_ticks=(),
-        wrongly_found=0,
+        false_detections=0,
     )._replace(**more_of_it)
-    return Outcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), kept)
+    return Outcome(status, {"max_abs_error_rad": [0.0] * 3}, np.zeros(3), data)
 
 
 def test_rows_are_the_same_whatever_the_threads(found):
-    plan = planned(EXPERIMENT, seeds=2)
-    assert json.dumps(rows(plan, carried_out(plan, workers=1))) == json.dumps(rows(*found))
+    plan = make_plan(EXPERIMENT, seeds=2)
+    assert json.dumps(rows(plan, run_plan(plan, threads=1))) == json.dumps(rows(*found))
 
 
 def test_every_run_ends_with_a_status_and_numbers(found):
     plan, outcomes = found
-    assert failed(plan, outcomes) == []
-    assert all(run.kept.numbers for each in outcomes.values() for run in each)
+    assert unexpected_ends(plan, outcomes) == []
+    assert all(run.data.is_finite for each in outcomes.values() for run in each)
     assert (
         "each ended with a status and with nothing but numbers"
         in fault_sections.groups_section(outcomes).text
@@ -95,30 +95,30 @@ def test_every_run_ends_with_a_status_and_numbers(found):
 
 def test_single_group_and_pair_track_where_told_or_found_and_else_not(found):
     for groups in ((0,), PAIR):
-        for way in (TOLD, DETECTING, BOUNDED):
+        for way in (REPORTED, DETECTING, BOUNDED):
             told = row(found, of_groups(groups, way))
             assert (told["tracks"], told["reason"], told["rank"]) == (2, None, 3)
             assert 0.9 < told["error_ratio_range"][0] <= told["error_ratio_range"][1] < 1.15
-        untold = row(found, of_groups(groups, NOT_TOLD))
+        untold = row(found, of_groups(groups, UNREPORTED))
         assert untold["tracks"] == 0
         assert "of the torque asked for comes" in untold["reason"]
 
 
 def test_errors_are_those_of_the_healthy_run_with_the_same_seed(found):
     _, outcomes = found
-    case = of_groups(PAIR, NOT_TOLD)
+    case = of_groups(PAIR, UNREPORTED)
     for seed, run in enumerate(outcomes[case.name]):
         errors = [
             np.abs(simulate(scenarios.load("nutation", {**fields, "seed": seed})).telemetry["error_rad"])
             for fields in (case.fields_of(seed), BASE)
         ]
-        first = round(run.kept.start_s / 1e-3)
-        assert case.drawn(seed)["fault.0.start_s"] == pytest.approx(run.kept.start_s)
-        assert (run.kept.after_rad, run.kept.healthy_rad) == tuple(error[first:].max() for error in errors)
+        first = round(run.data.start_s / 1e-3)
+        assert case.seeded_fields(seed)["fault.0.start_s"] == pytest.approx(run.data.start_s)
+        assert (run.data.after_rad, run.data.healthy_rad) == tuple(error[first:].max() for error in errors)
         np.testing.assert_array_equal(*(error[: first + 1] for error in errors))  # nothing has failed yet
         assert np.any(errors[0][first + 1 :] != errors[1][first + 1 :])
     for run in outcomes[HEALTHY.name]:
-        assert (run.kept.ratio, run.kept.start_s) == (1.0, 0.0)
+        assert (run.data.ratio, run.data.start_s) == (1.0, 0.0)
 
 
 def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(found):
@@ -126,21 +126,21 @@ def test_the_reference_has_the_allocation_and_the_window_of_the_faulty_run(found
     bounded = scenario_of(of_groups(PAIR, BOUNDED), None, 1)
     run = outcomes[of_groups(PAIR, BOUNDED).name][1]
     error = np.abs(simulate(bounded.model_copy(update={"fault": ()})).telemetry["error_rad"])
-    assert run.kept.healthy_rad == error[round(run.kept.start_s / 1e-3) :].max()
+    assert run.data.healthy_rad == error[round(run.data.start_s / 1e-3) :].max()
     # It leaves the workspace before the end: the window of the reference ends there too.
     case = of_part(DROPOUT, ALONE)
     run = outcomes[case.name][0]
     assert run.status == Status.LEFT_WORKSPACE
     healthy = simulate(scenario_of(HEALTHY_PROTOTYPE, None, 0)).telemetry["error_rad"]
-    window = slice(round(run.kept.start_s / 1e-3), round(run.kept.ended_s / 1e-3))
-    assert run.kept.healthy_rad == np.abs(healthy[window]).max()
+    window = slice(round(run.data.start_s / 1e-3), round(run.data.ended_s / 1e-3))
+    assert run.data.healthy_rad == np.abs(healthy[window]).max()
 
 
 def test_the_detector_s_times_are_told(found):
     told = row(found, of_groups(PAIR, DETECTING))
     assert [len(times) for times in told["time_to_detection_s"]] == [2, 2]
     assert told["wrongly_found"] == 0
-    assert row(found, of_groups(PAIR, TOLD))["time_to_detection_s"] == [[None, None]] * 2
+    assert row(found, of_groups(PAIR, REPORTED))["time_to_detection_s"] == [[None, None]] * 2
 
 
 def opened(group, start_s, end_s=5.0, **changes):
@@ -163,9 +163,9 @@ def test_an_idle_group_is_not_detected_until_it_is_driven():
     assert length >= 50
     begin = end - length
     # Cut off within the idle stretch it is not detected, and otherwise some ticks after it.
-    missed = keep(opened(group, 1e-3 * (begin + 2), 1e-3 * end))
-    assert (missed.found_s, missed.driven_ticks) == ((None,), (0,))
-    (latency_s,) = keep(opened(group, 1e-3 * (begin + 2))).found_s
+    missed = reduce(opened(group, 1e-3 * (begin + 2), 1e-3 * end))
+    assert (missed.latencies_s, missed.driven_ticks) == ((None,), (0,))
+    (latency_s,) = reduce(opened(group, 1e-3 * (begin + 2))).latencies_s
     assert latency_s > 1e-3 * (length - 2)
 
 
@@ -177,12 +177,12 @@ def stretches(true):
 
 def test_latency_is_a_distribution_in_which_the_undetected_count():
     runs = [
-        outcome(1.0, found_s=(time_s,), driven_ticks=(5 if time_s else 1,), left=None)
+        outcome(1.0, latencies_s=(time_s,), driven_ticks=(5 if time_s else 1,), remaining=None)
         for time_s in [4e-3] * 80 + [5e-3] * 12 + [0.2] * 5 + [None] * 3
     ]
     told = outcome(0.9)
-    names = [of_groups((0,), way).name for way in (DETECTING, TOLD)]
-    section = fault_latency.section({names[0]: runs, names[1]: [told] * len(runs)})
+    names = [of_groups((0,), way).name for way in (DETECTING, REPORTED)]
+    section = fault_latency.section(Outcomes({names[0]: runs, names[1]: [told] * len(runs)}))
     (row,) = section.tables[0].rows
     assert row == (
         "one open", "100", "4", "5", "200", "not detected", "200", "3 (3.0 %)", "5", "5", "1",
@@ -198,14 +198,14 @@ def test_latency_is_a_distribution_in_which_the_undetected_count():
 
 def test_cost_is_what_the_delay_adds_with_the_same_seed_and_start(found):
     _, outcomes = found
-    detecting, told = (outcomes[of_groups(PAIR, way).name] for way in (DETECTING, TOLD))
+    detecting, told = (outcomes[of_groups(PAIR, way).name] for way in (DETECTING, REPORTED))
     for one, other in zip(detecting, told, strict=True):
-        assert one.kept.start_s == other.kept.start_s
-        assert fault_latency.cost_rad(one, other) == one.kept.after_rad - other.kept.after_rad
+        assert one.data.start_s == other.data.start_s
+        assert fault_latency.cost_rad(one, other) == one.data.after_rad - other.data.after_rad
 
 
 def test_too_little_torque_is_the_reason(found):
-    told = row(found, of_groups(MANY, TOLD))
+    told = row(found, of_groups(MANY, REPORTED))
     assert told["tracks"] == 0
     assert told["torque_left_over_needed"] < 0.5
     assert told["least_norm_torque_over_needed"] <= told["torque_left_over_needed"]
@@ -220,16 +220,16 @@ def test_the_watchdog_s_reason_is_told(found):
 
 def test_the_other_engine_agrees(found):
     _, outcomes = found
-    ((one, other),) = fault_study.compared(outcomes, TOLD)
+    ((one, other),) = fault_study.engine_pairs(outcomes, REPORTED)
     assert fault_study.agree(one, other)
     assert fault_study.difference_rad(one, other) < 1e-12  # 10,000 steps that round otherwise
-    apart = other._replace(kept=other.kept._replace(after_rad=other.kept.after_rad + 2e-9))
+    apart = other._replace(data=other.data._replace(after_rad=other.data.after_rad + 2e-9))
     assert not fault_study.agree(one, apart)
 
 
 def test_page_shows_every_figure_and_row(found):
     _, outcomes = found
-    groups, delays, reasons, parts, other = fault_study.tell(outcomes)
+    groups, delays, reasons, parts, other = fault_study.sections(outcomes)
     assert [row[0] for row in delays.tables[0].rows] == [
         "one open", "two open", "three to nine open", "one shorted",
     ]  # fmt: skip
@@ -242,17 +242,17 @@ def test_page_shows_every_figure_and_row(found):
     assert dropout[1].startswith("left_workspace: ")
     assert dropout[4] == "no fresh measurement"
     assert len(other.tables[0].rows) == 1
-    drawn = [draw().file for section in (groups, delays, reasons, parts, other) for draw in section.draw]
-    assert drawn == [
+    files = [draw().file for section in (groups, delays, reasons, parts, other) for draw in section.drawings]
+    assert files == [
         "faults_shares.png", "faults_pairs.png", "faults_latency.png", "faults_torque.png",
     ]  # fmt: skip
 
 
 def test_map_of_pairs_has_pairs_below_and_single_groups_on_the_diagonal(found):
-    ratios = fault_sections.ratios(found[1], NOT_TOLD)
+    ratios = fault_sections.ratios(found[1], UNREPORTED)
     there = np.argwhere(np.isfinite(ratios)).tolist()
     assert there == [[0, 0], [1, 0]]
-    assert ratios[1, 0] == row(found, of_groups(PAIR, NOT_TOLD))["error_ratio"]
+    assert ratios[1, 0] == row(found, of_groups(PAIR, UNREPORTED))["error_ratio"]
 
 
 def test_tracking_is_to_complete_and_to_stay_within_twice():
@@ -263,15 +263,15 @@ def test_tracking_is_to_complete_and_to_stay_within_twice():
 
 
 def test_a_lost_direction_is_the_first_reason(found):
-    left = found[1][of_groups(PAIR, TOLD).name][0].kept.left
-    assert reason(outcome(3.0, left=left._replace(rank=2))) == "rank 2"
-    assert reason(outcome(1.5, left=left._replace(rank=2))) is None
+    left = found[1][of_groups(PAIR, REPORTED).name][0].data.remaining
+    assert reason(outcome(3.0, remaining=left._replace(rank=2))) == "rank 2"
+    assert reason(outcome(1.5, remaining=left._replace(rank=2))) is None
 
 
 def test_a_run_that_ends_before_the_fault_has_no_ratio():
-    kept = keep(opened(0, 1.0, 0.5))
-    assert np.isnan(kept.ratio)
-    assert json.loads(json.dumps(more([outcome(float("nan"))]), allow_nan=False))["error_ratio"] is None
+    data = reduce(opened(0, 1.0, 0.5))
+    assert np.isnan(data.ratio)
+    assert json.loads(json.dumps(row_fields([outcome(float("nan"))]), allow_nan=False))["error_ratio"] is None
 
 
 def test_a_figure_parts_the_good_from_the_bad_with_the_fewest_errors():

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from spheretwin.paper import cases
-from spheretwin.paper import cases as memories
-from spheretwin.paper.cases import Memory, carried_out, key_of, known, planned, scenario_of
+from spheretwin.paper import runner
 from spheretwin.paper.rows import rows
+from spheretwin.paper.runner import OutcomeCache, key_of, make_plan, run_plan, scenario_of, summarise
 from tests.twin.paper.cases import IDEAL, NOISY, SHORT, experiment
 
 MINE = IDEAL._replace(name="mine")
@@ -16,46 +15,46 @@ MINE = IDEAL._replace(name="mine")
 def cache(monkeypatch):
     """A cache of its own, in memory."""
     entries = {}
-    monkeypatch.setattr(memories, "load_entry", entries.get)
-    monkeypatch.setattr(memories, "store_entry", entries.__setitem__)
+    monkeypatch.setattr(runner, "load_entry", entries.get)
+    monkeypatch.setattr(runner, "store_entry", entries.__setitem__)
     return entries
 
 
 @pytest.fixture
 def ran(monkeypatch):
     """Scenarios that were really run."""
-    real, found = cases.simulate, []
+    real, found = runner.simulate, []
 
     def simulate(scenario):
         found.append(scenario)
         return real(scenario)
 
-    monkeypatch.setattr(cases, "simulate", simulate)
+    monkeypatch.setattr(runner, "simulate", simulate)
     return found
 
 
 def remembering(plan):
-    return Memory(plan.experiment.name, {name: case.key for name, case in known(plan).items()})
+    return OutcomeCache(plan, summarise(plan))
 
 
 def test_rows_that_were_run_are_not_run_again_and_are_the_same(ran):
-    made = experiment(NOISY, IDEAL, keep=lambda run: run.telemetry["error_rad"].copy())
-    plan = planned(made, seeds=3)
-    first = carried_out(plan, memory=remembering(plan))
+    made = experiment(NOISY, IDEAL, reduce=lambda run: run.telemetry["error_rad"].copy())
+    plan = make_plan(made, seeds=3)
+    first = run_plan(plan, cache=remembering(plan))
     assert len(ran) == 4
-    again = carried_out(plan, memory=remembering(plan))
+    again = run_plan(plan, cache=remembering(plan))
     assert len(ran) == 4
     assert rows(plan, again) == rows(plan, first)
     for name in first:
         for one, other in zip(first[name], again[name], strict=True):
-            np.testing.assert_array_equal(one.kept, other.kept)
-    more = planned(made, seeds=5)
-    carried_out(more, memory=remembering(more))
+            np.testing.assert_array_equal(one.data, other.data)
+    more = make_plan(made, seeds=5)
+    run_plan(more, cache=remembering(more))
     assert sorted(scenario.seed for scenario in ran[4:]) == [3, 4]  # threads begin in any order
 
 
 def test_what_was_run_before_an_interruption_is_kept(ran, monkeypatch):
-    plan = planned(experiment(NOISY), seeds=4)
+    plan = make_plan(experiment(NOISY), seeds=4)
     told = []
 
     def done(name):
@@ -64,9 +63,9 @@ def test_what_was_run_before_an_interruption_is_kept(ran, monkeypatch):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        carried_out(plan, done, workers=1, memory=remembering(plan))
+        run_plan(plan, done, threads=1, cache=remembering(plan))
     before = len(ran)
-    carried_out(plan, memory=remembering(plan))
+    run_plan(plan, cache=remembering(plan))
     assert len(ran) - before <= 2
 
 
@@ -93,6 +92,6 @@ def test_a_law_of_the_user_s_is_known_by_what_is_in_its_file(tmp_path):
 def test_either_plant_is_remembered_for_itself(ran):
     case = NOISY._replace(fields={"duration": 0.05})
     for plant in ("mujoco", "lagrangian", "mujoco"):
-        plan = planned(experiment(case), seeds=1, plant=plant)
-        carried_out(plan, memory=remembering(plan))
+        plan = make_plan(experiment(case), seeds=1, plant=plant)
+        run_plan(plan, cache=remembering(plan))
     assert [scenario.plant.engine for scenario in ran] == ["mujoco", "lagrangian"]

@@ -8,9 +8,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from spheretwin.paper import page
-from spheretwin.paper.cases import carried_out, planned
 from spheretwin.paper.experiment import Finding
 from spheretwin.paper.page import Chapter
+from spheretwin.paper.runner import make_plan, run_plan
 from spheretwin.viz.pages.markdown import Drawing
 from tests.twin.paper.cases import IDEAL, experiment
 
@@ -40,8 +40,8 @@ class Reader(HTMLParser):
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
     made = experiment(IDEAL._replace(name="one | two"))
-    sections = made.tell(carried_out(planned(made, 1)))
-    sections = [section._replace(draw=[drawing]) for section in sections]
+    sections = made.sections(run_plan(make_plan(made, 1)))
+    sections = [section._replace(drawings=[drawing]) for section in sections]
     paths = page.write(
         folder, [Chapter(made, sections)], "spheretwin reproduce short --seeds 3", {"python": "3"}
     )
@@ -104,7 +104,7 @@ def test_html_is_read_on_a_phone_and_in_the_dark(written):
 def test_the_first_page_says_what_was_reproduced(tmp_path):
     made = experiment(IDEAL)
     findings = [Finding(True, "this was"), Finding(False, "that was not | at all"), Finding(None, "more")]
-    chapters = [Chapter(made, made.tell(carried_out(planned(made, 1))), findings)]
+    chapters = [Chapter(made, made.sections(run_plan(make_plan(made, 1))), findings)]
     text = page.write(tmp_path, chapters, "", {})[0].read_text(encoding="utf-8")
     first = text.split("## A short one")[0]
     assert page.FIRST in first
@@ -117,7 +117,7 @@ def test_the_first_page_says_what_was_reproduced(tmp_path):
 def test_every_row_s_command_line_is_there(tmp_path, count):
     made = experiment(IDEAL)
     commands = [f"spheretwin simulate tilt --seed {number}" for number in range(count)]
-    chapters = [Chapter(made, made.tell(carried_out(planned(made, 1))), [], commands, "Rows: some.")]
+    chapters = [Chapter(made, made.sections(run_plan(make_plan(made, 1))), [], commands, "Rows: some.")]
     text, html = (path.read_text(encoding="utf-8") for path in page.write(tmp_path, chapters, "", {}))
     assert "Rows: some." in text
     file = tmp_path / "short_commands.txt"

@@ -1,38 +1,34 @@
 """Readings of the control law: what each changes, and the score by hand."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import readings
-from spheretwin.paper.cases import scenario_of
-from spheretwin.paper.experiment import OF_PAPER
+from spheretwin.paper.experiment import Outcomes
+from spheretwin.paper.laws import PAPER_LAWS, PRINTED_rad, printed_rad
 from spheretwin.paper.readings import AS_SHIPPED, READINGS, case
-from spheretwin.paper.rows import PRINTED_rad, printed_rad
+from spheretwin.paper.runner import scenario_of
 from spheretwin.paper.sinusoid import Condition
 from spheretwin.paper.sinusoid import case as of_figure
+from tests.twin.paper.cases import outcome
 
 
 def made_up(ratio, only=READINGS):
     """Outcomes that are so many times the printed ones, by reading."""
-    return {
-        case(reading, law, *at).name: [
-            SimpleNamespace(
-                max_abs_error=ratio(reading) * np.array(printed_rad(law.law, *at)),
-                figures={"saturated_fraction": 0.0},
-                status=Status.COMPLETED,
-            )
-        ]
-        for reading in only
-        for at in PRINTED_rad
-        for law in OF_PAPER
-    }
+    return Outcomes(
+        {
+            case(reading, law, *condition).name: [
+                outcome(ratio(reading) * np.array(printed_rad(law.law, *condition)), saturated_fraction=0.0)
+            ]
+            for reading in only
+            for condition in PRINTED_rad
+            for law in PAPER_LAWS
+        }
+    )
 
 
 def test_the_shipped_reading_is_what_figures_6_and_7_run():
-    for law in OF_PAPER:
+    for law in PAPER_LAWS:
         for at in PRINTED_rad:
             ours = scenario_of(case(AS_SHIPPED, law, *at), None)
             assert ours == scenario_of(of_figure(law, Condition(*at)), None)
@@ -40,7 +36,7 @@ def test_the_shipped_reading_is_what_figures_6_and_7_run():
 
 def test_a_reading_is_level_rate_and_slope_and_nothing_else():
     for reading in READINGS:
-        scenario = scenario_of(case(reading, OF_PAPER[-1], 0.2, 1.0), None)
+        scenario = scenario_of(case(reading, PAPER_LAWS[-1], 0.2, 1.0), None)
         assert scenario.controller.level == reading.level
         assert scenario.controller.period_s == pytest.approx(1 / reading.rate_Hz)
         assert scenario.controller.surface_slope == ((reading.surface_slope or 50.0),) * 3
@@ -48,22 +44,22 @@ def test_a_reading_is_level_rate_and_slope_and_nothing_else():
 
 
 def test_score_is_the_rms_of_the_logarithm():
-    (tried,) = readings.found(made_up(lambda reading: 2.0, READINGS[:1]))
-    assert tried.score == pytest.approx(np.log(2))
-    assert tried.ratios.size == 18
-    (half,) = readings.found(made_up(lambda reading: np.array([0.5, 2.0, 1.0]), READINGS[:1]))
+    (double,) = readings.results(made_up(lambda reading: 2.0, READINGS[:1]))
+    assert double.score == pytest.approx(np.log(2))
+    assert double.ratios.size == 18
+    (half,) = readings.results(made_up(lambda reading: np.array([0.5, 2.0, 1.0]), READINGS[:1]))
     assert half.score == pytest.approx(np.log(2) * np.sqrt(2 / 3))
 
 
 def test_the_finding_names_the_nearest_reading():
-    (found,) = readings.findings(made_up(lambda reading: 1.1 if reading is READINGS[2] else 3.0))
-    assert found.held
-    assert READINGS[2].label in found.text
+    (finding,) = readings.findings(made_up(lambda reading: 1.1 if reading is READINGS[2] else 3.0))
+    assert finding.reproduced
+    assert READINGS[2].label in finding.text
     # Gains other than the printed ones are no reading of the paper.
-    (found,) = readings.findings(made_up(lambda reading: 1.1 if reading.surface_slope else 3.0))
-    assert not found.held
-    assert "λ = 5" in found.text
-    assert "AFSM's errors then differ from the print by a factor of 1.10 to 1.10 at L = 1 and" in found.text
+    (finding,) = readings.findings(made_up(lambda reading: 1.1 if reading.surface_slope else 3.0))
+    assert not finding.reproduced
+    assert "λ = 5" in finding.text
+    assert "AFSM's errors then differ from the print by a factor of 1.10 to 1.10 at L = 1 and" in finding.text
     assert readings.findings(made_up(lambda reading: 1.0, READINGS[:3])) == []
 
 
@@ -73,10 +69,10 @@ def test_with_another_slope_the_page_states_how_far_each_law_is_from_the_print()
     outcomes = made_up(lambda reading: 1.0)
     slope = READINGS[-1]
     for m, L in PRINTED_rad:
-        for law in OF_PAPER[1:]:
+        for law in PAPER_LAWS[1:]:
             printed = np.array(printed_rad(law.law, m, L))
-            outcomes[case(slope, law, m, L).name][0].max_abs_error = ratios[L] * printed
-    (section,) = readings.tell(outcomes)
+            outcomes[case(slope, law, m, L).name] = [outcome(ratios[L] * printed, saturated_fraction=0.0)]
+    (section,) = readings.sections(outcomes)
     ranges = "by a factor of 1.40 to 1.52 at L = 1 and a factor of 0.79 to 0.88 at L = 2"
     expected = f"With λ = 5 the errors differ from the print: adaptive fuzzy {ranges}, AFSM {ranges}."
     assert section.text.endswith(expected)

@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from spheretwin.models import actuator
 from spheretwin.models.design.capability import torque_matrices
-from spheretwin.paper.fault_outcomes import MOST, left
+from spheretwin.paper.fault_outcomes import MOST, remaining_torque
 
 # Four groups about x, y, z and, at half the torque, about z again.
 BY_HAND = np.array([[[1.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 1.0, 0.5]]])
@@ -21,39 +21,39 @@ def path(poses, seed=0):
 
 
 def test_all_groups_by_hand():
-    found = left(BY_HAND, ALONG_Z, LIMIT_A, ())
+    found = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, ())
     assert found.torque == pytest.approx(1.5 * LIMIT_A / 2)
     # Least norm asks the stronger for twice the current: 1 to 0.5, and 1.25 of torque at the limit.
     assert found.least_norm == pytest.approx(1.25 * LIMIT_A / 2)
-    assert found.comes == pytest.approx(1.0)
+    assert found.least_share == pytest.approx(1.0)
     assert found.singular_value_Nm_per_A == pytest.approx(1.0)
     assert found.rank == 3
 
 
 def test_the_weaker_group_alone_by_hand():
-    found = left(BY_HAND, ALONG_Z, LIMIT_A, (2,))
+    found = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, (2,))
     assert found.torque == found.least_norm == pytest.approx(0.5 * LIMIT_A / 2)
-    assert found.comes == pytest.approx(0.25 / 1.25)
+    assert found.least_share == pytest.approx(0.25 / 1.25)
     assert found.singular_value_Nm_per_A == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(("opened", "rank"), [((2, 3), 2), ((0, 2, 3), 1)])
 def test_a_lost_direction_leaves_no_torque(opened, rank):
-    found = left(BY_HAND, ALONG_Z, LIMIT_A, opened)
-    assert (found.torque, found.least_norm, found.comes, found.rank) == (0.0, 0.0, 0.0, rank)
+    found = remaining_torque(BY_HAND, ALONG_Z, LIMIT_A, opened)
+    assert (found.torque, found.least_norm, found.least_share, found.rank) == (0.0, 0.0, 0.0, rank)
 
 
 def test_three_open_groups_of_five_leave_a_plane():
     G = np.random.default_rng(4).normal(size=(6, 3, 5))
-    found = left(G, np.ones((6, 3)), LIMIT_A, (0, 2, 4))
+    found = remaining_torque(G, np.ones((6, 3)), LIMIT_A, (0, 2, 4))
     assert (found.rank, found.torque) == (2, 0.0)
 
 
 def test_the_least_of_a_path_is_that_of_its_worst_pose():
     G, torque_S = path(20)
-    whole = left(G, torque_S, LIMIT_A, (1, 5, 8))
-    alone = [left(G[i : i + 1], torque_S[i : i + 1], LIMIT_A, (1, 5, 8)) for i in range(20)]
-    for name in ("torque", "least_norm", "comes", "singular_value_Nm_per_A", "rank"):
+    whole = remaining_torque(G, torque_S, LIMIT_A, (1, 5, 8))
+    alone = [remaining_torque(G[i : i + 1], torque_S[i : i + 1], LIMIT_A, (1, 5, 8)) for i in range(20)]
+    for name in ("torque", "least_norm", "least_share", "singular_value_Nm_per_A", "rank"):
         assert getattr(whole, name) == min(getattr(each, name) for each in alone)
 
 
@@ -63,7 +63,7 @@ def test_torque_is_that_of_a_linear_programme(opened):
     G, torque_S = path(8, seed=1)
     others = [group for group in range(18) if group not in opened]
     for pose in range(len(G)):
-        found = left(G[pose : pose + 1], torque_S[pose : pose + 1], LIMIT_A, opened)
+        found = remaining_torque(G[pose : pose + 1], torque_S[pose : pose + 1], LIMIT_A, opened)
         equal = np.column_stack([G[pose][:, others], -torque_S[pose]])
         bounds = [(-LIMIT_A, LIMIT_A)] * len(others) + [(0, None)]
         solved = linprog([0.0] * len(others) + [-1.0], A_eq=equal, b_eq=np.zeros(3), bounds=bounds)
@@ -76,7 +76,7 @@ def test_torque_is_that_of_a_linear_programme(opened):
 def test_what_comes_is_what_currents_for_all_groups_give(opened):
     """Tried out: least-norm currents of all groups, those of the open ones gone, in many directions."""
     G, torque_S = path(1, seed=2)
-    found = left(G, torque_S, LIMIT_A, opened)
+    found = remaining_torque(G, torque_S, LIMIT_A, opened)
     kept = G[0].copy()
     kept[:, list(opened)] = 0.0
     gives = kept @ np.linalg.pinv(G[0])  # torque given of a torque asked for
@@ -85,10 +85,10 @@ def test_what_comes_is_what_currents_for_all_groups_give(opened):
     u = np.random.default_rng(3).normal(size=(3, 20_000))
     u /= np.linalg.norm(u, axis=0)
     shares = np.sum(u * np.linalg.solve(C, gives @ C @ u), axis=0)
-    assert shares.min() >= found.comes - 1e-12
+    assert shares.min() >= found.least_share - 1e-12
     # 20,000 directions come within 0.03 rad of the worst one, whose share is the least to second order.
-    assert shares.min() == pytest.approx(found.comes, abs=1e-3)
+    assert shares.min() == pytest.approx(found.least_share, abs=1e-3)
 
 
 def test_nothing_wanted_is_nothing_lacking():
-    assert left(BY_HAND, np.zeros((1, 3)), LIMIT_A, ()).torque == MOST
+    assert remaining_torque(BY_HAND, np.zeros((1, 3)), LIMIT_A, ()).torque == MOST

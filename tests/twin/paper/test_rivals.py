@@ -9,13 +9,14 @@ import pytest
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import page, rival_conditions, rival_tables
-from spheretwin.paper.cases import carried_out, failed, planned, scenario_of
-from spheretwin.paper.experiment import BY_LAW
+from spheretwin.paper.experiment import Outcome, Outcomes
+from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.page import Chapter
 from spheretwin.paper.rival_conditions import FOLDER, HARDWARE, IDEAL, PROTOTYPE, tuned_gains
 from spheretwin.paper.rival_results import results, start_error, within
 from spheretwin.paper.rivals import EXPERIMENT
 from spheretwin.paper.rows import rows
+from spheretwin.paper.runner import make_plan, run_plan, scenario_of, unexpected_ends
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
 from spheretwin.study.study import load
@@ -82,7 +83,7 @@ def test_frozen_gains_give_what_the_search_recorded(hardware, law):
     rows_of_law = [row for row in Grid(searched.study) if row.law == {"law": law}]
     assert frozen(hardware)[law]
     for each in frozen(hardware)[law]:
-        tried = trials.carried_out(
+        tried = trials.run_trial(
             searched, rows_of_law, each["fields"], study.optimise.objective, lambda _: False, lambda: False
         )
         # The same scenario and seed; another processor rounds otherwise, which a loop of high gain amplifies.
@@ -122,24 +123,25 @@ def test_group_gains_are_drawn_from_the_seed_of_each_run():
 
 def outcome(error, variation, status=Status.COMPLETED):
     """With the same error on all hinges."""
-    return SimpleNamespace(
-        status=status,
-        figures={"current_variation_A_s": variation},
-        max_abs_error=np.full(3, error),
-        tail_rms_error=np.full(3, error / 10),
-        kept=np.full(3, error / 20),
-    )
+    figures = {
+        "current_variation_A_s": variation,
+        "max_abs_error_rad": [error] * 3,
+        "tail_rms_error_rad": [error / 10] * 3,
+    }
+    return Outcome(status, figures, np.full(3, error), np.full(3, error / 20))
 
 
 def made_up(limit, by_law, condition=IDEAL.conditions[0]):
     """Outcomes of laws by the errors of their seeds."""
-    chosen = {each.law: each for each in tuned_gains(IDEAL.study) if each.limit_A_s == limit}
-    return {
-        rival_conditions.tuned_case(IDEAL, condition, chosen[law]).name: [
-            outcome(each, limit) for each in errors
-        ]
-        for law, errors in by_law.items()
-    }
+    tuned = {gains.law: gains for gains in tuned_gains(IDEAL.study) if gains.limit_A_s == limit}
+    return Outcomes(
+        {
+            rival_conditions.tuned_case(IDEAL, condition, tuned[law]).name: [
+                outcome(error, limit) for error in errors
+            ]
+            for law, errors in by_law.items()
+        }
+    )
 
 
 def test_results_are_medians_and_no_numbers_if_a_run_was_lost():
@@ -168,7 +170,7 @@ def test_findings_say_where_rivals_are_level_or_better(errors, expected):
 
 def test_nothing_is_found_where_nothing_ran():
     assert rival_tables.findings({}) == []
-    assert EXPERIMENT.tell({}) == []
+    assert EXPERIMENT.sections({}) == []
 
 
 def test_the_error_at_the_start_is_the_largest_until_the_rates_agree():
@@ -185,20 +187,20 @@ def short():
     chosen = [
         case
         for case in EXPERIMENT.cases()
-        if "limit_A_s" not in case.told or case.fields["controller.law"] in ("afsm_eso", "pid")
+        if "limit_A_s" not in case.details or case.fields["controller.law"] in ("afsm_eso", "pid")
     ]
     cases = [
         case._replace(fields={**case.fields, "duration": case.fields.get("duration", 0.6)}) for case in chosen
     ]
-    plan = planned(EXPERIMENT._replace(cases=lambda: cases), seeds=1)
-    return plan, carried_out(plan)
+    plan = make_plan(EXPERIMENT._replace(cases=lambda: cases), seeds=1)
+    return plan, run_plan(plan)
 
 
 def test_rows_and_page_have_what_ran(short, tmp_path):
     plan, outcomes = short
-    assert failed(plan, outcomes) == []
+    assert unexpected_ends(plan, outcomes) == []
     json.dumps(rows(plan, outcomes), allow_nan=False)
-    chapter = Chapter(plan.experiment, EXPERIMENT.tell(outcomes), EXPERIMENT.findings(outcomes))
+    chapter = Chapter(plan.experiment, EXPERIMENT.sections(outcomes), EXPERIMENT.findings(outcomes))
     written = page.write(tmp_path, [chapter], "", {})[0].read_text(encoding="utf-8")
     for hardware in HARDWARE:
         figure = f"rivals_{hardware.name}.png"
@@ -218,7 +220,7 @@ def test_full_current_is_below_what_any_law_reaches_with_bounded_allocation(shor
         if condition.perturbed:
             continue
         limits = {
-            allocation: np.max(outcomes[rival_conditions.limit_case(condition, allocation).name][0].kept)
+            allocation: np.max(outcomes[rival_conditions.limit_case(condition, allocation).name][0].data)
             for allocation in rival_conditions.ALLOCATIONS
         }
         assert limits["bounded"] < limits["least_norm"]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.cases import planned
 from spheretwin.paper.experiment import Outcome
-from spheretwin.paper.rows import ended, of_axis, rows, spread_deg
+from spheretwin.paper.rows import of_axis, rows, spread_deg, statuses_text
+from spheretwin.paper.runner import make_plan
 from tests.twin.paper.cases import NOISY, allowed, experiment
 
 
@@ -19,7 +19,7 @@ THREE = [outcome(0.3), outcome(0.1), outcome(0.2)]
 
 
 def row(outcomes, case=NOISY):
-    return rows(planned(experiment(case), len(outcomes)), {case.name: outcomes})[0]
+    return rows(make_plan(experiment(case), len(outcomes)), {case.name: outcomes})[0]
 
 
 def test_row_has_the_public_face():
@@ -46,8 +46,8 @@ def test_status_is_what_should_not_have_been():
     assert row(mixed)["status"] == "left_workspace"
     assert row(mixed)["statuses"] == {"completed": 3, "left_workspace": 1}
     assert row(mixed, allowed(NOISY))["status"] == "completed"
-    assert ended(mixed) == "3 completed, 1 left_workspace"
-    assert ended(THREE) == "completed"
+    assert statuses_text(mixed) == "3 completed, 1 left_workspace"
+    assert statuses_text(THREE) == "completed"
 
 
 def test_spread_in_degrees():

@@ -8,15 +8,15 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.cases import carried_out, failed, measured_error, planned
 from spheretwin.paper.rows import rows
+from spheretwin.paper.runner import make_plan, measured_error, run_plan, unexpected_ends
 from spheretwin.simulation import simulate
 from tests.twin.paper.cases import IDEAL, LOST, NOISY, allowed, experiment
 
 
 def test_rows_are_the_same_bytes_whatever_the_threads():
-    plan = planned(experiment(NOISY, IDEAL, NOISY._replace(name="again")), seeds=5)
-    told = [json.dumps(rows(plan, carried_out(plan, workers=workers))) for workers in (1, 2, 7)]
+    plan = make_plan(experiment(NOISY, IDEAL, NOISY._replace(name="again")), seeds=5)
+    told = [json.dumps(rows(plan, run_plan(plan, threads=workers))) for workers in (1, 2, 7)]
     assert told[0] == told[1] == told[2]
     noisy, ideal, again = json.loads(told[0])
     assert (noisy["seeds"], ideal["seeds"]) == (5, 1)
@@ -24,8 +24,8 @@ def test_rows_are_the_same_bytes_whatever_the_threads():
 
 
 def test_an_outcome_is_that_of_its_case_and_seed():
-    plan = planned(experiment(NOISY), seeds=3)
-    found = carried_out(plan)["noisy"]
+    plan = make_plan(experiment(NOISY), seeds=3)
+    found = run_plan(plan)["noisy"]
     for seed, outcome in enumerate(found):
         run = simulate(scenarios.load("tilt", {**NOISY.fields, "seed": seed}))
         table = run.telemetry
@@ -42,34 +42,37 @@ def test_ideal_sensors_measure_the_true_error():
 
 def test_every_run_is_told_of_once():
     told = []
-    plan = planned(experiment(NOISY, IDEAL), seeds=3)
-    carried_out(plan, told.append)
+    plan = make_plan(experiment(NOISY, IDEAL), seeds=3)
+    run_plan(plan, told.append)
     assert sorted(told) == ["ideal", "noisy", "noisy", "noisy"]
-    assert len(told) == plan.runs
+    assert len(told) == len(plan.jobs)
 
 
 def test_a_limit_leaves_the_first_cases():
-    plan = planned(experiment(NOISY, IDEAL, LOST), seeds=2, limit=1)
+    plan = make_plan(experiment(NOISY, IDEAL, LOST), seeds=2, limit=1)
     assert [case.name for case in plan.cases] == ["noisy"]
-    assert list(carried_out(plan)) == ["noisy"]
+    assert list(run_plan(plan)) == ["noisy"]
 
 
 def test_what_is_kept_of_a_run_is_handed_on():
-    plan = planned(
-        experiment(IDEAL, keep=lambda run: len(run.telemetry), more=lambda all_of: {"n": all_of[0].kept}), 1
+    plan = make_plan(
+        experiment(
+            IDEAL, reduce=lambda run: len(run.telemetry), row_fields=lambda all_of: {"n": all_of[0].data}
+        ),
+        1,
     )
-    outcomes = carried_out(plan)
-    assert outcomes["ideal"][0].kept == 200
+    outcomes = run_plan(plan)
+    assert outcomes["ideal"][0].data == 200
     assert rows(plan, outcomes)[0]["n"] == 200
 
 
 def test_a_run_that_ends_early_is_told_unless_it_may():
-    plan = planned(experiment(IDEAL, LOST), seeds=2)
-    outcomes = carried_out(plan)
-    assert failed(plan, outcomes) == ["lost (left_workspace)"]
+    plan = make_plan(experiment(IDEAL, LOST), seeds=2)
+    outcomes = run_plan(plan)
+    assert unexpected_ends(plan, outcomes) == ["lost (left_workspace)"]
     assert [row["status"] for row in rows(plan, outcomes)] == ["completed", "left_workspace"]
-    may = planned(experiment(allowed(LOST)), seeds=2)
-    assert failed(may, carried_out(may)) == []
+    may = make_plan(experiment(allowed(LOST)), seeds=2)
+    assert unexpected_ends(may, run_plan(may)) == []
 
 
 def test_a_run_without_a_tick_has_no_numbers(tmp_path):
@@ -78,18 +81,20 @@ def test_a_run_without_a_tick_has_no_numbers(tmp_path):
         "def step(t, reference, measurement, parameters, state, torque):\n    torque[:] = float('nan')\n"
     )
     none = IDEAL._replace(name="none", fields={**IDEAL.fields, "controller.law": f"{law}:step"})
-    plan = planned(experiment(none), seeds=1)
-    outcomes = carried_out(plan)
+    plan = make_plan(experiment(none), seeds=1)
+    outcomes = run_plan(plan)
     (outcome,) = outcomes["none"]
     assert outcome.status == Status.DIVERGED
     for error in (outcome.max_abs_error, outcome.measured_max_abs_error, outcome.tail_rms_error):
         assert np.isnan(error).all()
-    assert failed(plan, outcomes) == ["none (diverged)"]
+    assert unexpected_ends(plan, outcomes) == ["none (diverged)"]
     (row,) = rows(plan, outcomes)
     assert row["status"] == "diverged"
 
 
 def test_a_case_that_cannot_be_run_is_bad_input():
-    plan = planned(experiment(NOISY, NOISY._replace(name="wrong", fields={"controller.law": "pdd"})), seeds=3)
+    plan = make_plan(
+        experiment(NOISY, NOISY._replace(name="wrong", fields={"controller.law": "pdd"})), seeds=3
+    )
     with pytest.raises(InputError, match=r"controller\.law"):
-        carried_out(plan)
+        run_plan(plan)

@@ -1,6 +1,4 @@
-"""Figures 6 and 7: what is varied, what is printed, and what is said to have been reproduced."""
-
-from types import SimpleNamespace
+"""Figures 6 and 7: variations, printed numbers and findings."""
 
 import numpy as np
 import pytest
@@ -8,18 +6,20 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import sinusoid
-from spheretwin.paper.cases import carried_out, failed, planned
-from spheretwin.paper.experiment import COMPARED, OF_PAPER
-from spheretwin.paper.rows import PRINTED_rad, printed_rad, rows
+from spheretwin.paper.experiment import Outcomes
+from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, PRINTED_rad, printed_rad
+from spheretwin.paper.rows import rows
+from spheretwin.paper.runner import make_plan, run_plan, unexpected_ends
 from spheretwin.paper.sinusoid import EXPERIMENT_6, EXPERIMENT_7, FIGURE6, FIGURE7, Condition, case
+from tests.twin.paper.cases import outcome
 
 AT = Condition(0.2, 2.0)
 
 
 @pytest.fixture(scope="module")
 def figure7():
-    plan = planned(EXPERIMENT_7, seeds=1)
-    return plan, carried_out(plan)
+    plan = make_plan(EXPERIMENT_7, seeds=1)
+    return plan, run_plan(plan)
 
 
 def test_figure_6_varies_m_alone_and_figure_7_the_load_alone():
@@ -28,12 +28,12 @@ def test_figure_6_varies_m_alone_and_figure_7_the_load_alone():
         (EXPERIMENT_7, "disturbance.load", [0, 1, 2, 3, 4, 5]),
     ):
         cases = experiment.cases()
-        assert len(cases) == len(values) * len(COMPARED)
-        assert sorted({each.fields[field] for each in cases}) == values
-        kept = ({"plant.modelling_error", "disturbance.load"} - {field}).pop()
-        assert {each.fields[kept] for each in cases} == {1.0 if kept.endswith("load") else 0.2}
-        for each in cases:
-            scenario = scenarios.load(each.scenario, each.fields)
+        assert len(cases) == len(values) * len(COMPARED_LAWS)
+        assert sorted({of_law.fields[field] for of_law in cases}) == values
+        fixed = ({"plant.modelling_error", "disturbance.load"} - {field}).pop()
+        assert {of_law.fields[fixed] for of_law in cases} == {1.0 if fixed.endswith("load") else 0.2}
+        for of_law in cases:
+            scenario = scenarios.load(of_law.scenario, of_law.fields)
             assert scenario.controller == type(scenario.controller)()  # the gains are the laws' own
             assert scenario.plant.modelling_torque_Nm == (0.002, 0.001, 0.001)  # (54), whatever m
 
@@ -52,61 +52,57 @@ def test_printed_numbers_are_in_their_order():
 
 def test_rows_have_what_is_printed_and_a_lost_run_is_a_row(figure7):
     plan, outcomes = figure7
-    told = {(row["controller"], row["L"]): row for row in rows(plan, outcomes)}
-    assert told["afsm", 2.0]["paper"] == [0.1854, 0.1986, 0.1769]
-    assert told["afsm", 3.0]["paper"] is None
-    assert told["pd", 2.0]["status"] == "left_workspace"
-    assert failed(plan, outcomes) == []
+    by_condition = {(row["controller"], row["L"]): row for row in rows(plan, outcomes)}
+    assert by_condition["afsm", 2.0]["paper"] == [0.1854, 0.1986, 0.1769]
+    assert by_condition["afsm", 3.0]["paper"] is None
+    assert by_condition["pd", 2.0]["status"] == "left_workspace"
+    assert unexpected_ends(plan, outcomes) == []
     for law, L, error in (("afsm", 1, 0.030), ("afsm", 2, 0.041), ("adaptive_fuzzy", 1, 0.038)):
-        row = told[law, float(L)]
+        row = by_condition[law, float(L)]
         assert row["max_abs_error_rad"][0] == pytest.approx(error, abs=5e-4)  # as README prints them
         assert row["rms_error_rad"][0] < row["max_abs_error_rad"][0]
         assert row["rms_torque_Nm"] > 0.05 * L  # the load alone, on three hinges
         assert row["current_variation_A_s"] > 0
 
 
-def test_order_and_growth_of_the_paper_came_out_again_and_its_sizes_did_not(figure7):
-    said = EXPERIMENT_7.findings(figure7[1])
-    order, sizes, lost, growth = said
-    assert order.held
+def test_order_and_growth_of_the_paper_are_reproduced_and_its_sizes_are_not(figure7):
+    order, sizes, lost, growth = EXPERIMENT_7.findings(figure7[1])
+    assert order.reproduced
     assert "PD > adaptive fuzzy > AFSM over L = 0 to 5" in order.text
-    assert not sizes.held
-    assert not lost.held
+    assert not sizes.reproduced
+    assert not lost.reproduced
     assert "1 of 1 runs ended as left_workspace" in lost.text
-    assert growth.held
+    assert growth.reproduced
 
 
 def made_up(errors, status=Status.COMPLETED):
     """Outcomes of one seed by law, with the same error on all three hinges."""
-    figures = {"saturated_fraction": 0.5}
-    return {
-        case(compared, AT).name: [
-            SimpleNamespace(max_abs_error=np.array(error) * np.ones(3), figures=figures, status=status)
-        ]
-        for compared, error in zip(OF_PAPER, errors, strict=True)
-    }
+    by_law = zip(PAPER_LAWS, errors, strict=True)
+    return Outcomes(
+        {case(law, AT).name: [outcome(error, status, saturated_fraction=0.5)] for law, error in by_law}
+    )
 
 
 def test_findings_are_of_the_outcomes():
-    printed = [printed_rad(compared.law, *AT) for compared in OF_PAPER]
-    (found,) = sinusoid.sizes(AT, made_up(printed))
-    assert found.held
-    assert "PD 1.00 to 1.00 times, adaptive fuzzy 1.00 to 1.00 times, AFSM 1.00 to 1.00 times" in found.text
-    far = [np.array(each) * factor for each, factor in zip(printed, (1.24, 1.26, 0.76), strict=True)]
-    held = {each.held: each.text for each in sinusoid.sizes(AT, made_up(far))}
-    assert "adaptive fuzzy 1.26" in held[False]
-    assert "closer than the paper says" not in held[False]
-    assert "PD" in held[True]
-    assert "AFSM" in held[True]
-    (kept,) = sinusoid.order(FIGURE7, made_up([3.0, 2.0, 1.0]))
+    printed = [printed_rad(law.law, *AT) for law in PAPER_LAWS]
+    (finding,) = sinusoid.sizes(AT, made_up(printed))
+    assert finding.reproduced
+    assert "PD 1.00 to 1.00 times, adaptive fuzzy 1.00 to 1.00 times, AFSM 1.00 to 1.00 times" in finding.text
+    far = [np.array(error) * factor for error, factor in zip(printed, (1.24, 1.26, 0.76), strict=True)]
+    texts = {finding.reproduced: finding.text for finding in sinusoid.sizes(AT, made_up(far))}
+    assert "adaptive fuzzy 1.26" in texts[False]
+    assert "closer than the paper says" not in texts[False]
+    assert "PD" in texts[True]
+    assert "AFSM" in texts[True]
+    (right,) = sinusoid.order(FIGURE7, made_up([3.0, 2.0, 1.0]))
     (broken,) = sinusoid.order(FIGURE7, made_up([3.0, 1.0, 2.0]))
-    assert kept.held
-    assert not broken.held
+    assert right.reproduced
+    assert not broken.reproduced
     assert "in 3 of 6 comparisons" in broken.text
 
 
 def test_nothing_is_said_of_what_was_not_run():
-    for varied in (FIGURE6, FIGURE7):
-        assert sinusoid.order(varied, {}) == []
-    assert sinusoid.sizes(AT, {}) == []
-    assert sinusoid.growth(FIGURE7, {}) == []
+    for variation in (FIGURE6, FIGURE7):
+        assert sinusoid.order(variation, Outcomes()) == []
+    assert sinusoid.sizes(AT, Outcomes()) == []
+    assert sinusoid.growth(FIGURE7, Outcomes()) == []

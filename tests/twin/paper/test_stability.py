@@ -1,4 +1,4 @@
-"""Stability: V from its definition, margins by their ends, and what is kept of a run."""
+"""Stability: V from its definition, margins by their ends, and the reduction of a run."""
 
 from types import SimpleNamespace
 
@@ -8,10 +8,11 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import stability
-from spheretwin.paper import stability as conditions
-from spheretwin.paper.cases import planned, sample, scenario_of
-from spheretwin.paper.stability import REACHED_rad_s, consequents, descent, keep, regressor
+from spheretwin.paper.lyapunov import consequents, descent, regressor
+from spheretwin.paper.runner import make_plan, scenario_of
+from spheretwin.paper.stability import REACHED_rad_s, reduce
 from spheretwin.simulation import simulate
+from tests.twin.paper.cases import outcome
 
 FAST = {"plant.engine": "lagrangian", "duration": 2.0}
 
@@ -39,16 +40,16 @@ def test_rules_of_the_regressor_sum_to_one():
 
 
 def test_v_falls_and_is_of_afsm_alone(run):
-    found = descent(run)
-    assert found.risen < found.fallen
-    assert 0 < found.of_parameters < 1
+    course = descent(run)
+    assert course.risen < course.fallen
+    assert 0 < course.of_parameters < 1
     pid = simulate(scenarios.load("sinusoid", {**FAST, "duration": 0.1, "controller.law": "pid"}))
     assert descent(pid) is None
     torque = {**FAST, "duration": 0.1, "controller.law": "afsm", "controller.level": "torque"}
     assert descent(simulate(scenarios.load("sinusoid", torque))) is None
 
 
-def test_v_is_seen_to_rise_where_the_estimates_run_the_wrong_way(run):
+def test_v_rises_if_the_adaptation_has_the_wrong_sign(run):
     """With the sign of the adaptation turned in the telemetry, the errors of the parameters grow."""
     table = run.telemetry
     values = table.values.copy()
@@ -60,12 +61,12 @@ def test_v_is_seen_to_rise_where_the_estimates_run_the_wrong_way(run):
 
 
 def test_reaching_is_the_first_time_on_the_surface(run):
-    kept, table = keep(run), run.telemetry
+    data, table = reduce(run), run.telemetry
     s = np.abs(table["sliding_s"]).max(axis=1)  # AFSM's own λ is that of the figure
     first = np.flatnonzero(s < REACHED_rad_s)
-    assert kept.reached_s == (table["t_s"][first[0]] if len(first) else None)
-    assert kept.early is None
-    assert kept.gains[0] == table["switching_gain"][-1].max()
+    assert data.reached_s == (table["t_s"][first[0]] if len(first) else None)
+    assert data.early is None
+    assert data.gains[0] == table["switching_gain"][-1].max()
 
 
 def test_ends_of_a_margin():
@@ -75,26 +76,23 @@ def test_ends_of_a_margin():
 
 
 def test_a_law_holds_by_its_error_and_its_end():
-    def outcome(error, status=Status.COMPLETED):
-        return SimpleNamespace(status=status, tail_rms_error=np.array([0.0, 0.0, error]))
-
-    assert stability.holds(outcome(0.99 * stability.HOLDS_rad))
-    assert not stability.holds(outcome(1.01 * stability.HOLDS_rad))
+    assert stability.holds(outcome([0.0, 0.0, 0.99 * stability.HOLDS_rad]))
+    assert not stability.holds(outcome([0.0, 0.0, 1.01 * stability.HOLDS_rad]))
     assert not stability.holds(outcome(np.nan))
     assert not stability.holds(outcome(0.0, Status.DIVERGED))
 
 
 def test_margins_begin_at_what_is_healthy_and_are_compared_with_no_other_plant():
-    cases = conditions.cases()
+    cases = stability.cases()
     assert len({case.name for case in cases}) == len(cases)
-    for law in conditions.WATCHED:
-        for of in conditions.MARGINS:
-            for step, case in zip(of.steps, conditions.margin(law, of), strict=True):
+    for law in stability.LAWS:
+        for quantity in stability.MARGINS:
+            for step, case in zip(quantity.steps, stability.margin(law, quantity), strict=True):
                 scenario = scenario_of(case, None)
-                assert not case.compared
-                if of is conditions.DELAY:
+                assert not case.comparable
+                if quantity is stability.DELAY:
                     assert scenario.drive.delay_s == pytest.approx(1e-3 * step)
-                    assert scenario.nominal.delay_s == 0.0  # nobody tells the law
-    jobs = sample(planned(stability.EXPERIMENT, seeds=1))
-    assert {job.case.fields["controller.law"] for job in jobs} == {law.law for law in conditions.WATCHED}
-    assert all(job.case.compared for job in jobs)
+                    assert scenario.nominal.delay_s == 0.0  # no law knows it
+    jobs = make_plan(stability.EXPERIMENT, seeds=1).sample
+    assert {job.case.fields["controller.law"] for job in jobs} == {law.law for law in stability.LAWS}
+    assert all(job.case.comparable for job in jobs)

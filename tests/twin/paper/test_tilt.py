@@ -1,4 +1,4 @@
-"""Figure 11: what is compared, that changes are single, and what counts as the paper's figure."""
+"""Figure 11: laws, single changes, and the paper's figure."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,9 @@ import pytest
 from spheretwin import scenario as scenarios
 from spheretwin.control.laws.pid import BANDWIDTH_rad_s
 from spheretwin.paper import tilt
-from spheretwin.paper.cases import carried_out, planned
-from spheretwin.paper.rows import rows
-from spheretwin.paper.tilt import BY_LAW, CHANGES, COMPARED, printed
+from spheretwin.paper.rows import padded, rows
+from spheretwin.paper.runner import make_plan, run_plan
+from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, printed
 from spheretwin.simulation import simulate
 
 
@@ -19,18 +19,18 @@ def found():
         case._replace(fields={**case.fields, "plant.engine": "lagrangian"})
         for case in tilt.EXPERIMENT.cases()
     ]
-    plan = planned(tilt.EXPERIMENT._replace(cases=lambda: cases), seeds=2)
-    return plan, carried_out(plan)
+    plan = make_plan(tilt.EXPERIMENT._replace(cases=lambda: cases), seeds=2)
+    return plan, run_plan(plan)
 
 
 def test_laws_are_the_paper_s_a_tuned_pid_and_ours():
-    assert [compared.law for compared in COMPARED] == ["pd", "adaptive_fuzzy", "afsm", "pid", "afsm_eso"]
+    assert [law.law for law in TILT_LAWS] == ["pd", "adaptive_fuzzy", "afsm", "pid", "afsm_eso"]
     assert f"{BANDWIDTH_rad_s:g} 1/s" in BY_LAW["pid"].gains
-    for compared in COMPARED:
-        scenario = scenarios.load("tilt", printed(compared).fields)
+    for law in TILT_LAWS:
+        scenario = scenarios.load("tilt", printed(law).fields)
         assert scenario.hardware == "prototype"
         assert scenario.plant.payload_kg == 0.05
-        preset = {"preset": "prototype"} if compared.law == "afsm_eso" else {}
+        preset = {"preset": "prototype"} if law.law == "afsm_eso" else {}
         assert scenario.controller == type(scenario.controller)(**preset)  # printed gains are the defaults
 
 
@@ -62,7 +62,7 @@ def differences(one, other, path=()):
 )
 def test_a_change_is_of_one_thing_alone(change):
     changed = scenarios.load("tilt", change.case().fields).model_dump(mode="json")
-    unchanged = scenarios.load("tilt", printed(change.compared).fields).model_dump(mode="json")
+    unchanged = scenarios.load("tilt", printed(BY_LAW[change.law]).fields).model_dump(mode="json")
     sections = {name.split(".")[0] for name in differences(changed, unchanged)}
     assert len(sections) == 1
     named = {name.split(".")[1] for name in differences(changed, unchanged)}
@@ -73,14 +73,12 @@ def test_a_change_is_of_one_thing_alone(change):
 
 def test_order_of_the_paper_is_kept_and_the_tuned_laws_are_ahead(found):
     _, outcomes = found
-    errors = [
-        [each.measured_max_abs_error[0] for each in outcomes[printed(compared).name]] for compared in COMPARED
-    ]
+    errors = [[run.measured_max_abs_error[0] for run in outcomes[printed(law).name]] for law in TILT_LAWS]
     assert np.all(np.diff(errors[:3], axis=0) < 0)
     assert np.all(np.max(errors[3:], axis=0) < errors[2])
     section = tilt.printed_section(outcomes)
     assert "holds for α under 2 of 2 seeds" in section.text
-    assert [row[0] for row in section.tables[0].rows] == [compared.label for compared in COMPARED]
+    assert [row[0] for row in section.tables[0].rows] == [law.label for law in TILT_LAWS]
 
 
 def test_ideal_sensors_leave_afsm_what_the_corners_cost(found):
@@ -114,17 +112,17 @@ def test_reached_is_by_the_median():
     assert said([0.127], [0.127]) == "no"
 
 
-def test_windows_keep_the_largest_error_of_each():
+def test_windows_contain_the_largest_error_of_each():
     run = simulate(scenarios.load("tilt", {"duration": 0.095, "hardware": "prototype"}))
-    kept = tilt.keep(run)
+    windows = tilt.reduce(run)
     error = np.abs(run.telemetry["q_measured_rad"] - run.telemetry["q_ref_rad"])
-    assert kept.shape == (4, 2)  # of 20 ticks each; the rest is less than a window
-    np.testing.assert_array_equal(kept[1], error[20:40, :2].max(axis=0))
+    assert windows.shape == (4, 2)  # of 20 ticks each; the rest is less than a window
+    np.testing.assert_array_equal(windows[1], error[20:40, :2].max(axis=0))
     assert pytest.approx(0.02) == tilt.WINDOW_s
 
 
 def test_runs_that_ended_early_leave_gaps_in_the_figure():
-    stacked = tilt._stacked([np.ones((4, 2)), np.ones((2, 2))])
+    stacked = padded([np.ones((4, 2)), np.ones((2, 2))])
     assert stacked.shape == (2, 4, 2)
     assert np.isnan(stacked[1, 2:]).all()
-    np.testing.assert_allclose(stacked[0], np.degrees(1.0))
+    np.testing.assert_array_equal(stacked[0], 1.0)

@@ -33,7 +33,7 @@ class Work:
     def __call__(self, row: Row) -> Result | None:
         """Result of a row; None where there is a fault."""
         try:
-            result = self.rows.carried_out(row)
+            result = self.rows.run(row)
             if result.error is None and self.rows.chooses_plant and agreement.is_checked(row):
                 agreement.check(self.rows, row)
                 self.checked.append(row.number)
@@ -78,13 +78,13 @@ class Engine(NamedTuple):
 
     Attributes
     ----------
-    carried_out : callable
+    run : callable
         Rows of an order with their results, in any order; None for one that has shown a fault.
     takes_address : bool
         Whether it can be told where its machines are.
     """
 
-    carried_out: Callable[[Order], Generator[tuple[Row, Result | None]]]
+    run: Callable[[Order], Generator[tuple[Row, Result | None]]]
     takes_address: bool = False
 
 

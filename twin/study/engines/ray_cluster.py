@@ -59,7 +59,7 @@ CONNECT_S = 60.0
 PROBE = "import ray, sys; ray.init(address=sys.argv[1], log_to_driver=False, configure_logging=False)"
 
 
-def carried_out(order: Order) -> Generator[tuple[Row, Result | None]]:
+def run(order: Order) -> Generator[tuple[Row, Result | None]]:
     """Results of rows, each batch as it is finished.
 
     Raises
@@ -75,7 +75,7 @@ def carried_out(order: Order) -> Generator[tuple[Row, Result | None]]:
     here: list[int] = []
     with _connected(ray, order):
         yield from _Cluster(ray, order, here).results()
-    yield from threads.carried_out(
+    yield from threads.run_each(
         (order.grid[number] for number in here), order.work, order.threads, order.stop_requested
     )
 
@@ -89,7 +89,7 @@ class _Cluster:
         self._batches = Batches(_without(order.numbers, kept_here, here), order.rows)
         self._job = ray.put(ray_worker.job_of(order.work.rows))
         # What is lost comes back to `Batches`, which knows how often; Ray itself repeats nothing.
-        self._task = ray.remote(num_cpus=1, max_retries=0)(ray_worker.carried_out)
+        self._task = ray.remote(num_cpus=1, max_retries=0)(ray_worker.run_batch)
         self._flying: dict[Any, list[int]] = {}
         self._silences, self._looked_s = 0, time.monotonic()
         self._cores = self._most()
@@ -271,4 +271,4 @@ def _answers(address: str) -> bool:
         return False
 
 
-ENGINE = Engine(carried_out, takes_address=True)
+ENGINE = Engine(run, takes_address=True)

@@ -70,7 +70,7 @@ def job_of(rows: Rows) -> Job:
     return Job(study.model_dump_json(), study.folder, os.getcwd(), tuple(sorted(basis_of(rows).items())))
 
 
-def carried_out(job: Job, numbers: list[int]) -> Landed:
+def run_batch(job: Job, numbers: list[int]) -> Landed:
     """Run rows of a job by their numbers, up to the first fault."""
     try:
         grid, rows = _prepared(job)

@@ -1,111 +1,91 @@
-"""The local engine: rows over threads of this process, which the loop lets run side by side."""
+"""Parallel runs in threads of this process: of the local engine, of tunings and of experiments."""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from queue import SimpleQueue
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 from spheretwin.study.engines.engine import Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
 
-# Rows of each thread that are not taken over yet: enough that none waits, few enough that no memory gathers.
+# Results of each thread that wait for the caller: enough that no thread waits, few enough to need no memory.
 AHEAD = 4
 
 T = TypeVar("T")
+R = TypeVar("R")
 
 
-def carried_out(
-    rows: Iterable[Row],
-    work: Callable[[Row], T],
+def run_each(
+    items: Iterable[T],
+    work: Callable[[T], R],
     threads: int | None = None,
     stop_requested: Callable[[], bool] = lambda: False,
-) -> Generator[tuple[Row, T]]:
-    """Results of rows, each as it is finished.
+) -> Generator[tuple[T, R]]:
+    """Yield each item with its result, in the order in which they finish.
+
+    Each thread takes the next item by itself: a dispatcher would need a tenth of the time of a run of a
+    millisecond, and Python runs in one thread at a time.
 
     Parameters
     ----------
-    rows : iterable of Row
+    items : iterable
+        None of them is None.
     work : callable
-        Runs a row.
+        Runs an item. Its exceptions are raised in the thread of the caller.
     threads : int, optional
-        As many as there are cores unless given.
+        Number of cores unless given.
     stop_requested : callable
-        Asked after each row; from True on no other is begun, and those in flight are finished.
+        Called after each result. After True no item is started, and running items are finished.
     """
-    crew = _Crew(iter(rows), work, threads or os.cpu_count() or 1)
+    count = threads or os.cpu_count() or 1
+    source, results = iter(items), SimpleQueue[tuple[T, R] | BaseException | None]()
+    lock, room, stopped = threading.Lock(), threading.Semaphore(AHEAD * count), threading.Event()
+
+    def next_item() -> T | None:
+        room.acquire()
+        with lock:
+            return None if stopped.is_set() else next(source, None)
+
+    def run_items() -> None:
+        try:
+            while (item := next_item()) is not None:
+                results.put((item, work(item)))
+        except BaseException as error:  # the caller raises it
+            results.put(error)
+        results.put(None)
+        room.release()  # another thread may wait for it, only to end
+
+    crew = [threading.Thread(target=run_items, name=f"run_{i}") for i in range(count)]
+    for thread in crew:
+        thread.start()
+    running = count
     try:
-        for landed in crew.landed():
-            yield landed
-            crew.goes_on(not stop_requested())
+        while running:
+            result = results.get()
+            if isinstance(result, BaseException):
+                raise result
+            if result is None:
+                running -= 1
+                continue
+            yield result
+            if stop_requested():
+                stopped.set()
+            room.release()
     finally:
-        crew.dismiss()
-
-
-class _Crew(Generic[T]):
-    """Threads each of which takes a row, runs it, puts down what came of it, and takes the next.
-
-    Nobody hands rows out: for runs of a millisecond that would take a tenth of the time, and take it from the
-    threads, which run Python one at a time.
-    """
-
-    def __init__(self, rows: Iterator[Row], work: Callable[[Row], T], count: int) -> None:
-        self._rows, self._work = rows, work
-        self._taking, self._room = threading.Lock(), threading.Semaphore(AHEAD * count)
-        self._put_down: SimpleQueue[tuple[Row, T] | BaseException | None] = SimpleQueue()
-        self._is_over = False
-        self._threads = [threading.Thread(target=self._labour, name=f"row_{i}") for i in range(count)]
-        for thread in self._threads:
-            thread.start()
-
-    def landed(self) -> Iterator[tuple[Row, T]]:
-        """Rows with what came of them, until no thread is at work; raises what one of them raised."""
-        at_work = len(self._threads)
-        while at_work:
-            found = self._put_down.get()
-            if isinstance(found, BaseException):
-                raise found
-            if found is None:
-                at_work -= 1
-            else:
-                yield found
-
-    def goes_on(self, whether: bool) -> None:
-        """Make room for a row more, as one was taken over; or let none be begun."""
-        self._is_over |= not whether
-        self._room.release()
-
-    def dismiss(self) -> None:
-        """Let no other row be begun, and wait for those in flight."""
-        self._is_over = True
-        self._room.release(len(self._threads))
-        for thread in self._threads:
+        stopped.set()
+        room.release(count)
+        for thread in crew:
             thread.join()
 
-    def _labour(self) -> None:
-        try:
-            while (row := self._next()) is not None:
-                self._put_down.put((row, self._work(row)))
-        except BaseException as error:  # it is the caller's, in whose thread it is raised
-            self._put_down.put(error)
-        self._put_down.put(None)
 
-    def _next(self) -> Row | None:
-        """Row to be run; None where there is none."""
-        self._room.acquire()
-        with self._taking:
-            row = None if self._is_over else next(self._rows, None)
-        if row is None:
-            self._room.release()  # another thread may wait for it, only to end
-        return row
-
-
-def _of_order(order: Order) -> Generator[tuple[Row, Result | None]]:
+def run(order: Order) -> Generator[tuple[Row, Result | None]]:
+    """Yield the rows of an order with their results."""
     rows = (order.grid[number] for number in order.numbers)
-    return carried_out(rows, order.work, order.threads, order.stop_requested)
+    return run_each(rows, order.work, order.threads, order.stop_requested)
 
 
-ENGINE = Engine(_of_order)
+ENGINE = Engine(run)

@@ -52,7 +52,7 @@ class FinishedTrial(NamedTuple):
     tried: Tried
 
 
-def carried_out(
+def run_trial(
     rows: Rows,
     conditions: Sequence[Row],
     fields: Mapping[str, float],
@@ -78,7 +78,7 @@ def carried_out(
     for row in conditions:
         if stop_requested():
             return None
-        result = rows.carried_out(with_fields(row, fields))
+        result = rows.run(with_fields(row, fields))
         found = [optimise.of_row(objective, figure_of(result, objective)) for objective in wanted]
         numbers = [value for value in found if value is not None]
         if reason := _why_lost(row, result, wanted, found):

@@ -73,7 +73,7 @@ def fresh(
     conditions = [row for row in longer if row.law == law and row.repeat >= seeds]
 
     def judged(number: int) -> Fresh | None:
-        tried = trial.carried_out(
+        tried = trial.run_trial(
             rows, conditions, fields[number], optimise.objective, lambda _: False, stop_requested
         )
         if tried is None:
@@ -316,7 +316,7 @@ class _Law:
         proposed = [self.proposer.propose(number) for number in batch if number not in finished]
         flying = {
             pool.submit(
-                trial.carried_out,
+                trial.run_trial,
                 self._rows,
                 self.conditions,
                 gains.values(self.gains, each.params),

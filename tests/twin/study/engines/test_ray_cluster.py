@@ -100,7 +100,7 @@ def blocked_on(node_id, folder):
             (folder / "at_work").touch()
         while is_blocked or not (folder / "at_work").exists():
             time.sleep(0.01)
-        return ray_worker.carried_out(job, numbers)
+        return ray_worker.run_batch(job, numbers)
 
     return run_unless_blocked
 
@@ -112,7 +112,7 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
         engine.Batches, "lost", lambda self, batch: (lost.append(list(batch)), back(self, batch))[1]
     )
     (node,) = machines.worker_nodes
-    monkeypatch.setattr(ray_worker, "carried_out", blocked_on(node.node_id, tmp_path))
+    monkeypatch.setattr(ray_worker, "run_batch", blocked_on(node.node_id, tmp_path))
     killed = []
 
     def kill(done, of):
@@ -137,19 +137,19 @@ def test_a_node_that_is_killed_half_way_loses_nothing(study, machines, wanted, t
 
 
 def test_a_fault_on_a_node_stops_the_study_and_keeps_what_is_finished(study, machines, tmp_path, monkeypatch):
-    carried_out = ray_worker.carried_out
+    carried_out = ray_worker.run_batch
 
     def of_plants_that_differ(job, numbers):
         from spheretwin.study import agreement
         from spheretwin.study.engines import ray_worker
 
         agreement.BOUND = -1.0  # in the process of a node
-        return ray_worker.carried_out(job, numbers)
+        return ray_worker.run_batch(job, numbers)
 
-    monkeypatch.setattr(ray_worker, "carried_out", of_plants_that_differ)
+    monkeypatch.setattr(ray_worker, "run_batch", of_plants_that_differ)
     with pytest.raises(SpheretwinError, match="to be the same on both plants"):
         run(study, tmp_path, machines)
-    monkeypatch.setattr(ray_worker, "carried_out", carried_out)
+    monkeypatch.setattr(ray_worker, "run_batch", carried_out)
     assert (tmp_path / "table.parquet").exists()
     assert len((tmp_path / journal.NAME).read_text().splitlines()) < 1 + ROWS
 

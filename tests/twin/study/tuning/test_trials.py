@@ -104,7 +104,7 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     noisy = study(tmp_path, **TWO)
     tuned(noisy, tmp_path, trials=8)
     before = (tmp_path / storage.NAME).read_bytes()
-    monkeypatch.setattr("spheretwin.study.tuning.trials.carried_out", None)
+    monkeypatch.setattr("spheretwin.study.tuning.trials.run_trial", None)
     found = tuned(noisy, tmp_path, trials=8)
     assert (found.trials, found.resumed) == (8, 8)
     assert (tmp_path / storage.NAME).read_bytes() == before

@@ -74,7 +74,7 @@ def test_pruning_loses_nothing(tmp_path, objectives, over):
     completed = [each.tried.values for each in law.kept if each.tried.ended == Ended.COMPLETED]
     for each in pruned:
         fields = gains.values(noisy.optimise.gain, each.chosen)
-        whole = trial.carried_out(
+        whole = trial.run_trial(
             rows, conditions, fields, noisy.optimise.objective, lambda _: False, lambda: False
         )
         assert len(each.tried.each) < len(whole.each) == 5
