@@ -21,13 +21,13 @@ from spheretwin.study import run as run_study
 from spheretwin.study.engines import ENGINES
 from spheretwin.study.grid import Grid
 from spheretwin.study.row import Rows
-from spheretwin.study.runner import Found
+from spheretwin.study.runner import StudyResult
 from spheretwin.study.statistics import summary
 from spheretwin.study.study import Study, load, shipped
 from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.report import summary as tuning_summary
-from spheretwin.study.tuning.tuning import tuned
+from spheretwin.study.tuning.tuning import tune
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import counted
 
@@ -152,7 +152,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
         timers_stopped(),
         contextlib.redirect_stdout(sys.stderr),  # the output of user code is not part of the figures
     ):
-        outcome = tuned(
+        outcome = tune(
             study,
             folder,
             trials=options.trials,
@@ -180,7 +180,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     return outcome.trials >= outcome.of
 
 
-def _outcome_json(outcome: Found) -> dict[str, Any]:
+def _outcome_json(outcome: StudyResult) -> dict[str, Any]:
     return {
         "rows": outcome.rows,
         "of": outcome.of,
@@ -193,7 +193,7 @@ def _outcome_json(outcome: Found) -> dict[str, Any]:
     }
 
 
-def _report(outcome: Found, rows: statistics.Rows, printed: dict[str, Any], source: str) -> list[Path]:
+def _report(outcome: StudyResult, rows: statistics.Rows, printed: dict[str, Any], source: str) -> list[Path]:
     """Write the page next to the table if figures can be drawn."""
     if report.can_be_drawn():
         return report.write(

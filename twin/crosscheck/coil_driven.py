@@ -8,7 +8,7 @@ step of the same plant is the reference. Both engines answer both.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,7 +21,7 @@ from spheretwin import assembly
 from spheretwin import scenario as scenarios
 from spheretwin.active_config import initial_config
 from spheretwin.crosscheck.part import Part
-from spheretwin.crosscheck.trajectories import ORDER_MARGIN, Convergence
+from spheretwin.crosscheck.trajectories import ENGINES, Convergence, convergence, order_check
 from spheretwin.linear import Magnetics, hinge_matrix
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
@@ -33,7 +33,6 @@ from spheretwin.shared_buffers import shared_buffers
 
 Array = NDArray[np.float64]
 
-ENGINES = {"MuJoCo": "mujoco", "Lagrangian": "lagrangian"}
 DURATION_s = 0.3
 SAMPLE_s = 0.01  # where motions are compared
 STEP_s = 5e-4  # the default physics step
@@ -65,7 +64,7 @@ DISTURBANCE_Nm = (0.01, -0.005, 0.002)
 
 
 class CoilDriven(NamedTuple):
-    """Checks, and the convergence that they were taken from, by what was driven and the engine."""
+    """Checks, and the convergence by motion and engine."""
 
     checks: list[Check]
     convergence: dict[str, Convergence]
@@ -83,14 +82,14 @@ def compare(mjcf: Path, actuator: Actuator) -> CoilDriven:
     """
     reference = integrate(actuator)
     currents = {
-        name: convergence(partial(by_plant, mjcf, engine), STEPS_s, reference)
+        name: convergence(partial(by_plant, mjcf, engine), reference, STEPS_s)
         for name, engine in ENGINES.items()
     }
     complete = {
         name: convergence(
             partial(by_complete_plant, mjcf, engine),
-            COMPLETE_STEPS_s,
             by_complete_plant(mjcf, engine, FINE_s),
+            COMPLETE_STEPS_s,
         )
         for name, engine in ENGINES.items()
     }
@@ -156,15 +155,6 @@ def by_complete_plant(mjcf: Path, engine: str, step_s: float) -> Array:
     return _driven(mjcf, fields, PERIOD_s, COMPLETE_AMPLITUDE_A, np.array(DISTURBANCE_Nm))
 
 
-def convergence(
-    method: Callable[[float], Array], steps_s: tuple[float, ...], reference: Array
-) -> Convergence:
-    """Largest error of any hinge angle at each step, and its order by regression."""
-    errors = np.array([np.max(np.abs((method(step_s) - reference)[:, :3])) for step_s in steps_s])
-    order = np.polyfit(np.log(steps_s), np.log(errors), 1)[0] if np.all(np.isfinite(errors)) else np.nan
-    return Convergence(np.array(steps_s), errors, float(order))
-
-
 def _samples_s() -> Array:
     return SAMPLE_s * np.arange(round(DURATION_s / SAMPLE_s) + 1, dtype=np.float64)
 
@@ -182,7 +172,7 @@ def _driven(
     begun = initial_config(scenarios.load("hold", {**own, **fields}), None, None)
     scenario, actuator = begun.scenario, begun.files.actuator
     groups = len(actuator.groups)
-    rotor = assembly.rotor_of(scenario, begun.files)  # held: what is stepped has addresses within it
+    rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
     stepped = rotor.start(np.array(START_rad), np.array(START_rad_s))
     plant = assembly.plant_of(scenario, actuator, stepped, shared_buffers(scenario, groups))
     every = round(SAMPLE_s / period_s)
@@ -238,22 +228,12 @@ def _motion(name: str, measured: Convergence) -> Check:
 
 
 def _order(name: str, compares: str, measured: Convergence) -> Check:
-    return Check(
-        name=f"order of convergence: {name}",
-        compares=f"{compares}; slope of log error over log step, {len(measured.steps_s)} steps from"
-        f" {1e3 * max(measured.steps_s):g} to {1e3 * min(measured.steps_s):g} ms",
-        states=len(measured.steps_s),
-        value=measured.order,
-        bound=ORDER + ORDER_MARGIN,
-        why=f"order {ORDER}: the torque matrix and the back-EMF are those in the middle of a step, friction"
-        " is split around it; taken at the start of a step, any of them makes it order 1. The margin is what"
-        " the next power of the step adds at these steps",
-        at_least=ORDER - ORDER_MARGIN,
-        detail={
-            f"error at {1e3 * step_s:g} ms, rad": float(error)
-            for step_s, error in zip(measured.steps_s, measured.errors_rad, strict=True)
-        },
+    why = (
+        f"order {ORDER}: the torque matrix and the back-EMF are those in the middle of a step, friction is"
+        " split around it; taken at the start of a step, any of them makes it order 1. The margin is what"
+        " the next power of the step adds at these steps"
     )
+    return order_check(name, measured, ORDER, why, f"{compares}; ", "")
 
 
 PART = Part("coil-driven motion", lambda on: compare(on.mjcf, on.actuator))

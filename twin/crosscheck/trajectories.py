@@ -161,11 +161,32 @@ def by_own_steps(actuator: Actuator, pieces: Pieces, step_s: float) -> Array:
     return np.array(states)
 
 
-def convergence(method: Callable[[float], Array], reference: Array) -> Convergence:
-    """Regression of the logarithm of the largest error on that of the step."""
-    errors = np.array([np.max(np.abs((method(step_s) - reference)[:, :3])) for step_s in STEPS_s])
-    order = np.polyfit(np.log(STEPS_s), np.log(errors), 1)[0] if np.all(np.isfinite(errors)) else np.nan
-    return Convergence(np.array(STEPS_s), errors, float(order))
+def convergence(
+    method: Callable[[float], Array], reference: Array, steps_s: tuple[float, ...] = STEPS_s
+) -> Convergence:
+    """Largest error of any hinge angle at each step, and its order by regression."""
+    errors = np.array([np.max(np.abs((method(step_s) - reference)[:, :3])) for step_s in steps_s])
+    order = np.polyfit(np.log(steps_s), np.log(errors), 1)[0] if np.all(np.isfinite(errors)) else np.nan
+    return Convergence(np.array(steps_s), errors, float(order))
+
+
+def order_check(name: str, measured: Convergence, order: int, why: str, motion: str, reference: str) -> Check:
+    """Check of an order of convergence; `motion` and `reference` are the ends of its description."""
+    longest, shortest = 1e3 * max(measured.steps_s), 1e3 * min(measured.steps_s)
+    return Check(
+        name=f"order of convergence: {name}",
+        compares=f"{motion}slope of log error over log step, {len(measured.steps_s)} steps from {longest:g}"
+        f" to {shortest:g} ms{reference}",
+        states=len(measured.steps_s),
+        value=measured.order,
+        bound=order + ORDER_MARGIN,
+        why=why,
+        at_least=order - ORDER_MARGIN,
+        detail={
+            f"error at {1e3 * step_s:g} ms, rad": float(error)
+            for step_s, error in zip(measured.steps_s, measured.errors_rad, strict=True)
+        },
+    )
 
 
 def _trajectory(difference: Array) -> Check:
@@ -183,20 +204,8 @@ def _trajectory(difference: Array) -> Check:
 
 
 def _order(name: str, measured: Convergence, order: int) -> Check:
-    return Check(
-        name=f"order of convergence: {name}",
-        compares=f"slope of log error over log step, {len(STEPS_s)} steps from {1e3 * max(STEPS_s):g}"
-        f" to {1e3 * min(STEPS_s):g} ms, against DOP853",
-        states=len(STEPS_s),
-        value=measured.order,
-        bound=order + ORDER_MARGIN,
-        why=f"order {order} in theory; the margin is what the next power of the step adds at these steps",
-        at_least=order - ORDER_MARGIN,
-        detail={
-            f"error at {1e3 * step_s:g} ms, rad": float(error)
-            for step_s, error in zip(measured.steps_s, measured.errors_rad, strict=True)
-        },
-    )
+    why = f"order {order} in theory; the margin is what the next power of the step adds at these steps"
+    return order_check(name, measured, order, why, "", ", against DOP853")
 
 
 TRAJECTORIES = Part("trajectories", lambda on: compare_trajectories(on.mjcf, on.actuator))

@@ -175,7 +175,7 @@ class FaultData(NamedTuple):
     """Whether faults were reported to the allocation, or detected."""
     least_norm: bool
     """Whether the allocation is that of least norm."""
-    left: RemainingTorque | None
+    remaining: RemainingTorque | None
     """None if no groups are open."""
     latencies_s: tuple[float | None, ...]
     """For each failed group, detection latency: time from fault to detection; None if not detected."""

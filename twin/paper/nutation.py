@@ -180,8 +180,8 @@ def sections(outcomes: Outcomes) -> list[Section]:
         ResultTable("Largest |error|: median over the seeds, and range", HEAD, largest, 3),
         ResultTable(EFFORT_TITLE, EFFORT_HEAD, [effort(law, runs) for law, runs in by_law.items()]),
     ]
-    runs = _in_figures(outcomes)
-    drawings = [lambda: angles(runs), lambda: errors(runs), lambda: paths(runs)] if runs else []
+    shown = _in_figures(outcomes)
+    drawings = [lambda: angles(shown), lambda: errors(shown), lambda: paths(shown)] if shown else []
     return [Section("The nutation under each law", METHOD, tables, drawings)]
 
 

@@ -1,4 +1,4 @@
-"""Whether the fast plant can be believed: the first row and a hundredth of the others are run on MuJoCo too.
+"""Agreement of the plants: the first row and a hundredth of the others run on MuJoCo too.
 
 Both plants run the same loop, so that the root mean square of the error of a run is the same but for
 rounding where the law is smooth. Where sgn(s) chatters, a sign that rounding decides moves it by some
@@ -24,11 +24,11 @@ BOUND = 0.02
 
 
 Ending = tuple[Status, list[float]]
-"""How a run ended, and the rms error of each hinge, rad."""
+"""Status of a run, and the rms error of each hinge, rad."""
 
 
 def is_checked(row: Row) -> bool:
-    """Whether a row is one of those that are run twice: decided by its key, so at random, and for ever."""
+    """True if a row runs on both plants; its key decides, so that the choice is random but fixed."""
     return row.number == 0 or int(row.key, 16) % EVERY == 0
 
 
@@ -38,7 +38,7 @@ def check(rows: Rows, row: Row) -> None:
     Raises
     ------
     SpheretwinError
-        They end otherwise, or differ by more than `BOUND`.
+        Their statuses differ, or their errors by more than `BOUND`.
     """
     if rows.scenario(row).plant.engine != FAST or not rows.chooses_plant:
         return
@@ -51,28 +51,28 @@ def check(rows: Rows, row: Row) -> None:
 
 
 def compare(expected: str, ours: Ending, theirs: Ending, way_out: str) -> float:
-    """Hold a run on the Lagrangian against the same on MuJoCo; returns how far they are apart.
+    """Compare a run on the Lagrangian with the same run on MuJoCo; return their relative difference.
 
     Parameters
     ----------
     expected : str
-        Who expects it of what, for the complaint.
+        Start of the message.
     ours, theirs : Ending
     way_out : str
-        What to do where they differ, for the same.
+        What to do if they differ, for the message.
 
     Raises
     ------
     SpheretwinError
-        They end otherwise, or both complete and differ by more than `BOUND`.
+        Their statuses differ, or both complete and differ by more than `BOUND`.
     """
-    apart = _apart(ours[1], theirs[1]) if ours[0] == theirs[0] == Status.COMPLETED else 0.0
-    if ours[0] != theirs[0] or not apart <= BOUND:
+    difference = _difference(ours[1], theirs[1]) if ours[0] == theirs[0] == Status.COMPLETED else 0.0
+    if ours[0] != theirs[0] or not difference <= BOUND:
         raise SpheretwinError(
             f"{expected} to be the same on both plants within {BOUND:g}, received {_ending_text(ours)} on the"
             f" Lagrangian and {_ending_text(theirs)} on MuJoCo; {way_out}"
         )
-    return apart
+    return difference
 
 
 def _rms(rows: Rows, row: Row, engine: str) -> Ending:
@@ -83,10 +83,10 @@ def _rms(rows: Rows, row: Row, engine: str) -> Ending:
         return status, metric.value() or []
 
 
-def _apart(ours: list[float], theirs: list[float]) -> float:
+def _difference(ours: list[float], theirs: list[float]) -> float:
     largest = max(np.max(ours), np.max(theirs))
     return float(np.max(np.abs(np.subtract(ours, theirs))) / largest) if largest > 0 else 0.0
 
 
-def _ending_text(found: Ending) -> str:
-    return f"{found[0]} with {', '.join(f'{each:.6g}' for each in found[1])} rad"
+def _ending_text(ending: Ending) -> str:
+    return f"{ending[0]} with {', '.join(f'{error:.6g}' for error in ending[1])} rad"

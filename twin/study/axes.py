@@ -1,4 +1,4 @@
-"""What an axis is: a field, and its values, listed or drawn."""
+"""Axis of a study: a field, and its values, listed or random."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, field_validator, model_validator
 
-# A grid beyond this is a slip of the pen: at a millisecond a row it would take weeks.
+# A larger number is a mistake: at a millisecond a row it would take weeks.
 MOST_VALUES = 1_000_000
 
 LARGEST = 1e9
@@ -21,8 +21,8 @@ Count = Annotated[int, Field(ge=1, le=MOST_VALUES)]
 class Axis(BaseModel):
     """A field that differs from row to row.
 
-    A kind of which every value is known says them in `listed`; one that is drawn turns uniform numbers from
-    0 to 1 into values in `drawn`.
+    A listed axis returns its values from `listed`; a random axis turns uniform numbers from 0 to 1 into
+    values in `quantile`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -37,12 +37,12 @@ class Axis(BaseModel):
 
     @property
     def is_drawn(self) -> bool:
-        """Whether its values are drawn."""
+        """Whether its values are random."""
         return False
 
 
 class ListedAxis(Axis):
-    """An axis of which every value is known."""
+    """Axis with listed values."""
 
     @abstractmethod
     def listed(self) -> list[Any]:
@@ -50,7 +50,7 @@ class ListedAxis(Axis):
 
 
 class DrawnAxis(Axis):
-    """An axis whose values are drawn."""
+    """Axis with random values."""
 
     @property
     def is_drawn(self) -> bool:
@@ -92,7 +92,7 @@ class Logspace(ListedAxis):
 
 
 class Normal(DrawnAxis):
-    """Normal, cut off at some standard deviations: what lies beyond is not drawn, and piles up nowhere."""
+    """Normal distribution, truncated at some standard deviations."""
 
     kind: Literal["normal"] = Field("normal", description="how the values are chosen")
     mean: Number = Field(description="mean")

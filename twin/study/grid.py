@@ -1,8 +1,8 @@
-"""From a study to its rows: which value of each axis, which law, which seed; each row by its number alone.
+"""Rows of a study: values, law and seed of each row follow from its number.
 
 Axes that are zipped go together, all other axes are crossed, and so are the points of the drawn ones, the
-laws and the seeds. The last of them changes fastest. Nothing is listed that can be counted: a row is found
-from its number, so that a study of millions takes no memory.
+laws and the seeds. The last of them changes fastest. Rows are not listed, so that a study of millions takes
+no memory.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ KEY_LENGTH = 16
 # At a millisecond a row, beyond this a study takes more than a day.
 MOST_ROWS = 10**8
 
-# Of the points of drawn axes: what separates them from whatever else is drawn under the same seed.
+# Separates the random points of the axes from other random numbers with the same seed.
 STAGE = 301
 
 
@@ -38,10 +38,10 @@ class Row(NamedTuple):
 
     number: int
     key: str
-    """By which it is known: of its values, its law and its repeat."""
+    """Digest of its values, its law and its repeat."""
     seed: int
     values: Mapping[str, Any]
-    """Of each axis, by its field."""
+    """Value of each axis by its field."""
     law: Mapping[str, Any] | None
     repeat: int
 
@@ -56,7 +56,7 @@ class Grid:
     Raises
     ------
     InputError
-        Zipped axes are not equally long, or there are more rows than can ever be run.
+        Zipped axes are not equally long, or there are too many rows.
     """
 
     def __init__(self, study: Study) -> None:
@@ -101,7 +101,7 @@ class Grid:
         return Row(number, key, _seed(self._study.seed, drawn_from), ordered, self._laws[law], repeat)
 
     def values(self, field: str) -> list[Any] | None:
-        """All values of an axis; None of one that is drawn, which has numbers."""
+        """All values of a listed axis; None for a random axis."""
         return next((group[field] for group in self._groups if field in group), None)
 
     def of_law(self, law: int, most: int) -> Iterator[Row]:
@@ -112,7 +112,7 @@ class Grid:
 
     @property
     def laws(self) -> int:
-        """How many laws there are; the scenario's alone is one."""
+        """Number of laws; 1 for the law of the scenario alone."""
         return len(self._laws)
 
     def of(self, key: str) -> Row:
@@ -121,7 +121,7 @@ class Grid:
         Raises
         ------
         InputError
-            There is none.
+            There is no such row.
         """
         for row in self:
             if row.key == key:
@@ -130,7 +130,7 @@ class Grid:
 
 
 def _groups(study: Study) -> dict[str, dict[str, list[Any]]]:
-    """Listed axes that go together: values by field, by what tells the group."""
+    """Zipped axes: values by field, by the name of the group."""
     groups: dict[str, dict[str, list[Any]]] = {}
     for place, axis in enumerate(study.axis):
         if isinstance(axis, ListedAxis):
@@ -140,24 +140,24 @@ def _groups(study: Study) -> dict[str, dict[str, list[Any]]]:
 
 
 def _check_lengths(study: Study, group: Mapping[str, list[Any]]) -> None:
-    """Values that go together are as many of each."""
+    """Check that zipped axes have equal lengths."""
     lengths = {field: len(values) for field, values in group.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{length} of {field}" for field, length in lengths.items())
-        raise InputError(f"study {study.name}: expected zipped axes of equal length, received {told}")
+        listed = ", ".join(f"{length} of {field}" for field, length in lengths.items())
+        raise InputError(f"study {study.name}: expected zipped axes of equal length, received {listed}")
 
 
 def _check_values(study: Study, group: Mapping[str, list[Any]]) -> None:
-    """No two values are the same: their rows would be."""
+    """Check that no two values are equal: their rows would be."""
     if twice := repeated(zip(*group.values(), strict=True)):
-        told = ", ".join(map(shown, twice[0]))
+        listed = ", ".join(map(shown, twice[0]))
         raise InputError(
-            f"study {study.name}: expected different values of {', '.join(group)}, received {told} twice"
+            f"study {study.name}: expected different values of {', '.join(group)}, received {listed} twice"
         )
 
 
 def _points(study: Study) -> NDArray[np.float64]:
-    """Values of the drawn axes, (samples, axes); one empty point where there are none."""
+    """Values of the random axes, (samples, axes); one empty point without such axes."""
     axes = cast(tuple[DrawnAxis, ...], study.drawn_axes)
     if not axes:
         return np.empty((1, 0))
@@ -174,7 +174,7 @@ def _uniform(study: Study, axes: int, samples: int) -> NDArray[np.float64]:
         from scipy.stats import qmc  # slow to import
 
         if study.design == "sobol":
-            # Whole powers of two are drawn, and as many used as are wanted: a longer study begins alike.
+            # A power of two of points is generated: a longer study begins with the same points.
             points = qmc.Sobol(axes, rng=generator).random_base2((samples - 1).bit_length())[:samples]
         else:
             points = qmc.LatinHypercube(axes, rng=generator).random(samples)
@@ -201,7 +201,7 @@ def _seed(study_seed: int, key: str) -> int:
     return int.from_bytes(digest[:8], "big") >> 11
 
 
-# What no text of a scenario may hold.
+# Character that no text of a scenario contains.
 MARK = "\x01"
 
 MOST_USUAL = 2**63
@@ -210,20 +210,19 @@ MOST_USUAL = 2**63
 class Template:
     """JSON of a scenario with a gap for each number that differs from row to row.
 
-    To put the fields of a row together, name by name, takes longer than to check them. Where rows differ in
-    numbers alone, which fields there are and what their texts say is the same in all of them. Each row is
-    checked as a whole all the same.
+    Merging the fields of a row takes longer than validating them. If rows differ in numbers alone, everything
+    else is the same in all of them. Each row is validated completely all the same.
 
     Parameters
     ----------
     parts : sequence of str
         Text before each gap, and behind the last.
     order : sequence of int
-        Which of the values is in each gap.
+        Index of the value of each gap.
     kind : type
         Of the scenario.
     source : str
-        Where it comes from, for complaints.
+        Its origin, for messages.
     """
 
     def __init__(self, parts: Sequence[str], order: Sequence[int], kind: type[Scenario], source: str) -> None:
@@ -248,26 +247,26 @@ class Template:
         return check_events(scenario, self._source)
 
     def _text(self, value: float) -> str:
-        """A number as JSON has it, which is as Python has it but for a few."""
+        """Number as JSON text, which is almost always its Python text."""
         is_usual = isfinite(value) if isinstance(value, float) else abs(value) < MOST_USUAL
         return repr(value) if is_usual else reading.as_json(self._source, value).decode()
 
 
 def template_of(fields: dict[str, Any], gaps: Sequence[str], source: str) -> Template | None:
-    """Template of rows; None where a gap is in another one.
+    """Template of rows; None if a gap is in another one.
 
     Parameters
     ----------
     fields : dict
-        Of one of the rows, by section, ready to be checked; changed in place.
+        Fields of one row by section, not validated; changed in place.
     gaps : sequence of str
-        Dotted names of what differs.
+        Dotted names of the differing fields.
     source : str
 
     Raises
     ------
     InputError
-        A name leads nowhere, or the fields are not as TOML has them.
+        A name is of no field, or the fields are not valid TOML values.
     """
     kind = reading.scenario_type(fields)
     for place, dotted in enumerate(gaps):
@@ -285,5 +284,5 @@ def template_of(fields: dict[str, Any], gaps: Sequence[str], source: str) -> Tem
 
 
 def are_numbers(values: Iterable[Any]) -> bool:
-    """Whether values are such as a template has gaps for: they bring no fields of their own."""
+    """True if values are numbers, for which a template has gaps."""
     return all(type(value) in (float, int) for value in values)

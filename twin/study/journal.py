@@ -1,4 +1,4 @@
-"""What the results of a study stand on: the study, its files, the sources, the versions; each by a digest."""
+"""Provenance of the results of a study by digests, and the journal of its finished rows."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from spheretwin.study.grid import Row
 from spheretwin.study.row import Result, Rows
 
 
-def basis_of(rows: Rows) -> dict[str, str]:
+def provenance_of(rows: Rows) -> dict[str, str]:
     """Digests of study, files and sources, and the version of each package.
 
-    Of a file, what is in it, not where it is: a study may be run from anywhere, and its folder may be moved.
+    The digest of a file is of its content, not of its path: the folder of a study may be moved.
     """
     study = rows.study.model_dump(mode="json", exclude={"description"})
     return {
@@ -40,27 +40,27 @@ def basis_of(rows: Rows) -> dict[str, str]:
 
 
 def digest_of(rows: Rows) -> str:
-    """Digest of all that results depend on."""
-    return _digest(basis_of(rows))
+    """Digest of everything that results depend on."""
+    return _digest(provenance_of(rows))
 
 
-def _digest(told: Any) -> str:
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+def _digest(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _contents(rows: Rows) -> Iterator[Any]:
-    """Values of the base and of what differs from row to row, with the content of each file for its path."""
+    """Values of the base and of the axes, with the content of each file instead of its path."""
     study = rows.study
     yield reading.replace_files(rows.base.model_dump(mode="json"), _content)
     named = [(axis.field, value) for axis in study.axis for value in getattr(axis, "values", ())]
     named += [("controller", dict(law)) for law in study.law]
     for dotted, value in named:
         if isinstance(value, str | list | dict):  # a number names no file
-            found = reading.single_field(dotted, reading.resolve_value_paths(study.folder, dotted, value))
-            yield reading.replace_files(found, _content)
+            field = reading.single_field(dotted, reading.resolve_value_paths(study.folder, dotted, value))
+            yield reading.replace_files(field, _content)
     for name in study.metrics:
         if is_reference(name):
-            yield _content(study.beside(name), "metrics")
+            yield _content(study.path(name), "metrics")
 
 
 def _content(path: str, dotted: str) -> str:
@@ -75,16 +75,16 @@ else:
     import fcntl
 
 BEYOND = 1 << 62
-"""Byte that is locked where a lock keeps others from reading: one that no file has."""
+"""Locked byte, beyond the end of any file: on Windows a lock prevents others from reading."""
 
 
 def lock(file: BinaryIO) -> None:
-    """Take the lock of a file until it is closed.
+    """Lock a file until it is closed.
 
     Raises
     ------
     OSError
-        Another process has it.
+        Another process has locked it.
     """
     if sys.platform == "win32":
         place = file.tell()
@@ -99,8 +99,8 @@ def lock(file: BinaryIO) -> None:
 
 NAME = "journal.jsonl"
 
-NOT_YET = 0
-"""Place of no row: the first line is there. Zeros take no memory until they are written over."""
+MISSING = 0
+"""Offset of a row that is not finished; the first line is there. Zeros take no memory until overwritten."""
 
 
 class Journal:
@@ -109,31 +109,31 @@ class Journal:
     Parameters
     ----------
     path : Path
-        Made, or gone on with.
+        New, or continued.
     digest : str
-        Of all that results depend on.
+        Digest of everything that results depend on.
     rows : int
-        Of the study.
+        Number of rows of the study.
 
     Attributes
     ----------
     torn : bool
         Whether a torn last line was dropped.
     damaged : int
-        Lines that were passed over.
+        Damaged lines, which were skipped.
 
     Raises
     ------
     InputError
-        It is that of another study, another process writes it, or it is no journal.
+        It belongs to another study, another process writes it, or it is no journal.
     SpheretwinError
-        It could not be begun, as on a full disk.
+        It could not be written, as on a full disk.
     """
 
     def __init__(self, path: Path, digest: str, rows: int) -> None:
         self.path, self.torn, self.damaged = path, False, 0
         self._head = json.dumps({"journal": 1, "digest": digest}).encode() + b"\n"
-        self._places: NDArray[np.int64] = np.zeros(rows, dtype=np.int64)
+        self._offsets: NDArray[np.int64] = np.zeros(rows, dtype=np.int64)
         self._end = 0
         self._file = _opened(path)
         try:
@@ -150,41 +150,41 @@ class Journal:
 
     def done(self, below: int | None = None) -> int:
         """Number of finished rows below a number; of all unless given."""
-        return int(np.count_nonzero(self._places[:below]))
+        return int(np.count_nonzero(self._offsets[:below]))
 
     def has(self, number: int) -> bool:
         """Whether a row is finished."""
-        return bool(self._places[number] != NOT_YET)
+        return bool(self._offsets[number] != MISSING)
 
     def add(self, row: Row, result: Result) -> None:
-        """Keep a result.
+        """Store a result.
 
         Raises
         ------
         SpheretwinError
-            It could not be written, as on a full disk; what was written before is kept.
+            It could not be written, as on a full disk; earlier results are stored.
         """
-        place = self._end
+        offset = self._end
         self._write(_line([row.number, row.key, *result]))
-        self._places[row.number] = place
+        self._offsets[row.number] = offset
 
     def results(self) -> Iterator[tuple[int, Result]]:
         """Finished rows in the order of the study: the number of each, and its result."""
         with self.path.open("rb") as file:
-            for number in np.flatnonzero(self._places):
-                file.seek(int(self._places[number]))
+            for number in np.flatnonzero(self._offsets):
+                file.seek(int(self._offsets[number]))
                 yield int(number), _result(json.loads(file.readline()))
 
     def _begin(self, digest: str) -> None:
         with self.path.open("rb") as file:
             head = file.readline()
-            if self._head.startswith(head) and head != self._head:  # new, or torn before it was one
+            if self._head.startswith(head) and head != self._head:  # new, or torn
                 self._write(self._head)
                 return
-            found = _parsed(head)
-            if not isinstance(found, dict) or "journal" not in found:
+            stored = _parsed(head)
+            if not isinstance(stored, dict) or "journal" not in stored:
                 raise InputError(f"study: expected a journal of a study, received {self.path}")
-            if found.get("digest") != digest:
+            if stored.get("digest") != digest:
                 raise InputError(
                     f"study: expected {self.path} to be a journal of this study with these sources and"
                     " versions, received one of others; remove it, or write into another folder"
@@ -199,21 +199,21 @@ class Journal:
             self.torn = True
             return
         number = _number(line)
-        if number is None or not 0 <= number < len(self._places):
+        if number is None or not 0 <= number < len(self._offsets):
             self.damaged += 1
         else:
-            self._places[number] = self._end
+            self._offsets[number] = self._end
         self._end += len(line)
 
     def _write(self, line: bytes) -> None:
-        """Put a line at the end, whole or not at all."""
+        """Append a line completely or not at all."""
         try:
             self._file.seek(self._end)
-            left = memoryview(line)
-            while left:
-                left = left[self._file.write(left) :]
+            rest = memoryview(line)
+            while rest:
+                rest = rest[self._file.write(rest) :]
         except OSError as error:
-            with suppress(OSError):  # what is left of the line is dropped when it is read
+            with suppress(OSError):  # a torn line is dropped when it is read
                 self._file.truncate(self._end)
             raise SpheretwinError(
                 f"study: {self.path} could not be written, {error.strerror or error};"
@@ -223,7 +223,7 @@ class Journal:
 
 
 def _opened(path: Path) -> BinaryIO:
-    """The file, without a buffer: what is written is written, and what failed is not tried again."""
+    """Open the file without a buffer: a failed write is not repeated."""
     try:
         file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b", 0)
     except OSError as error:
@@ -239,13 +239,13 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _line(record: list[Any]) -> bytes:
-    """A line of JSON, the last entry of which is a check of all before it."""
+    """Line of JSON whose last entry is a checksum of the others."""
     body = json.dumps(record).encode()[:-1]
     return body + b', "%08x"]\n' % zlib.crc32(body)
 
 
 def _number(line: bytes) -> int | None:
-    """Row of a line; None where it is damaged."""
+    """Row of a line; None if it is damaged."""
     body = line[: -len(', "00000000"]\n')]
     parsed = _parsed(line) if line[len(body) :] == b', "%08x"]\n' % zlib.crc32(body) else None
     return parsed[0] if isinstance(parsed, list) else None

@@ -1,4 +1,4 @@
-"""Which figures suit a study: over one axis lines, over two a map, over more what the worst goes with."""
+"""Report of a study: lines over one axis, a map over two, rank correlations over more, and its page."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 MOST_BARS, MOST_SCATTERS = 20, 8
 
-# A map of more is no map: where each row has a value of its own, nothing stands beside anything.
+# Largest number of values on an axis of a map.
 MOST_SQUARES = 60
 
 LEAST_SPREAD = 10
-"""Completed rows from which on their distribution is one."""
+"""Least number of completed rows for a distribution."""
 
 
 def drawings(rows: Rows) -> Iterator[Drawing]:
-    """Figures of a study, in the order of its page; none where no row was completed."""
+    """Figures of a study, in the order of its page; none without a completed row."""
     varied = {field: values for field, values in rows.axes.items() if len(_distinct(values)) > 1}
     if rows.main is None or not np.any(rows.completed):
         return
@@ -71,7 +71,7 @@ def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
     figure = maps.maps(
         panels,
         (first, second),
-        ([_value_text(each) for each in down[0]], [_value_text(each) for each in across[0]]),
+        ([_value_text(value) for value in down[0]], [_value_text(value) for value in across[0]]),
         _quantity(rows),
         f"{rows.study['name']}: {_quantity(rows)}",
     )
@@ -85,23 +85,24 @@ def _map(rows: Rows, varied: Mapping[str, NDArray[Any]]) -> Drawing:
 def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
     from spheretwin.viz.figures import distributions
 
-    whole = {law: _whole(rows, law) for law in rows.law_names}
-    whole = {law: chosen for law, chosen in whole.items() if np.count_nonzero(chosen) >= LEAST_SPREAD}
-    if not whole:
+    complete = {law: _complete(rows, law) for law in rows.law_names}
+    complete = {law: of_law for law, of_law in complete.items() if np.count_nonzero(of_law) >= LEAST_SPREAD}
+    if not complete:
         return
     y: Array = rows.figures[str(rows.main)]
-    found = {
-        law: ranked([each[chosen] for each in numbers.values()], y[chosen]) for law, chosen in whole.items()
+    ranks = {
+        law: ranked([values[of_law] for values in numbers.values()], y[of_law])
+        for law, of_law in complete.items()
     }
-    order, names = strongest(found.values()), list(numbers)
+    order, names = strongest(ranks.values()), list(numbers)
     bars = order[:MOST_BARS]
     figure = distributions.ranks(
         [names[place] for place in bars],
         {law: rank._replace(by_value=rank.by_value[bars], by_distance=rank.by_distance[bars])
-         for law, rank in found.items()},
+         for law, rank in ranks.items()},
         f"{rows.study['name']}: what {_quantity(rows)} goes with",
     )  # fmt: skip
-    partial = all(rank.is_partial for rank in found.values())
+    partial = all(rank.is_partial for rank in ranks.values())
     left = ", when what goes with the other axes is taken away" if partial else ""
     caption = (
         f"Spearman's rank correlation of {_quantity(rows)} with the value of each axis, and, as a ring, with"
@@ -111,8 +112,8 @@ def _many(rows: Rows, numbers: Mapping[str, NDArray[Any]]) -> Iterator[Drawing]:
     yield Drawing("report_ranks.png", caption, figure)
     shown = [names[place] for place in order[:MOST_SCATTERS]]
     figure = distributions.scatters(
-        {name: {law: numbers[name][chosen] for law, chosen in whole.items()} for name in shown},
-        {law: y[chosen] for law, chosen in whole.items()},
+        {name: {law: numbers[name][of_law] for law, of_law in complete.items()} for name in shown},
+        {law: y[of_law] for law, of_law in complete.items()},
         _quantity(rows),
         f"{rows.study['name']}: {_quantity(rows)} over its {len(shown)} strongest axes",
     )
@@ -148,13 +149,13 @@ def _quantity(rows: Rows) -> str:
     return f"{rows.main}"
 
 
-def _whole(rows: Rows, law: str) -> NDArray[np.bool_]:
+def _complete(rows: Rows, law: str) -> NDArray[np.bool_]:
     """Completed rows of a law that have the main figure."""
     return (rows.laws == law) & rows.completed & np.isfinite(rows.figures[str(rows.main)])
 
 
 def _differ(several: Iterable[Array]) -> bool:
-    """Whether there are two different numbers at all."""
+    """True if there are two different numbers."""
     return len(np.unique(np.concatenate(list(several)))) > 1
 
 
@@ -163,12 +164,12 @@ def _distinct(values: NDArray[Any]) -> list[Any]:
 
 
 def _placed(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:
-    """Different values, numbers in their order, names in that of the study; and which each row has."""
+    """Distinct values, numbers sorted and names in the order of the study, and the index of each row."""
     if values.dtype == np.float64:
         distinct, places = np.unique(values, return_inverse=True)
         return distinct, places
     names = _distinct(values)
-    return np.array(names, dtype=object), np.array([names.index(each) for each in values])
+    return np.array(names, dtype=object), np.array([names.index(value) for value in values])
 
 
 def _panel(rows: Rows, law: str, down: NDArray[np.int64], across: NDArray[np.int64]) -> MapPanel:
@@ -182,11 +183,11 @@ def _panel(rows: Rows, law: str, down: NDArray[np.int64], across: NDArray[np.int
 def _line(rows: Rows, law: str, places: NDArray[np.int64], count: int) -> StudyLine:
     from spheretwin.viz.figures.maps import StudyLine
 
-    of_law, whole = rows.laws == law, _whole(rows, law)
+    of_law, complete = rows.laws == law, _complete(rows, law)
     values = rows.figures[str(rows.main)]
     spread = np.full((3, count), np.nan)
-    for place in np.unique(places[whole]):
-        spread[:, place] = np.quantile(values[whole & (places == place)], [0.5, 0, 1])
+    for place in np.unique(places[complete]):
+        spread[:, place] = np.quantile(values[complete & (places == place)], [0.5, 0, 1])
     lost = np.bincount(places[of_law & ~rows.completed], minlength=count) > 0
     return StudyLine(spread[0], spread[1], spread[2], lost)
 
@@ -198,19 +199,19 @@ def _value_text(value: Any) -> str:
 MARKDOWN, HTML = "report.md", "report.html"
 
 MOST_NAMED = 5
-"""Rows that are named one by one, the worst of them and those that failed."""
+"""Number of listed rows, of the worst and of the failed ones."""
 
 
 def can_be_drawn() -> bool:
-    """Whether there is what figures are drawn with."""
+    """True if figures can be drawn."""
     return find_spec("matplotlib") is not None
 
 
 def write(
     folder: Path,
     rows: Rows,
-    told: Mapping[str, Any],
-    wanted: tuple[int, int],
+    summary: Mapping[str, Any],
+    requested: tuple[int, int],
     source: str,
     versions: Mapping[str, str],
 ) -> list[Path]:
@@ -221,12 +222,12 @@ def write(
     folder : Path
         Exists.
     rows : Rows
-    told : mapping
-        Their summary.
-    wanted : two int
-        Rows that were wanted, and all that the study has.
+    summary : mapping
+        `statistics.summary` of the rows.
+    requested : two int
+        Requested rows, and rows of the study.
     source : str
-        The study as the command line names it.
+        Name of the study on the command line.
     versions : mapping
         Version by package, for the foot.
 
@@ -237,15 +238,15 @@ def write(
     """
     drawn = list(drawings(rows))
     save_drawings(folder, drawn)
-    text = markdown(rows, told, wanted, drawn, source, versions)
+    text = markdown(rows, summary, requested, drawn, source, versions)
     title = str(rows.study["name"])
     return [save_text(folder / MARKDOWN, text), save_text(folder / HTML, html.page(title, text))]
 
 
 def markdown(
     rows: Rows,
-    told: Mapping[str, Any],
-    wanted: tuple[int, int],
+    summary: Mapping[str, Any],
+    requested: tuple[int, int],
     drawn: Sequence[Drawing],
     source: str,
     versions: Mapping[str, str],
@@ -253,34 +254,36 @@ def markdown(
     """Text of the page."""
     study, command = rows.study, f"spheretwin sweep {shlex.quote(source)}"
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
-    lines = [f"# {study['name']}", "", study["description"], "", _ends(rows, *wanted), ""]
-    lines += ["## Figures of the rows", "", *_summary(told), ""]
+    lines = [f"# {study['name']}", "", study["description"], "", _ends(rows, *requested), ""]
+    lines += ["## Figures of the rows", "", *_summary(summary), ""]
     lines += [pieces.figure(drawing) for drawing in drawn]
     lines += _worst(rows, command)
     lines += _failures(rows)
     lines += ["## What differs from row to row", "", *_axes(study, rows), ""]
-    limit = f" --limit {wanted[0]}" if wanted[0] < wanted[1] else ""
+    limit = f" --limit {requested[0]}" if requested[0] < requested[1] else ""
     lines += [f"Made by `{command}{limit}` with {used}.", ""]
     return "\n".join(lines)
 
 
-def _ends(rows: Rows, of: int, whole: int) -> str:
-    """How many rows there are, and how they ended."""
+def _ends(rows: Rows, of: int, total: int) -> str:
+    """Number of the rows and their statuses."""
     count = len(rows.laws)
     ends = ", ".join(f"{number} {status}" for status, number in Counter(rows.statuses.tolist()).items())
     missing = f" The other {of - count} are still to be run: the same command goes on." if count < of else ""
-    first = f" Only {of} of the study's {whole} rows were requested." if of < whole else ""
+    first = f" Only {of} of the study's {total} rows were requested." if of < total else ""
     return f"{count} of {of} rows: {ends or 'none'}.{missing}{first}"
 
 
-def _summary(told: Mapping[str, Any]) -> list[str]:
+def _summary(summary: Mapping[str, Any]) -> list[str]:
     """Median and 95 % range of each figure, a column a law; below them the statuses."""
-    figures = [name for name in next(iter(told.values()), {}) if name != "statuses"]
-    statuses = sorted({status for of_law in told.values() for status in of_law["statuses"]})
-    body = [[name, *(_spread(of_law[name]) for of_law in told.values())] for name in figures]
-    body += [[name, *(str(of_law["statuses"].get(name, 0)) for of_law in told.values())] for name in statuses]
-    head = ["median (95 % range) of the completed rows", *told]
-    return pieces.table(head, body, [False, *(True for _ in told)])
+    figures = [name for name in next(iter(summary.values()), {}) if name != "statuses"]
+    statuses = sorted({status for of_law in summary.values() for status in of_law["statuses"]})
+    body = [[name, *(_spread(of_law[name]) for of_law in summary.values())] for name in figures]
+    body += [
+        [name, *(str(of_law["statuses"].get(name, 0)) for of_law in summary.values())] for name in statuses
+    ]
+    head = ["median (95 % range) of the completed rows", *summary]
+    return pieces.table(head, body, [False, *(True for _ in summary)])
 
 
 def _spread(figure: Mapping[str, Any]) -> str:
@@ -291,7 +294,7 @@ def _spread(figure: Mapping[str, Any]) -> str:
 
 
 def _worst(rows: Rows, command: str) -> list[str]:
-    """Completed rows with the largest main figure, and how each is run alone."""
+    """Completed rows with the largest main figure, and the command that runs each alone."""
     if rows.main is None:
         return []
     values = np.where(rows.completed, rows.figures[rows.main], np.nan)
@@ -309,13 +312,13 @@ def _worst(rows: Rows, command: str) -> list[str]:
 
 
 def _failures(rows: Rows) -> list[str]:
-    """Rows by how they ended, where that was not their end, with the first of each kind."""
-    found: dict[tuple[str, str, str], list[int]] = {}
+    """Rows that did not complete by status and reason, with the first of each kind."""
+    by_kind: dict[tuple[str, str, str], list[int]] = {}
     for place in np.flatnonzero(~rows.completed).tolist():
-        found.setdefault((rows.laws[place], rows.statuses[place], rows.complaints[place]), []).append(place)
-    if not found:
+        by_kind.setdefault((rows.laws[place], rows.statuses[place], rows.complaints[place]), []).append(place)
+    if not by_kind:
         return []
-    kinds = sorted(found.items(), key=lambda each: -len(each[1]))
+    kinds = sorted(by_kind.items(), key=lambda kind: -len(kind[1]))
     body = [
         [
             law,
@@ -334,7 +337,7 @@ def _failures(rows: Rows) -> list[str]:
 
 
 def _axes(study: Mapping[str, Any], rows: Rows) -> list[str]:
-    """Axes, as they are in the rows that there are."""
+    """Axes with the values of the finished rows."""
     if not study["axis"]:
         return ["Nothing but the seed."]
     body = [[f"`{axis['field']}`", axis["kind"], _range(rows.axes[axis["field"]])] for axis in study["axis"]]
@@ -342,11 +345,11 @@ def _axes(study: Mapping[str, Any], rows: Rows) -> list[str]:
 
 
 def _range(values: Any) -> str:
-    """What an axis has in the table, in a few words."""
+    """Short list of the values of an axis in the table."""
     distinct = list(dict.fromkeys(values.tolist()))
     if values.dtype != np.float64:
-        listed = ", ".join(str(each) for each in distinct[:MOST_NAMED])
+        listed = ", ".join(str(value) for value in distinct[:MOST_NAMED])
         return shown(listed).strip("'\"") + (", …" if len(distinct) > MOST_NAMED else "")
     if len(distinct) <= MOST_NAMED:
-        return ", ".join(f"{each:.6g}" for each in distinct)
+        return ", ".join(f"{value:.6g}" for value in distinct)
     return f"{len(distinct)} from {np.nanmin(values):.6g} to {np.nanmax(values):.6g}"

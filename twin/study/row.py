@@ -1,4 +1,4 @@
-"""One row of a study, from its number to its figures."""
+"""Row of a study: its scenario, its run and its figures."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ REFUSED = "refused"
 """Status of a row whose values make no scenario."""
 
 FAILED = "failed"
-"""Status of a row in which code of the user's raised."""
+"""Status of a row in which user code raised an exception."""
 
 
 class Result(NamedTuple):
-    """What is kept of a row; all of it as JSON holds it, and the same whenever and wherever it runs."""
+    """Result of a row in JSON types; it does not depend on where and when the row runs."""
 
     status: str
     reason: str | None
@@ -66,7 +66,7 @@ class Rows:
     Raises
     ------
     InputError
-        The scenario cannot be read, an axis names no field, or a figure of the user's cannot be had.
+        The scenario cannot be read, an axis names no field, or a user metric cannot be loaded.
     """
 
     def __init__(self, study: Study, telemetry: Path | None = None) -> None:
@@ -74,7 +74,7 @@ class Rows:
         self._telemetry = telemetry
         self._files: dict[tuple[str | None, ...], Files] = {}
         self._templates: dict[tuple[Any, ...], Template | None] = {}
-        self._fields = fields_with(study.source, self._found(study.fields))
+        self._fields = fields_with(study.source, self._resolve(study.fields))
         self._names_files = True
         self.base = self._validated(copy.deepcopy(self._fields))
         self._names_files = bool(study.law) or not all(map(_is_of_numbers, study.axis))
@@ -82,13 +82,13 @@ class Rows:
         chosen = [name for name in study.metrics if name in METRICS]
         self._check_axes()
         self.metrics = tuple(METRICS) if not study.metrics else tuple(chosen)
-        self._references = [study.beside(name) for name in study.metrics if is_reference(name)]
+        self._references = [study.path(name) for name in study.metrics if is_reference(name)]
         self._own = _own_metrics(self._references)
         self.chooses_plant = study.fast and not self._names_engine()
 
     @property
     def own_metrics(self) -> tuple[str, ...]:
-        """Names of the user's figures."""
+        """Names of the user metrics."""
         return tuple(self._own)
 
     def scenario(self, row: Row, engine: str | None = None) -> Scenario:
@@ -98,7 +98,7 @@ class Rows:
         ----------
         row : Row
         engine : str, optional
-            Plant; the fast one where the model allows it, unless given.
+            Plant; the fast one if the model allows it, unless given.
 
         Raises
         ------
@@ -120,14 +120,14 @@ class Rows:
         try:
             scenario = self.scenario(row, engine)
             with self.session(scenario) as session:
-                return self._followed(row, scenario, session)
+                return self._follow(row, scenario, session)
         except InputError as error:
             return Result(REFUSED, None, str(error), {})
         except LawError as error:
             return Result(FAILED, None, str(error), {})
-        except SpheretwinError:  # no fault of the row's: a full disk
+        except SpheretwinError:  # not of the row: a full disk
             raise
-        except Exception as error:  # the user's code may raise anything
+        except Exception as error:  # user code may raise anything
             return Result(FAILED, None, exception_text(error), {})
 
     def session(self, scenario: Scenario) -> Session:
@@ -138,9 +138,9 @@ class Rows:
         return Session(scenario, files=self._files[named])
 
     def command(self, row: Row) -> str:
-        """Command line that runs a row alone; its values as they are, where they make no scenario."""
+        """Command line that runs a row alone; with the values of the row if they make no scenario."""
         law = {"controller": {**_period(self._fields), **row.law}} if row.law is not None else {}
-        named = self._found({**self.study.fields, **law, **row.values})
+        named = self._resolve({**self.study.fields, **law, **row.values})
         named["seed"] = row.seed
         try:
             scenario = self.scenario(row)
@@ -162,9 +162,9 @@ class Rows:
         """Fields of a row by section."""
         fields = self._fields_under(row.values)
         if row.law is not None:
-            law = self._found({"controller": dict(row.law)})["controller"]
+            law = self._resolve({"controller": dict(row.law)})["controller"]
             fields["controller"] = {**_period(fields), **law}
-        for dotted, value in self._found(row.values).items():
+        for dotted, value in self._resolve(row.values).items():
             self._fill_list(fields, dotted)
             reading.override(fields, dotted, value)
         fields["seed"] = row.seed
@@ -177,32 +177,32 @@ class Rows:
         members = {name: value for name, value in values.items() if is_tag(name)}
         if not members:
             return copy.deepcopy(self._fields)
-        return fields_with(self.study.source, self._found({**self.study.fields, **members}))
+        return fields_with(self.study.source, self._resolve({**self.study.fields, **members}))
 
-    def _found(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Values by dotted name, the paths in them taken from where the study is."""
-        return {dotted: self._found_one(dotted, value) for dotted, value in values.items()}
+    def _resolve(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values by dotted name, with paths relative to the folder of the study."""
+        return {dotted: self._resolve_value(dotted, value) for dotted, value in values.items()}
 
-    def _found_one(self, dotted: str, value: Any) -> Any:
+    def _resolve_value(self, dotted: str, value: Any) -> Any:
         if not isinstance(value, str | list | tuple | dict):  # a number names no file
             return value
         return reading.resolve_value_paths(self.study.folder, dotted, value)
 
     def _names_engine(self) -> bool:
-        """Whether the plant is chosen by who wrote the study, or the scenario."""
+        """True if the study or the scenario names the plant."""
         plant = self._fields.get("plant")
         chosen = isinstance(plant, Mapping) and "engine" in plant
         return chosen or any(axis.field in ("plant", ENGINE) for axis in self.study.axis)
 
-    def _followed(self, row: Row, scenario: Scenario, session: Session) -> Result:
+    def _follow(self, row: Row, scenario: Scenario, session: Session) -> Result:
         metrics = {
             name: METRICS[name](PlannedRun(session.begun_as, session.actuator, scenario.ticks))
             for name in self.metrics
         }
         sinks: list[Sink] = [follower(metrics)]
-        kept = TelemetryBuffer(session.signals, scenario.ticks) if self._own else None
+        buffer = TelemetryBuffer(session.signals, scenario.ticks) if self._own else None
         file = self._file(row, session)
-        sinks += [sink for sink in (kept, file) if sink]
+        sinks += [sink for sink in (buffer, file) if sink]
         try:
             status = follow(session, scenario.ticks, sinks)
         finally:
@@ -212,8 +212,8 @@ class Rows:
             raise session.law_error
         figures = {name: metric.value() for name, metric in metrics.items()}
         complaints: list[str] = []
-        if kept:
-            run = Run(session.begun_as, status, kept.table, session.loop_s, session.actuator)
+        if buffer:
+            run = Run(session.begun_as, status, buffer.table, session.loop_s, session.actuator)
             figures |= {name: _own_value(name, metric, run, complaints) for name, metric in self._own.items()}
         reason = session.reason.text if session.reason else None
         return Result(str(status), reason, "; ".join(complaints) or None, figures)
@@ -229,7 +229,7 @@ class Rows:
         return check_events(reading.validated(self._whole(fields), source), source)
 
     def _whole(self, fields: dict[str, Any]) -> dict[str, Any]:
-        """Fields with what their hardware says of others, and their paths as they are found from here."""
+        """Fields with the defaults of their hardware, and with resolved paths."""
         hardware = fields.get("hardware")
         for dotted, value in hardware_defaults(
             fields, hardware if isinstance(hardware, str) else None
@@ -238,10 +238,10 @@ class Rows:
         return reading.resolve_paths("", fields) if self._names_files else fields
 
     def _check_axes(self) -> None:
-        """Find out before the first row whether each axis names a field."""
+        """Check before the first row that each axis names a field."""
         known = dict(every_field(type(self.base)))
         for law in self.study.law:
-            name = self._found({"controller.law": law["law"]})["controller.law"]
+            name = self._resolve({"controller.law": law["law"]})["controller.law"]
             known |= dict(every_field(scenario_with(name)))
         for axis in self.study.axis:
             name = re.sub(r"\.\d+(?=\.|$)", f".{INDEX}", axis.field)
@@ -252,7 +252,7 @@ class Rows:
                 )
 
     def _fill_list(self, fields: dict[str, Any], dotted: str) -> None:
-        """Where a name leads into a list that the scenario leaves open, put its defaults there first."""
+        """Fill a list with its defaults if the name is of an entry and the scenario leaves the list open."""
         above, _, last = dotted.rpartition(".")
         if not last.isdecimal():
             return
@@ -274,7 +274,7 @@ class Rows:
 
 
 def follower(metrics: Mapping[str, Metric]) -> Sink:
-    """Follows a run into some metrics."""
+    """Sink that writes a run into some metrics."""
     return _Follower(metrics)
 
 
@@ -295,7 +295,7 @@ class _Follower:
 
 
 def _period(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Control period of the base scenario, which another law keeps."""
+    """Control period of the base scenario, which holds for all laws."""
     controller = fields.get("controller")
     if isinstance(controller, Mapping) and "period_s" in controller:
         return {"period_s": controller["period_s"]}
@@ -303,18 +303,18 @@ def _period(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _is_of_numbers(axis: Axis) -> bool:
-    """Whether no value of an axis can name a file."""
-    return axis.is_drawn or all(isinstance(each, int | float) for each in getattr(axis, "values", ()))
+    """True if no value of an axis can name a file."""
+    return axis.is_drawn or all(isinstance(value, int | float) for value in getattr(axis, "values", ()))
 
 
 def _list_of(dotted: str) -> str:
-    """Name of the list where a name is that of an entry of one: a command line has lists as a whole."""
+    """Name of the list if a name is of an entry: a command line sets complete lists."""
     above, _, last = dotted.rpartition(".")
     return above if last.isdecimal() else dotted
 
 
 def _value_at(whole: Mapping[str, Any], dotted: str, value: Any) -> Any:
-    """Value of a field of a whole scenario, where it is a list; else as it was given."""
+    """Value of a field of a complete scenario if it is a list; else the given value."""
     inside: Any = whole
     for part in dotted.split("."):
         inside = inside.get(part) if isinstance(inside, Mapping) else None
@@ -322,13 +322,13 @@ def _value_at(whole: Mapping[str, Any], dotted: str, value: Any) -> Any:
 
 
 def _own_metrics(references: list[str]) -> dict[str, UserMetric]:
-    own = {each.rpartition(":")[2]: load_function(each, "metric") for each in references}
+    own = {name.rpartition(":")[2]: load_function(name, "metric") for name in references}
     check_names(own)
     return own
 
 
 def _own_value(name: str, metric: UserMetric, run: Run, complaints: list[str]) -> Any:
-    """A figure of the user's; None where it cannot be had: the row's other figures must not be lost by it."""
+    """Value of a user metric; None after an exception, so that the other figures of the row are not lost."""
     try:
         return own_value(name, metric, run)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""A study from its first row to its table: what is in the journal already is not run again."""
+"""Run of a study: rows that are not in the journal, then the table."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from spheretwin.study.journal import Journal, digest_of
 from spheretwin.study.row import Rows
 from spheretwin.study.study import Study
 
-TRIED = 32
-"""Rows of a law of which one at least has to make a scenario."""
+CHECKED_ROWS = 32
+"""Rows of a law of which at least one must make a scenario."""
 
 
 def check(grid: Grid, rows: Rows) -> None:
-    """Find out whether a study has rows that can be run, and a table that can be written.
+    """Check that a study has rows that can be run, and a table that can be written.
 
-    Some values of an axis may be out of range: their rows are refused one by one. Where all rows of a law
-    are, as by a gain that it has not, the study is.
+    Some values of an axis may be out of range: their rows are refused one by one. If all rows of a law are
+    refused, as with a gain that it does not have, the study is refused.
 
     Raises
     ------
     InputError
-        A law has no such row, two columns of the table have one name, or there is no row whose telemetry is
-        wanted.
+        A law has no such row, two columns of the table have one name, or a row whose telemetry is requested
+        does not exist.
     """
     study = rows.study
     table.check_names(rows)
@@ -47,7 +47,7 @@ def check(grid: Grid, rows: Rows) -> None:
 
 def _check_law(grid: Grid, rows: Rows, law: int) -> None:
     complaints: list[str] = []
-    for row in grid.of_law(law, TRIED):
+    for row in grid.of_law(law, CHECKED_ROWS):
         try:
             rows.scenario(row)
         except InputError as error:
@@ -64,13 +64,13 @@ def _check_law(grid: Grid, rows: Rows, law: int) -> None:
 TELEMETRY = "telemetry"
 
 
-class Found(NamedTuple):
-    """What a study left.
+class StudyResult(NamedTuple):
+    """Result of a study.
 
     Attributes
     ----------
     rows : int
-        Finished, those of earlier runs included.
+        Finished rows, including those of earlier runs.
     of : int
         Requested: the first rows up to the limit, and those behind it that were finished earlier.
     study_rows : int
@@ -78,17 +78,17 @@ class Found(NamedTuple):
     failed : int
         Finished rows whose status is not ``completed``, or that lack a figure because a metric raised.
     resumed : int
-        Rows that were in the journal already.
+        Rows of earlier runs.
     torn : bool
         Whether the journal ended in a torn line, which was dropped.
     damaged : int
-        Lines of the journal that were passed over, and their rows run again.
+        Damaged lines of the journal, whose rows were run again.
     checked : int
         Rows that were run on both plants.
     wall_s : float
     startup_s : float, optional
-        Of it, what went by before the first row was finished: the engine's start, and what is read and
-        compiled once. None where none was run.
+        Time until the first row was finished: start of the engine, files and compilation. None if no row was
+        run.
     table : Path
     """
 
@@ -115,7 +115,7 @@ def run_study(
     limit: int | None,
     done: Callable[[int, int], None],
     stop_requested: Callable[[], bool],
-) -> Found:
+) -> StudyResult:
     """Run a study, as `spheretwin.study.run` says."""
     started = time.perf_counter()
     chosen = _engine(engine, address)
@@ -124,28 +124,29 @@ def run_study(
     rows = Rows(study, _telemetry_folder(study, folder))
     check(grid, rows)
     wanted = min(len(grid), limit or len(grid))
-    with Journal(folder / journal.NAME, digest_of(rows), len(grid)) as kept:
-        resumed, missing = kept.done(), wanted - kept.done(wanted)
+    with Journal(folder / journal.NAME, digest_of(rows), len(grid)) as stored:
+        resumed, missing = stored.done(), wanted - stored.done(wanted)
         work = Work(rows)
-        todo = (number for number in range(wanted) if not kept.has(number))
+        todo = (number for number in range(wanted) if not stored.has(number))
         order = Order(todo, missing, grid, work, threads, address, stop_requested)
         try:
-            first = _fill(kept, resumed + missing, chosen, order, done)
+            first = _fill(stored, resumed + missing, chosen, order, done)
         except BaseException:
-            with suppress(SpheretwinError):  # what came first is told, as that the disk is full
-                table.write(folder / table.NAME, grid, kept, rows)
+            with suppress(SpheretwinError):  # the first error is reported, as of a full disk
+                table.write(folder / table.NAME, grid, stored, rows)
             raise
-        table.write(folder / table.NAME, grid, kept, rows)
-        return Found(
-            rows=kept.done(),
+        table.write(folder / table.NAME, grid, stored, rows)
+        return StudyResult(
+            rows=stored.done(),
             of=resumed + missing,
             study_rows=len(grid),
             failed=sum(
-                result.status != Status.COMPLETED or result.error is not None for _, result in kept.results()
+                result.status != Status.COMPLETED or result.error is not None
+                for _, result in stored.results()
             ),
             resumed=resumed,
-            torn=kept.torn,
-            damaged=kept.damaged,
+            torn=stored.torn,
+            damaged=stored.damaged,
             checked=len(work.checked),
             wall_s=time.perf_counter() - started,
             startup_s=None if first is None else first - started,
@@ -154,25 +155,25 @@ def run_study(
 
 
 def _fill(
-    kept: Journal, wanted: int, engine: Engine, order: Order, done: Callable[[int, int], None]
+    journal: Journal, wanted: int, engine: Engine, order: Order, done: Callable[[int, int], None]
 ) -> float | None:
-    """Run what the journal has not yet; returns when the first row was finished.
+    """Run the missing rows; return the time at which the first one was finished.
 
     Raises
     ------
     SpheretwinError
-        One of the rows has shown that the others cannot be believed; those in flight are finished and kept.
+        A row has a fault that affects all others; running rows are finished and stored.
     """
-    work, asked = order.work, order.stop_requested
-    finished = kept.done()
+    work, interrupted = order.work, order.stop_requested
+    finished = journal.done()
     done(finished, wanted)
     first = None
-    stopping = order._replace(stop_requested=lambda: bool(work.faults) or asked())
+    stopping = order._replace(stop_requested=lambda: bool(work.faults) or interrupted())
     with closing(engine.run(stopping)) as results:
         for row, result in results:
             first = first or time.perf_counter()
             if result is not None:
-                kept.add(row, result)
+                journal.add(row, result)
                 finished += 1
                 done(finished, wanted)
     if work.faults:
@@ -187,7 +188,7 @@ def _engine(name: str, address: str | None) -> Engine:
             f" received {shown(name)}{did_you_mean(name, ENGINES)}"
         )
     if address is not None and not ENGINES[name].takes_address:
-        able = [each for each, engine in ENGINES.items() if engine.takes_address]
+        able = [other for other, engine in ENGINES.items() if engine.takes_address]
         raise InputError(f"sweep: expected engine {', '.join(able)} for an address, received {name}")
     return ENGINES[name]
 

@@ -1,4 +1,4 @@
-"""The table of a study as arrays: a number a row for each figure, values of the axes, laws and statuses."""
+"""Statistics of a study: its table as arrays, rank correlations and a summary."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Texts = NDArray[np.object_]
 MAIN = "max_abs_error_rad"
 
 TEXTS = ("key", "law", "status", "reason", "error")
-BESIDE = ("row", "key", "seed", "law", "repeat", "status", "reason", "error")
+OTHER_COLUMNS = ("row", "key", "seed", "law", "repeat", "status", "reason", "error")
 
 
 class Rows(NamedTuple):
@@ -37,13 +37,13 @@ class Rows(NamedTuple):
     study : dict
         As its TOML says it.
     numbers : (n,) array
-        Of the rows, in the study.
+        Numbers of the rows in the study.
     keys, laws, statuses, complaints : (n,) object arrays
-        A complaint is the reason of an end, or the error; empty where there is none.
+        A complaint is the reason of the status, or the error; empty without one.
     axes : mapping of field to (n,) array
         Numbers, or text.
     figures : mapping of name to (n,) array
-        Of a figure of each hinge, the largest of the three; NaN where there is none.
+        Of a figure of each hinge, the largest of the three; NaN without a value.
     """
 
     study: dict[str, Any]
@@ -57,23 +57,23 @@ class Rows(NamedTuple):
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """Which rows came to their end."""
+        """True for the rows that completed."""
         return self.statuses == str(Status.COMPLETED)
 
     @property
     def failures(self) -> NDArray[np.int64]:
-        """Places of rows that a watchdog ended, or in which a law or a metric of the user's raised."""
+        """Indices of rows that the watchdog ended, or in which user code raised an exception."""
         failed = np.isin(self.statuses, [FAILED, str(Status.FAILSAFE)])
         return np.flatnonzero(failed | (self.completed & (self.complaints != "")))
 
     @property
     def law_names(self) -> list[str]:
-        """Laws, in the order in which they come first."""
+        """Laws in the order of their first rows."""
         return list(dict.fromkeys(self.laws.tolist()))
 
     @property
     def main(self) -> str | None:
-        """The figure that others are held against: the largest error, else the first that is kept."""
+        """Main figure of the report: the largest error, else the first figure."""
         return MAIN if MAIN in self.figures else next(iter(self.figures), None)
 
 
@@ -103,13 +103,13 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
     figures = [
         field.name
         for field in schema
-        if field.name not in (*BESIDE, *axes) and not pa.types.is_string(field.type)
+        if field.name not in (*OTHER_COLUMNS, *axes) and not pa.types.is_string(field.type)
     ]
-    found = file.read(columns=[*TEXTS, "row", *axes, *figures], use_threads=False)
-    texts = {name: np.array(found[name].to_pylist(), dtype=object) for name in TEXTS}
+    columns = file.read(columns=[*TEXTS, "row", *axes, *figures], use_threads=False)
+    texts = {name: np.array(columns[name].to_pylist(), dtype=object) for name in TEXTS}
     return Rows(
         study,
-        found["row"].to_numpy(),
+        columns["row"].to_numpy(),
         texts["key"],
         np.array([_label(law) for law in texts["law"]], dtype=object),
         texts["status"],
@@ -117,13 +117,13 @@ def _rows(file: pyarrow.parquet.ParquetFile) -> Rows:
             [error or reason or "" for error, reason in zip(texts["error"], texts["reason"], strict=True)],
             dtype=object,
         ),
-        {field: _values(found[field]) for field in axes},
-        {name: largest(found[name]) for name in sorted(figures, key=_place)},
+        {field: _values(columns[field]) for field in axes},
+        {name: largest(columns[name]) for name in sorted(figures, key=_place)},
     )
 
 
 def largest(column: pa.ChunkedArray) -> Array:
-    """One number a row: of a list, the largest; NaN where there is none, or a part of it."""
+    """One number for each row: the largest of a list; NaN if a number is missing."""
     import pyarrow as pa
 
     if not pa.types.is_list(column.type):
@@ -139,12 +139,12 @@ def largest(column: pa.ChunkedArray) -> Array:
 
 
 def _label(law: str) -> str:
-    """A law as people read it: its name, then its gains."""
+    """Label of a law: its name, then its gains."""
     if not law.startswith("{"):
         return law
-    told = json.loads(law)
-    gains = (f"{name} = {value}" for name, value in told.items() if name != "law")
-    return ", ".join([told["law"], *gains])
+    fields = json.loads(law)
+    gains = (f"{name} = {value}" for name, value in fields.items() if name != "law")
+    return ", ".join([fields["law"], *gains])
 
 
 def _values(column: pa.ChunkedArray) -> NDArray[Any]:
@@ -157,7 +157,7 @@ def _values(column: pa.ChunkedArray) -> NDArray[Any]:
 
 
 def _place(name: str) -> int:
-    """Metrics in their own order, the user's behind them."""
+    """Position of a figure: metrics in their order, then user metrics."""
     return list(METRICS).index(name) if name in METRICS else len(METRICS)
 
 
@@ -167,18 +167,17 @@ if TYPE_CHECKING:  # Matplotlib is slow to import, and need not be there
 NORMAL_95 = 1.96
 
 ENOUGH = 4
-"""Rows a column from which on the others can be taken away."""
+"""Least number of rows for each column of a partial correlation."""
 
 SINGULAR = 1e6
 
 
 def ranked(axes: Sequence[NDArray[np.float64]], figure: NDArray[np.float64]) -> Rank:
-    """Spearman's rank correlations of a figure, partial where there are rows enough.
+    """Spearman's rank correlations of a figure, partial if there are enough rows.
 
-    An error does not care for the sign of what shifts it: such an axis has no rank correlation with it, and
-    shows by its distance from its middle. Where one axis outweighs all others, these show only when what
-    goes with it is taken away: the partial correlation is that of what a linear fit of the ranks of all
-    other columns leaves of both.
+    An error may depend on the distance of an axis from its middle and not on its sign: both are columns. If
+    one axis dominates, the others show in the partial correlation alone: that of the residuals of a linear
+    fit of the ranks of all other columns.
 
     Parameters
     ----------
@@ -194,29 +193,29 @@ def ranked(axes: Sequence[NDArray[np.float64]], figure: NDArray[np.float64]) -> 
     is_partial = (
         rows >= ENOUGH * among
         and differ[-1] == len(columns)
-        and bool(np.linalg.cond(inner) < SINGULAR)  # else some axes go together, as those of a zip
+        and bool(np.linalg.cond(inner) < SINGULAR)  # else some axes depend on each other, as those of a zip
     )
     if is_partial:
         inverse = np.linalg.inv(inner)
         size = np.sqrt(np.diag(inverse))
-        found = np.zeros(len(columns))
-        found[differ[:-1]] = -inverse[-1, :-1] / (size[-1] * size[:-1])
+        correlations = np.zeros(len(columns))
+        correlations[differ[:-1]] = -inverse[-1, :-1] / (size[-1] * size[:-1])
     else:
-        found = plain[-1, :-1]
+        correlations = plain[-1, :-1]
     free = rows - among if is_partial else rows - 1
     from spheretwin.viz.figures.distributions import Rank
 
-    return Rank(found[: len(axes)], found[len(axes) :], NORMAL_95 / np.sqrt(free), is_partial)
+    return Rank(correlations[: len(axes)], correlations[len(axes) :], NORMAL_95 / np.sqrt(free), is_partial)
 
 
 def strongest(ranks: Iterable[Rank]) -> list[int]:
-    """Places of the axes by their largest correlation of either kind, under any law, the strongest first."""
+    """Indices of the axes by their largest correlation of either kind under any law, the strongest first."""
     sizes = [np.maximum(np.abs(rank.by_value), np.abs(rank.by_distance)) for rank in ranks]
     return np.argsort(-np.max(sizes, axis=0), kind="stable").tolist()
 
 
 def _ranks(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Ranks about their mean, of length 1; zeros where nothing differs."""
+    """Ranks about their mean, of length 1; zeros if all values are equal."""
     from scipy.stats import rankdata  # slow to import
 
     about = rankdata(values) - (len(values) + 1) / 2
@@ -228,7 +227,7 @@ LEVELS = (2.5, 50.0, 97.5)
 
 
 def summary(rows: Rows) -> dict[str, Any]:
-    """What a study says as a whole.
+    """Summary of a study.
 
     Returns
     -------
@@ -236,18 +235,18 @@ def summary(rows: Rows) -> dict[str, Any]:
         By law: ``statuses`` with their counts, and for each figure of the completed rows ``median`` and
         ``range_95``; of a figure of each hinge, the largest of the three is taken.
     """
-    found: dict[str, Any] = {}
+    by_law: dict[str, Any] = {}
     for law in rows.law_names:
         of_law = rows.laws == law
-        found[law] = {
+        by_law[law] = {
             "statuses": dict(Counter(rows.statuses[of_law].tolist())),
             **{name: _spread(values[of_law & rows.completed]) for name, values in rows.figures.items()},
         }
-    return found
+    return by_law
 
 
 def _spread(values: NDArray[np.float64]) -> dict[str, Any]:
-    """Median and range of the numbers among some values; None where there is none."""
+    """Median and range of the finite values; None without one."""
     numbers = values[np.isfinite(values)]
     if not len(numbers):
         return {"median": None, "range_95": None}

@@ -1,4 +1,4 @@
-"""A study as its TOML says it: a base scenario, what differs from row to row, and what is kept of each."""
+"""Study: a base scenario, axes, laws and seeds of its rows, and the figures of each row."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class Study(BaseModel):
         return self
 
     def _check_nothing_is_dropped(self, axes: list[str]) -> None:
-        """Refuse fields that something else of the study would overwrite without a word."""
+        """Refuse fields that another part of the study would overwrite."""
         for field in self.fields:
             if field == "seed":
                 raise ValueError("expected seed and seeds of the study, received seed among its fields")
@@ -142,14 +142,14 @@ class Study(BaseModel):
             if self.law and of_controller and field != "controller.period_s":
                 raise ValueError(f"expected {field} in each [[law]], received it among the fields")
 
-    def beside(self, path: str) -> str:
-        """A path, or a reference into a file, as it is found from the working folder."""
+    def path(self, path: str) -> str:
+        """Path, or reference into a file, relative to the working folder."""
         return os.path.join(self.folder, os.path.expanduser(path))
 
     @property
     def source(self) -> str:
-        """The scenario as it is found from the working folder."""
-        return self.beside(self.scenario) if self.scenario.endswith(".toml") else self.scenario
+        """Scenario, its path relative to the working folder."""
+        return self.path(self.scenario) if self.scenario.endswith(".toml") else self.scenario
 
     @property
     def drawn_axes(self) -> tuple[Axis, ...]:
@@ -158,7 +158,7 @@ class Study(BaseModel):
 
 
 def repeated(values: Iterable[Any]) -> list[Any]:
-    """Those among some values that are there more than once; a whole number is the same as a broken one."""
+    """Values that occur more than once; an integer equals a float of the same value."""
     listed = list(values)
     with suppress(TypeError):  # lists and tables, which need a closer look
         if len(set(listed)) == len(listed):
@@ -249,7 +249,7 @@ def fast_engine(named: str | None, integrator: str) -> str:
 
 @lru_cache(maxsize=8)
 def _is_free_rotor(path: Path) -> bool:
-    """Whether a model holds no more than the Lagrangian knows; one that cannot be read will say so itself."""
+    """True if the Lagrangian covers the model; a model that cannot be read is reported when it is loaded."""
     try:
         return not mjcf.read(path).unknown_to_the_lagrangian
     except InputError:

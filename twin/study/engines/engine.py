@@ -1,4 +1,4 @@
-"""What an engine of a sweep is: it runs rows wherever it can, and hands over each as it is finished."""
+"""Engine of a sweep: it runs rows and returns each as it is finished."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Work:
     ----------
     rows : Rows
     faults : list of SpheretwinError
-        Why rows have no result: no fault of theirs.
+        Reasons for rows without a result that are no fault of these rows.
     checked : list of int
         Rows that were run on both plants.
     """
@@ -31,7 +31,7 @@ class Work:
         self.checked: list[int] = []
 
     def __call__(self, row: Row) -> Result | None:
-        """Result of a row; None where there is a fault."""
+        """Result of a row; None after a fault."""
         try:
             result = self.rows.run(row)
             if result.error is None and self.rows.chooses_plant and agreement.is_checked(row):
@@ -44,24 +44,24 @@ class Work:
 
 
 class Order(NamedTuple):
-    """What an engine is asked for.
+    """Rows that an engine has to run.
 
     Attributes
     ----------
     numbers : iterator of int
-        Of the rows to run.
+        Numbers of the rows.
     rows : int
-        How many these are.
+        Count of the numbers.
     grid : Grid
         Of the study.
     work : Work
-        Runs a row here. What goes wrong elsewhere is added to it, as if it had been here.
+        Runs a row in this process. An engine adds the faults of other processes to it.
     threads : int, optional
-        Rows at most that run at a time; as many as there are cores unless given.
+        Largest number of rows at a time; number of cores unless given.
     address : str, optional
-        Of the machines, for an engine that takes one.
+        Address of a cluster, for an engine that takes one.
     stop_requested : callable
-        From True on no other row is begun, and those in flight are finished.
+        After True no row is started, and running rows are finished.
     """
 
     numbers: Iterator[int]
@@ -79,9 +79,9 @@ class Engine(NamedTuple):
     Attributes
     ----------
     run : callable
-        Rows of an order with their results, in any order; None for one that has shown a fault.
+        Yields the rows of an order with their results, in any order; None for a row with a fault.
     takes_address : bool
-        Whether it can be told where its machines are.
+        Whether it needs the address of a cluster.
     """
 
     run: Callable[[Order], Generator[tuple[Row, Result | None]]]
@@ -92,21 +92,21 @@ TASK_S = 1.0
 
 MOST_ROWS = 10_000
 
-# Of a row alone in its batch: a node may be lost under it by chance, but hardly as often as this.
+# Losses of a batch of one row: a node may be lost by chance, but hardly as often as this.
 MOST_LOSSES = 4
 
 
 class Batches:
-    """Numbers of rows, cut into batches as they are asked for.
+    """Batches of row numbers.
 
-    The first hold a row each; how long these took says how many the next may hold. Towards the end they
-    become smaller, so that all cores have something to do until it.
+    The first batches have one row; their duration gives the size of the next. Towards the end batches become
+    smaller, so that all cores are busy until the end.
 
     Parameters
     ----------
     numbers : iterator of int
     count : int
-        How many they are.
+        Count of the numbers.
     """
 
     def __init__(self, numbers: Iterator[int], count: int) -> None:
@@ -114,10 +114,10 @@ class Batches:
         self._again: deque[list[int]] = deque()
         self._losses: Counter[int] = Counter()
         self.rows = 1
-        """Rows of a batch that takes about as long as it should."""
+        """Rows of a batch that takes about `TASK_S`."""
 
     def next(self, at_a_time: int) -> list[int]:
-        """Next batch, empty where there is none; `at_a_time` of them are under way together."""
+        """Next batch, empty if there is none; `at_a_time` of them run together."""
         if self._again:
             return self._again.popleft()
         share = -(-self._left // (2 * at_a_time))
@@ -126,14 +126,14 @@ class Batches:
         return batch
 
     def landed(self, rows: int, wall_s: float) -> None:
-        """Learn from a batch that is finished; the first row of a process is slow, so only up to a factor."""
+        """Adapt the size to a finished batch, by a limited factor: the first row of a process is slow."""
         fitting = TASK_S * rows / max(wall_s, 1e-9)
         self.rows = int(min(max(fitting, self.rows // 2, 1), 2 * self.rows, MOST_ROWS))
 
     def lost(self, batch: list[int]) -> bool:
-        """Take a batch back whose node or process was lost; False where it has been lost too often.
+        """Take back a batch whose node or process was lost; False if it was lost too often.
 
-        It comes again in two halves: a row that takes its process along is soon alone.
+        It runs again in two halves: a row that ends its process is soon alone.
         """
         self._losses.update(batch)
         if len(batch) == 1:

@@ -23,51 +23,51 @@ from collections.abc import Generator, Iterator
 from typing import Any
 
 from spheretwin.models.base.errors import InputError, SpheretwinError, shown, without_breaks
-from spheretwin.study.engines import ray_worker, threads
+from spheretwin.study.engines import ray_internals, ray_worker, threads
 from spheretwin.study.engines.engine import Batches, Engine, Order
 from spheretwin.study.grid import Row
 from spheretwin.study.row import Result
 
-# Whoever runs a sweep hears of it from the sweep; nobody else does.
+# No messages of Ray and no usage statistics.
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # else it warns of accelerators, which nothing here uses
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",  # no warning about accelerators
 }
 
-# What makes Ray take 127.0.0.1 for its own address, and let in none but its own processes.
+# Ray uses 127.0.0.1 as its address and accepts only its own processes.
 ALONE = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_AUTH_MODE": "token"}
 
 PORT = 6379
 
 OBJECTS_BYTES = 100_000_000
-"""Store of a local cluster: results are small, and go with the messages."""
+"""Object store of a local cluster: results are small, and are part of the messages."""
 
 AHEAD = 2
 """Batches a core: one runs, one waits."""
 
-LOOK_S = 1.0
-"""How often to look whether there is still a cluster to wait for."""
+HEARTBEAT_S = 1.0
+"""Interval of the checks that the cluster is still there."""
 
 MOST_SILENCES = 3
-"""Looks in a row that find no cluster, or no core in it, before it is given up."""
+"""Consecutive checks without a cluster, or without a core in it, after which it is lost."""
 
 REACH_S = 5.0
 
 CONNECT_S = 60.0
 
-# Where what answers is no cluster, or one that has another address for itself, Ray asks it again for ever.
+# If the answer is not of a cluster, or of one with another address, Ray repeats its request for ever.
 PROBE = "import ray, sys; ray.init(address=sys.argv[1], log_to_driver=False, configure_logging=False)"
 
 
 def run(order: Order) -> Generator[tuple[Row, Result | None]]:
-    """Results of rows, each batch as it is finished.
+    """Yield the results of rows, each batch as it is finished.
 
     Raises
     ------
     InputError
         Ray is not installed, or there is no cluster at the address.
     SpheretwinError
-        The cluster was lost, or a row took its process along again and again.
+        The cluster was lost, or a row repeatedly ended its process.
     """
     if order.rows == 0:
         return
@@ -81,17 +81,17 @@ def run(order: Order) -> Generator[tuple[Row, Result | None]]:
 
 
 class _Cluster:
-    """The driver's side: which batches are under way, and what comes back of them."""
+    """Driver: running batches and their results."""
 
     def __init__(self, ray: Any, order: Order, here: list[int]) -> None:
         self._ray, self._order = ray, order
-        kept_here = set(order.work.rows.study.telemetry)
-        self._batches = Batches(_without(order.numbers, kept_here, here), order.rows)
+        local = set(order.work.rows.study.telemetry)
+        self._batches = Batches(_without(order.numbers, local, here), order.rows)
         self._job = ray.put(ray_worker.job_of(order.work.rows))
-        # What is lost comes back to `Batches`, which knows how often; Ray itself repeats nothing.
+        # `Batches` counts and repeats lost batches; Ray itself repeats nothing.
         self._task = ray.remote(num_cpus=1, max_retries=0)(ray_worker.run_batch)
-        self._flying: dict[Any, list[int]] = {}
-        self._silences, self._looked_s = 0, time.monotonic()
+        self._running: dict[Any, list[int]] = {}
+        self._silences, self._checked_s = 0, time.monotonic()
         self._cores = self._most()
         context = ray.get_runtime_context()
         (ours,) = (node for node in ray.nodes() if node["NodeID"] == context.get_node_id())
@@ -103,42 +103,42 @@ class _Cluster:
     def results(self) -> Iterator[tuple[Row, Result | None]]:
         while True:
             if not self._order.stop_requested():
-                self._take_off()
-            if not self._flying:
+                self._submit()
+            if not self._running:
                 return
-            ready, _ = self._ray.wait(list(self._flying), timeout=LOOK_S)
-            if time.monotonic() - self._looked_s >= LOOK_S:
-                self._look()
+            ready, _ = self._ray.wait(list(self._running), timeout=HEARTBEAT_S)
+            if time.monotonic() - self._checked_s >= HEARTBEAT_S:
+                self._check()
             for task in ready:
-                yield from self._land(task)
+                yield from self._collect(task)
 
-    def _take_off(self) -> None:
-        # A batch of one row may take long: none is begun that an interruption would have to wait for.
+    def _submit(self) -> None:
+        # A batch of one row may take long: no batch waits that an interruption would have to wait for.
         most = self._cores * (AHEAD if self._batches.rows > 1 else 1)
-        while len(self._flying) < max(most, 1):
+        while len(self._running) < max(most, 1):
             batch = self._batches.next(max(most, 1))
             if not batch:
                 return
-            self._flying[self._task.remote(self._job, batch)] = batch
+            self._running[self._task.remote(self._job, batch)] = batch
 
-    def _land(self, task: Any) -> Iterator[tuple[Row, Result | None]]:
-        batch, errors = self._flying.pop(task), self._ray.exceptions
+    def _collect(self, task: Any) -> Iterator[tuple[Row, Result | None]]:
+        batch, errors = self._running.pop(task), self._ray.exceptions
         try:
-            landed: ray_worker.Landed = self._ray.get(task)
-        except errors.RayTaskError as error:  # sources so different that they cannot even say so
+            result: ray_worker.BatchResult = self._ray.get(task)
+        except errors.RayTaskError as error:  # sources that differ too much to report it
             raise SpheretwinError(
                 f"study {self._order.work.rows.study.name}: expected every node to run its rows,"
                 f" received {type(error.cause).__name__}: {without_breaks(error.cause)}"
             ) from None
-        except errors.RayError as error:  # node, process or memory is gone
+        except errors.RayError as error:  # node, process or memory is lost
             self._lose(batch, error)
             return
-        self._batches.landed(len(batch), landed.wall_s)
-        self._order.work.checked += landed.checked
-        for number, result in landed.results:
-            yield self._order.grid[number], result
-        if landed.fault is not None:
-            self._order.work.faults.append(SpheretwinError(landed.fault))
+        self._batches.landed(len(batch), result.wall_s)
+        self._order.work.checked += result.checked
+        for number, of_row in result.results:
+            yield self._order.grid[number], of_row
+        if result.fault is not None:
+            self._order.work.faults.append(SpheretwinError(result.fault))
 
     def _lose(self, batch: list[int], error: Exception) -> None:
         self._cores = self._most()
@@ -148,15 +148,15 @@ class _Cluster:
                 f" alive, received {type(error).__name__} again and again; what is finished is kept"
             )
 
-    def _look(self) -> None:
-        """See whether head and own node are still there.
+    def _check(self) -> None:
+        """Check that head and own node are still there.
 
         Raises
         ------
         SpheretwinError
-            One is gone. Ray itself would end this process for it some time later, without a word.
+            One is lost. Ray itself would end this process some time later without a message.
         """
-        self._looked_s = time.monotonic()
+        self._checked_s = time.monotonic()
         is_there = all(map(_answers, self._lifelines))
         self._cores = self._most() if is_there else 0
         self._silences = 0 if self._cores else self._silences + 1
@@ -173,9 +173,9 @@ class _Cluster:
         return min(cores, self._order.threads or cores)
 
 
-def _without(numbers: Iterator[int], kept_here: set[int], here: list[int]) -> Iterator[int]:
+def _without(numbers: Iterator[int], local: set[int], here: list[int]) -> Iterator[int]:
     for number in numbers:
-        if number in kept_here:
+        if number in local:
             here.append(number)
         else:
             yield number
@@ -198,10 +198,10 @@ def _ray(local: bool) -> Any:
 
 @contextlib.contextmanager
 def _connected(ray: Any, order: Order) -> Iterator[None]:
-    """A cluster: the one at the address, or one on this machine that ends with the sweep."""
+    """Connect to the cluster at the address, or to one on this machine that ends with the sweep."""
     quiet = {"log_to_driver": False, "configure_logging": False}
     logging.getLogger("ray").setLevel(logging.CRITICAL)
-    ray._private.worker._worker_logs_enabled = False  # what a lost node had to say, on the driver's stdout
+    ray_internals.silence(ray)
     if order.address is not None:
         _check_reachable(order.address)
     before = signal.getsignal(signal.SIGTERM)
@@ -216,14 +216,14 @@ def _connected(ray: Any, order: Order) -> Iterator[None]:
             )
         else:
             ray.init(address=order.address, **quiet)
-    except Exception as error:  # Ray has no root for what fails as it starts: gRPC, sockets raise their own
-        # None of our code runs in here, so that no fault of ours is hidden.
+    except Exception as error:  # exceptions of gRPC and sockets have no common base
+        # None of our code runs here: no fault of ours is hidden.
         raise InputError(
             f"sweep: expected a Ray cluster {_where(order.address)}, received {without_breaks(error)}"
         ) from None
     finally:
         if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, before)  # Ray takes it, to leave at once
+            signal.signal(signal.SIGTERM, before)  # Ray replaces it
     try:
         yield
     finally:
@@ -235,12 +235,12 @@ def _where(address: str | None) -> str:
 
 
 def _check_reachable(address: str) -> None:
-    """Find out within a minute what Ray finds out in many, or never.
+    """Check the address within a minute; Ray itself may need many, or never end.
 
     Raises
     ------
     InputError
-        Nobody answers there.
+        There is no answer.
     """
     if "://" in address:
         raise InputError(

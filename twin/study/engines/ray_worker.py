@@ -1,7 +1,7 @@
-"""What a process of a cluster does: it makes the study's rows from its configuration, once, and runs batches.
+"""Process of a cluster: it creates the rows of the study from its configuration, once, and runs batches.
 
-A figure must not depend on where its row was run. So a process first holds what its results would stand on
-against what the driver's stand on, and runs no row where the two differ.
+A figure must not depend on the node. A process first compares its sources, files and versions with those of
+the driver, and runs no row if they differ.
 """
 
 from __future__ import annotations
@@ -17,45 +17,45 @@ from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.study.engines.engine import Work
 from spheretwin.study.grid import Grid
-from spheretwin.study.journal import basis_of
+from spheretwin.study.journal import provenance_of
 from spheretwin.study.row import Result, Rows
 from spheretwin.study.study import Study
 
 
 class Job(NamedTuple):
-    """A study as it travels: nothing of it but text.
+    """Study as text for other processes.
 
     Attributes
     ----------
     study : str
         JSON.
     folder : str
-        Where the study's paths are taken from.
+        Folder of the paths of the study.
     working_folder : str
-        Where this folder in turn is taken from.
-    basis : tuple of (str, str)
-        What the driver's results stand on: name, and digest or version.
+        Folder of that folder.
+    provenance : tuple of (str, str)
+        Provenance of the driver: name, and digest or version.
     """
 
     study: str
     folder: str
     working_folder: str
-    basis: tuple[tuple[str, str], ...]
+    provenance: tuple[tuple[str, str], ...]
 
 
-class Landed(NamedTuple):
-    """What came of a batch.
+class BatchResult(NamedTuple):
+    """Results of a batch.
 
     Attributes
     ----------
     results : list of (int, Result)
-        By the row's number, those that were finished.
+        Finished rows by number.
     checked : list of int
         Rows that were run on both plants.
     fault : str, optional
-        Why the study has to stop.
+        Reason to stop the study.
     wall_s : float
-        What the rows took.
+        Duration of the rows.
     """
 
     results: list[tuple[int, Result]]
@@ -65,17 +65,17 @@ class Landed(NamedTuple):
 
 
 def job_of(rows: Rows) -> Job:
-    """Job of a study, as the driver has it."""
+    """Job of the study of the driver."""
     study = rows.study
-    return Job(study.model_dump_json(), study.folder, os.getcwd(), tuple(sorted(basis_of(rows).items())))
+    return Job(study.model_dump_json(), study.folder, os.getcwd(), tuple(sorted(provenance_of(rows).items())))
 
 
-def run_batch(job: Job, numbers: list[int]) -> Landed:
+def run_batch(job: Job, numbers: list[int]) -> BatchResult:
     """Run rows of a job by their numbers, up to the first fault."""
     try:
         grid, rows = _prepared(job)
     except SpheretwinError as error:
-        return Landed([], [], str(error), 0.0)
+        return BatchResult([], [], str(error), 0.0)
     started = time.perf_counter()
     work, results = Work(rows), []
     with timers_stopped():
@@ -85,7 +85,7 @@ def run_batch(job: Job, numbers: list[int]) -> Landed:
                 break
             results.append((number, result))
     fault = str(work.faults[0]) if work.faults else None
-    return Landed(results, work.checked, fault, time.perf_counter() - started)
+    return BatchResult(results, work.checked, fault, time.perf_counter() - started)
 
 
 @lru_cache(maxsize=1)
@@ -95,7 +95,7 @@ def _prepared(job: Job) -> tuple[Grid, Rows]:
     Raises
     ------
     SpheretwinError
-        A file is not here, or they would stand on something else than the driver's.
+        A file is missing, or sources, files or versions differ from the driver's.
     """
     with suppress(
         OSError
@@ -104,10 +104,10 @@ def _prepared(job: Job) -> tuple[Grid, Rows]:
     study = Study.model_validate_json(job.study).model_copy(update={"folder": job.folder})
     try:
         rows = Rows(study)
-        ours = basis_of(rows)
+        ours = provenance_of(rows)
     except SpheretwinError as error:
         raise SpheretwinError(f"study {study.name}: node {platform.node()}: {error}") from None
-    theirs = dict(job.basis)
+    theirs = dict(job.provenance)
     if apart := [
         _difference_text(name, ours, theirs)
         for name in sorted({*ours, *theirs})

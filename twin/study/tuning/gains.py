@@ -1,4 +1,4 @@
-"""The gains of each law of a study: the fields that follow from them, and what can be told before a trial."""
+"""Gains of each law of a study: their fields, ranges and start, and the checks before the first trial."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from spheretwin.study.tuning.trials import with_fields
 
 
 def section_of(study: Study) -> Optimise:
-    """What a study says of its tuning.
+    """Section [optimise] of a study.
 
     Raises
     ------
     InputError
-        It says nothing, or gains that it cannot have.
+        The study has none, or a gain conflicts with its fields or axes.
     """
     if study.optimise is None:
         raise InputError(f"study {study.name}: expected [optimise] in a study that is tuned, received none")
@@ -39,7 +39,7 @@ def section_of(study: Study) -> Optimise:
 
 
 def called(law: Mapping[str, Any] | None, rows: Rows) -> str:
-    """Name of a law as tables have it: its own alone where nothing else is said of it."""
+    """Label of a law in tables: its name alone if it has no other fields."""
     if law is None:
         return rows.base.controller.law
     return str(law["law"]) if set(law) == {"law"} else json.dumps(law, sort_keys=True)
@@ -51,29 +51,29 @@ def gains_of(study: Study, law: Mapping[str, Any] | None, rows: Rows) -> tuple[G
     Raises
     ------
     InputError
-        None, two of one name, some of which start and some do not, or one that a study says otherwise.
+        There is none, two have one name, only some have a start, or the law fixes a gain.
     """
     name = rows.base.controller.law if law is None else str(law["law"])
-    gains = tuple(each for each in section_of(study).gain if each.law in ("", name))
+    gains = tuple(gain for gain in section_of(study).gain if gain.law in ("", name))
     if not gains:
         raise InputError(f"study {study.name}: expected gains of {name}, received none")
-    names = [each.called for each in gains]
-    if twice := [each for each in names if names.count(each) > 1]:
+    names = [gain.called for gain in gains]
+    if twice := [gain for gain in names if names.count(gain) > 1]:
         raise InputError(f"study {study.name}: expected gains of different names, received {twice[0]} twice")
-    starts = [each.called for each in gains if each.start is not None]
+    starts = [gain.called for gain in gains if gain.start is not None]
     if 0 < len(starts) < len(gains):
-        missing = next(each for each in names if each not in starts)
+        missing = next(gain for gain in names if gain not in starts)
         raise InputError(
             f"study {study.name}: expected start of every gain of {name}, received none of {missing}"
         )
-    fixed = {f"controller.{each}" for each in law or {}}
-    if both := [each for each in values(gains, dict.fromkeys(names, 1.0)) if each in fixed]:
+    fixed = {f"controller.{field}" for field in law or {}}
+    if both := [field for field in values(gains, dict.fromkeys(names, 1.0)) if field in fixed]:
         raise InputError(f"study {study.name}: expected {both[0]} in [[law]] or as a gain, received both")
     return gains
 
 
 def check_laws(study: Study, rows: Rows) -> None:
-    """Find out whether each gain is of a law of the study.
+    """Check that each gain is of a law of the study.
 
     Raises
     ------
@@ -97,37 +97,37 @@ def values(gains: Sequence[Gain], chosen: Mapping[str, float]) -> dict[str, floa
     gains : sequence of Gain
     chosen : mapping of a gain's name to float
     """
-    found: dict[str, float] = {}
+    fields: dict[str, float] = {}
     for gain in gains:
         if chosen.get(gain.switch, ON) < ON:
             continue
         for setting in gain.settings:
             value = setting.factor * chosen[gain.called] ** setting.power
-            found[setting.field] = found.get(setting.field, 1.0) * value
-    return found
+            fields[setting.field] = fields.get(setting.field, 1.0) * value
+    return fields
 
 
 def numbers(gains: Sequence[Gain]) -> dict[str, tuple[float, float, bool]]:
     """Numbers that a trial chooses: lowest, highest and whether on a logarithmic scale, by name."""
-    ranges = {each.called: (each.low, each.high, each.log) for each in gains}
-    return ranges | {each.switch: (0.0, 1.0, False) for each in gains if each.optional}
+    ranges = {gain.called: (gain.low, gain.high, gain.log) for gain in gains}
+    return ranges | {gain.switch: (0.0, 1.0, False) for gain in gains if gain.optional}
 
 
 def start_of(gains: Sequence[Gain]) -> dict[str, float] | None:
-    """Values of the first trial; None where none are said."""
-    starts = {each.called: each.start for each in gains if each.start is not None}
+    """Values of the first trial; None if the gains have none."""
+    starts = {gain.called: gain.start for gain in gains if gain.start is not None}
     return starts if len(starts) == len(gains) else None
 
 
 def judged(study: Study) -> Study:
-    """A study of the figures alone that its trials are judged by.
+    """Study with the figures of the objectives alone.
 
     Raises
     ------
     InputError
         An objective is no figure of the study.
     """
-    own = {each.rpartition(":")[2]: each for each in study.metrics if is_reference(each)}
+    own = {name.rpartition(":")[2]: name for name in study.metrics if is_reference(name)}
     names: dict[str, None] = {}
     for objective in section_of(study).objective:
         if objective.metric not in METRICS and objective.metric not in own:
@@ -143,12 +143,12 @@ def judged(study: Study) -> Study:
 
 
 def check(study: Study, rows: Rows, laws: Sequence[tuple[Sequence[Gain], Row]]) -> None:
-    """Find out whether each law runs with its gains, from those that it starts with on.
+    """Check that each law runs with the start of its gains.
 
     Raises
     ------
     InputError
-        A gain sets no field or has no law, or the values that it starts with make no scenario.
+        A gain sets no field or has no law, or its start makes no scenario.
     """
     check_laws(study, rows)
     for of_law, row in laws:
@@ -156,8 +156,8 @@ def check(study: Study, rows: Rows, laws: Sequence[tuple[Sequence[Gain], Row]]) 
 
 
 def middle(of_law: Sequence[Gain]) -> dict[str, float]:
-    """Values that gains start with, or those in the middle of their ranges where none are said."""
-    return start_of(of_law) or {each.called: _middle(each) for each in of_law}
+    """Start of the gains, or the middle of their ranges without one."""
+    return start_of(of_law) or {gain.called: _middle(gain) for gain in of_law}
 
 
 def _middle(gain: Gain) -> float:

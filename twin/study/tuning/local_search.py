@@ -43,9 +43,9 @@ def proposed(
     gains : sequence of Gain
     optimise : Optimise
     key : str
-        Seed and law: what the random numbers follow from, together with the number of the trial.
+        Seed and law, which determine the random numbers together with the number of the trial.
     number : int
-        Of the trial, from 0 on.
+        Number of the trial, from 0 on.
     earlier : sequence of FinishedTrial
         Trials of earlier batches.
     """
@@ -60,7 +60,7 @@ def proposed(
         else:
             progress = min((number - optimise.draws) / (optimise.planned - optimise.draws), 1)
             step = WIDEST * (NARROWEST / WIDEST) ** progress
-            switches = np.array([name not in {each.called for each in gains} for name in ranges])
+            switches = np.array([name not in {gain.called for gain in gains} for name in ranges])
             point = _perturbed(_point(ranges, start.chosen), switches, step, generator)
     return {
         name: _value(place, *of) for (name, of), place in zip(ranges.items(), point.tolist(), strict=True)
@@ -68,17 +68,19 @@ def proposed(
 
 
 def _start(optimise: Optimise, number: int, earlier: Sequence[FinishedTrial]) -> FinishedTrial | None:
-    """Trial that is perturbed: the best within the limit whose turn it is, or the nearest to that limit."""
-    by_number = {each.number: each for each in earlier}
-    completed = {each.number: each.tried.values for each in earlier if each.tried.ended == Ended.COMPLETED}
+    """Trial that is perturbed: the best within the limit of this trial, or the nearest to that limit."""
+    by_number = {trial.number: trial for trial in earlier}
+    completed = {
+        trial.number: trial.tried.values for trial in earlier if trial.tried.ended == Ended.COMPLETED
+    }
     if not optimise.limits:
-        best = min(completed, key=lambda each: (completed[each], each), default=None)
+        best = min(completed, key=lambda trial: (completed[trial], trial), default=None)
     else:
         turn = (number - optimise.draws) % len(optimise.limits)
         best = objectives.best_within(completed, optimise.limits[turn])
         if best is None:
-            near = [each for each in earlier if each.tried.ended != Ended.LOST]
-            best = min((each.tried.values[1], each.number) for each in near)[1] if near else None
+            near = [trial for trial in earlier if trial.tried.ended != Ended.LOST]
+            best = min((trial.tried.values[1], trial.number) for trial in near)[1] if near else None
     return None if best is None else by_number[best]
 
 
@@ -112,7 +114,7 @@ def _value(place: float, low: float, high: float, is_log: bool) -> float:
 def _sobol(dimensions: int, points: int, generator: np.random.Generator) -> Array:
     from scipy.stats import qmc  # slow to import
 
-    # A whole power of two is drawn, and as many used as are wanted.
+    # A power of two of points is generated.
     return qmc.Sobol(dimensions, rng=generator).random_base2((points - 1).bit_length())[:points]
 
 

@@ -1,4 +1,4 @@
-"""What is drawn of a tuning: its objectives over the trials, and the front of two."""
+"""Report of a tuning: page, figures and the file of the best gains."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from spheretwin.study.optimise import ON, SWITCH, Gain, Objective, Optimise, bes
 from spheretwin.study.study import Study
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.trials import Ended
-from spheretwin.study.tuning.tuning import Chosen, Found, OfLaw
+from spheretwin.study.tuning.tuning import LawResult, ReportedTrial, TuningResult
 from spheretwin.viz.pages import html
 from spheretwin.viz.pages import markdown as pieces
 from spheretwin.viz.pages.markdown import Drawing, save_drawings, save_text
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from spheretwin.viz.figures import fronts
 
 
-def drawings(name: str, found: Found, objectives: Sequence[Objective]) -> list[Drawing]:
+def drawings(name: str, result: TuningResult, objectives: Sequence[Objective]) -> list[Drawing]:
     """Figures of a tuning; none of one without a trial."""
     from spheretwin.viz.figures import fronts  # matplotlib is slow to import
 
-    by_label = {law.law: _trials(law, objectives) for law in found.laws if law.kept}
+    by_label = {law.law: _trials(law, objectives) for law in result.laws if law.trials}
     if not by_label:
         return []
     names = [each.called for each in objectives]
@@ -45,85 +45,85 @@ def drawings(name: str, found: Found, objectives: Sequence[Objective]) -> list[D
     return drawn
 
 
-def _trials(law: OfLaw, objectives: Sequence[Objective]) -> fronts.Trials:
+def _trials(law: LawResult, objectives: Sequence[Objective]) -> fronts.Trials:
     from spheretwin.viz.figures import fronts
 
     signs = np.array([each.sign for each in objectives])
-    best = {each.kept.number for each in law.best}
+    best = {trial.finished.number for trial in law.best}
     lost = [np.nan] * len(objectives)
-    values = [lost if each.tried.ended == Ended.LOST else each.tried.values for each in law.kept]
-    fresh = [each.fresh.values for each in law.best if each.fresh and each.fresh.values]
+    values = [lost if trial.tried.ended == Ended.LOST else trial.tried.values for trial in law.trials]
+    holdouts = [trial.holdout.values for trial in law.best if trial.holdout and trial.holdout.values]
     return fronts.Trials(
         law=law.law,
-        numbers=np.array([float(each.number) for each in law.kept]),
+        numbers=np.array([float(trial.number) for trial in law.trials]),
         values=signs * np.array(values, dtype=float),
-        completed=np.array([each.tried.ended == Ended.COMPLETED for each in law.kept]),
-        best=np.array([each.number in best for each in law.kept]),
+        completed=np.array([trial.tried.ended == Ended.COMPLETED for trial in law.trials]),
+        best=np.array([trial.number in best for trial in law.trials]),
         signs=signs,
         has_start=law.start is not None,
-        fresh=signs * np.array(fresh, dtype=float).reshape(-1, len(objectives)),
+        fresh=signs * np.array(holdouts, dtype=float).reshape(-1, len(objectives)),
     )
 
 
-KEPT = ("trial", "gains", "fields", "values")
-"""What the file of the gains found has of a trial."""
+FIELDS = ("trial", "gains", "fields", "values")
+"""Fields of a trial in the file of the best gains."""
 
 
-def summary(found: Found, objectives: Sequence[Objective]) -> dict[str, Any]:
-    """What was found: of each law how its trials ended, its start, and its best or its front."""
+def summary(result: TuningResult, objectives: Sequence[Objective]) -> dict[str, Any]:
+    """Summary by law: statuses of its trials, its start, and its best or its front."""
     return {
         "objectives": [each.model_dump(mode="json") for each in objectives],
-        "laws": {law.law: _of_law(law, objectives) for law in found.laws},
-        "trials": found.trials,
-        "of": found.of,
-        "resumed": found.resumed,
-        "wall_s": found.wall_s,
-        "table": str(found.table),
+        "laws": {law.law: _of_law(law, objectives) for law in result.laws},
+        "trials": result.trials,
+        "of": result.of,
+        "resumed": result.resumed,
+        "wall_s": result.wall_s,
+        "table": str(result.table),
     }
 
 
-def best(found: Found, objectives: Sequence[Objective]) -> dict[str, Any]:
-    """Gains found: of each law its best trial, that within each limit, or the trials of the front."""
-    return {"laws": {law.law: _best_of(law, objectives) for law in found.laws}}
+def best(result: TuningResult, objectives: Sequence[Objective]) -> dict[str, Any]:
+    """Best gains of each law: the best trial, that within each limit, or the trials of the front."""
+    return {"laws": {law.law: _best_of(law, objectives) for law in result.laws}}
 
 
-def _best_of(law: OfLaw, objectives: Sequence[Objective]) -> list[dict[str, Any]]:
-    by_number = {each.kept.number: each for each in law.best}
-    values = {number: each.kept.tried.values for number, each in by_number.items()}
+def _best_of(law: LawResult, objectives: Sequence[Objective]) -> list[dict[str, Any]]:
+    by_number = {trial.finished.number: trial for trial in law.best}
+    values = {number: trial.finished.tried.values for number, trial in by_number.items()}
     limits = objectives[-1].limits
     numbers: list[tuple[float | None, int | None]] = [(limit, best_within(values, limit)) for limit in limits]
     return [
-        {"limit": limit, **{name: _chosen_figures(by_number[number], objectives)[name] for name in KEPT}}
+        {"limit": limit, **{name: _trial_figures(by_number[number], objectives)[name] for name in FIELDS}}
         for limit, number in (numbers if limits else [(None, number) for number in by_number])
         if number is not None
     ]
 
 
-def _of_law(law: OfLaw, objectives: Sequence[Objective]) -> dict[str, Any]:
-    counts = Counter(each.tried.ended for each in law.kept)
-    lost = [each.tried.reason for each in law.kept if each.tried.ended == Ended.LOST]
+def _of_law(law: LawResult, objectives: Sequence[Objective]) -> dict[str, Any]:
+    counts = Counter(trial.tried.ended for trial in law.trials)
+    lost = [trial.tried.reason for trial in law.trials if trial.tried.ended == Ended.LOST]
     return {
         "ended": {str(each): counts[each] for each in Ended},
         "lost": lost[0] if lost else None,
-        "rows": sum(len(each.tried.each) for each in law.kept),
-        "start": _chosen_figures(law.start, objectives) if law.start else None,
-        "best": [_chosen_figures(each, objectives) for each in law.best],
+        "rows": sum(len(trial.tried.by_row) for trial in law.trials),
+        "start": _trial_figures(law.start, objectives) if law.start else None,
+        "best": [_trial_figures(trial, objectives) for trial in law.best],
     }
 
 
-def _chosen_figures(chosen: Chosen, objectives: Sequence[Objective]) -> dict[str, Any]:
-    tried, fresh = chosen.kept.tried, chosen.fresh
+def _trial_figures(trial: ReportedTrial, objectives: Sequence[Objective]) -> dict[str, Any]:
+    tried, holdout = trial.finished.tried, trial.holdout
     completed = tried.ended == Ended.COMPLETED
     return {
-        "trial": chosen.kept.number,
+        "trial": trial.finished.number,
         "ended": str(tried.ended),
         "reason": tried.reason or None,
-        "gains": _gains(chosen.kept.chosen),
-        "fields": dict(chosen.fields),
+        "gains": _gains(trial.finished.chosen),
+        "fields": dict(trial.fields),
         "values": _signed(tried.values, objectives) if completed else None,
-        "fresh": _signed(fresh.values, objectives) if fresh and fresh.values else None,
-        "fresh_reason": (fresh.reason or None) if fresh else None,
-        "command": chosen.command,
+        "fresh": _signed(holdout.values, objectives) if holdout and holdout.values else None,
+        "fresh_reason": (holdout.reason or None) if holdout else None,
+        "command": trial.command,
     }
 
 
@@ -146,7 +146,7 @@ def _signed(values: Sequence[float], objectives: Sequence[Objective]) -> dict[st
 
 MARKDOWN, HTML, GAINS = "tuning.md", "tuning.html", "gains.json"
 
-HOW = {
+METHODS = {
     "tpe": "proposed by a tree-structured Parzen estimator",
     "nsga2": "proposed by NSGA-II",
     "random": "drawn at random",
@@ -156,7 +156,9 @@ ALIGNED = [False, False, True, True, False, False]
 """Whether the columns of the ranges are numbers."""
 
 
-def write(folder: Path, study: Study, found: Found, command: str, versions: Mapping[str, str]) -> list[Path]:
+def write(
+    folder: Path, study: Study, result: TuningResult, command: str, versions: Mapping[str, str]
+) -> list[Path]:
     """Write the page, and its figures where matplotlib is, into a folder; returns both forms of the page.
 
     Parameters
@@ -164,9 +166,9 @@ def write(folder: Path, study: Study, found: Found, command: str, versions: Mapp
     folder : Path
         Exists.
     study : Study
-    found : Found
+    result : TuningResult
     command : str
-        What makes the page again.
+        Command that creates the page again.
     versions : mapping
         Version by package, for the foot.
 
@@ -177,12 +179,10 @@ def write(folder: Path, study: Study, found: Found, command: str, versions: Mapp
     """
     drawn: list[Drawing] = []
     if find_spec("matplotlib") is not None:
-        # slow to import
-
-        drawn = drawings(study.name, found, section_of(study).objective)
+        drawn = drawings(study.name, result, section_of(study).objective)
         save_drawings(folder, drawn)
-    text = markdown(study, found, drawn, command, versions)
-    gains = json.dumps(best(found, section_of(study).objective), indent=1, ensure_ascii=False)
+    text = markdown(study, result, drawn, command, versions)
+    gains = json.dumps(best(result, section_of(study).objective), indent=1, ensure_ascii=False)
     return [
         save_text(folder / MARKDOWN, text),
         save_text(folder / HTML, html.page(study.name, text)),
@@ -191,11 +191,11 @@ def write(folder: Path, study: Study, found: Found, command: str, versions: Mapp
 
 
 def markdown(
-    study: Study, found: Found, drawn: Sequence[Drawing], command: str, versions: Mapping[str, str]
+    study: Study, result: TuningResult, drawn: Sequence[Drawing], command: str, versions: Mapping[str, str]
 ) -> str:
     """Text of the page."""
     optimise = section_of(study)
-    whole = summary(found, optimise.objective)
+    whole = summary(result, optimise.objective)
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
     lines = [f"# {study.name}", "", study.description, "", *_what(study), ""]
     lines += [pieces.figure(each) for each in drawn]
@@ -206,7 +206,7 @@ def markdown(
 
 
 def _what(study: Study) -> list[str]:
-    """What was looked for, and how."""
+    """Objectives, method and ranges."""
     optimise = section_of(study)
     ranges = [
         [each.called, each.law or "all", *_range(each), _sets(each.settings), each.reason]
@@ -220,7 +220,7 @@ def _what(study: Study) -> list[str]:
     )
     return [
         f"Objectives: {objectives}, over {study.seeds} seeds of each point."
-        f" Trials are {HOW[optimise.sampler]}, {optimise.together} at a time."
+        f" Trials are {METHODS[optimise.sampler]}, {optimise.together} at a time."
         + (" One that can no longer be among the best is pruned." if optimise.prune else "")
         + _limits(optimise)
         + fresh,
@@ -272,7 +272,7 @@ def _chosen(of_law: Mapping[str, Any]) -> list[str]:
         numbers = {**each["gains"], **each["fields"]}
         values_of = map(numbers.get, columns)
         cells = ["off" if value is None else f"{value:.4g}" for value in values_of]
-        for told_of in [each["values"], *([each["fresh"]] if is_fresh else [])]:
-            cells += [f"{told_of[name]:.4g}" if told_of else "lost" for name in values]
+        for figures in [each["values"], *([each["fresh"]] if is_fresh else [])]:
+            cells += [f"{figures[name]:.4g}" if figures else "lost" for name in values]
         body.append([label, *cells])
     return pieces.table(head, body, [False, *(True for _ in head[1:])])

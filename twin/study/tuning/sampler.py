@@ -1,4 +1,4 @@
-"""What is tried next: Optuna's samplers, each trial with a stream of its own, so that any run proposes alike.
+"""Proposals of trials by Optuna's samplers, each trial with a random stream of its own.
 
 The samplers of a trial are made anew from the study's seed and the trial's number, and see the trials of
 earlier batches and what its own batch asked for before it. Nothing else of the process goes into a proposal:
@@ -49,7 +49,7 @@ def optuna() -> ModuleType:
 
 @contextmanager
 def opened(path: Path) -> Iterator[BaseStorage]:
-    """Storage in a file, made or gone on with; Optuna says nothing meanwhile but what is wrong.
+    """Storage in a file, new or continued; Optuna logs warnings alone.
 
     Raises
     ------
@@ -73,8 +73,8 @@ def opened(path: Path) -> Iterator[BaseStorage]:
         module.logging.set_verbosity(verbosity)
 
 
-class _Held:
-    """A lock for Optuna, which takes and gives it back at each line: the process has one for all of them."""
+class _NoLock:
+    """Lock of Optuna, which acquires and releases it at each line: the process holds one for all lines."""
 
     def acquire(self) -> bool:
         return True
@@ -113,7 +113,7 @@ def _drop_torn_line(file: BinaryIO, path: Path) -> None:
 def _read(module: ModuleType, path: Path) -> BaseStorage:
     journal = module.storages.journal
     try:
-        return journal.JournalStorage(journal.JournalFileBackend(str(path), cast(Any, _Held())))
+        return journal.JournalStorage(journal.JournalFileBackend(str(path), cast(Any, _NoLock())))
     except OSError:
         raise
     except Exception as error:  # whatever its parser meets in a file that is none of its own
@@ -136,17 +136,17 @@ if TYPE_CHECKING:
 # Of NSGA-II: some generations have to fit into as many trials as are usual here.
 POPULATION = 20
 
-DIGEST, EACH, REASON = "digest", "each", "reason"
+DIGEST, BY_ROW, REASON = "digest", "each", "reason"
 
 
 class Proposer:
-    """Trials of one law: proposed, told of and kept.
+    """Trials of one law in the storage of Optuna.
 
     Parameters
     ----------
     storage : BaseStorage
     law : str
-        By which its trials are kept.
+        Name under which its trials are stored.
     digest : str
         Of all that its results depend on.
     gains : sequence of Gain
@@ -158,7 +158,7 @@ class Proposer:
     Raises
     ------
     InputError
-        The trials that are there are those of another study.
+        The stored trials are those of another study.
     """
 
     def __init__(
@@ -182,10 +182,10 @@ class Proposer:
         else:
             self._study = self._optuna.create_study(study_name=law, storage=storage, directions=directions)
         trials = self._study.get_trials(deepcopy=False)
-        found = self._study.user_attrs.get(DIGEST)
-        if found is None and not trials:
+        stored = self._study.user_attrs.get(DIGEST)
+        if stored is None and not trials:
             self._study.set_user_attr(DIGEST, digest)
-        elif found != digest:
+        elif stored != digest:
             raise InputError(
                 f"study: expected trials of this study with these sources and versions for {law},"
                 " received those of others; remove them, or write into another folder"
@@ -195,7 +195,7 @@ class Proposer:
             self._study.enqueue_trial(start)
 
     @property
-    def kept(self) -> list[FinishedTrial]:
+    def finished(self) -> list[FinishedTrial]:
         """Finished trials, by number."""
         trials = self._study.get_trials(deepcopy=False)
         return [self._of(trial) for trial in trials if trial.state.is_finished()]
@@ -203,20 +203,26 @@ class Proposer:
     @property
     def best(self) -> list[int]:
         """Numbers of the best trial, of the best within each limit, or of the front."""
-        kept = {each.number: each.tried.values for each in self.kept if each.tried.ended == Ended.COMPLETED}
+        completed = {
+            trial.number: trial.tried.values
+            for trial in self.finished
+            if trial.tried.ended == Ended.COMPLETED
+        }
         if len(self._optimise.objective) == 1:
-            return sorted(kept, key=lambda number: (kept[number], number))[:1]
+            return sorted(completed, key=lambda number: (completed[number], number))[:1]
         if limits := self._optimise.limits:
-            within = [objectives.best_within(kept, limit) for limit in limits]
-            return list(dict.fromkeys(each for each in within if each is not None))
+            within = [objectives.best_within(completed, limit) for limit in limits]
+            return list(dict.fromkeys(number for number in within if number is not None))
         front: list[int] = []
-        for number in sorted(kept, key=lambda number: (kept[number], number)):
-            if not front or kept[number][1] < kept[front[-1]][1]:  # none before it is worse in the first
+        for number in sorted(completed, key=lambda number: (completed[number], number)):
+            if (
+                not front or completed[number][1] < completed[front[-1]][1]
+            ):  # none before it is worse in the first
                 front.append(number)
         return front
 
     def propose(self, number: int) -> Trial:
-        """Trial of a number, as it was proposed where it has been; numbers one after the other."""
+        """Trial of a number; an earlier proposal of it is repeated. Numbers are proposed in order."""
         self._study.sampler = self._sampler(number)
         trials = self._study.get_trials(deepcopy=False)
         waiting = self._optuna.trial.TrialState.WAITING
@@ -235,18 +241,18 @@ class Proposer:
         return trial
 
     def tell(self, trial: Trial, tried: Tried) -> None:
-        """Keep what a trial gave."""
-        # What a killed process had told already is the same, and Optuna warns of a second time.
+        """Store the result of a trial."""
+        # A killed process may have stored a part of it, and Optuna warns of a second time.
         before: FrozenTrial = self._study.get_trials(deepcopy=False)[trial.number]
         state = self._optuna.trial.TrialState
-        trial.set_user_attr(EACH, tried.each)
+        trial.set_user_attr(BY_ROW, tried.by_row)
         if tried.ended == Ended.LOST:
             trial.set_user_attr(REASON, tried.reason)
             if not before.constraints:  # known as worse than any that completes
                 trial.set_constraint("completed", 1.0)
         can_report = len(self._optimise.objective) == 1 and not before.intermediate_values
         if tried.ended == Ended.PRUNED and can_report:  # Optuna takes no reports of two objectives
-            trial.report(self._signed(tried.values)[0], len(tried.each))
+            trial.report(self._signed(tried.values)[0], len(tried.by_row))
         if tried.ended == Ended.COMPLETED:
             self._study.tell(trial, self._signed(tried.values))
         else:
@@ -254,23 +260,24 @@ class Proposer:
 
     def _local(self, number: int) -> dict[str, float]:
         first = number - number % self._optimise.together
-        earlier = [each for each in self.kept if each.number < first]
+        earlier = [trial for trial in self.finished if trial.number < first]
         return proposed(self._gains, self._optimise, f"{self._seed} {self._law}", number, earlier)
 
     def _signed(self, values: Sequence[float]) -> list[float]:
-        return [each.sign * value for each, value in zip(self._optimise.objective, values, strict=True)]
+        signs = [objective.sign for objective in self._optimise.objective]
+        return [sign * value for sign, value in zip(signs, values, strict=True)]
 
     def _of(self, trial: FrozenTrial) -> FinishedTrial:
         attributes: dict[str, Any] = trial.user_attrs
-        each = attributes.get(EACH, [])
+        by_row = attributes.get(BY_ROW, [])
         values = [
-            objectives.of_rows(objective, [row[place] for row in each], self._rows)
-            for place, objective in enumerate(self._optimise.objective)
+            objectives.of_rows(objective, [row[i] for row in by_row], self._rows)
+            for i, objective in enumerate(self._optimise.objective)
         ]
-        reason = attributes.get(REASON, "" if EACH in attributes else "told of by another program")
+        reason = attributes.get(REASON, "" if BY_ROW in attributes else "told of by another program")
         completed = trial.state == self._optuna.trial.TrialState.COMPLETE
         ended = Ended.LOST if reason else Ended.COMPLETED if completed else Ended.PRUNED
-        return FinishedTrial(trial.number, trial.params, Tried(ended, reason, values, each))
+        return FinishedTrial(trial.number, trial.params, Tried(ended, reason, values, by_row))
 
     def _sampler(self, number: int, gain: str = "") -> BaseSampler:
         digest = hashlib.sha256(f"{self._seed} {self._law} {number} {gain}".encode()).digest()

@@ -24,23 +24,23 @@ class Ended(StrEnum):
 
 
 class Tried(NamedTuple):
-    """What a trial gave.
+    """Result of a trial.
 
     Attributes
     ----------
     ended : Ended
     reason : str
-        Why it lost; empty where it did not.
+        Reason of a loss; empty without one.
     values : list of float
         Objectives, to be minimised: all of the rows, or the least that they can be.
-    each : list of list of float
-        The same of each row that was run, (rows, objectives).
+    by_row : list of list of float
+        Objectives of each row that was run, (rows, objectives).
     """
 
     ended: Ended
     reason: str
     values: list[float]
-    each: list[list[float]]
+    by_row: list[list[float]]
 
 
 class FinishedTrial(NamedTuple):
@@ -60,7 +60,7 @@ def run_trial(
     has_lost: Callable[[Sequence[float]], bool],
     stop_requested: Callable[[], bool],
 ) -> Tried | None:
-    """Run a trial; None where it was stopped on the way.
+    """Run a trial; None if it was stopped.
 
     Parameters
     ----------
@@ -74,20 +74,19 @@ def run_trial(
         Whether a trial whose objectives are at least these has lost.
     stop_requested : callable
     """
-    each: list[list[float]] = []
+    by_row: list[list[float]] = []
     for row in conditions:
         if stop_requested():
             return None
         result = rows.run(with_fields(row, fields))
-        found = [optimise.of_row(objective, figure_of(result, objective)) for objective in wanted]
-        numbers = [value for value in found if value is not None]
-        if reason := _why_lost(row, result, wanted, found):
-            return Tried(Ended.LOST, reason, _values(wanted, each, len(conditions)), each)
-        each.append(numbers)
-        values = _values(wanted, each, len(conditions))
-        if len(each) < len(conditions) and has_lost(values):
-            return Tried(Ended.PRUNED, "", values, each)
-    return Tried(Ended.COMPLETED, "", values, each)
+        numbers = [optimise.of_row(objective, figure_of(result, objective)) for objective in wanted]
+        if reason := _reason_of_loss(row, result, wanted, numbers):
+            return Tried(Ended.LOST, reason, _values(wanted, by_row, len(conditions)), by_row)
+        by_row.append([number for number in numbers if number is not None])
+        values = _values(wanted, by_row, len(conditions))
+        if len(by_row) < len(conditions) and has_lost(values):
+            return Tried(Ended.PRUNED, "", values, by_row)
+    return Tried(Ended.COMPLETED, "", values, by_row)
 
 
 def with_fields(row: Row, fields: Mapping[str, float]) -> Row:
@@ -100,18 +99,20 @@ def figure_of(result: Result, objective: Objective) -> object:
     return result.figures.get(objective.metric)
 
 
-def _why_lost(row: Row, result: Result, wanted: Sequence[Objective], found: Sequence[float | None]) -> str:
+def _reason_of_loss(
+    row: Row, result: Result, wanted: Sequence[Objective], numbers: Sequence[float | None]
+) -> str:
     if result.status != Status.COMPLETED:
         more = result.error or result.reason
         return f"row {row.number}: {result.status}{f', {more}' if more else ''}"
-    for objective, value in zip(wanted, found, strict=True):
+    for objective, value in zip(wanted, numbers, strict=True):
         if value is None:
             return f"row {row.number}: no {objective.metric}{f', {result.error}' if result.error else ''}"
     return ""
 
 
-def _values(wanted: Sequence[Objective], each: Sequence[Sequence[float]], rows: int) -> list[float]:
+def _values(wanted: Sequence[Objective], by_row: Sequence[Sequence[float]], rows: int) -> list[float]:
     return [
-        optimise.of_rows(objective, [values[place] for values in each], rows)
-        for place, objective in enumerate(wanted)
+        optimise.of_rows(objective, [values[i] for values in by_row], rows)
+        for i, objective in enumerate(wanted)
     ]

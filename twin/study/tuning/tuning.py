@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from spheretwin.models.base.files import make_folder
 from spheretwin.models.telemetry import checksums
 from spheretwin.study import agreement
 from spheretwin.study import optimise as objectives
+from spheretwin.study.engines.threads import run_each
 from spheretwin.study.grid import Grid, Row
 from spheretwin.study.journal import digest_of
 from spheretwin.study.optimise import Gain, Objective, Optimise
@@ -23,16 +23,19 @@ from spheretwin.study.study import Study
 from spheretwin.study.tuning import gains, sampler
 from spheretwin.study.tuning import trials as trial
 from spheretwin.study.tuning.sampler import Proposer
-from spheretwin.study.tuning.trials import Ended, FinishedTrial
+from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
+
+if TYPE_CHECKING:
+    from optuna import Trial
 
 
-class Fresh(NamedTuple):
-    """What gains give under fresh seeds.
+class Holdout(NamedTuple):
+    """Objectives of gains under seeds that no trial was chosen by.
 
     Attributes
     ----------
     reason : str
-        Why they lost; empty where they did not.
+        Reason of a loss; empty without one.
     values : list of float
         Objectives, to be minimised.
     """
@@ -41,14 +44,14 @@ class Fresh(NamedTuple):
     values: list[float]
 
 
-def fresh(
+def hold_out(
     rows: Rows,
     law: Mapping[str, Any] | None,
     optimise: Optimise,
     fields: Mapping[int, Mapping[str, float]],
     threads: int | None,
     stop_requested: Callable[[], bool],
-) -> dict[int, Fresh]:
+) -> dict[int, Holdout]:
     """Run some trials of a law under as many further seeds as the study says.
 
     Parameters
@@ -64,7 +67,7 @@ def fresh(
     Returns
     -------
     dict
-        By trial; empty without fresh seeds, and without those that were stopped on the way.
+        By trial; empty without further seeds. Trials that were stopped are absent.
     """
     if not optimise.fresh:
         return {}
@@ -72,17 +75,16 @@ def fresh(
     longer = Grid(rows.study.model_copy(update={"seeds": seeds + optimise.fresh}))
     conditions = [row for row in longer if row.law == law and row.repeat >= seeds]
 
-    def judged(number: int) -> Fresh | None:
-        tried = trial.run_trial(
+    def run(number: int) -> Tried | None:
+        return trial.run_trial(
             rows, conditions, fields[number], optimise.objective, lambda _: False, stop_requested
         )
-        if tried is None:
-            return None
-        return Fresh(tried.reason, tried.values if tried.ended == Ended.COMPLETED else [])
 
-    with ThreadPoolExecutor(threads or os.cpu_count(), thread_name_prefix="fresh") as pool:
-        found = zip(fields, pool.map(judged, fields), strict=True)
-        return {number: each for number, each in found if each is not None}
+    return {
+        number: Holdout(tried.reason, tried.values if tried.ended == Ended.COMPLETED else [])
+        for number, tried in run_each(fields, run, threads)
+        if tried is not None
+    }
 
 
 NAME = "trials.parquet"
@@ -106,9 +108,9 @@ def write(path: Path, study: Study, rows: Rows, laws: Sequence[LawTrials]) -> No
 
     optimise = gains.section_of(study)
     objectives = optimise.objective
-    names = dict.fromkeys(each for _, of_law, _, _ in laws for each in gains.numbers(of_law))
+    names = dict.fromkeys(name for _, of_law, _, _ in laws for name in gains.numbers(of_law))
     settings = dict.fromkeys(
-        each.field for _, of_law, _, _ in laws for gain in of_law for each in gain.settings
+        setting.field for _, of_law, _, _ in laws for gain in of_law for setting in gain.settings
     )
     kinds = {
         "law": pa.string(),
@@ -118,92 +120,91 @@ def write(path: Path, study: Study, rows: Rows, laws: Sequence[LawTrials]) -> No
         "best": pa.bool_(),
         "rows": pa.int64(),
         **dict.fromkeys([*names, *settings], pa.float64()),
-        **{each.called: pa.float64() for each in objectives},
-        **{f"{each.called}, each row": pa.list_(pa.float64()) for each in objectives},
+        **{objective.called: pa.float64() for objective in objectives},
+        **{f"{objective.called}, each row": pa.list_(pa.float64()) for objective in objectives},
     }
     records = [
         {
-            **_head(law, each, best),
-            **each.chosen,
-            **gains.values(of_law, each.chosen),
-            **_trial_summary(objectives, each),
+            **_head(law, finished, best),
+            **finished.chosen,
+            **gains.values(of_law, finished.chosen),
+            **_objectives(objectives, finished),
         }
-        for law, of_law, kept, best in laws
-        for each in kept
+        for law, of_law, trials, best in laws
+        for finished in trials
     ]
     metadata = {
         "study": study.model_dump_json(),
         "optimise": optimise.model_dump_json(),
         "scenario": rows.base.model_dump_json(),
     }
-    columns = [pa.array([each.get(name) for each in records], type=kind) for name, kind in kinds.items()]
+    columns = [pa.array([record.get(name) for record in records], type=kind) for name, kind in kinds.items()]
     schema = pa.schema([pa.field(name, kind) for name, kind in kinds.items()], metadata=metadata)
     checksums.write_parquet(path, schema, [pa.table(columns, schema=schema)], compression="zstd")
 
 
-def _head(law: str, kept: FinishedTrial, best: Sequence[int]) -> dict[str, Any]:
+def _head(law: str, finished: FinishedTrial, best: Sequence[int]) -> dict[str, Any]:
     return {
         "law": law,
-        "trial": kept.number,
-        "ended": str(kept.tried.ended),
-        "reason": kept.tried.reason or None,
-        "best": kept.number in best,
-        "rows": len(kept.tried.each),
+        "trial": finished.number,
+        "ended": str(finished.tried.ended),
+        "reason": finished.tried.reason or None,
+        "best": finished.number in best,
+        "rows": len(finished.tried.by_row),
     }
 
 
-def _trial_summary(objectives: Sequence[Objective], kept: FinishedTrial) -> dict[str, Any]:
-    told: dict[str, Any] = {}
-    for place, objective in enumerate(objectives):
-        lost = kept.tried.ended == Ended.LOST
-        told[objective.called] = None if lost else objective.sign * kept.tried.values[place]
-        told[f"{objective.called}, each row"] = [objective.sign * each[place] for each in kept.tried.each]
-    return told
+def _objectives(objectives: Sequence[Objective], finished: FinishedTrial) -> dict[str, Any]:
+    fields: dict[str, Any] = {}
+    for i, objective in enumerate(objectives):
+        lost = finished.tried.ended == Ended.LOST
+        fields[objective.called] = None if lost else objective.sign * finished.tried.values[i]
+        fields[f"{objective.called}, each row"] = [objective.sign * row[i] for row in finished.tried.by_row]
+    return fields
 
 
 Stop = Callable[[], bool]
 
 
-class Chosen(NamedTuple):
-    """A trial that is told of."""
+class ReportedTrial(NamedTuple):
+    """Trial of the report: the start of a law, or one of its best."""
 
-    kept: FinishedTrial
+    finished: FinishedTrial
     fields: Mapping[str, float]
     """Value of each field that its gains set."""
-    fresh: Fresh | None
-    """What it gives under seeds that no trial was chosen by."""
+    holdout: Holdout | None
     command: str
     """Command line that runs its first row."""
 
 
-class OfLaw(NamedTuple):
-    """What was found of one law."""
+class LawResult(NamedTuple):
+    """Trials of one law."""
 
     law: str
-    kept: Sequence[FinishedTrial]
-    start: Chosen | None
-    """The first trial, where the study says what it is."""
-    best: Sequence[Chosen]
+    trials: Sequence[FinishedTrial]
+    start: ReportedTrial | None
+    """The first trial, if the study defines it."""
+    best: Sequence[ReportedTrial]
     """One trial, or the front from the best of the first objective to that of the second."""
 
 
-class Found(NamedTuple):
-    """What a tuning left.
+class TuningResult(NamedTuple):
+    """Result of a tuning.
 
     Attributes
     ----------
-    laws : sequence of OfLaw
+    laws : sequence of LawResult
     trials : int
-        Finished, those of earlier runs included.
+        Finished, including those of earlier runs.
     of : int
-        Wanted.
+        Requested.
     resumed : int
-        Trials that were there already.
+        Trials of earlier runs.
     wall_s : float
     table : Path
     """
 
-    laws: Sequence[OfLaw]
+    laws: Sequence[LawResult]
     trials: int
     of: int
     resumed: int
@@ -211,7 +212,7 @@ class Found(NamedTuple):
     table: Path
 
 
-def tuned(
+def tune(
     study: Study,
     folder: Path,
     *,
@@ -219,22 +220,22 @@ def tuned(
     threads: int | None = None,
     done: Callable[[int, int], None] = lambda trials, of: None,
     stop_requested: Stop = lambda: False,
-) -> Found:
-    """Look for the gains of each law of a study.
+) -> TuningResult:
+    """Tune the gains of each law of a study.
 
     Parameters
     ----------
     study : Study
         With ``[optimise]``.
     folder : Path
-        For storage and table. Where trials of the same study are there already, it goes on behind them.
+        For storage and table. Trials of the same study in it are continued.
     trials : int, optional
         Of each law; the study's unless given. More are the same and some more, where the number before was a
         multiple of those proposed together.
     threads : int, optional
-        As many as there are cores unless given; what is found does not depend on it.
+        Number of cores unless given; the result does not depend on it.
     done : callable
-        Told of the trials that are finished, and of how many there are.
+        Receives the number of finished trials, and of all trials.
     stop_requested : callable
         True ends it when the rows in flight are finished.
 
@@ -243,32 +244,35 @@ def tuned(
     InputError
         The study, the scenario or the folder cannot be used.
     SpheretwinError
-        The first row differs between the plants, or a file could not be written; what is finished is kept.
+        The first row differs between the plants, or a file could not be written; finished trials are stored.
     """
     started = time.perf_counter()
     optimise = gains.section_of(study)
     rows = Rows(gains.judged(study))
     laws = [_Law(study, rows, law) for law in study.law or (None,)]
-    gains.check(study, rows, [(each.gains, each.conditions[0]) for each in laws])
+    gains.check(study, rows, [(law.gains, law.conditions[0]) for law in laws])
     make_folder(folder)
     wanted = trials or optimise.planned
-    with sampler.opened(folder / sampler.NAME) as kept:
+    with sampler.opened(folder / sampler.NAME) as storage:
         digest = _digest(rows, optimise)
         for law in laws:
             law.proposer = Proposer(
-                kept, law.called, digest, law.gains, optimise, study.seed, len(law.conditions)
+                storage, law.called, digest, law.gains, optimise, study.seed, len(law.conditions)
             )
-        resumed = sum(len(law.proposer.kept) for law in laws)
+        resumed = sum(len(law.proposer.finished) for law in laws)
         try:
             _fill(laws, wanted, threads, done, stop_requested)
         finally:
-            found = [(law.called, law.gains, law.proposer.kept, law.proposer.best) for law in laws]
-            write(folder / NAME, study, rows, found)
-        told = [law.found(threads, stop_requested) for law in laws]
-    return Found(
-        laws=told,
-        trials=sum(len(law.kept) for law in told),
-        of=max(wanted * len(laws), sum(len(law.kept) for law in told)),
+            trials_of_laws = [
+                (law.called, law.gains, law.proposer.finished, law.proposer.best) for law in laws
+            ]
+            write(folder / NAME, study, rows, trials_of_laws)
+        results = [law.result(threads, stop_requested) for law in laws]
+    finished = sum(len(result.trials) for result in results)
+    return TuningResult(
+        laws=results,
+        trials=finished,
+        of=max(wanted * len(laws), finished),
         resumed=resumed,
         wall_s=time.perf_counter() - started,
         table=folder / NAME,
@@ -289,74 +293,64 @@ class _Law:
 
     def batches(self, wanted: int) -> Iterator[range]:
         """Numbers of the trials that are proposed together and not all finished."""
-        finished = {each.number for each in self.proposer.kept}
+        finished = {trial.number for trial in self.proposer.finished}
         for first in range(0, wanted, self._optimise.together):
             batch = range(first, min(first + self._optimise.together, wanted))
             if not finished.issuperset(batch):
                 yield batch
 
     def run(
-        self, batch: range, pool: ThreadPoolExecutor, stop_requested: Stop, told: Callable[[], None]
+        self, batch: range, threads: int | None, stop_requested: Stop, report: Callable[[], None]
     ) -> None:
-        """Run what is not finished of a batch."""
-        kept = self.proposer.kept
-        finished = {each.number for each in kept}
-        before = [
-            each.tried.values
-            for each in kept
-            if each.number < batch.start and each.tried.ended == Ended.COMPLETED
+        """Run the unfinished trials of a batch."""
+        earlier = self.proposer.finished
+        finished = {trial.number for trial in earlier}
+        completed = [
+            trial.tried.values
+            for trial in earlier
+            if trial.number < batch.start and trial.tried.ended == Ended.COMPLETED
         ]
 
         def has_lost(values: Sequence[float]) -> bool:
             if not self._optimise.prune:
                 return False
             beyond = bool(self._optimise.limits) and values[1] > self._optimise.limits[-1]
-            return beyond or any(objectives.dominates(each, values) for each in before)
+            return beyond or any(objectives.dominates(better, values) for better in completed)
 
-        proposed = [self.proposer.propose(number) for number in batch if number not in finished]
-        flying = {
-            pool.submit(
-                trial.run_trial,
-                self._rows,
-                self.conditions,
-                gains.values(self.gains, each.params),
-                self._optimise.objective,
-                has_lost,
-                stop_requested,
-            ): each
-            for each in proposed
-        }
-        try:
-            for future in as_completed(flying):
-                tried = future.result()
+        def run(proposal: Trial) -> Tried | None:
+            fields = gains.values(self.gains, proposal.params)
+            return trial.run_trial(
+                self._rows, self.conditions, fields, self._optimise.objective, has_lost, stop_requested
+            )
+
+        proposals = [self.proposer.propose(number) for number in batch if number not in finished]
+        with closing(run_each(proposals, run, threads)) as results:
+            for proposal, tried in results:
                 if tried is not None:
-                    self.proposer.tell(flying[future], tried)
-                    told()
-        finally:
-            for future in flying:
-                future.cancel()
+                    self.proposer.tell(proposal, tried)
+                    report()
 
-    def found(self, threads: int | None, stop_requested: Stop) -> OfLaw:
-        """What is told of the law: its start and its best, under fresh seeds too."""
-        kept = {each.number: each for each in self.proposer.kept}
-        has_start = gains.start_of(self.gains) is not None and 0 in kept
+    def result(self, threads: int | None, stop_requested: Stop) -> LawResult:
+        """Result of the law: its start and its best, with their holdout."""
+        finished = {trial.number: trial for trial in self.proposer.finished}
+        has_start = gains.start_of(self.gains) is not None and 0 in finished
         numbers = dict.fromkeys([*([0] if has_start else []), *self.proposer.best])
-        fields = {number: gains.values(self.gains, kept[number].chosen) for number in numbers}
-        judged = fresh(self._rows, self._law, self._optimise, fields, threads, stop_requested)
-        chosen = {
-            number: Chosen(
-                kept[number],
+        fields = {number: gains.values(self.gains, finished[number].chosen) for number in numbers}
+        holdouts = hold_out(self._rows, self._law, self._optimise, fields, threads, stop_requested)
+        reported = {
+            number: ReportedTrial(
+                finished[number],
                 fields[number],
-                judged.get(number),
+                holdouts.get(number),
                 self._rows.command(trial.with_fields(self.conditions[0], fields[number])),
             )
             for number in numbers
         }
-        best = [chosen[number] for number in self.proposer.best]
-        return OfLaw(self.called, list(kept.values()), chosen[0] if has_start else None, best)
+        best = [reported[number] for number in self.proposer.best]
+        return LawResult(self.called, list(finished.values()), reported[0] if has_start else None, best)
 
     def check_plant(self) -> None:
-        """Hold the fast plant against MuJoCo: the first row, as it starts."""
+        """Compare the fast plant with MuJoCo on the first row with the gains of the start."""
         middle = gains.middle(self.gains)
         row = trial.with_fields(self.conditions[0], gains.values(self.gains, middle))
         agreement.check(self._rows, row)
@@ -365,28 +359,27 @@ class _Law:
 def _fill(
     laws: Sequence[_Law], wanted: int, threads: int | None, done: Callable[[int, int], None], stop: Stop
 ) -> None:
-    """Run the trials that are not there yet."""
-    of = wanted * len(laws)
-    finished = sum(min(len(law.proposer.kept), wanted) for law in laws)
-    done(finished, of)
+    """Run the missing trials."""
+    total = wanted * len(laws)
+    finished = sum(min(len(law.proposer.finished), wanted) for law in laws)
+    done(finished, total)
 
-    def told() -> None:
+    def report() -> None:
         nonlocal finished
         finished += 1
-        done(finished, of)
+        done(finished, total)
 
-    with ThreadPoolExecutor(threads or os.cpu_count(), thread_name_prefix="trial") as pool:
-        for law in laws:
-            for place, batch in enumerate(law.batches(wanted)):
-                if stop():
-                    return
-                if place == 0:
-                    law.check_plant()
-                law.run(batch, pool, stop, told)
+    for law in laws:
+        for i, batch in enumerate(law.batches(wanted)):
+            if stop():
+                return
+            if i == 0:
+                law.check_plant()
+            law.run(batch, threads, stop, report)
 
 
 def _digest(rows: Rows, optimise: Optimise) -> str:
-    """Digest of all that a trial depends on; how many there are, and how they are told of, is none of it."""
+    """Digest of everything that a trial depends on, without the number of trials and the holdout."""
     section = optimise.model_dump(mode="json", exclude={"trials", "fresh"})
-    told = json.dumps([digest_of(rows), section, sampler.optuna().__version__], sort_keys=True)
-    return hashlib.sha256(told.encode()).hexdigest()
+    content = json.dumps([digest_of(rows), section, sampler.optuna().__version__], sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()

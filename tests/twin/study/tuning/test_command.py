@@ -209,7 +209,7 @@ def test_without_matplotlib_there_are_trials_and_a_word(small, tmp_path, capsys,
 
 
 def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkeypatch):
-    tuned = sweep.tuned
+    tune = sweep.tune
 
     def interrupted(*arguments, done, **more):
         def told(trials, of):
@@ -217,11 +217,11 @@ def test_what_is_interrupted_exits_1_and_goes_on(small, tmp_path, capsys, monkey
                 signal.raise_signal(signal.SIGINT)
             done(trials, of)
 
-        return tuned(*arguments, done=told, **more)
+        return tune(*arguments, done=told, **more)
 
     arguments = ["sweep", small, "--optimise", "--json", "--out", str(tmp_path / "out"), "--threads", "1"]
     with monkeypatch.context() as patch:
-        patch.setattr(sweep, "tuned", interrupted)
+        patch.setattr(sweep, "tune", interrupted)
         assert cli.main(arguments) == cli.FAILED
     out, err = capsys.readouterr()
     found = json.loads(out)["trials"]

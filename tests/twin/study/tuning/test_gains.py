@@ -9,7 +9,7 @@ from spheretwin.study.optimise import Gain
 from spheretwin.study.row import Rows
 from spheretwin.study.study import load, made
 from spheretwin.study.tuning.gains import gains_of, middle, numbers, values
-from spheretwin.study.tuning.tuning import tuned
+from spheretwin.study.tuning.tuning import tune
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 SHIPPED = load("tuning")
@@ -183,7 +183,7 @@ BAD_STUDIES = {
 def test_what_cannot_be_tuned_is_refused_in_a_line_before_a_trial(tmp_path, case):
     make, told = BAD_STUDIES[case]
     with pytest.raises(InputError) as refusal:
-        tuned(make(tmp_path), tmp_path / "out")
+        tune(make(tmp_path), tmp_path / "out")
     assert told in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert not (tmp_path / "out").exists()

@@ -6,7 +6,7 @@ import pytest
 from spheretwin.study.optimise import Gain, Objective, Optimise
 from spheretwin.study.tuning.local_search import NARROWEST, WIDEST, proposed
 from spheretwin.study.tuning.trials import Ended, FinishedTrial, Tried
-from spheretwin.study.tuning.tuning import tuned
+from spheretwin.study.tuning.tuning import tune
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 DRAWS, PERTURBATIONS = 64, 40
@@ -106,19 +106,19 @@ def test_the_best_within_each_limit_is_reported_and_nothing_beyond_the_last_is_c
         draws=30,
         perturbations=10,
     )
-    (law,) = tuned(noisy, tmp_path).laws
-    assert len(law.kept) == 50
-    completed = [each for each in law.kept if each.tried.ended == Ended.COMPLETED]
+    (law,) = tune(noisy, tmp_path).laws
+    assert len(law.trials) == 50
+    completed = [each for each in law.trials if each.tried.ended == Ended.COMPLETED]
     assert all(each.tried.values[1] <= 2.0 for each in completed)
-    assert any(each.tried.ended == Ended.PRUNED and each.tried.values[1] > 2.0 for each in law.kept)
+    assert any(each.tried.ended == Ended.PRUNED and each.tried.values[1] > 2.0 for each in law.trials)
     for limit, best in zip((0.5, 2.0), law.best, strict=True):
         within = [each.tried.values[0] for each in completed if each.tried.values[1] <= limit]
-        assert best.kept.tried.values[0] == min(within)
+        assert best.finished.tried.values[0] == min(within)
 
 
 def test_a_single_objective_is_searched_about_its_best(tmp_path):
     known = study(tmp_path, gains=[gain()], sampler="local", draws=16, perturbations=24)
-    (law,) = tuned(known, tmp_path).laws
+    (law,) = tune(known, tmp_path).laws
     (best,) = law.best
     # The range is 4.6 wide by its logarithm; the last steps are 2 % of it.
-    assert abs(np.log(best.kept.chosen["controller.stiffness"] / 300)) < 2 * NARROWEST * np.log(100)
+    assert abs(np.log(best.finished.chosen["controller.stiffness"] / 300)) < 2 * NARROWEST * np.log(100)

@@ -10,7 +10,7 @@ import pytest
 
 from spheretwin.models.base.errors import InputError, SpheretwinError
 from spheretwin.study.tuning import sampler as storage
-from spheretwin.study.tuning.tuning import tuned
+from spheretwin.study.tuning.tuning import tune
 from tests.twin.study.tuning.cases import TWO, gain, study
 
 TRIALS = 24
@@ -30,7 +30,7 @@ LOCAL = {"sampler": "local", "draws": 10, "perturbations": 14}
 @pytest.mark.parametrize("sampler", [{"sampler": "tpe"}, {"sampler": "nsga2"}, LOCAL], ids=str)
 def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_path, sampler):
     noisy = study(tmp_path, **TWO, **sampler)
-    tuned(noisy, tmp_path, trials=TRIALS, threads=1)
+    tune(noisy, tmp_path, trials=TRIALS, threads=1)
     whole, kept = table(tmp_path), b"".join(lines(tmp_path))
     # Between two lines, within one, and behind one but for its end.
     ends = [round(len(kept) * share) for share in (0.001, 0.02, 0.11, 0.37, 0.53, 0.71, 0.83, 0.93, 0.99)]
@@ -39,7 +39,7 @@ def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_p
         folder = tmp_path / str(place)
         folder.mkdir()
         (folder / storage.NAME).write_bytes(kept[:end])
-        found = tuned(noisy, folder, trials=TRIALS, threads=2)
+        found = tune(noisy, folder, trials=TRIALS, threads=2)
         assert found.resumed < TRIALS
         assert found.trials == found.of == TRIALS
         assert table(folder) == whole
@@ -47,11 +47,11 @@ def test_wherever_a_process_was_killed_it_is_gone_on_as_if_it_had_not_been(tmp_p
 
 def test_every_cut_within_one_batch_is_gone_on_with(tmp_path):
     noisy = study(tmp_path, **TWO)
-    tuned(noisy, tmp_path, trials=16, threads=1)
+    tune(noisy, tmp_path, trials=16, threads=1)
     whole, kept = table(tmp_path), lines(tmp_path)
     for count in range(len(kept) - 30, len(kept)):
         (tmp_path / storage.NAME).write_bytes(b"".join(kept[:count]))
-        tuned(noisy, tmp_path, trials=16, threads=1)
+        tune(noisy, tmp_path, trials=16, threads=1)
         assert table(tmp_path) == whole
 
 
@@ -59,11 +59,11 @@ KILLED = """
 import sys
 from pathlib import Path
 from spheretwin.study.study import made
-from spheretwin.study.tuning.tuning import tuned
+from spheretwin.study.tuning.tuning import tune
 import json
 study = made(json.loads(sys.argv[1]), "known")
 print("ready", flush=True)
-tuned(study, Path(sys.argv[2]), trials=2000, threads=1, done=lambda done, of: print(done, flush=True))
+tune(study, Path(sys.argv[2]), trials=2000, threads=1, done=lambda done, of: print(done, flush=True))
 """
 
 
@@ -78,34 +78,34 @@ def test_a_killed_process_loses_no_trial_that_it_told_of(tmp_path):
             told = int(line) if line.isdecimal() else told
         # Another process is kept out as long as this one lives.
         with pytest.raises(InputError, match=r"one process at a time, received .*which another one writes"):
-            tuned(noisy, tmp_path / "killed", trials=TRIALS)
+            tune(noisy, tmp_path / "killed", trials=TRIALS)
         os.kill(process.pid, signal.SIGKILL)
-    found = tuned(noisy, tmp_path / "killed", trials=TRIALS)
+    found = tune(noisy, tmp_path / "killed", trials=TRIALS)
     assert found.resumed >= 9
-    kept = found.laws[0].kept[:TRIALS]
-    assert kept == tuned(noisy, tmp_path / "once", trials=TRIALS).laws[0].kept
+    kept = found.laws[0].trials[:TRIALS]
+    assert kept == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
 
 
 def test_what_is_stopped_goes_on(tmp_path):
     noisy = study(tmp_path, **TWO, fresh=3)
     asked = iter(range(10**9))
-    found = tuned(noisy, tmp_path, trials=TRIALS, threads=1, stop_requested=lambda: next(asked) > 20)
+    found = tune(noisy, tmp_path, trials=TRIALS, threads=1, stop_requested=lambda: next(asked) > 20)
     assert 0 < found.trials < found.of == TRIALS
     told = []
-    again = tuned(noisy, tmp_path, trials=TRIALS, threads=1, done=lambda done, of: told.append((done, of)))
+    again = tune(noisy, tmp_path, trials=TRIALS, threads=1, done=lambda done, of: told.append((done, of)))
     assert again.resumed == found.trials
     assert told == [(done, TRIALS) for done in range(found.trials, TRIALS + 1)]
-    once = tuned(noisy, tmp_path / "once", trials=TRIALS, threads=1)
+    once = tune(noisy, tmp_path / "once", trials=TRIALS, threads=1)
     assert table(tmp_path) == table(tmp_path / "once")
     assert again.laws == once.laws
 
 
 def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     noisy = study(tmp_path, **TWO)
-    tuned(noisy, tmp_path, trials=8)
+    tune(noisy, tmp_path, trials=8)
     before = (tmp_path / storage.NAME).read_bytes()
     monkeypatch.setattr("spheretwin.study.tuning.trials.run_trial", None)
-    found = tuned(noisy, tmp_path, trials=8)
+    found = tune(noisy, tmp_path, trials=8)
     assert (found.trials, found.resumed) == (8, 8)
     assert (tmp_path / storage.NAME).read_bytes() == before
 
@@ -121,34 +121,34 @@ OTHERS = {
 
 @pytest.mark.parametrize("other", OTHERS)
 def test_trials_of_another_study_are_refused(tmp_path, other):
-    tuned(study(tmp_path, **TWO), tmp_path, trials=4)
+    tune(study(tmp_path, **TWO), tmp_path, trials=4)
     before = (tmp_path / storage.NAME).read_bytes()
     with pytest.raises(InputError, match=r"expected trials of this study .* received those of others"):
-        tuned(study(tmp_path, **{**TWO, **OTHERS[other]}), tmp_path, trials=4)
+        tune(study(tmp_path, **{**TWO, **OTHERS[other]}), tmp_path, trials=4)
     assert (tmp_path / storage.NAME).read_bytes() == before
 
 
 def test_trials_under_figures_that_were_edited_are_refused(tmp_path):
     noisy = study(tmp_path, **TWO)
-    tuned(noisy, tmp_path, trials=4)
+    tune(noisy, tmp_path, trials=4)
     with (tmp_path / "figures.py").open("a") as file:
         file.write("# edited\n")
     with pytest.raises(InputError, match="received those of others"):
-        tuned(noisy, tmp_path, trials=4)
+        tune(noisy, tmp_path, trials=4)
 
 
 @pytest.mark.parametrize("content", [b"no trials\n", b'{"op_code": 0}\n', b"[1, 2]\n{}\n", b"\x00\xff\n"])
 def test_a_file_that_is_none_is_refused(tmp_path, content):
     (tmp_path / storage.NAME).write_bytes(content)
     with pytest.raises(InputError, match=r"expected trials of Optuna, received .*trials\.jsonl"):
-        tuned(study(tmp_path, **TWO), tmp_path, trials=4)
+        tune(study(tmp_path, **TWO), tmp_path, trials=4)
     assert (tmp_path / storage.NAME).read_bytes() == content
 
 
 def test_a_folder_that_cannot_be_used_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="expected a writable folder"):
-        tuned(study(tmp_path, **TWO), tmp_path / "file" / "out", trials=4)
+        tune(study(tmp_path, **TWO), tmp_path / "file" / "out", trials=4)
 
 
 def test_a_full_disk_loses_no_trial(tmp_path, monkeypatch):
@@ -164,25 +164,27 @@ def test_a_full_disk_loses_no_trial(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(optuna.storages.journal.JournalFileBackend, "append_logs", full)
         with pytest.raises(SpheretwinError, match="could not be written, No space left on device"):
-            tuned(noisy, tmp_path, trials=TRIALS)
-    found = tuned(noisy, tmp_path, trials=TRIALS)
+            tune(noisy, tmp_path, trials=TRIALS)
+    found = tune(noisy, tmp_path, trials=TRIALS)
     assert found.resumed > 3
-    assert found.laws[0].kept == tuned(noisy, tmp_path / "once", trials=TRIALS).laws[0].kept
+    assert found.laws[0].trials == tune(noisy, tmp_path / "once", trials=TRIALS).laws[0].trials
 
 
 def test_any_optuna_opens_the_trials(tmp_path):
-    found = tuned(study(tmp_path, **TWO), tmp_path, trials=TRIALS)
+    found = tune(study(tmp_path, **TWO), tmp_path, trials=TRIALS)
     optuna = storage.optuna()
     journal = optuna.storages.journal
     backend = journal.JournalFileBackend(str(tmp_path / storage.NAME))
     opened = optuna.load_study(study_name="pd", storage=journal.JournalStorage(backend))
-    assert {each.number for each in opened.best_trials} == {each.kept.number for each in found.laws[0].best}
+    assert {each.number for each in opened.best_trials} == {
+        each.finished.number for each in found.laws[0].best
+    }
 
 
 def test_without_optuna_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(InputError, match=r"expected the extra `spheretwin\[tune\]` to look for gains"):
-        tuned(study(tmp_path, **TWO), tmp_path / "out", trials=4)
+        tune(study(tmp_path, **TWO), tmp_path / "out", trials=4)
 
 
 def test_nothing_but_a_tuning_needs_optuna():

@@ -1,0 +1,21 @@
+"""The internal switch of Ray exists and has its effect; a change of Ray fails here, not in a sweep."""
+
+import sys
+
+import pytest
+
+from spheretwin.study.engines import ray_internals
+
+ray = pytest.importorskip("ray")
+
+
+def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
+    worker = ray._private.worker
+    assert hasattr(worker, "_worker_logs_enabled"), "Ray has no switch _worker_logs_enabled any more"
+    monkeypatch.setattr(worker, "_worker_logs_enabled", True)
+    message = {"pid": "raylet", "ip": "10.0.0.1", "lines": ["a node is lost"]}
+    worker.print_worker_logs(message, sys.stdout)
+    assert "a node is lost" in capsys.readouterr().out
+    ray_internals.silence(ray)
+    worker.print_worker_logs(message, sys.stdout)
+    assert capsys.readouterr().out == ""
