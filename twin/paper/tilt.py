@@ -112,10 +112,10 @@ PRINTED_HEAD = (
 
 def printed_section(outcomes: Outcomes) -> Section:
     """Errors of the laws next to the paper's, and their course."""
-    by_law = {law: runs for law in TILT_LAWS if (runs := outcomes.runs(printed(law)))}
+    of_laws = [(law, runs) for law in TILT_LAWS if (runs := outcomes.runs(printed(law)))]
     title = "Largest |error| over the run in degrees: median over the seeds, and range"
-    windows = {law.law: [run.data for run in runs] for law, runs in by_law.items()}
-    table = [_printed_row(law, runs) for law, runs in by_law.items()]
+    windows = {law.law: [run.data for run in runs] for law, runs in of_laws}
+    table = [_printed_row(law, runs) for law, runs in of_laws]
     order = "".join(f" T{finding.text.removeprefix('t')}." for finding in _order(outcomes))
     return Section(
         "The laws as printed",

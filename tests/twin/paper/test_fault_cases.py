@@ -143,4 +143,4 @@ def test_all_ways_and_engines_of_a_set_share_the_start_of_a_seed_and_other_seeds
 
 def test_only_what_is_drawn_or_a_sample_runs_once():
     assert {case.details["kind"] for case in ALL if case.single_run} == {"drawn", "MuJoCo"}
-    assert all(case.draws for case in ALL)  # the disturbance is drawn
+    assert all(case.is_random for case in ALL)  # the disturbance depends on the seed

@@ -169,8 +169,8 @@ def test_findings_say_where_rivals_are_level_or_better(errors, expected):
 
 
 def test_nothing_is_found_where_nothing_ran():
-    assert rival_tables.findings({}) == []
-    assert EXPERIMENT.sections({}) == []
+    assert rival_tables.findings(Outcomes()) == []
+    assert EXPERIMENT.sections(Outcomes()) == []
 
 
 def test_the_error_at_the_start_is_the_largest_until_the_rates_agree():
