@@ -6,7 +6,6 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
-from typing import Any
 
 from spheretwin.cli.common import print_json
 from spheretwin.cli.options import Parser, whole
