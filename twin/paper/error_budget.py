@@ -7,23 +7,17 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.control.laws import LAWS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.paper.experiment import (
-    Array,
-    Case,
-    Experiment,
-    Finding,
-    Outcome,
-    Outcomes,
-    ResultTable,
-    Section,
-)
+from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.rows import of_axis, spread_deg
 from spheretwin.scenario.sections import HARDWARE
 from spheretwin.viz.pages.markdown import Drawing
+
+Array = NDArray[np.float64]
 
 PROTOTYPE = HARDWARE["prototype"]
 

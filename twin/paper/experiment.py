@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NONE = "–"
-"""Cell of a table without a value."""
-
 
 class Case(NamedTuple):
     """One condition: a scenario with some of its fields changed, run once for each seed."""

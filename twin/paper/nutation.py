@@ -7,21 +7,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.models import actuator as actuators
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import rows
-from spheretwin.paper.experiment import (
-    Array,
-    Case,
-    Experiment,
-    Finding,
-    Outcome,
-    Outcomes,
-    ResultTable,
-    Section,
-)
+from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw
 from spheretwin.paper.sinusoid import EFFORT_HEAD, EFFORT_TITLE, EXPECTED, by_hinge, effort, triple
 from spheretwin.run import Run
@@ -29,6 +21,8 @@ from spheretwin.viz.pages.markdown import Drawing
 
 if TYPE_CHECKING:
     from spheretwin.viz.comparison.trajectories import LawTrajectory
+
+Array = NDArray[np.float64]
 
 SCENARIO = "nutation"
 CONDITION = {"plant.modelling_error": 0.2, "disturbance.load": 2.0}

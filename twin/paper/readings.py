@@ -6,20 +6,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import (
-    Array,
-    Case,
-    Experiment,
-    Finding,
-    Outcome,
-    Outcomes,
-    ResultTable,
-    Section,
-)
+from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import PAPER_LAWS, ComparedLaw, PRINTED_rad, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
+
+Array = NDArray[np.float64]
 
 SCENARIO = "sinusoid"
 

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from spheretwin.paper.experiment import NONE, Finding, Outcomes, ResultTable
+from spheretwin.paper.experiment import Finding, Outcomes, ResultTable
 from spheretwin.paper.laws import BY_LAW
 from spheretwin.paper.rival_conditions import HARDWARE, Condition, Hardware, study, tuned_gains
 from spheretwin.paper.rival_results import LEVEL, OUR_LAW, Result, current_limits_rad, results, within
+from spheretwin.paper.rows import NONE
 
 ALLOCATION_LABELS = {
     "least_norm": "full current, least norm",

@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import NONE, Array, Case, Outcome, Outcomes
+from spheretwin.paper.experiment import Array, Case, Outcome, Outcomes
 from spheretwin.paper.runner import CaseSummary, Plan, command_line, summarise
 from spheretwin.study.agreement import BOUND
+
+NONE = "–"
+"""Cell of a table without a value."""
 
 ERRORS: dict[str, Callable[[Outcome], Any]] = {
     "max_abs_error": lambda outcome: outcome.max_abs_error,

@@ -8,23 +8,16 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper import rows
-from spheretwin.paper.experiment import (
-    NONE,
-    Array,
-    Case,
-    Experiment,
-    Finding,
-    Outcome,
-    Outcomes,
-    ResultTable,
-    Section,
-)
+from spheretwin.paper.experiment import Case, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.laws import COMPARED_LAWS, PAPER_LAWS, ComparedLaw, printed_rad
 from spheretwin.viz.pages.markdown import Drawing
+
+Array = NDArray[np.float64]
 
 SCENARIO = "sinusoid"
 
@@ -218,7 +211,7 @@ def tables(variation: Variation, outcomes: Outcomes) -> list[ResultTable]:
 
 def _largest(condition: Condition, law: ComparedLaw, runs: Sequence[Outcome]) -> tuple[str, ...]:
     paper = printed_rad(law.law, *condition)
-    printed = NONE if paper is None else " / ".join(f"{1e3 * error:.1f}" for error in paper)
+    printed = rows.NONE if paper is None else " / ".join(f"{1e3 * error:.1f}" for error in paper)
     return law.label, rows.statuses_text(runs), printed, *by_hinge(runs, "max_abs_error")
 
 
@@ -243,7 +236,7 @@ def by_hinge(runs: Sequence[Outcome], error: str, digits: int = 1) -> tuple[str,
 
 def triple(values: Array, digits: int) -> str:
     """Numbers of α, β and γ."""
-    return " / ".join(f"{value:.{digits}f}" if np.isfinite(value) else NONE for value in values)
+    return " / ".join(f"{value:.{digits}f}" if np.isfinite(value) else rows.NONE for value in values)
 
 
 METHOD = (

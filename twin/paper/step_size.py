@@ -8,15 +8,7 @@ import numpy as np
 
 from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
-from spheretwin.paper.experiment import (
-    Array,
-    Case,
-    Experiment,
-    Finding,
-    Outcomes,
-    ResultTable,
-    Section,
-)
+from spheretwin.paper.experiment import Array, Case, Experiment, Finding, Outcomes, ResultTable, Section
 from spheretwin.run import Run
 from spheretwin.scenario.sections import PlantSection
 

@@ -7,16 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from spheretwin.paper import rows
-from spheretwin.paper.experiment import (
-    NONE,
-    Array,
-    Experiment,
-    Finding,
-    Outcome,
-    Outcomes,
-    ResultTable,
-    Section,
-)
+from spheretwin.paper.experiment import Array, Experiment, Finding, Outcome, Outcomes, ResultTable, Section
 from spheretwin.paper.runner import measured_error
 from spheretwin.paper.tilt_cases import BY_LAW, CHANGES, TILT_LAWS, Change, TiltLaw, cases, printed
 from spheretwin.run import Run
@@ -193,7 +184,7 @@ def change_section(outcomes: Outcomes) -> Section:
 def reached(law: TiltLaw, measured: Array, true: Array) -> str:
     """State if a law reaches the paper's figure, from the errors (rad) of all seeds."""
     if law.paper_deg is None:
-        return NONE
+        return rows.NONE
     limit = REACHED * np.radians(law.paper_deg)
     if np.median(measured) <= limit:
         return "yes"

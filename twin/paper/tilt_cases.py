@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spheretwin.paper.experiment import NONE, Case
+from spheretwin.paper.experiment import Case
+from spheretwin.paper.rows import NONE
 
 
 class TiltLaw(NamedTuple):

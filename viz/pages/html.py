@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from markdown_it import MarkdownIt
-from markdown_it.renderer import RendererHTML
 from markdown_it.token import Token
-from markdown_it.utils import OptionsDict
 
 # Figures have a white ground in the dark theme too; wide content scrolls within its own box.
 STYLE = """
@@ -59,8 +56,8 @@ def page(title: str, markdown: str, figures: Path | None = None) -> str:
 def rendered(markdown: str, figures: Path | None = None) -> str:
     """Return the HTML of Markdown; parameters as in `page`."""
     reader = MarkdownIt("commonmark", {"html": False}).enable("table")
-    reader.add_render_rule("table_open", _table_opens)
-    reader.add_render_rule("table_close", _table_closes)
+    reader.add_render_rule("table_open", _constant('<div class="wide" tabindex="0">\n<table>\n'))
+    reader.add_render_rule("table_close", _constant("</table>\n</div>\n"))
     tokens = reader.parse(markdown)
     if figures:
         _put_in(tokens, figures)
@@ -107,21 +104,6 @@ def _put_in(tokens: Sequence[Token], folder: Path) -> None:
         _put_in(token.children or (), folder)
 
 
-def _table_opens(
-    renderer: RendererHTML,
-    tokens: Sequence[Token],
-    at: int,
-    options: OptionsDict,
-    environment: MutableMapping[str, Any],
-) -> str:
-    return '<div class="wide" tabindex="0">\n<table>\n'
-
-
-def _table_closes(
-    renderer: RendererHTML,
-    tokens: Sequence[Token],
-    at: int,
-    options: OptionsDict,
-    environment: MutableMapping[str, Any],
-) -> str:
-    return "</table>\n</div>\n"
+def _constant(text: str) -> Callable[..., str]:
+    """Render rule with the same HTML for every token."""
+    return lambda *_: text
