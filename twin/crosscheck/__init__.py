@@ -1,1 +1,1 @@
-"""The reasons to trust the twin: engine, Lagrangian and Pinocchio held against each other."""
+"""Cross-check: comparison of the engine, the Lagrangian and Pinocchio."""

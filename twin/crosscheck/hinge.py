@@ -110,8 +110,8 @@ class Hinge(NamedTuple):
     def mujoco_Nm(self, rate_rad_s: Array) -> Array:
         """Torque that creeps at a rate under MuJoCo's friction loss and damping."""
         level = np.minimum(self.coulomb_Nm, self.mujoco_soft_Nm_s() * rate_rad_s)
-        held: Array = self.viscous_Nm_s * rate_rad_s + level
-        return held
+        torque: Array = self.viscous_Nm_s * rate_rad_s + level
+        return torque
 
     def mujoco_soft_Nm_s(self) -> float:
         """MuJoCo's friction loss over the rate of its creep, below the level."""
@@ -186,15 +186,15 @@ def by_mujoco(mjcf: Path, hinge: Hinge, rate_rad_s: float, torque_Nm: Array) -> 
     InputError
         The model cannot be read.
     """
-    kept = read(mjcf)
-    rotor = MujocoRotor(_with_bearing(kept, hinge), STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
+    model = read(mjcf)
+    rotor = MujocoRotor(_with_bearing(model, hinge), STEP_s, "RK4", 0.0, 0.0, gravity_m_s2=0.0)
     none = friction(np.zeros(3), np.zeros(3), hinge.smoothing_rad_s, np.ones(3), STEP_s)
     return _motion(rotor.start(np.zeros(3), _on_gamma(rate_rad_s)), none, torque_Nm)
 
 
-def _with_bearing(kept: Mjcf, hinge: Hinge) -> Mjcf:
+def _with_bearing(mjcf: Mjcf, hinge: Hinge) -> Mjcf:
     """A model with MuJoCo's friction on γ, under MuJoCo's own defaults whatever the file's options are."""
-    model = copy(kept.bare)
+    model = copy(mjcf.bare)
     model.dof_frictionloss[GAMMA], model.dof_damping[GAMMA] = hinge.coulomb_Nm, hinge.viscous_Nm_s
     model.dof_solref[GAMMA] = TIME_CONSTANT_s, DAMPING_RATIO
     model.dof_solimp[GAMMA] = IMPEDANCE, LARGEST_IMPEDANCE, *RISE
@@ -203,7 +203,7 @@ def _with_bearing(kept: Mjcf, hinge: Hinge) -> Mjcf:
     model.opt.noslip_iterations = 0
     # One constraint is solved in two steps of Newton's, without any: a tolerance would end it before.
     model.opt.tolerance = 0.0
-    return replace(kept, bare=model)
+    return replace(mjcf, bare=model)
 
 
 def _motion(plant: Any, bearing: Friction, torque_Nm: Array) -> Motion:

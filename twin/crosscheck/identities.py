@@ -28,7 +28,7 @@ _WHY_EXACT = "rounding alone, near 1e-16: both sides are exact"
 
 
 class Identities(NamedTuple):
-    """Checks alone: nothing of it is drawn."""
+    """Checks without a figure."""
 
     checks: list[Check]
 
@@ -221,7 +221,7 @@ def euler_attitude(motion: Motion) -> Array:
     """Attitude of an axisymmetric rotor at each time, exact, from its state at time 0.
 
     With J1 = J2 the third axis turns about the fixed angular momentum H at H/J1, and the rotor turns about
-    its third axis at (1 - J3/J1) w3 beside (Landau and Lifshitz, Mechanics, section 33).
+    its third axis at (1 - J3/J1) w3 in addition (Landau and Lifshitz, Mechanics, section 33).
     """
     J1, _, J3 = motion.inertia
     precession = motion.t_s[:, None] * motion.momentum_S[0] / J1

@@ -1,4 +1,4 @@
-"""A part of the cross-check: what it examines, and what all parts leave."""
+"""Part of the cross-check: its subject and its findings."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from spheretwin.models.base.checks import Check
 F = TypeVar("F", bound="Finding")
 
 STATES = 10_000
-"""Random states at which the dynamics are compared, unless told otherwise."""
+"""Default number of random states at which the dynamics are compared."""
 
 
 class Subject(NamedTuple):
-    """What is examined."""
+    """Subject of the checks."""
 
     mjcf: Path
     actuator: Actuator
@@ -25,7 +25,7 @@ class Subject(NamedTuple):
 
 
 class Finding(Protocol):
-    """What a part leaves: its checks, and whatever its figures are drawn from."""
+    """Result of a part: its checks, and the data of its figures."""
 
     @property
     def checks(self) -> list[Check]:
@@ -41,7 +41,7 @@ class Part(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What every part has left, by its name."""
+    """Findings of every part by its name."""
 
     findings: Mapping[str, Finding]
 
@@ -51,5 +51,5 @@ class Evidence(NamedTuple):
         return [check for finding in self.findings.values() for check in finding.checks]
 
     def of(self, kind: type[F]) -> F:
-        """What the part left whose findings are of a kind."""
+        """Findings of a kind."""
         return next(finding for finding in self.findings.values() if isinstance(finding, kind))

@@ -44,7 +44,7 @@ def run(
     states : int
         Random states at which formulas are compared.
     begun : callable
-        Told the name of each of `PARTS` as it begins.
+        Receives the name of each of `PARTS` as it begins.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def draw_torque_free(evidence: Evidence) -> Drawing:
     """Drift of what a torque-free rotor keeps."""
     from spheretwin.viz.figures import crosscheck
 
-    found = evidence.of(free_rotor.FreeRotor)
+    rotor = evidence.of(free_rotor.FreeRotor)
     axis = {
         "energy": "energy, relative",
         "angular momentum": "angular momentum,\nrelative",
@@ -171,10 +171,10 @@ def draw_torque_free(evidence: Evidence) -> Drawing:
         axis[quantity]: {
             f"{spin} rad/s": crosscheck.Bounded(drift.values, drift.bound) for spin, drift in by_spin.items()
         }
-        for quantity, by_spin in found.drifts.items()
+        for quantity, by_spin in rotor.drifts.items()
     }
     title = f"Torque-free rotor over {free_rotor.DURATION_s:g} s, by spin rate"
-    figure = crosscheck.drifts(found.t_s, panels, title)
+    figure = crosscheck.drifts(rotor.t_s, panels, title)
     caption = "Drift of energy and angular momentum, and attitude against Euler's exact solution at J1 = J2."
     return Drawing("torque_free.png", caption, figure)
 
@@ -221,7 +221,7 @@ def write(folder: Path, evidence: Evidence, versions: Mapping[str, str]) -> Path
     folder : Path
         Exists.
     evidence : Evidence
-        What the suite left.
+        Result of the suite.
     versions : mapping
         Version by package, for the foot of the page.
 
@@ -257,6 +257,6 @@ def markdown(checks: list[Check], drawings: list[Drawing], versions: Mapping[str
 
 
 def _row(check: Check) -> tuple[str, ...]:
-    kept = "yes" if check.ok else "**no**"
+    verdict = "yes" if check.ok else "**no**"
     figures = f"{check.states:,}", check.value_text(), check.bound_text()
-    return check.name, check.compares, *figures, kept, check.why
+    return check.name, check.compares, *figures, verdict, check.why

@@ -1,6 +1,6 @@
 """Rows of a study: values, law and seed of each row follow from its number.
 
-Axes that are zipped go together, all other axes are crossed, and so are the points of the drawn ones, the
+Axes that are zipped go together, all other axes are crossed, and so are the points of the random ones, the
 laws and the seeds. The last of them changes fastest. Rows are not listed, so that a study of millions takes
 no memory.
 """
@@ -93,8 +93,8 @@ class Grid:
         values: dict[str, Any] = {}
         for group, place in zip(self._groups, places, strict=True):
             values |= {field: listed[place] for field, listed in group.items()}
-        drawn = zip(self._study.drawn_axes, self._points[point].tolist(), strict=True)
-        values |= {axis.field: value for axis, value in drawn}
+        random = zip(self._study.drawn_axes, self._points[point].tolist(), strict=True)
+        values |= {axis.field: value for axis, value in random}
         ordered = {axis.field: values[axis.field] for axis in self._study.axis}
         key = _key(ordered, self._laws[law], repeat)
         drawn_from = f"repeat {repeat}" if self._study.common_seeds else key

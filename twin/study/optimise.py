@@ -35,7 +35,7 @@ class Setting(BaseModel):
 
 
 class Gain(BaseModel):
-    """A number to be found, and the fields that follow from it."""
+    """Number that is tuned, and the fields that follow from it."""
 
     model_config = CONFIG
 

@@ -236,9 +236,9 @@ def write(
     SpheretwinError
         A file cannot be written there.
     """
-    drawn = list(drawings(rows))
-    save_drawings(folder, drawn)
-    text = markdown(rows, summary, requested, drawn, source, versions)
+    figures = list(drawings(rows))
+    save_drawings(folder, figures)
+    text = markdown(rows, summary, requested, figures, source, versions)
     title = str(rows.study["name"])
     return [save_text(folder / MARKDOWN, text), save_text(folder / HTML, html.page(title, text))]
 
@@ -247,7 +247,7 @@ def markdown(
     rows: Rows,
     summary: Mapping[str, Any],
     requested: tuple[int, int],
-    drawn: Sequence[Drawing],
+    figures: Sequence[Drawing],
     source: str,
     versions: Mapping[str, str],
 ) -> str:
@@ -256,7 +256,7 @@ def markdown(
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
     lines = [f"# {study['name']}", "", study["description"], "", _ends(rows, *requested), ""]
     lines += ["## Figures of the rows", "", *_summary(summary), ""]
-    lines += [pieces.figure(drawing) for drawing in drawn]
+    lines += [pieces.figure(drawing) for drawing in figures]
     lines += _worst(rows, command)
     lines += _failures(rows)
     lines += ["## What differs from row to row", "", *_axes(study, rows), ""]

@@ -105,10 +105,10 @@ class Study(BaseModel):
 
     @model_validator(mode="after")
     def _fits(self) -> Study:
-        drawn = [axis.field for axis in self.axis if axis.is_drawn]
-        if drawn and self.samples is None:
-            raise ValueError(f"expected samples, as {', '.join(drawn)} is drawn, received none")
-        if self.samples is not None and not drawn:
+        random = [axis.field for axis in self.axis if axis.is_drawn]
+        if random and self.samples is None:
+            raise ValueError(f"expected samples, as {', '.join(random)} is drawn, received none")
+        if self.samples is not None and not random:
             raise ValueError(f"expected an axis that is drawn for samples, received {self.samples}")
         fields = [axis.field for axis in self.axis]
         if twice := sorted({field for field in fields if fields.count(field) > 1}):
@@ -153,7 +153,7 @@ class Study(BaseModel):
 
     @property
     def drawn_axes(self) -> tuple[Axis, ...]:
-        """Axes whose values are drawn."""
+        """Axes with random values."""
         return tuple(axis for axis in self.axis if axis.is_drawn)
 
 

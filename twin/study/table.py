@@ -25,7 +25,7 @@ NAME = "table.parquet"
 BATCH_ROWS = 2_000
 
 FIXED = ("row", "key", "seed", "law", "repeat", "status", "reason", "error")
-"""Columns of every table, beside its axes and its figures."""
+"""Columns of every table in addition to its axes and its figures."""
 
 LARGEST_WHOLE = 2**63 - 1
 

@@ -16,7 +16,7 @@ from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octav
 from spheretwin.viz.pages import html
 from spheretwin.viz.quantities import Array, ScalarQuantity
 
-# The browser is told to contact no host.
+# The browser contacts no host.
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:;"
     " font-src data:; form-action 'none'; base-uri 'none'"

@@ -55,7 +55,7 @@ def _cell(text: str) -> str:
 
 
 def prepare(folder: Path, *libraries: str) -> None:
-    """Find out before a run whether a page can be drawn and written, and leave an empty folder.
+    """Check before a run that a page can be drawn and written, and make its folder.
 
     Parameters
     ----------

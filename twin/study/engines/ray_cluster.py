@@ -3,8 +3,8 @@
 A process a core, and not threads within fewer: a third of a short row is Python, which threads run one at a
 time. Only numbers of rows travel to the nodes, and only results back, into the same journal. Files that a
 study names must be on every node, under the same paths, and so must the same sources and versions: a node
-that has others is refused by `spheretwin.study.engines.ray_worker`. Rows whose telemetry is kept are run by
-the driver, beside whose journal it belongs.
+that has others is refused by `spheretwin.study.engines.ray_worker`. The driver runs the rows whose telemetry
+is stored, as it belongs next to the journal.
 """
 
 from __future__ import annotations

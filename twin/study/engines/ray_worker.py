@@ -97,9 +97,7 @@ def _prepared(job: Job) -> tuple[Grid, Rows]:
     SpheretwinError
         A file is missing, or sources, files or versions differ from the driver's.
     """
-    with suppress(
-        OSError
-    ):  # where it is not, files that are named from it are not either, which will be told
+    with suppress(OSError):  # without it its files are missing, which is reported
         os.chdir(job.working_folder)
     study = Study.model_validate_json(job.study).model_copy(update={"folder": job.folder})
     try:

@@ -1,1 +1,1 @@
-"""Tuning: gains that a sampler proposes, judged by the rows of a study, as trials that are kept."""
+"""Tuning: a sampler proposes gains, and trials evaluate them on the rows of a study."""

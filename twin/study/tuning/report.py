@@ -32,7 +32,7 @@ def drawings(name: str, result: TuningResult, objectives: Sequence[Objective]) -
     if not by_label:
         return []
     names = [each.called for each in objectives]
-    drawn = [
+    figures = [
         Drawing(
             "trials.png",
             "Objectives trial by trial: rings were pruned, and are at least that; crosses lost.",
@@ -41,8 +41,8 @@ def drawings(name: str, result: TuningResult, objectives: Sequence[Objective]) -
     ]
     if len(objectives) == 2:
         caption = "The front: no trial is as good in both objectives and better in one."
-        drawn.append(Drawing("front.png", caption, fronts.front(by_label, names, f"{name}: front")))
-    return drawn
+        figures.append(Drawing("front.png", caption, fronts.front(by_label, names, f"{name}: front")))
+    return figures
 
 
 def _trials(law: LawResult, objectives: Sequence[Objective]) -> fronts.Trials:
@@ -177,11 +177,11 @@ def write(
     SpheretwinError
         A file cannot be written there.
     """
-    drawn: list[Drawing] = []
+    figures: list[Drawing] = []
     if find_spec("matplotlib") is not None:
-        drawn = drawings(study.name, result, section_of(study).objective)
-        save_drawings(folder, drawn)
-    text = markdown(study, result, drawn, command, versions)
+        figures = drawings(study.name, result, section_of(study).objective)
+        save_drawings(folder, figures)
+    text = markdown(study, result, figures, command, versions)
     gains = json.dumps(best(result, section_of(study).objective), indent=1, ensure_ascii=False)
     return [
         save_text(folder / MARKDOWN, text),
@@ -191,14 +191,14 @@ def write(
 
 
 def markdown(
-    study: Study, result: TuningResult, drawn: Sequence[Drawing], command: str, versions: Mapping[str, str]
+    study: Study, result: TuningResult, figures: Sequence[Drawing], command: str, versions: Mapping[str, str]
 ) -> str:
     """Text of the page."""
     optimise = section_of(study)
     whole = summary(result, optimise.objective)
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
     lines = [f"# {study.name}", "", study.description, "", *_what(study), ""]
-    lines += [pieces.figure(each) for each in drawn]
+    lines += [pieces.figure(each) for each in figures]
     for law, of_law in whole["laws"].items():
         lines += [f"## {law}", "", _counted(of_law), "", *_chosen(of_law), ""]
     lines += [f"Made by `{command}` with {used}.", ""]

@@ -1,8 +1,8 @@
 """Proposals of trials by Optuna's samplers, each trial with a random stream of its own.
 
-The samplers of a trial are made anew from the study's seed and the trial's number, and see the trials of
-earlier batches and what its own batch asked for before it. Nothing else of the process goes into a proposal:
-neither threads nor an interruption change it, a SIGKILL in the middle of a proposal included.
+The samplers of a trial are created from the study's seed and the trial's number. They receive the trials of
+earlier batches and the earlier proposals of the same batch. A proposal depends on nothing else: neither on
+threads nor on an interruption, a SIGKILL during a proposal included.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def opened(path: Path) -> Iterator[BaseStorage]:
     InputError
         Another process writes it, or it is none.
     SpheretwinError
-        It could not be written, as on a full disk; what was written before is kept.
+        It could not be written, as on a full disk; earlier trials are stored.
     """
     module = optuna()
     verbosity = module.logging.get_verbosity()
@@ -235,7 +235,7 @@ class Proposer:
                 self._study.enqueue_trial(self._local(number))
             trial = self._study.ask()
         for name, (low, high, is_log) in numbers(self._gains).items():
-            # Of its own for each gain: those that a killed process had drawn already are not drawn again.
+            # A sampler for each gain: gains that a killed process proposed are not proposed again.
             self._study.sampler = self._sampler(number, name)
             trial.suggest_float(name, low, high, log=is_log)
         return trial
