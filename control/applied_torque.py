@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.models.base.compiled import allocation_free, transfer_state
+from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.state import push
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import rotor_torque
 
@@ -105,9 +106,7 @@ def estimate_applied_torque(
     )
     last = commands.shape[0] - 1
     for j in range(command.shape[0]):
-        for row in range(last, 0, -1):
-            commands[row, j] = commands[row - 1, j]
-        commands[0, j] = command[j]
+        push(commands, j, command[j])
         older, newer = commands[last, j], commands[last - 1, j]
         distance = current[j] - older
         first = older + applied_torque.older_lag.mean_share * distance
@@ -118,15 +117,6 @@ def estimate_applied_torque(
         current[j] = newer + applied_torque.newer_lag.decay * distance
     rotor_torque(G, mean, applied_torque.torque_S)
     generalised_torque(pose, applied_torque.torque_S, applied_torque.torque_q)
-
-
-def transfer_applied_torque(previous: AppliedTorque, applied_torque: AppliedTorque) -> None:
-    """Copy the state into an estimate with another delay or lag; older commands repeat the oldest one.
-
-    If `previous` was off, it has no state, and the estimate starts at rest.
-    """
-    if previous.on and applied_torque.on:
-        transfer_state(previous, applied_torque)
 
 
 def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:

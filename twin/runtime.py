@@ -10,23 +10,14 @@ from numpy.typing import NDArray
 from spheretwin import assembly
 from spheretwin import loop as loops
 from spheretwin.control.allocation import ALLOCATIONS
-from spheretwin.control.applied_torque import transfer_applied_torque
-from spheretwin.control.compensators import transfer_compensators
-from spheretwin.control.controller import Supervision
 from spheretwin.control.law import Law
-from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_watchdog
+from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_trip
 from spheretwin.electronics.drive import transfer_drive
-from spheretwin.electronics.sensors import transfer_sensors
+from spheretwin.electronics.sensors import measure_again
 from spheretwin.loop import dispatch, is_user_law
-from spheretwin.models.base.compiled import (
-    callback_errors,
-    check_length,
-    for_types_of,
-    restore_state,
-    save_state,
-    transfer_state,
-)
+from spheretwin.models.base.compiled import callback_errors, for_types_of
 from spheretwin.models.base.errors import LawError
+from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.rotor import Rotor
 from spheretwin.scenario.files import Files
@@ -37,6 +28,11 @@ from spheretwin.shared_buffers import faults_of, sensors_of, shared_buffers, sup
 NO_INPUTS = loops.Inputs(
     np.empty(0), np.empty((0, 3, 3)), np.empty((0, 3)), np.empty((0, 0)), np.empty((0, 0))
 )
+
+# Names of parts in messages.
+LAW_PARAMETERS, LAW_MEMORY = "the law's parameters", "the law's memory"
+COMPENSATORS = "the governor, the prediction and the feed-forward"
+ESTIMATOR_MEMORY = "the estimator's memory"
 
 
 class LastTick(NamedTuple):
@@ -156,12 +152,9 @@ class Runtime:
         """Run a control tick for each row of `log`; return the rows written and the code of a status."""
         ticks, code = self._run(inputs, log)
         if ticks:
-            row, first = log[ticks - 1], loops.CURRENT_COMMAND
-            self._last = LastTick(
-                row[loops.ANGLE : loops.ANGLE + 3].copy(),
-                inputs.noise[ticks - 1].copy(),
-                row[first : first + len(self._plant.current)].copy(),
-            )
+            first = loops.CURRENT_COMMAND
+            row = log[ticks - 1, : first + len(self._plant.current)].copy()  # the caller owns the log
+            self._last = LastTick(row[loops.ANGLE : loops.ANGLE + 3], inputs.noise[ticks - 1], row[first:])
         return ticks, code
 
     def _run(self, inputs: loops.Inputs, log: NDArray[np.float64]) -> tuple[int, int]:
@@ -193,28 +186,30 @@ class Runtime:
         rotor = self._rotor if same else _transfer_rotor(self._rotor, scenario, files)
         law = user_law or self._law_for(scenario)
         other = Runtime(scenario, files, law, rotor)
-        other._plant.current[:] = self._plant.current
-        other._plant.last_qdot[:] = self._plant.last_qdot
         other._last = self._last
+        measure_again(other._sensors, scenario.sensors, self._last.q, self._last.noise)
+        before, after = self.parts, other.parts
+        for name in before.keys() - self._parts_that_start_again(other, user_law):
+            transfer_state(before[name], after[name])
         transfer_drive(self._plant.drive, other._plant.drive, self._last.command)
-        transfer_sensors(self._sensors, other._sensors, scenario.sensors, self._last.q, self._last.noise)
-        _transfer_supervision(self._controller.supervision, other._controller.supervision)
-        if scenario.manual.on or not self._scenario.manual.on:
-            self._transfer_law(other, user_law)
-        transfer_applied_torque(self._controller.applied_torque, other._controller.applied_torque)
-        if type(scenario.estimator) is type(self._scenario.estimator):
-            other._controller.estimator_state.memory[:] = self._controller.estimator_state.memory
+        transfer_trip(self._controller.supervision.watchdog, other._controller.supervision.watchdog)
         return other
 
-    def _transfer_law(self, other: Runtime, user_law: Law | None) -> None:
-        """Transfer the state of the law and of its compensators to another runtime."""
-        before, after = self._controller, other._controller
-        same_kind = user_law is None and type(other._scenario.controller) is type(self._scenario.controller)
-        if other.law is self.law:
-            after.parameters[:] = before.parameters
-        if other.law is self.law or (same_kind and len(after.memory) == len(before.memory)):
-            after.memory[:] = before.memory
-        transfer_compensators(before.compensators, after.compensators)
+    def _parts_that_start_again(self, other: Runtime, user_law: Law | None) -> set[str]:
+        """Return the names of the parts that keep nothing of the state of this runtime in another one."""
+        before, after, parts = self._scenario, other._scenario, set()
+        same_law, same_kind = other.law is self.law, type(after.controller) is type(before.controller)
+        same_size = len(other._controller.memory) == len(self._controller.memory)
+        after_manual = before.manual.on and not after.manual.on
+        if after_manual or not same_law:
+            parts.add(LAW_PARAMETERS)
+        if after_manual or not (same_law or (user_law is None and same_kind and same_size)):
+            parts.add(LAW_MEMORY)
+        if after_manual:
+            parts.add(COMPENSATORS)
+        if type(after.estimator) is not type(before.estimator):
+            parts.add(ESTIMATOR_MEMORY)
+        return parts
 
     def _law_for(self, scenario: ResolvedScenario) -> Law:
         """Return the law of a scenario: the active law if nothing that it is built from has changed."""
@@ -236,11 +231,11 @@ class Runtime:
             "currents": self._plant.current,
             "the last rates": self._plant.last_qdot,
             "the drive's state": self._plant.drive,
-            "the law's parameters": controller.parameters,
-            "the law's memory": controller.memory,
+            LAW_PARAMETERS: controller.parameters,
+            LAW_MEMORY: controller.memory,
             "the applied torque": controller.applied_torque,
-            "the governor, the prediction and the feed-forward": controller.compensators,
-            "the estimator's memory": controller.estimator_state.memory,
+            COMPENSATORS: controller.compensators,
+            ESTIMATOR_MEMORY: controller.estimator_state.memory,
             "the sensors' state": self._sensors,
             "the groups' states": supervision.groups,
             "the detector's state": supervision.detector,
@@ -280,11 +275,3 @@ def _transfer_rotor(rotor: StartedRotor, scenario: ResolvedScenario, files: File
     if len(other.state()) == len(state):  # otherwise a body was added or removed: only pose and rates remain
         other.restore(state)
     return StartedRotor(other, data)
-
-
-def _transfer_supervision(before: Supervision, after: Supervision) -> None:
-    """Transfer the state of the supervision to one with other parameters."""
-    transfer_state(before.groups, after.groups)
-    if before.detector.on:
-        transfer_state(before.detector, after.detector)
-    transfer_watchdog(before.watchdog, after.watchdog)

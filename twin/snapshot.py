@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,9 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.runtime import RuntimeState
 from spheretwin.scenario.files import Files, digest
 from spheretwin.scenario.sections import ResolvedScenario
+
+VERSION = 2
+"""Version of the content of a snapshot; it increases with each change of the state or of its classes."""
 
 
 class UserLaws:
@@ -72,6 +76,14 @@ class Snapshot:
     journal: tuple[Change, ...]
     events: tuple[Change, ...]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The content is read after the check of the version: classes of other versions may have moved.
+        return _unpickled, (VERSION, pickle.dumps(vars(self)))
+
+    def __setstate__(self, state: object) -> None:
+        """Refuse a snapshot of version 1, which was pickled without its version."""
+        _unpickled(1, b"")
+
     def check_fits(self, files: Files) -> None:
         """Check that model, curves and law are those of the snapshot.
 
@@ -90,3 +102,18 @@ class Snapshot:
             raise InputError(
                 "session: expected a snapshot of the same model and torque curves, received one of others"
             )
+
+
+def _unpickled(version: int, content: bytes) -> Snapshot:
+    """Return a pickled snapshot.
+
+    Raises
+    ------
+    InputError
+        Its content has another version.
+    """
+    if version != VERSION:
+        raise InputError(
+            f"session: expected a snapshot of version {VERSION}, received one of version {version}"
+        )
+    return Snapshot(**pickle.loads(content))

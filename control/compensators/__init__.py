@@ -14,8 +14,8 @@ from spheretwin.control.compensators.feed_forward import (
     subtract_feed_forward,
 )
 from spheretwin.control.compensators.prediction import Prediction, advance, predict
-from spheretwin.control.compensators.reference_governor import Governor, govern, transfer_governor
-from spheretwin.models.base.compiled import allocation_free, transfer_state
+from spheretwin.control.compensators.reference_governor import Governor, govern
+from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.magnetics import TorqueModel
 
 Array = NDArray[np.float64]
@@ -67,10 +67,3 @@ def apply_compensators(
         subtract_feed_forward(compensators.feed_forward, measurement[2])
         compute_feed_forward(compensators.feed_forward, reference)
     return True
-
-
-def transfer_compensators(before: Compensators, after: Compensators) -> None:
-    """Copy the state of each compensator into compensators with other parameters."""
-    transfer_governor(before.governor, after.governor)
-    transfer_state(before.prediction, after.prediction)
-    transfer_state(before.feed_forward, after.feed_forward)

@@ -26,6 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from spheretwin.control.applied_torque import split_delay
 from spheretwin.control.law import NonNegativeEach, each
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.state import delayed_mean, push
 from spheretwin.models.lagrangian import coriolis_rows, inertia_entries, triple, turns
 
 Array = NDArray[np.float64]
@@ -109,11 +110,8 @@ def feed_forward(
 @allocation_free
 def subtract_feed_forward(feed: FeedForward, torque_q: Array) -> None:
     """Subtract the torque fed forward from the applied torque (N·m) of the last period."""
-    last = feed.history.shape[0] - 1
     for i in range(3):
-        torque_q[i] -= (
-            feed.fraction * feed.history[last, i] + (1.0 - feed.fraction) * feed.history[last - 1, i]
-        )
+        torque_q[i] -= delayed_mean(feed.history, i, feed.fraction)
 
 
 @allocation_free
@@ -139,6 +137,4 @@ def compute_feed_forward(feed: FeedForward, reference: Array) -> None:
         k = feed.viscous_Nm_s[i] + feed.coulomb_Nm[i] / sqrt(v[i] ** 2 + feed.smoothing_rad_s**2)
         coriolis = C[i][0] * v[0] + C[i][1] * v[1] + C[i][2] * v[2]
         feed.torque_q[i] = k * v[i] + feed.share[i] * (inertial[i] + coriolis)
-        for row in range(feed.history.shape[0] - 1, 0, -1):
-            feed.history[row, i] = feed.history[row - 1, i]
-        feed.history[0, i] = feed.torque_q[i]
+        push(feed.history, i, feed.torque_q[i])

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.control.law import PositiveEach
-from spheretwin.models.base.compiled import allocation_free, transfer_state
+from spheretwin.models.base.compiled import allocation_free
 
 Array = NDArray[np.float64]
 
@@ -133,9 +133,3 @@ def fhan(x: float, v: float, largest: float, h: float) -> float:
     else:
         switching = h * v + copysign(0.5, after) * (sqrt(reach * (reach + 8.0 * abs(after))) - reach)
     return -largest * min(max(switching / reach, -1.0), 1.0)
-
-
-def transfer_governor(before: Governor, after: Governor) -> None:
-    """Copy the state into a governor with other limits; one that was off starts at the next tick."""
-    if before.on and after.on:
-        transfer_state(before, after)

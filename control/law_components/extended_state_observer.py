@@ -53,6 +53,7 @@ from spheretwin.control.law_components.nominal_motion import (
     inertial_torque,
 )
 from spheretwin.models.base.compiled import allocation_free
+from spheretwin.models.base.state import delayed_mean, push
 from spheretwin.models.lagrangian import Triple
 
 
@@ -140,14 +141,11 @@ def history_layout(known: NominalModel) -> tuple[float, int]:
 @allocation_free
 def delayed_command(history: NDArray[np.float64], axis: int, fraction: float) -> float:
     """Return the torque (N·m) on an axis that was commanded for the last period."""
-    last = history.shape[0] - 3
-    return fraction * history[last + axis] + (1.0 - fraction) * history[last - 3 + axis]
+    return delayed_mean(history.reshape((-1, 3)), axis, fraction)
 
 
 @allocation_free
 def store_command(history: NDArray[np.float64], torque: NDArray[np.float64]) -> None:
     """Store the torque (3,) that is commanded now."""
-    for i in range(history.shape[0] - 1, 2, -1):
-        history[i] = history[i - 3]
     for axis in range(3):
-        history[axis] = torque[axis]
+        push(history.reshape((-1, 3)), axis, torque[axis])

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from spheretwin.models.base.compiled import allocation_free, transfer_state
+from spheretwin.models.base.compiled import allocation_free
 
 Array = NDArray[np.float64]
 
@@ -108,7 +108,11 @@ class Watchdog(NamedTuple):
 
     def state_arrays(self) -> tuple[NDArray[Any], ...]:
         """Return the arrays that hold the state."""
-        return self.last_rad, self.missing, self.halt, self.reason, self.ticks_since_trip
+        return self.last_rad, self.missing, *self.trip_arrays()
+
+    def trip_arrays(self) -> tuple[NDArray[Any], ...]:
+        """Return the arrays that hold a trip."""
+        return self.halt, self.reason, self.ticks_since_trip
 
 
 class MeasurementLimits(NamedTuple):
@@ -212,8 +216,7 @@ def count_rundown(watchdog: Watchdog) -> bool:
     return watchdog.ticks_since_trip[0] > watchdog.rundown_ticks
 
 
-def transfer_watchdog(before: Watchdog, after: Watchdog) -> None:
-    """Copy the state into a watchdog with other limits; the measurements of one that was off are dropped."""
-    transfer_state(before, after)
-    if not before.on:
-        after.last_rad[:], after.missing[:] = np.nan, 0
+def transfer_trip(before: Watchdog, after: Watchdog) -> None:
+    """Copy a trip into a watchdog with other limits, also into or from one that is off."""
+    for source, target in zip(before.trip_arrays(), after.trip_arrays(), strict=True):
+        target[:] = source

@@ -1,4 +1,4 @@
-"""Decorators for compiled functions, with a cache that cannot become stale, and the state of tuples."""
+"""Decorators for compiled functions, with a cache that cannot become stale."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import overload, register_jitable
 from numpy.typing import NDArray
 
-from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.numba_internals import MachineCode
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -300,73 +299,3 @@ def copy_rows(source: NDArray[np.float64], target: NDArray[np.float64]) -> None:
     for i in range(source.shape[0]):
         for j in range(3):
             target[i, j] = source[i, j]
-
-
-def arrays_of(part: Any, method: str = "state_arrays") -> list[NDArray[Any]]:
-    """Return the arrays that a method of a part and of its nested parts gives, in a fixed order."""
-    if isinstance(part, np.ndarray):
-        return [part]
-    if hasattr(part, method):
-        inner = getattr(part, method)()
-    else:
-        inner = (
-            [inner_part for inner_part in part if isinstance(inner_part, tuple)]
-            if isinstance(part, tuple)
-            else []
-        )
-    return [array for inner_part in inner for array in arrays_of(inner_part, method)]
-
-
-def save_state(part: Any) -> NDArray[np.float64]:
-    """Return a copy of the state of a part, as numbers."""
-    return np.concatenate([np.empty(0), *(array.ravel() for array in arrays_of(part))])
-
-
-def restore_state(part: Any, state: NDArray[np.float64], name: str) -> None:
-    """Write a saved state into a part of the same size.
-
-    Parameters
-    ----------
-    part : named tuple, array or tuple of them
-    state : array
-        From `save_state`.
-    name : str
-        Name of the part, for the message.
-
-    Raises
-    ------
-    InputError
-        The numbers of values differ; nothing is written.
-    """
-    arrays = arrays_of(part)
-    check_length(name, state, sum(array.size for array in arrays))
-    first = 0
-    for array in arrays:
-        array[...] = state[first : first + array.size].reshape(array.shape)
-        first += array.size
-
-
-def transfer_state(before: Any, after: Any) -> None:
-    """Copy the state of a part into another of the same kind.
-
-    Arrays of different lengths have their newest row first: missing rows repeat the oldest one.
-    """
-    for source, target in zip(arrays_of(before), arrays_of(after), strict=True):
-        rows = min(len(source), len(target))
-        target[:rows] = source[:rows]
-        if rows:
-            target[rows:] = source[-1]
-
-
-def check_length(name: str, state: NDArray[np.float64], expected: int) -> None:
-    """Check the length of a state.
-
-    Raises
-    ------
-    InputError
-        It is not the expected one.
-    """
-    if np.shape(state) != (expected,):
-        raise InputError(
-            f"session: expected a snapshot with {expected} numbers of {name}, received {np.size(state)}"
-        )

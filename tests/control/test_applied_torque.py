@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from spheretwin import scenario as scenarios
 from spheretwin.control.applied_torque import applied_torque, estimate_applied_torque
 from spheretwin.control.law import Law
-from spheretwin.models.base.compiled import restore_state, save_state
+from spheretwin.models.base.state import restore_state, save_state
 from spheretwin.models.kinematics import generalised_torque, rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.telemetry.signals import ANGLES, Signal

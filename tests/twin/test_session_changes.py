@@ -7,6 +7,7 @@ import pytest
 
 from spheretwin import cli
 from spheretwin import scenario as scenarios
+from spheretwin import snapshot as snapshots
 from spheretwin.control.law import Law
 from spheretwin.models.actuator import TORQUE_CURVE_PATH
 from spheretwin.models.base.errors import InputError
@@ -221,6 +222,29 @@ def test_a_snapshot_knows_a_law_of_a_file_by_what_the_file_held(file):
         file.write_text(LAWS.replace("-0.5 *", "-0.6 *"))
         with pytest.raises(InputError, match="as it was when the snapshot was taken"):
             session.restore(pickle.loads(taken))
+
+
+def test_a_pickled_snapshot_of_another_version_is_refused(monkeypatch):
+    with Session(hold()) as session:
+        snapshot = session.snapshot()
+    monkeypatch.setattr(snapshots, "VERSION", snapshots.VERSION + 1)
+    newer = pickle.dumps(snapshot)
+    monkeypatch.undo()
+    message = f"^session: expected a snapshot of version {snapshots.VERSION}, received one of version "
+    with pytest.raises(InputError, match=f"{message}{snapshots.VERSION + 1}$"):
+        pickle.loads(newer)
+    # A dataclass without `__reduce__` is pickled like this: version 1.
+    first = pickle.dumps(Unversioned(snapshots.Snapshot, vars(snapshot)))
+    with pytest.raises(InputError, match=f"{message}1$"):
+        pickle.loads(first)
+
+
+class Unversioned:
+    def __init__(self, kind, state):
+        self.kind, self.state = kind, state
+
+    def __reduce__(self):
+        return object.__new__, (self.kind,), self.state
 
 
 def test_a_trajectory_of_the_user_s_is_not_taken_for_a_shape():

@@ -29,6 +29,7 @@ from spheretwin.electronics.sensor_stage import SensorSetup, SensorStage, TickNo
 from spheretwin.electronics.stages import FaultLine, fault_line, through
 from spheretwin.electronics.transducers import CHANNELS
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.state import push
 
 HARMONICS = 3
 
@@ -291,12 +292,10 @@ def pass_adcs(stage: Adcs, measurement: NDArray[np.float64], noise: TickNoise) -
 @allocation_free
 def _delayed(stage: Adcs, channel: int, angle: float) -> float:
     """Store an angle and return the one delayed by a fault, or the first angle."""
-    ring = stage.delayed_rad
-    first = isnan(ring[0, channel])
-    for row in range(ring.shape[0] - 1, 0, -1):
-        ring[row, channel] = angle if first else ring[row - 1, channel]
-    ring[0, channel] = angle
-    return ring[stage.delay_ticks[0], channel]
+    history = stage.delayed_rad
+    for _ in range(history.shape[0] if isnan(history[0, channel]) else 1):  # the first angle fills all rows
+        push(history, channel, angle)
+    return history[stage.delay_ticks[0], channel]
 
 
 class Adc(NamedTuple):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.state import push
 
 # Clock times are decimal fractions: a delay is a multiple of a step only up to rounding.
 WHOLE = 1e-9
@@ -30,16 +31,15 @@ class DelaySection(BaseModel):
 
 
 class Delay(NamedTuple):
-    """Delayed commands in a ring buffer; the oldest is overwritten first."""
+    """Delayed commands."""
 
-    ring: NDArray[np.float64]  # (commands, n) A
-    newest: NDArray[np.int64]  # (1,) row of `ring` with the command computed last
+    history: NDArray[np.float64]  # (commands, n) A, newest first
     steps: int  # of physics, from sample to output
     substeps: int  # physics steps in a control period
 
-    def state_arrays(self) -> tuple[NDArray[Any], ...]:
+    def state_arrays(self) -> tuple[NDArray[np.float64], ...]:
         """Return the arrays with the state."""
-        return self.ring, self.newest
+        return (self.history,)
 
 
 def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> Delay:
@@ -68,17 +68,14 @@ def delay(section: DelaySection, step_s: float, substeps: int, groups: int) -> D
             f" periods, received {section.delay_s!r} and {step_s!r} s"
         )
     commands = -(-steps // substeps) + 1
-    return Delay(np.zeros((commands, groups)), np.zeros(1, dtype=np.int64), steps, substeps)
+    return Delay(np.zeros((commands, groups)), steps, substeps)
 
 
 @part_of_its_caller
 def latch(delay: Delay, command: NDArray[np.float64]) -> None:
     """Store the command (n,), A, that was computed from the sample of this control tick."""
-    ring = delay.ring
-    newest = (delay.newest[0] + 1) % ring.shape[0]
-    delay.newest[0] = newest
-    for j in range(ring.shape[1]):
-        ring[newest, j] = command[j]
+    for j in range(command.shape[0]):
+        push(delay.history, j, command[j])
 
 
 @part_of_its_caller
@@ -97,17 +94,7 @@ def due(delay: Delay, substep: int, out: NDArray[np.float64]) -> None:
     out : (n,) array, A
         Result.
     """
-    ring = delay.ring
     missing = delay.steps - substep
     ago = (missing + delay.substeps - 1) // delay.substeps if missing > 0 else 0
-    row = (delay.newest[0] - ago) % ring.shape[0]
-    for j in range(ring.shape[1]):
-        out[j] = ring[row, j]
-
-
-def transfer_delay(before: Delay, after: Delay) -> None:
-    """Transfer the delayed commands; if the new delay is longer, the oldest command repeats."""
-    rows = len(before.ring)
-    for ago in range(len(after.ring)):
-        after.ring[-1 - ago] = before.ring[(before.newest[0] - min(ago, rows - 1)) % rows]
-    after.newest[0] = len(after.ring) - 1
+    for j in range(out.shape[0]):
+        out[j] = delay.history[ago, j]

@@ -40,10 +40,11 @@ from spheretwin.electronics.coil import (
     update_resistance,
 )
 from spheretwin.electronics.converters import DacSection
-from spheretwin.electronics.delay import Delay, DelaySection, delay, due, latch, transfer_delay
+from spheretwin.electronics.delay import Delay, DelaySection, delay, due, latch
 from spheretwin.electronics.drive_stage import DriveSetup, DriveStage
 from spheretwin.electronics.stages import FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller, transfer_state
+from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity
 
 
@@ -241,7 +242,7 @@ def drive_chain(
     setup = DriveSetup(seed, step_s, groups, faults is not None and faults.scheduled)
     if faults:
         more = -(-faults.longest_delay_steps // substeps)
-        command_delay = command_delay._replace(ring=np.zeros((len(command_delay.ring) + more, groups)))
+        command_delay = command_delay._replace(history=np.zeros((len(command_delay.history) + more, groups)))
     chain = DriveChain(
         converts=section.converts or faults is not None,
         supplied=section.supply_V is not None,
@@ -274,7 +275,7 @@ def begin(chain: DriveChain, command: Array) -> None:
     if chain.converts:
         if output.state[0] == STUCK:
             for j in range(setpoint.shape[0]):
-                setpoint[j] = chain.delay.ring[chain.delay.newest[0], j]
+                setpoint[j] = chain.delay.history[0, j]
         else:
             for j in range(setpoint.shape[0]):
                 setpoint[j] = 0.0 if output.state[0] == SILENT else command[j]
@@ -347,7 +348,7 @@ def update_setpoint(chain: DriveChain, substep: int) -> None:
     """Compute the setpoint of the amplifiers for a physics step."""
     setpoint, fixed, output = chain.setpoint, chain.delay, chain.output
     due(
-        Delay(fixed.ring, fixed.newest, fixed.steps + output.delay_steps[0], fixed.substeps),
+        Delay(fixed.history, fixed.steps + output.delay_steps[0], fixed.substeps),
         substep,
         setpoint,
     )
@@ -454,13 +455,11 @@ def transfer(before: DriveChain | None, after: DriveChain, command: Array) -> No
         Last command.
     """
     if before is None:
-        after.delay.ring[:] = command
+        after.delay.history[:] = command
     else:
-        transfer_delay(before.delay, after.delay)
-        after.coil.temperature_degC[:] = before.coil.temperature_degC
-        update_resistance(after.coil)
-    if after.converts:  # the held values are those that this chain would have had
+        transfer_state(before.delay, after.delay)
+    if after.converts:  # the stored values are those that this chain would have had
         update_setpoint(after, after.delay.substeps - 1)
-    for was, now in zip(before.stages if before else after.stages, after.stages, strict=True):
-        if was.on and now.on:
-            transfer_state(was, now)
+    if before is not None:
+        transfer_state(before, after)
+        update_resistance(after.coil)

@@ -19,7 +19,7 @@ from spheretwin.electronics.random_streams import Streams
 from spheretwin.electronics.sensor_stage import SensorSetup, SensorStage, TickNoise
 from spheretwin.electronics.stages import chained
 from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
-from spheretwin.models.base.compiled import allocation_free, transfer_state
+from spheretwin.models.base.compiled import allocation_free
 from spheretwin.trajectories.rounding import CONFIG, Triple
 
 
@@ -186,11 +186,3 @@ def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: 
         chain.output_rad[i] = measurement[0, i]
         finite = finite and isfinite(measurement[0, i]) and isfinite(measurement[1, i])
     return finite
-
-
-def transfer(before: SensorChain, after: SensorChain) -> None:
-    """Transfer the state to a chain with other parameters; a stage that was off has no state."""
-    for was, now in zip(before.stages, after.stages, strict=True):
-        if was.on and now.on:
-            transfer_state(was, now)
-    after.output_rad[:] = before.output_rad

@@ -49,29 +49,24 @@ def build_sensors(section: SensorsSection, seed: int, faults: SensorFaults | Non
     return IdealSensors(2) if section.ideal and faults is None else sensor_chain(section, seed, faults)
 
 
-def transfer_sensors(
-    before: Sensors, after: Sensors, section: SensorsSection, q: NDArray, noise: NDArray
-) -> None:
-    """Transfer the state to sensors with other parameters.
+def measure_again(sensors: Sensors, section: SensorsSection, q: NDArray, noise: NDArray) -> None:
+    """Fill the stored values of new sensors: those that they would have had at the last tick.
 
     Parameters
     ----------
-    before, after : Sensors
+    sensors : Sensors
     section : SensorsSection
-        Section of `after`.
+        Section of the sensors.
     q : (3,) array, rad
         Pose at the last tick; empty before the first one.
     noise : array
         Random numbers of the last tick.
     """
-    if isinstance(after, SensorChain):
-        if len(q):  # the held values are those that these sensors would have had
-            numbers = width_of(noise_streams(section))
-            # Random numbers of sensors with another width do not apply to these.
-            last_noise = noise if len(noise) == numbers else np.zeros(numbers)
-            chain.sense(after, q, np.zeros(3), last_noise, np.empty((3, 3)))
-        if isinstance(before, SensorChain):
-            chain.transfer(before, after)
+    if isinstance(sensors, SensorChain) and len(q):
+        numbers = width_of(noise_streams(section))
+        # Random numbers of sensors with another width do not apply to these.
+        last_noise = noise if len(noise) == numbers else np.zeros(numbers)
+        chain.sense(sensors, q, np.zeros(3), last_noise, np.empty((3, 3)))
 
 
 def sense(sensors: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measurement: NDArray) -> bool:

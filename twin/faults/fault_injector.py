@@ -9,7 +9,7 @@ from spheretwin.control.supervision.enabled_groups import REPORTED, STATES, Enab
 from spheretwin.control.supervision.watchdog import REASONS
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.schedule import NEVER, FaultSchedule
-from spheretwin.models.base.compiled import arrays_of
+from spheretwin.models.base.state import arrays_of
 from spheretwin.models.telemetry.table import Table
 
 

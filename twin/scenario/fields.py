@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 
@@ -115,14 +116,12 @@ def place_of(scenario: type[BaseModel], path: tuple[str | int, ...]) -> FieldLoc
 
 def files_in(fields: dict[str, Any], kind: Kind, prefix: str = "") -> Iterator[NamedFile]:
     """Yield every file that given fields name, also in sections and lists of sections."""
-    members = kind.chosen(fields)
+    members = [_candidates(member) for member in kind.chosen(fields)]
     for name, value in fields.items():
-        field = next((member.model_fields[name] for member in members if name in member.model_fields), None)
-        if field is None:
-            continue
-        if _names_file(field, value):
+        mark, inside = next((member[name] for member in members if name in member), (None, None))
+        if _names_file(mark, value):
             yield NamedFile(fields, name, prefix + name)
-        elif inside := kind_of(field):
+        elif inside:
             is_list = isinstance(value, list) and inside.is_list
             for i, entry in enumerate(value if is_list else [value]):
                 if isinstance(entry, dict):
@@ -137,9 +136,17 @@ def _holds(annotation: Any, kind: type) -> bool:
     return is_kind or any(_holds(part, kind) for part in get_args(annotation))
 
 
-def _names_file(field: FieldInfo, value: Any) -> bool:
-    extra = field.json_schema_extra
-    mark = extra.get("path") if isinstance(extra, dict) else None
+@cache
+def _candidates(section: type[BaseModel]) -> dict[str, tuple[Any, Kind | None]]:
+    """Return mark and kind of each field of a section that can name a file or contain fields."""
+    extras = {name: field.json_schema_extra for name, field in section.model_fields.items()}
+    marks = {name: extra.get("path") if isinstance(extra, dict) else None for name, extra in extras.items()}
+    kinds = {name: kind_of(field) for name, field in section.model_fields.items()}
+    return {name: (marks[name], kinds[name]) for name in marks if marks[name] or kinds[name]}
+
+
+def _names_file(mark: Any, value: Any) -> bool:
+    """True if the value of a field with this mark names a file."""
     if mark == "code":
         return is_reference(value)
     is_name = mark == SHIPPED and value == SHIPPED

@@ -16,7 +16,7 @@ from spheretwin.control.supervision.enabled_groups import (
     mark_faulty_groups,
     mask_disabled_groups,
 )
-from spheretwin.models.base.compiled import restore_state, save_state
+from spheretwin.models.base.state import restore_state, save_state
 from spheretwin.models.magnetics import torque_matrix
 
 COUNT, LIMIT_A = 18, 8.0

@@ -26,7 +26,7 @@ from spheretwin.electronics.converters import convert, dac
 from spheretwin.electronics.data_sheet import drive_sheet
 from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
 from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
-from spheretwin.models.base.compiled import restore_state, save_state
+from spheretwin.models.base.state import restore_state, save_state
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 

@@ -15,12 +15,12 @@ from spheretwin.control.supervision.watchdog import (
     WatchdogSection,
     count_rundown,
     replace_invalid,
-    transfer_watchdog,
+    transfer_trip,
     trip,
     watch,
     watchdog,
 )
-from spheretwin.models.base.compiled import restore_state, save_state
+from spheretwin.models.base.state import restore_state, save_state, transfer_state
 
 PERIOD_S, NOISE_RAD, QUANTUM_RAD = 1e-3, np.array([3e-4, 3e-4, 0.0]), np.array([8e-5, 8e-5, 3e-3])
 RANGE_RAD = np.array([[-1.4, 1.4], [-1.4, 1.4], [-np.inf, np.inf]])
@@ -140,8 +140,16 @@ def test_the_state_is_complete(samples):
 def test_a_watchdog_that_was_off_starts_again():
     before, after = made(), made(largest_rate_rad_s=10.0)
     looked(before, [0.3, 0, 0])
-    transfer_watchdog(before, after)
+    transfer_state(before, after)
     assert looked(after, STILL) == Reason.JUMP
     after = made()
-    transfer_watchdog(before._replace(on=False), after)
+    transfer_state(before._replace(on=False), after)
     assert looked(after, [-0.9, 0, 0]) == Reason.NONE
+
+
+def test_a_trip_stays_when_the_watchdog_is_switched_off():
+    before, after = made(), made()._replace(on=False)
+    looked(before, [0, 0, 0], [1e5, 0, 0])
+    transfer_state(before, after)
+    transfer_trip(before, after)
+    assert (after.halt[0], after.reason[0]) == (RELEASE, Reason.SPEED)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from spheretwin.models.base.compiled import arrays_of, restore_state, save_state, transfer_state
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.state import arrays_of, push, restore_state, save_state, transfer_state
 
 
 class Filter(NamedTuple):
@@ -56,6 +56,31 @@ def test_another_length_is_refused_and_nothing_is_written(change):
     with pytest.raises(InputError, match="expected a snapshot with 12 numbers of the chain, received"):
         restore_state(part, change(np.zeros(12)), "the chain")
     assert save_state(part).tobytes() == before.tobytes()
+
+
+class Switched(NamedTuple):
+    on: bool
+    inner: Filter
+
+
+@pytest.mark.parametrize("before_on", [True, False])
+@pytest.mark.parametrize("after_on", [True, False])
+def test_only_a_part_that_is_on_before_and_after_keeps_its_state(before_on, after_on):
+    before, after = Switched(before_on, filled(3, 0)), Switched(after_on, filled(3, 1))
+    expected = before if before_on and after_on else Switched(after_on, filled(3, 1))
+    transfer_state(before, after)
+    assert save_state(after).tobytes() == save_state(expected).tobytes()
+    transfer_state(before.inner, after)  # another class
+    assert save_state(after).tobytes() == save_state(expected).tobytes()
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5])
+def test_a_history_holds_the_last_values_newest_first(rows):
+    history, values = np.zeros((rows, 2)), np.arange(1.0, 8.0)
+    for value in values:
+        push(history, 1, value)
+    np.testing.assert_array_equal(history[:, 1], values[::-1][:rows])
+    assert not history[:, 0].any()
 
 
 @pytest.mark.parametrize(("rows", "expected"), [(2, [0, 1]), (3, [0, 1, 2]), (5, [0, 1, 2, 2, 2])])

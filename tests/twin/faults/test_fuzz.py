@@ -109,7 +109,7 @@ INPUTS = {
     "current": lambda machine: machine._plant.current,
     "temperature": lambda machine: machine._plant.drive.coil.temperature_degC,
     "resistance": lambda machine: machine._plant.drive.coil.resistance_ohm,
-    "on their way": lambda machine: machine._plant.drive.delay.ring.ravel(),
+    "on their way": lambda machine: machine._plant.drive.delay.history.ravel(),
     "held": lambda machine: machine._plant.drive.stage("dac").line.table[:, LAST],
     "group gain": lambda machine: machine._plant.group_gain,
     "estimate": lambda machine: machine._controller.estimator_state.memory,
