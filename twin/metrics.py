@@ -54,11 +54,16 @@ class Metric(ABC):
     """Names of the entries, if the value is a list."""
 
     def __init__(self, planned: PlannedRun) -> None:
-        self.planned = planned
+        self.planned, self._rows = planned, 0
 
-    @abstractmethod
     def write(self, rows: Table) -> None:
         """Process the rows of one chunk, at least one."""
+        self._add(rows)
+        self._rows += len(rows)
+
+    @abstractmethod
+    def _add(self, rows: Table) -> None:
+        """Process the rows of one chunk; `_rows` is the number of rows before it."""
 
     @abstractmethod
     def value(self) -> Any:
@@ -74,72 +79,10 @@ Array = NDArray[np.float64]
 
 @rounding_each
 def add_rows(rows: Array, total: Array) -> None:
-    """Add rows (n, k) to a total (k,)."""
+    """Add rows (n, k) to a total (k,), one after the other: the sum does not depend on the chunks."""
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             total[j] += rows[i, j]
-
-
-@rounding_each
-def add_squares(rows: Array, total: Array) -> None:
-    """Add the squares of rows (n, k) to a total (k,)."""
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            total[j] += rows[i, j] * rows[i, j]
-
-
-@rounding_each
-def add_squares_by_piece(rows: Array, first: int, piece_rows: int, sums: Array) -> None:
-    """Add the squares of rows (n, k) to the sums (pieces, k) of the pieces that they are in.
-
-    Parameters
-    ----------
-    rows : (n, k) array
-    first : int
-        Index of the first row, counted from the start of the first piece.
-    piece_rows : int
-        Number of rows of a piece.
-    sums : (pieces, k) array
-        Result, increased.
-    """
-    for i in range(rows.shape[0]):
-        piece = (first + i) // piece_rows
-        for j in range(rows.shape[1]):
-            sums[piece, j] += rows[i, j] * rows[i, j]
-
-
-@rounding_each
-def add_variation(rows: Array, last: Array, total: Array) -> None:
-    """Add the variation of each column of rows (n, k) to a total (k,); update the last row `last` (k,)."""
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            total[j] += abs(rows[i, j] - last[j])
-            last[j] = rows[i, j]
-
-
-@rounding_each
-def raise_to_largest(rows: Array, largest: Array) -> None:
-    """Raise `largest` (k,) to the largest magnitudes of rows (n, k)."""
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            largest[j] = max(largest[j], abs(rows[i, j]))
-
-
-@rounding_each
-def raise_to_farthest(rows: Array, direction: Array, farthest: Array) -> None:
-    """Raise `farthest` (k,) to the largest values of rows (n, k) in a direction (k,), 1 or -1; 0: none."""
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            farthest[j] = max(farthest[j], direction[j] * rows[i, j])
-
-
-@rounding_each
-def update_last_outside(rows: Array, band: float, first: int, last: NDArray[np.int64]) -> None:
-    """Update `last` (k,) with the last row (n, k), counted from `first`, that is outside a band."""
-    for i in range(rows.shape[0]):
-        for j in range(rows.shape[1]):
-            if abs(rows[i, j]) > band:
-                last[j] = first + i
 
 
 class CopperLoss(Metric):
@@ -170,21 +113,21 @@ class CopperLoss(Metric):
         )
         self._follows = not section.converts
         self._resistance_ohm = section.resistance_ohm
-        self._rows, self._squares = 0, np.zeros(len(planned.actuator.groups))
+        self._squares = np.zeros(len(planned.actuator.groups))
         self._logged_W = np.zeros(len(planned.actuator.groups))
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        self._rows += len(rows)
+    def _add(self, rows: Table) -> None:
         if any(signal.name == "copper_loss_W" for signal in rows.signals):
             add_rows(np.ascontiguousarray(rows["copper_loss_W"]), self._logged_W)
-            return
-        if not self._follows:
-            add_squares(np.ascontiguousarray(rows["current_A"]), self._squares)
-            return
-        command, current = (np.ascontiguousarray(rows[f"current{part}_A"]) for part in ("_command", ""))
-        shares = self._first_step, self._tick, self._tick_squared
-        _add_lagging_squares(command, current, self._limit_A, shares, self._squares)
+        elif not self._follows:
+            add_rows(rows["current_A"] ** 2, self._squares)
+        else:
+            target = np.clip(rows["current_command_A"], -self._limit_A, self._limit_A)
+            distance = np.zeros_like(target)  # at the start of the tick; 0 without a lag
+            if self._first_step > 0:
+                distance = (rows["current_A"] - target) / self._first_step
+            crossed = 2.0 * self._tick * target * distance
+            add_rows(target**2 + crossed + self._tick_squared * distance**2, self._squares)
 
     def value(self) -> float | None:
         """Return the loss in J; None without a row."""
@@ -192,22 +135,6 @@ class CopperLoss(Metric):
             return None
         heat_W = np.sum(self._resistance_ohm * self._squares) + np.sum(self._logged_W)
         return float(heat_W * self.planned.period_s)
-
-
-@rounding_each
-def _add_lagging_squares(
-    command: Array, current: Array, limit_A: float, shares: tuple[float, float, float], total: Array
-) -> None:
-    """Add the mean squares over the ticks of currents that follow commands (n, k) to a total (k,)."""
-    first_step, tick, tick_squared = shares
-    for i in range(command.shape[0]):
-        for j in range(command.shape[1]):
-            target = min(max(command[i, j], -limit_A), limit_A)
-            distance = 0.0  # at the start of the tick; 0 without a lag
-            if first_step > 0:
-                distance = (current[i, j] - target) / first_step
-            crossed = 2.0 * tick * target * distance
-            total[j] += target * target + crossed + tick_squared * (distance * distance)
 
 
 class CurrentVariation(Metric):
@@ -221,16 +148,15 @@ class CurrentVariation(Metric):
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
         groups = len(planned.actuator.groups)
-        self._rows, self._variation = 0, np.zeros(groups)
+        self._variation = np.zeros(groups)
         self._last = np.zeros(groups)
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        command = np.ascontiguousarray(rows["current_command_A"])
+    def _add(self, rows: Table) -> None:
+        command = rows["current_command_A"]
         if not self._rows:
             self._last = command[0].copy()
-        add_variation(command, self._last, self._variation)
-        self._rows += len(rows)
+        add_rows(np.abs(np.diff(command, axis=0, prepend=self._last[None])), self._variation)
+        self._last = command[-1].copy()
 
     def value(self) -> float | None:
         """Return the variation in A/s; None with fewer than two rows."""
@@ -246,8 +172,7 @@ class MaxAbsCurrent(Metric):
         super().__init__(planned)
         self._largest = -np.inf
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
+    def _add(self, rows: Table) -> None:
         self._largest = max(self._largest, float(np.abs(rows["current_A"]).max()))
 
     def value(self) -> float | None:
@@ -264,12 +189,10 @@ class RmsTorque(Metric):
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._rows, self._squares = 0, np.zeros(3)
+        self._squares = np.zeros(3)
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        self._rows += len(rows)
-        add_squares(np.ascontiguousarray(rows["torque_Nm"]), self._squares)
+    def _add(self, rows: Table) -> None:
+        add_rows(rows["torque_Nm"] ** 2, self._squares)
 
     def value(self) -> float | None:
         """Return the torque in N·m; None without a row."""
@@ -285,11 +208,9 @@ class SaturatedFraction(Metric):
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._rows = self._saturated = self._rank_lost = 0
+        self._saturated = self._rank_lost = 0
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        self._rows += len(rows)
+    def _add(self, rows: Table) -> None:
         self._saturated += int(np.count_nonzero(saturated(rows)))
         self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
 
@@ -323,9 +244,8 @@ class MaxAbsError(Metric):
         super().__init__(planned)
         self._largest = np.full(3, -np.inf)
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        raise_to_largest(np.ascontiguousarray(rows["error_rad"]), self._largest)
+    def _add(self, rows: Table) -> None:
+        self._largest = np.maximum(self._largest, np.abs(rows["error_rad"]).max(axis=0))
 
     def value(self) -> list[float] | None:
         """Return [3] in rad; None without a row."""
@@ -344,8 +264,7 @@ class RmsError(Metric):
         super().__init__(planned)
         self._squares = SquaresByPiece(planned.ticks)
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
+    def _add(self, rows: Table) -> None:
         self._squares.add(rows["error_rad"])
 
     def value(self) -> list[float] | None:
@@ -371,18 +290,25 @@ class SquaresByPiece:
 
     def add(self, values: NDArray[np.float64]) -> None:
         """Add the next rows (n, 3)."""
-        first = self.rows - self._offset + PIECE_TICKS  # from the start of piece 0
-        missing = max(0, self.piece(self.rows + len(values) - 1) + 1 - len(self._sums))
-        self._sums = np.concatenate([self._sums, np.zeros((missing, 3))])
-        add_squares_by_piece(np.ascontiguousarray(values), first, PIECE_TICKS, self._sums)
+        first, squares = self.rows, values**2
         self.rows += len(values)
+        last_piece = self.piece(self.rows - 1)
+        missing = max(0, last_piece + 1 - len(self._sums))
+        self._sums = np.concatenate([self._sums, np.zeros((missing, 3))])
+        for piece in range(self.piece(first), last_piece + 1):
+            begins = self._first_tick(piece) - first
+            add_rows(squares[max(begins, 0) : max(begins + PIECE_TICKS, 0)], self._sums[piece])
 
     def rms(self, first: int) -> list[float] | None:
         """Return the root mean square from the first tick of a piece on; None without a row."""
         if not self.rows:
             return None
-        begins = max(0, (first - 1) * PIECE_TICKS + self._offset)
+        begins = max(0, self._first_tick(first))
         return np.sqrt(self._sums[first:].sum(axis=0) / (self.rows - begins)).tolist()
+
+    def _first_tick(self, piece: int) -> int:
+        """Return the first tick of a piece; below 0 for the first piece, which is shorter."""
+        return (piece - 1) * PIECE_TICKS + self._offset
 
     def piece(self, tick: int) -> int:
         """Return the piece that contains a tick."""
@@ -408,12 +334,12 @@ class SettlingTime(Metric):
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._rows, self._last_outside = 0, np.full(3, -1)
+        self._last_outside = np.full(3, -1)
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        update_last_outside(np.ascontiguousarray(rows["error_rad"]), BAND_rad, self._rows, self._last_outside)
-        self._rows += len(rows)
+    def _add(self, rows: Table) -> None:
+        outside = np.abs(rows["error_rad"]) > BAND_rad
+        last = self._rows + len(rows) - 1 - np.argmax(outside[::-1], axis=0)
+        self._last_outside = np.where(outside.any(axis=0), last, self._last_outside)
 
     def value(self) -> list[float | None] | None:
         """Return [3] in s; None without a row."""
@@ -434,15 +360,13 @@ class Overshoot(Metric):
 
     def __init__(self, planned: PlannedRun) -> None:
         super().__init__(planned)
-        self._rows, self._start, self._largest = 0, np.zeros(3), np.zeros(3)
+        self._start, self._largest = np.zeros(3), np.zeros(3)
 
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        error = np.ascontiguousarray(rows["error_rad"])
+    def _add(self, rows: Table) -> None:
+        error = rows["error_rad"]
         if not self._rows:
             self._start = error[0].copy()
-        self._rows += len(rows)
-        raise_to_farthest(error, -np.sign(self._start), self._largest)
+        self._largest = np.maximum(self._largest, (-np.sign(self._start) * error).max(axis=0))
 
     def value(self) -> list[float | None] | None:
         """Return [3] in rad; None without a row."""
@@ -452,22 +376,12 @@ class Overshoot(Metric):
         return [float(largest) if step else None for largest, step in zip(self._largest, steps, strict=True)]
 
 
-class TailRmsError(Metric):
+class TailRmsError(RmsError):
     """Root mean square of ``error_rad`` of each hinge over the second half of the run, [3] in rad.
 
     The second half begins at exactly half of the planned ticks, and in a run that ended early within 256
     ticks before its half.
     """
-
-    labels = ANGLES
-
-    def __init__(self, planned: PlannedRun) -> None:
-        super().__init__(planned)
-        self._squares = SquaresByPiece(planned.ticks)
-
-    def write(self, rows: Table) -> None:
-        """Process the rows of one chunk, at least one."""
-        self._squares.add(rows["error_rad"])
 
     def value(self) -> list[float] | None:
         """Return [3] in rad; None without a row."""

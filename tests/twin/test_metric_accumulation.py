@@ -1,11 +1,17 @@
-"""What metrics take from rows against NumPy's own arithmetic, to the last bit, in any chunks."""
+"""Sums and extremes of metrics compared with NumPy's arithmetic, to the last bit, in any chunks."""
 
 import numpy as np
 import pytest
 
 from spheretwin import metrics
+from spheretwin import scenario as scenarios
+from spheretwin.metrics import BAND_rad, PlannedRun, SquaresByPiece
+from spheretwin.models import actuator as actuators
+from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.table import Table
 
-ROWS = np.random.default_rng(0).normal(size=(1000, 5)) * 10.0 ** np.arange(-6, 4, 2)
+ROWS = np.random.default_rng(0).normal(size=(1000, 3)) * 10.0 ** np.array([-6, -2, 2])
+SIZES = pytest.mark.parametrize("size", [1, 7, 1000])
 
 
 def in_turn(rows, start):
@@ -20,51 +26,65 @@ def chunks(size):
     return [ROWS[first : first + size] for first in range(0, len(ROWS), size)]
 
 
-@pytest.mark.parametrize("size", [1, 7, 1000])
+def value(kind, column, size, session_scenario):
+    planned = PlannedRun(session_scenario, actuators.load(), len(ROWS))
+    metric = kind(planned)
+    for rows in chunks(size):
+        metric.write(Table((Signal(column, "1", 3, "values"),), rows))
+    return metric.value()
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return scenarios.load("hold", {"controller.period_s": 1e-3})
+
+
+@SIZES
 def test_sums_round_at_every_row_and_nowhere_else(size):
-    start = np.linspace(0.1, 0.5, 5)
-    plain, squares = start.copy(), start.copy()
+    start = np.linspace(0.1, 0.5, 3)
+    total = start.copy()
     for rows in chunks(size):
-        metrics.add_rows(rows, plain)
-        metrics.add_squares(rows, squares)
-    np.testing.assert_array_equal(plain, in_turn(ROWS, start))
-    np.testing.assert_array_equal(squares, in_turn(ROWS**2, start))
+        metrics.add_rows(rows, total)
+    np.testing.assert_array_equal(total, in_turn(ROWS, start))
 
 
-@pytest.mark.parametrize("size", [1, 7, 1000])
-def test_pieces_are_sums_of_their_own(size):
-    sums, first = np.zeros((5, 5)), 100
+@SIZES
+@pytest.mark.parametrize("planned", [0, 200, 1000, 1030])
+def test_pieces_are_separate_sums(size, planned):
+    squares, half = SquaresByPiece(planned), planned // 2
     for rows in chunks(size):
-        metrics.add_squares_by_piece(rows, first, 256, sums)
-        first += len(rows)
-    pieces = np.split(ROWS**2, [156, 412, 668, 924])
-    np.testing.assert_array_equal(sums, [in_turn(piece, np.zeros(5)) for piece in pieces])
+        squares.add(rows)
+    starts = [tick for tick in range(half % 256, len(ROWS), 256) if tick]
+    for piece, first in enumerate([0, *starts], start=squares.piece(0)):
+        sums = [in_turn(part, np.zeros(3)) for part in np.split(ROWS**2, starts)[piece - squares.piece(0) :]]
+        expected = np.sqrt(np.array(sums).sum(axis=0) / (len(ROWS) - first))
+        np.testing.assert_array_equal(squares.rms(piece), expected)
 
 
-@pytest.mark.parametrize("size", [1, 7, 1000])
-def test_variation_goes_on_from_chunk_to_chunk(size):
-    last, total = ROWS[0].copy(), np.zeros(5)
-    for rows in chunks(size):
-        metrics.add_variation(rows, last, total)
-    np.testing.assert_array_equal(total, in_turn(np.abs(np.diff(ROWS, axis=0)), np.zeros(5)))
-    np.testing.assert_array_equal(last, ROWS[-1])
+@SIZES
+def test_torque_is_the_root_of_the_mean_sum_of_squares(size, scenario):
+    expected = float(np.sqrt(in_turn(ROWS**2, np.zeros(3)).sum() / len(ROWS)))
+    assert value(metrics.RmsTorque, "torque_Nm", size, scenario) == expected
 
 
-@pytest.mark.parametrize("size", [1, 7, 1000])
-def test_largest_and_last_outside_are_those_of_all_rows(size):
-    largest, last, first = np.full(5, -np.inf), np.full(5, -1), 0
-    for rows in chunks(size):
-        metrics.raise_to_largest(rows, largest)
-        metrics.update_last_outside(rows, 1e-3, first, last)
-        first += len(rows)
-    np.testing.assert_array_equal(largest, np.abs(ROWS).max(axis=0))
-    outside = [np.flatnonzero(np.abs(column) > 1e-3) for column in ROWS.T]
-    assert last.tolist() == [places[-1] if len(places) else -1 for places in outside]
-    assert last.min() == -1 < last.max()
+@SIZES
+def test_the_largest_error_is_that_of_all_rows(size, scenario):
+    assert value(metrics.MaxAbsError, "error_rad", size, scenario) == np.abs(ROWS).max(axis=0).tolist()
 
 
-def test_how_far_rows_go_in_a_direction():
-    direction, farthest = np.array([1.0, -1.0, 0.0, 1.0, -1.0]), np.zeros(5)
-    for rows in chunks(7):
-        metrics.raise_to_farthest(rows, direction, farthest)
-    np.testing.assert_array_equal(farthest, np.maximum((direction * ROWS).max(axis=0), 0.0))
+@SIZES
+def test_settling_counts_from_the_last_row_outside_the_band(size, scenario):
+    outside = [np.flatnonzero(np.abs(column) > BAND_rad) for column in ROWS.T]
+    after = [int(places[-1]) + 1 if len(places) else 0 for places in outside]
+    expected = [tick * scenario.controller.period_s if tick < len(ROWS) else None for tick in after]
+    assert value(metrics.SettlingTime, "error_rad", size, scenario) == expected
+    assert after[0] == 0 < after[1]
+
+
+@SIZES
+def test_overshoot_is_the_farthest_beyond_the_reference(size, scenario):
+    farthest = np.maximum((-np.sign(ROWS[0]) * ROWS).max(axis=0), 0.0)
+    expected = [
+        float(far) if abs(first) > BAND_rad else None for far, first in zip(farthest, ROWS[0], strict=True)
+    ]
+    assert value(metrics.Overshoot, "error_rad", size, scenario) == expected
