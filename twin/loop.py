@@ -7,7 +7,6 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
 from spheretwin.channels import write_channels
@@ -29,6 +28,7 @@ from spheretwin.models.base.compiled import (
     uncompiled,
 )
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.numba_internals import Dispatcher
 from spheretwin.models.telemetry.signals import MOTION_SIGNALS, offsets, width
 from spheretwin.plant.step import DIVERGED, FAILSAFE, GOING, LEFT_WORKSPACE, Plant, PlantOutput, plant_tick
 

@@ -15,8 +15,9 @@ from spheretwin.control.supervision.watchdog import REASONS, Reason, transfer_tr
 from spheretwin.electronics.drive import transfer_drive
 from spheretwin.electronics.sensors import measure_again
 from spheretwin.loop import dispatch, is_user_law
-from spheretwin.models.base.compiled import callback_errors, for_types_of
+from spheretwin.models.base.compiled import for_types_of
 from spheretwin.models.base.errors import LawError
+from spheretwin.models.base.numba_internals import callback_errors
 from spheretwin.models.base.state import check_length, restore_state, save_state, transfer_state
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.rotor import Rotor

@@ -1,4 +1,14 @@
-"""Shared library of MuJoCo: timers, warnings and functions by address."""
+"""Private APIs of MuJoCo and pointers into its shared library, all in this file.
+
+*Addresses of models and data* (`MjModel._address`, `MjData._address`) and of `mj_step`. Reason: compiled code
+steps the engine without Python. Consequence of a change: an exception at the start of a session, and after
+a change of the C function an invalid access to memory.
+
+*Pointers of the library* (`mjcb_time`, `mju_user_warning`). Reason: `mujoco` has no function for them that
+Python can call. Consequence of a change: an exception at the first model or command.
+
+`tests/models/base/test_internals.py` checks each of them; `pyproject.toml` bounds the versions.
+"""
 
 import ctypes
 import warnings
@@ -21,6 +31,16 @@ def library() -> ctypes.CDLL:
         for path in folder.glob(pattern):
             return ctypes.CDLL(str(path))
     raise EngineError(f"engine: expected MuJoCo's shared library in {folder}, found none")
+
+
+def addresses(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[int, int]:
+    """Return the addresses of a model and of its data; they are valid as long as both objects exist."""
+    return model._address, data._address
+
+
+def step_address() -> int:
+    """Return the address of `mj_step`, a C function of the addresses of a model and of its data."""
+    return ctypes.cast(library().mj_step, ctypes.c_void_p).value or 0
 
 
 def _ignore(_: bytes) -> None:

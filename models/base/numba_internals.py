@@ -1,19 +1,43 @@
-"""Numba internals: cache of compiled functions in the package's cache folder, and functions by address."""
+"""Private APIs of numba, all in this file. `pyproject.toml` bounds the versions.
+
+*Machine code in a cache of this package* (`MachineCode`, `CompileResult._rebuild` and `_reduce`, `rtsys`,
+`_cache`). Reason: numba's cache tracks one file of sources, and a damaged entry is an error at every call.
+Consequence of a change: a function is compiled in every process, or an exception at its first call.
+
+*Functions by address* (`cgutils`, `FunctionType`). Reason: the loop is compiled once for all laws.
+Consequence: the loop does not compile.
+
+*No reference counting* (`_nrt`). Reason: it takes a third of the loop's own time. Consequence: the option is
+refused, or the loop is slower.
+
+*Callbacks with bounds checks and exceptions* (`CFunc`, `Dispatcher`, the text of `sys.unraisablehook`).
+Reason: numba checks bounds only in the outermost function, and drops the exceptions of callbacks.
+Consequence: an exception of a law is printed, and the run ends as diverged.
+
+`tests/models/base/test_internals.py` checks each of them.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import pickle
 import re
+import sys
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import CellType, FunctionType
 from typing import Any
 
+import llvmlite.binding
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.caching import NullCache
+from numba.core.ccallback import CFunc
 from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaWarning
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
@@ -26,6 +50,10 @@ from spheretwin.models.base import cache
 # Loaded machine code needs the symbols of hashes and the type of a callback, in addition to the math and
 # run-time libraries. These imports register them.
 _REGISTERED = hashing, function_type
+
+
+NO_ALLOCATION = {"_nrt": False}
+"""Options of a compiled function that creates no array: it counts no references."""
 
 
 # mypy sees the base class as Any, because numba has no type information.
@@ -87,6 +115,35 @@ class MachineCode(NullCache):  # type: ignore[misc]
         return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"
 
 
+def cached(dispatcher: Any, function: Callable[..., Any]) -> Any:
+    """Return a compiled function with a cache, as its `enable_caching` does with numba's own."""
+    dispatcher._cache = MachineCode(function, "function")
+    return dispatcher
+
+
+def c_callback(
+    signature: Any, function: Callable[..., Any], options: dict[str, Any], check_bounds: bool
+) -> Any:
+    """Compile a plain function as a C callback, whose field `address` is its address."""
+    step = _with_bounds_checks(function, {}) if check_bounds else function
+    options = {**options, "boundscheck": check_bounds}
+    callback: Any = CFunc(step, (signature.args, signature.return_type), {}, options)
+    # The cache tracks the sources of this package only; entries of others would become stale.
+    if function.__module__.startswith("spheretwin.") and not check_bounds:
+        callback._cache = MachineCode(function, "callback")
+    callback.compile()
+    return callback
+
+
+def external_function(name: str, address: int, signature: Any) -> Any:
+    """Return a C function for compiled code.
+
+    LLVM resolves its symbol by name, so that code that calls it can be cached.
+    """
+    llvmlite.binding.add_symbol(name, address)
+    return types.ExternalFunction(name, signature)
+
+
 def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
     """Return a converter from an address to a function of one signature.
 
@@ -131,3 +188,97 @@ def function_at(signature: Any) -> Callable[[Any], Callable[..., Any]]:
 
     overload(at)(compiled_at)
     return at
+
+
+def _with_bounds_checks(function: Any, copies: dict[int, Any]) -> FunctionType:
+    """Copy a plain function so that the compiled functions that it calls by name check bounds.
+
+    Numba checks bounds in the function that it compiles, but not in functions that this function calls.
+
+    Parameters
+    ----------
+    function : function
+    copies : dict
+        Copies of compiled functions made so far, by the identity of the original.
+    """
+    copy = _copied(function)
+    _name_copies(function, copy, copies)
+    return copy
+
+
+def _dispatcher_with_bounds_checks(value: Any, copies: dict[int, Any]) -> Any:
+    """Copy a compiled function so that it checks bounds; return any other value unchanged."""
+    if not isinstance(value, Dispatcher):
+        return value
+    if id(value) not in copies:
+        copy = _copied(value.py_func)
+        options = {**value.targetoptions, "boundscheck": True}
+        copies[id(value)] = type(value)(copy, value.locals, options)
+        _name_copies(value.py_func, copy, copies)  # last: functions may call each other
+    return copies[id(value)]
+
+
+def _copied(function: Any) -> FunctionType:
+    """Copy a function, with its own global variables and with empty cells."""
+    cells = tuple(CellType() for _ in function.__closure__ or ())
+    copy = FunctionType(
+        function.__code__, dict(function.__globals__), function.__name__, function.__defaults__, cells
+    )
+    copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
+    return copy
+
+
+def _name_copies(function: Any, copy: FunctionType, copies: dict[int, Any]) -> None:
+    """Let the copy of a function name the copies of the compiled functions that the original names."""
+    for name in set(function.__code__.co_names) & function.__globals__.keys():
+        copy.__globals__[name] = _dispatcher_with_bounds_checks(function.__globals__[name], copies)
+    for original, cell in zip(function.__closure__ or (), copy.__closure__ or (), strict=True):
+        cell.cell_contents = _dispatcher_with_bounds_checks(original.cell_contents, copies)
+
+
+class _CallbackErrors(threading.local):
+    """Receiver of the exceptions of compiled callbacks, one for each thread."""
+
+    receiver: Callable[[BaseException], None] | None = None
+
+
+_CALLBACK_ERRORS = _CallbackErrors()
+_HOOK_LOCK = threading.Lock()
+_HOOKS: list[Callable[[Any], object]] = []
+"""Previous hook, once for each running block."""
+
+
+@contextmanager
+def callback_errors(receiver: Callable[[BaseException], None]) -> Iterator[None]:
+    """Pass exceptions of compiled callbacks in this thread to a function, while the block runs.
+
+    A callback cannot raise into the compiled code that calls it. Numba hands its exception to
+    `sys.unraisablehook`, which prints it, and the caller goes on.
+
+    Parameters
+    ----------
+    receiver : callable
+        Called before the callback returns to its caller.
+    """
+    with _HOOK_LOCK:
+        _HOOKS.append(_HOOKS[0] if _HOOKS else sys.unraisablehook)
+        sys.unraisablehook = _receive
+    outer, _CALLBACK_ERRORS.receiver = _CALLBACK_ERRORS.receiver, receiver
+    try:
+        yield
+    finally:
+        _CALLBACK_ERRORS.receiver = outer
+        with _HOOK_LOCK:
+            before = _HOOKS.pop()
+            if not _HOOKS:
+                sys.unraisablehook = before
+
+
+def _receive(unraisable: Any) -> None:
+    """Pass on the exception of a callback; leave every other to the hook that was there before."""
+    # Numba names the compiler's context as the place, whatever the callback is.
+    is_callback = "CPUContext" in f"{unraisable.object}"
+    if _CALLBACK_ERRORS.receiver and is_callback:
+        _CALLBACK_ERRORS.receiver(unraisable.exc_value or unraisable.exc_type())
+    else:
+        (_HOOKS[0] if _HOOKS else sys.__unraisablehook__)(unraisable)

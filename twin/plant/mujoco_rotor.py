@@ -6,14 +6,14 @@ import ctypes
 from copy import copy
 from typing import Any, NamedTuple
 
-import llvmlite.binding
 import mujoco
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
 from spheretwin.models.base.compiled import COMPILES, compiled
-from spheretwin.models.base.mujoco_library import library
+from spheretwin.models.base.mujoco_library import addresses, step_address
+from spheretwin.models.base.numba_internals import external_function
 from spheretwin.models.mjcf import PAYLOAD, ROTOR, Mjcf, idle_stages
 from spheretwin.plant.rotor import EngineKind
 
@@ -99,8 +99,7 @@ class MujocoRotor:
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:], self.data.qvel[:] = q, qdot
         return MujocoData(
-            self.model._address,
-            self.data._address,
+            *addresses(self.model, self.data),
             self.data.qpos,
             self.data.qvel,
             self.data.qfrc_applied,
@@ -121,14 +120,11 @@ class MujocoRotor:
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
-_address = ctypes.cast(library().mj_step, ctypes.c_void_p).value or 0
 _mj_step: Any
 if COMPILES:
-    # Compiled code with a symbol that LLVM resolves by name can be cached; with a ctypes function it cannot.
-    llvmlite.binding.add_symbol("mj_step", _address)
-    _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
+    _mj_step = external_function("mj_step", step_address(), types.void(types.intp, types.intp))
 else:
-    _mj_step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(_address)
+    _mj_step = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(step_address())
 
 
 @compiled
