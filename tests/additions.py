@@ -360,7 +360,7 @@ def attenuate(stage, setpoint, draws):
         setpoint[j] *= stage.gain
     pass_line(stage, setpoint, draws)
 ''',
-        "twin/electronics/drive_chain.py",
+        "twin/electronics/drive_section.py",
         (
             "class DriveSection(DelaySection, DacSection, ",
             "class DriveSection(DelaySection, FilterSection, DacSection, ",

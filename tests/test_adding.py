@@ -147,7 +147,8 @@ class Bored:
     def finish(self, status): self.status = status
 
 with Session(scenario) as session:
-    recorder = Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=folder / "n.rrd")
+    facts = facts_of(session.initial_scenario)
+    recorder = Recorder(session.actuator, session.signals, facts, path=folder / "n.rrd")
     recorder.write(session.advance(10))
     recorder.finish(Status.BORED)
     recorder.close()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar
 
 import mujoco
@@ -13,9 +14,8 @@ from spheretwin import assembly
 from spheretwin.control.law import Law
 from spheretwin.control.law_components.parameters import COMPENSATORS
 from spheretwin.control.laws import LAWS
-from spheretwin.electronics.data_sheet import drive_sheet, sensor_sheet
-from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
-from spheretwin.electronics.sensor_chain import SensorsSection
+from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
+from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 from spheretwin.faults.fault import Fault
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator, CoilGroup
@@ -26,10 +26,11 @@ from spheretwin.models.magnetics import disagreements
 from spheretwin.models.mjcf import Mjcf
 from spheretwin.models.mjcf_reader import HINGES
 from spheretwin.models.telemetry.run_record import Change
-from spheretwin.models.telemetry.signals import Signal
+from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.plant.mujoco_rotor import integrator_name
 from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
 from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
+from spheretwin.scenario.reading import as_plain
 from spheretwin.scenario.sections import (
     PlantSection,
     ResolvedNominal,
@@ -199,6 +200,13 @@ def name_of_user_object(name: str) -> str:
     return f"{name} of the user's" if name in LAWS or name in SHAPES or is_reference(name) else name
 
 
+def recorded_value(value: Any) -> Any:
+    """Return the value of a change in JSON types, as a copy that does not follow changes by the caller."""
+    if isinstance(value, Law):
+        return name_of_user_object(value.name)
+    return json.loads(json.dumps(value, default=as_plain))
+
+
 def _first_pose(trajectory: Sampled) -> Triple:
     return tuple(trajectory.sample(np.zeros(1))[0, 0].tolist())
 
@@ -282,18 +290,22 @@ class ActiveConfig(NamedTuple):
         files = reload_files(self.files, self.scenario, scenario)
         return _config_of(scenario, files, user_law, self.user_trajectory)
 
-    def with_changes(self, changes: tuple[Change, ...]) -> Iterator[ActiveConfig]:
-        """Yield the configuration after each of some changes.
+    def check_changes(self, changes: tuple[Change, ...]) -> None:
+        """Check changes before a run, each in the configuration that the earlier ones give.
 
         Raises
         ------
         InputError
-            A change is invalid.
+            A change is not possible with this law, this trajectory or these files.
         """
-        config = self
+        config, logged = self, with_more({}, self.signals)
         for change in changes:
-            config = config.with_change(change.name, change.value)
-            yield config
+            try:
+                config = config.with_change(change.name, change.value)
+                logged = with_more(logged, config.signals)
+            except InputError as error:
+                at_s = change.tick * self.scenario.controller.period_s
+                raise InputError(f"{error}, as the event at {at_s:g} s sets it") from None
 
 
 def initial_config(

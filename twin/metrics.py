@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.drive_chain import current_lag
+from spheretwin.electronics.current_lag import current_lag
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
@@ -316,11 +316,7 @@ class SquaresByPiece:
 
 
 BAND_rad = 0.01
-"""Settling band: the usual 5 % of 0.2 rad, the amplitude of the shipped motions.
-
-The size is fixed: a share of the motion of each run would give a spinning hinge, which makes many turns, a
-band as wide as its errors.
-"""
+"""Settling band of every hinge: the usual 5 % of 0.2 rad, the amplitude of the shipped motions."""
 
 
 class SettlingTime(Metric):

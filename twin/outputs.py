@@ -193,7 +193,7 @@ class _FromTick:
 def _live_view(session: Session, view: str) -> LiveView:
     from spheretwin.viz.recording.live import LiveView  # Rerun is slow to import
 
-    live = LiveView(session.actuator, session.signals, facts_of(session.begun_as), shown=view)
+    live = LiveView(session.actuator, session.signals, facts_of(session.initial_scenario), shown=view)
     print(f"watch: {live.address}", file=sys.stderr, flush=True)
     return live
 
@@ -201,5 +201,5 @@ def _live_view(session: Session, view: str) -> LiveView:
 def _recorder_at_rate(session: Session, path: Path, view: str, rate_Hz: float | None) -> Recorder:
     from spheretwin.viz.recording.recorder import Recorder  # Rerun is slow to import
 
-    facts = facts_of(session.begun_as)
+    facts = facts_of(session.initial_scenario)
     return Recorder(session.actuator, session.signals, facts, path=path, shown=view, rate_Hz=rate_Hz)

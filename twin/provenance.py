@@ -48,8 +48,8 @@ def record_of(session: Session, before: RunRecord | None = None, first_tick: int
     first_tick : int
         Tick of the first row of the file.
     """
-    scenario = reading.resolve_paths(os.getcwd(), session.begun_as.model_dump(mode="json"))
-    if session.law_reference and isinstance(session.begun_as.controller, UserController):
+    scenario = reading.resolve_paths(os.getcwd(), session.initial_scenario.model_dump(mode="json"))
+    if session.law_reference and isinstance(session.initial_scenario.controller, UserController):
         scenario["controller"]["law"] = session.law_reference
     journal = tuple(map(_from_root, session.journal))
     digests = dict(before.files) if before else {}

@@ -51,7 +51,7 @@ def read(path: Path) -> RunPlan:
 
 
 def _with_moved_files(record: RunRecord, folder: Path) -> RunRecord:
-    """Record that names files in `folder` in place of gone or changed ones with the same digests."""
+    """Return the record with files of `folder` instead of missing or changed files with the same digests."""
     moved = {}
     for path, dotted in provenance.files_of(dict(record.scenario), record.journal):
         expected, candidate = record.files.get(path), folder / Path(path).name
@@ -86,7 +86,7 @@ def _plan(record: RunRecord, source: str) -> RunPlan:
         raise InputError(
             f"replay {source}: expected a run of at least one tick, received"
             f" {record.ticks - record.first_tick};"
-            " the parts of a run that was killed do not say how far it went"
+            " the partial files of a killed run do not contain its length"
         )
     named = provenance.files_of(scenario.model_dump(mode="json"), record.journal)
     _check_files(named, record.files, source)
@@ -95,8 +95,8 @@ def _plan(record: RunRecord, source: str) -> RunPlan:
 
 def _check_files(named: Iterable[tuple[str, str]], digests: Mapping[str, str | None], source: str) -> None:
     for path, dotted in named:
-        if path in digests and provenance.digest(dotted, path) != digests[path]:  # not in older files
+        if path in digests and provenance.digest(dotted, path) != digests[path]:  # older files have none
             raise InputError(
-                f"replay {source}: expected {dotted} {path} as it was when the run was made,"
-                " received one that is missing or was changed since"
+                f"replay {source}: expected {dotted} {path} as it was at the start of the run,"
+                " received a file that is missing or has changed"
             )

@@ -1,4 +1,4 @@
-"""One run: its scenario, status, telemetry and figures; saved, recorded, converted."""
+"""Result of a run: scenario, status, telemetry and figures; files, recordings and other formats of it."""
 
 from __future__ import annotations
 
@@ -38,20 +38,20 @@ TELEMETRY, RECORDING = ".parquet", ".rrd"
 
 @dataclass(frozen=True)
 class Run:
-    """One run and its telemetry.
+    """Result of a run.
 
     Attributes
     ----------
     scenario : ResolvedScenario
         Scenario at tick 0, with every default filled in.
     status : Status
-        ``completed``, or why it ended before.
+        ``completed``, or the reason for an early end.
     telemetry : Table
-        One row a control tick, up to where the run ended.
+        One row for each control tick, up to the end of the run.
     wall_s : float
-        Wall time of the simulated loop alone, s; not a number for a run that was read from a file.
+        Wall time of the loop alone, s; NaN for a run that was read from a file.
     actuator : Actuator
-        Actuator that was simulated.
+        Simulated actuator.
     law_error : LawError, optional
         Exception of a compiled law, which ended the run; one of a law in plain Python is raised.
     record : RunRecord, optional
@@ -79,23 +79,23 @@ class Run:
         return replace(record, status=self.status)
 
     def save(self, path: str | Path) -> Path:
-        """Save the run as telemetry (``.parquet``) or as a Rerun recording (``.rrd``); returns the path.
+        """Save the run as telemetry (``.parquet``) or as a Rerun recording (``.rrd``); return the path.
 
         Raises
         ------
         InputError
-            The name ends in neither, or no file can be made there.
+            The name has another suffix, or the file cannot be created.
         SpheretwinError
-            Writing failed; what was there before is untouched.
+            Writing failed; an earlier file is unchanged.
         """
         writers = {TELEMETRY: self.to_parquet, RECORDING: self.to_rrd}
         if (suffix := Path(path).suffix) not in writers:
-            expected = " or ".join(f"FILE{each}" for each in writers)
+            expected = " or ".join(f"FILE{suffix}" for suffix in writers)
             raise InputError(f"run: expected {expected}, received {shown(str(path))}")
         return writers[suffix](path)
 
     def to_parquet(self, path: str | Path) -> Path:
-        """Write telemetry and provenance, as ``simulate --telemetry`` does; returns the path.
+        """Write telemetry and provenance, as ``simulate --telemetry`` does; return the path.
 
         Raises
         ------
@@ -106,7 +106,7 @@ class Run:
         return Path(path)
 
     def to_rrd(self, path: str | Path) -> Path:
-        """Write a Rerun recording, as ``simulate --record`` does; returns the path.
+        """Write a Rerun recording, as ``simulate --record`` does; return the path.
 
         Raises
         ------
@@ -199,7 +199,7 @@ class Run:
         return [(name, _text(value)) for name, value in self.figures.items() if _has_value(value)]
 
     def _columns(self) -> list[tuple[str, Any]]:
-        """Every number of every signal but time, by name and label."""
+        """Return the columns of all signals except time, by name and label."""
         return [
             (heading, column)
             for signal in self.telemetry.signals
@@ -210,10 +210,10 @@ class Run:
         ]
 
     def _log(self) -> list[tuple[float, str]]:
-        """Faults, and the changes that the scenario planned or the user made, in the order of time."""
+        """Return the log of faults, events and changes by the user, in the order of time."""
         record, period_s = self.provenance, self.scenario.controller.period_s
-        changes = [each for each in scheduled_changes(self.scenario) if each.tick < len(self.telemetry)]
-        lines = [(each.tick * period_s, change_text(each)) for each in (*changes, *record.journal)]
+        events = [event for event in scheduled_changes(self.scenario) if event.tick < len(self.telemetry)]
+        lines = [(change.tick * period_s, change_text(change)) for change in (*events, *record.journal)]
         return sorted([*lines, *FaultMessages().of(self.telemetry)] if len(self.telemetry) else lines)
 
 
@@ -230,12 +230,12 @@ def _text(value: Any) -> str:
 
 
 def _imported(package: str) -> Any:
-    """Package that is not among the dependencies.
+    """Import a package that is not a dependency.
 
     Raises
     ------
     InputError
-        It is not installed.
+        The package is not installed.
     """
     try:
         return import_module(package)
@@ -246,9 +246,9 @@ def _imported(package: str) -> Any:
 
 
 UserMetric = Callable[[Run], Any]
-"""Function of the user: from a complete run to a value that JSON holds."""
+"""User function from a complete run to a value in JSON types."""
 
-# Keys of the JSON of a run that are no metrics.
+# Keys of the JSON of a run that are not metrics.
 OTHER_KEYS = (
     "scenario",
     "status",
@@ -263,52 +263,52 @@ OTHER_KEYS = (
 
 
 class Figures:
-    """Follows a run into every metric.
+    """Sink that computes every metric of a run.
 
     Parameters
     ----------
     planned : PlannedRun
-        The run to come.
+        Facts about the run before its first row.
     """
 
-    def __init__(self, scheduled_changes: PlannedRun) -> None:
-        self._metrics = {name: metric(scheduled_changes) for name, metric in METRICS.items()}
+    def __init__(self, planned: PlannedRun) -> None:
+        self._metrics = {name: metric(planned) for name, metric in METRICS.items()}
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk."""
+        """Process the rows of one chunk."""
         if len(rows):
             for metric in self._metrics.values():
                 metric.write(rows)
 
     def note(self, t_s: float, text: str) -> None:
-        """It changes no figure."""
+        """Ignore a message: it changes no figure."""
 
     def finish(self, status: str) -> None:
-        """Nothing remains to be done."""
+        """Ignore the end of the run: it changes no figure."""
 
     def values(self) -> dict[str, Any]:
-        """Figure by name; None where there are too few rows for one."""
+        """Return the figures by name; None for a figure with too few rows."""
         return {name: metric.value() for name, metric in self._metrics.items()}
 
     def warnings(self) -> list[str]:
-        """What the figures alone do not tell of the run; one line each."""
+        """Return warnings that concern the validity of the figures, one line each."""
         return [line for metric in self._metrics.values() for line in metric.warnings()]
 
 
 def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[str, Any]:
-    """Figures of a run whose telemetry is in memory.
+    """Return the figures of a run whose telemetry is in memory.
 
     Parameters
     ----------
     run : Run
         From `simulate`.
     extra : mapping of callable, optional
-        Functions of the user's own by the names of their figures.
+        User functions by the names of their figures.
 
     Raises
     ------
     InputError
-        A function has the name of another figure, raises, or gives what JSON does not hold.
+        A function has the name of another figure, raises, or returns a value that is not in JSON types.
     """
     own = extra or {}
     check_names(own)
@@ -318,12 +318,12 @@ def figures_of(run: Run, extra: Mapping[str, UserMetric] | None = None) -> dict[
 
 
 def check_names(own: Mapping[str, UserMetric]) -> None:
-    """Find out whether functions of the user's have names of their own.
+    """Check that user functions have new names.
 
     Raises
     ------
     InputError
-        One has not.
+        A function has the name of another figure.
     """
     for name in own:
         if name in METRICS or name in OTHER_KEYS:
@@ -332,12 +332,12 @@ def check_names(own: Mapping[str, UserMetric]) -> None:
 
 
 def own_value(name: str, metric: UserMetric, run: Run) -> Any:
-    """What a function of the user's says of a run, as JSON holds it.
+    """Return the value of a user function for a run, in JSON types.
 
     Raises
     ------
     InputError
-        It raises, or gives what JSON does not hold.
+        The function raises, or returns a value that is not in JSON types.
     """
     try:
         value = metric(run)
@@ -349,27 +349,27 @@ def own_value(name: str, metric: UserMetric, run: Run) -> Any:
         return json.loads(json.dumps(value, default=_as_plain))
     except KeyboardInterrupt:
         raise
-    except BaseException:  # not JSON, or an object of the user's that raises when it is read
-        raise InputError(f"metric {name}: expected what JSON holds, received {shown(value)}") from None
+    except BaseException:  # not JSON, or an object of the user that raises when it is read
+        raise InputError(f"metric {name}: expected a value in JSON types, received {shown(value)}") from None
 
 
 def summary(
     session: Session, status: str, figures: Mapping[str, Any], warnings: Sequence[str]
 ) -> dict[str, Any]:
-    """A session's run, ready for JSON.
+    """Return the summary of the run of a session, in JSON types.
 
     Parameters
     ----------
     session : Session
-        At the run's end.
+        Session at the end of the run.
     status : str
-        How it ended.
+        Final status.
     figures : mapping
-        By name, those of the user among them.
+        Figures by name, including those of user functions.
     warnings : sequence of str
-        Of model, scenario and figures.
+        Warnings about model, scenario and figures.
     """
-    scenario, wall_s = session.begun_as, session.loop_s
+    scenario, wall_s = session.initial_scenario, session.loop_s
     simulated_s = session.tick * scenario.controller.period_s
     return {
         "scenario": scenario.model_dump(mode="json"),

@@ -1,8 +1,7 @@
-"""A twin that runs for as long as it is asked to: advanced in chunks, changed between them, restored."""
+"""Session: a twin that is advanced in chunks, changed between them, saved and restored."""
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Iterator
@@ -30,42 +29,42 @@ from spheretwin.runtime import Runtime
 from spheretwin.scenario import files as scenario_files
 from spheretwin.scenario.changes import from_now_on, is_fixed, scheduled_changes
 from spheretwin.scenario.files import Files
-from spheretwin.scenario.reading import as_plain, is_dotted
+from spheretwin.scenario.reading import is_dotted
 from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserPath
 from spheretwin.snapshot import Snapshot, UserLaws
 from spheretwin.trajectories.trajectory import Sampled
 
 
 class Session:
-    """One twin, ready to be advanced; its horizon is open.
+    """Digital twin with an open end, ready to be advanced.
 
     Parameters
     ----------
     scenario : Scenario
-        From `scenario.load`; its duration is of no concern here.
+        From `scenario.load`; its duration is not used.
     law : Law, optional
-        Runs instead of the law that the scenario names.
+        Replaces the law of the scenario.
     trajectory : object with ``sample(t)``, optional
-        Followed instead of the trajectory that the scenario names, to the end.
+        Replaces the trajectory of the scenario, to the end.
     files : Files, optional
-        What the files of this scenario say, from `twin.scenario.files.files_of`; read anew unless given.
+        Content of the files of this scenario, from `scenario.files.files_of`; default: read now.
 
     Attributes
     ----------
-    begun_as : ResolvedScenario
-        The scenario at tick 0; with the journal it says all that has happened.
+    initial_scenario : ResolvedScenario
+        Scenario at tick 0; with the journal it describes the complete run.
     law_reference : str or None
         ``FILE.py:NAME`` of the law that was given at the start, if a file holds it.
     signals : tuple of Signal
         Columns of the telemetry; a change of law, friction or sensors may change them.
     journal : tuple of Change
-        What `set` did.
+        Changes by `set`.
     events : tuple of Change
-        What the events of the scenario did so far.
+        Changes by events of the scenario so far.
     tick : int
-        Control ticks done.
+        Number of completed control ticks.
     loop_s : float
-        Wall time spent in the loop alone, s.
+        Wall time of the loop alone, s.
 
     Raises
     ------
@@ -74,7 +73,7 @@ class Session:
 
     Notes
     -----
-    A session belongs to one thread at a time: calls from a second one while the first is at work are refused.
+    One thread at a time can use a session: a call of a second thread during a call of the first is refused.
     """
 
     def __init__(
@@ -93,38 +92,38 @@ class Session:
         self.events: tuple[Change, ...] = ()
         self._status = Status.RUNNING
         self._config = initial_config(scenario, law, trajectory, files)
-        self.begun_as = self.scenario
+        self.initial_scenario = self.scenario
         self.law_reference = reference_of(law)
-        self._planned = scheduled_changes(self.begun_as)
-        self._inputs = self._outside()
+        self._planned = scheduled_changes(self.initial_scenario)
+        self._inputs = self._input_generator()
         self._runtime = Runtime(self.scenario, self._config.files, self._config.law)
-        self._seen = with_more({}, self.signals)
-        self._check_plan()
-        self._make_planned()
+        self._logged = with_more({}, self.signals)
+        self._config.check_changes(self._planned)
+        self._apply_events()
 
     @property
     def actuator(self) -> Actuator:
-        """What is simulated."""
+        """Simulated actuator."""
         return self._config.files.actuator
 
     @property
     def scenario(self) -> ResolvedScenario:
-        """In force now: what was left open is filled in from the model and the trajectory."""
+        """Active scenario, with every default filled in from the model and the trajectory."""
         return self._config.scenario
 
     @property
     def status(self) -> Status:
-        """Status of the run: ``running``, ``failsafe`` from the tick of a trip on, or how the run ended."""
+        """Status of the run: ``running``, ``failsafe`` from the tick of a trip on, or the final status."""
         return Status.FAILSAFE if self.reason else self._status
 
     @property
     def ended(self) -> bool:
-        """True if no further tick can be run; after a trip the rundown is still to come."""
+        """True if no further tick can be run; after a trip the rundown still runs."""
         return self._status != Status.RUNNING
 
     @property
     def reason(self) -> Reason:
-        """Why the currents were taken away, by a watchdog or a coil that is too hot, if they were."""
+        """Reason for which a watchdog or an overheated coil has switched off the currents, if so."""
         return self._runtime.reason
 
     @property
@@ -139,32 +138,31 @@ class Session:
 
     @property
     def q_rad(self) -> NDArray[np.float64]:
-        """Hinge angles now, (3,) in rad."""
+        """Present hinge angles, (3,) in rad."""
         return self._runtime.q_rad
 
     @property
     def qdot_rad_s(self) -> NDArray[np.float64]:
-        """Hinge rates now, (3,) in rad/s."""
+        """Present hinge rates, (3,) in rad/s."""
         return self._runtime.qdot_rad_s
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Columns of the telemetry: the common ones, those of its stages, then the law's own."""
+        """Columns of the telemetry: common columns, columns of the stages, signals of the law."""
         return self._runtime.signals
 
     @property
     def law(self) -> Law:
-        """In force now."""
+        """Active law."""
         return self._runtime.law
 
     def advance(self, ticks: int) -> Table:
-        """Run some control ticks.
+        """Run control ticks.
 
         Parameters
         ----------
         ticks : int
-            How many at most; fewer are run where the run ends, or where an event of the scenario changes the
-            columns.
+            Largest number; fewer are run if the run ends or if an event of the scenario changes the columns.
 
         Returns
         -------
@@ -174,53 +172,53 @@ class Session:
         if not isinstance(ticks, int | np.integer) or ticks < 0:
             raise InputError(f"session: expected a number of ticks from 0 on, received {shown(ticks)}")
         with self._alone():
-            self._make_planned()
+            self._apply_events()
             log = allocated(int(ticks), self._runtime.row_width)
             return Table(self.signals, log[: self._advance(log)])
 
     def advance_into(self, log: NDArray[np.float64]) -> int:
-        """Run a control tick for each row of an array of the caller's; returns how many were run.
+        """Run a control tick for each row of an array of the caller; return the number of ticks.
 
         Raises
         ------
         InputError
-            Its rows are not those of the telemetry: compiled code would write beside them.
+            The rows of the array have another width than the telemetry.
         """
         with self._alone():
-            self._make_planned()
+            self._apply_events()
             check_rows(log, self._runtime.row_width)
             return self._advance(log)
 
     def check_horizon(self, ticks: int) -> None:
-        """Find out whether reference and disturbance are numbers up to a tick to come, or to an event.
+        """Check that reference and disturbance are finite up to a future tick, or up to the next event.
 
         Raises
         ------
         InputError
-            They are not.
+            They are not finite.
         """
-        waiting = [change.tick for change in self._waiting()[:1]]
-        self._inputs.check_horizon(max(min([ticks, *waiting]) - 1, self.tick))
+        next_event = [change.tick for change in self._pending()[:1]]
+        self._inputs.check_horizon(max(min([ticks, *next_event]) - 1, self.tick))
 
     def set(self, name: str, value: Any) -> None:
-        """Change a field of the scenario from the next tick on, or the law itself.
+        """Change a field of the scenario, or the law, from the next tick on.
 
-        What a scenario leaves open was filled in at the start: it does not follow (as the limit that the
-        allocation keeps to does not follow the drive's, unless it is set too).
+        Defaults were filled in at the start and do not follow the change: the current limit of the allocation
+        does not follow that of the drive.
 
         Parameters
         ----------
         name : str
-            Dotted, as ``disturbance.load``; ``fault`` with a mapping adds a fault, from now on unless it says
-            when.
+            Dotted name, such as ``disturbance.load``; ``fault`` with a mapping adds a fault, which starts now
+            unless it states a time.
         value : any
-            Checked as a scenario is; for ``controller.law`` also a `Law`. A law that stays keeps its memory,
-            also with other gains, unless these make the memory longer or shorter: then it begins anew.
+            Checked like a scenario; for ``controller.law`` also a `Law`. The same law with other gains keeps
+            its memory if the size of the memory is the same.
 
         Raises
         ------
         InputError
-            A field that is unknown, fixed for the run, or a value out of range; nothing has changed then.
+            The field is unknown or fixed for the run, or the value is out of range; nothing is changed.
         """
         with self._alone():
             if not is_dotted(name):
@@ -234,14 +232,14 @@ class Session:
             value = from_now_on(name, value, self.t_s)
             with self._all_or_nothing():
                 self._change(name, value)
-            self.journal += (Change(self.tick, name, _recorded(value)),)
+            self.journal += (Change(self.tick, name, active_config.recorded_value(value)),)
 
     def snapshot(self) -> Snapshot:
-        """All that this session goes on from."""
+        """Return the complete state of the session."""
         with self._alone():
             return Snapshot(
                 self.scenario,
-                self.begun_as,
+                self.initial_scenario,
                 self._own_laws.key_of(self._config.user_law),
                 scenario_files.digest(self._config.files),
                 self.scenario.controller.source,
@@ -254,13 +252,13 @@ class Session:
             )
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot, bit for bit as the session that it was taken of.
+        """Continue from a snapshot with the same bits as the session that it was taken from.
 
         Raises
         ------
         InputError
-            It is no snapshot, or was taken under a law of the user's that this session does not have, or on
-            another model.
+            It is not a snapshot, or it belongs to a user law that this session does not have or to another
+            model.
         """
         with self._alone(), self._all_or_nothing():
             if not isinstance(snapshot, Snapshot):
@@ -268,13 +266,13 @@ class Session:
             user_law = self._own_laws.under(snapshot.user_law)
             if isinstance(snapshot.scenario.trajectory, UserPath) != bool(self._config.user_trajectory):
                 raise InputError(
-                    "session: expected a snapshot along the trajectory that it follows itself,"
-                    f" received one along {snapshot.scenario.trajectory.shape}"
+                    "session: expected a snapshot with the trajectory of this session,"
+                    f" received one with {snapshot.scenario.trajectory.shape}"
                 )
             self._restore(snapshot, user_law)
 
     def close(self) -> None:
-        """End the session: to advance, set, keep or restore it is refused from then on."""
+        """End the session: later calls that advance, change, save or restore it are refused."""
         self._closed = True
 
     def __repr__(self) -> str:
@@ -290,7 +288,7 @@ class Session:
         self.close()
 
     def warnings(self) -> list[str]:
-        """What a user should know of model and scenario before believing the figures; one line each."""
+        """Return warnings about model and scenario, one line each."""
         return active_config.warnings_of(self.scenario, self._config.files)
 
     @contextmanager
@@ -308,7 +306,7 @@ class Session:
 
     @contextmanager
     def _all_or_nothing(self) -> Iterator[None]:
-        """Leave the session as it was where a change cannot be made: its parts are replaced, not altered."""
+        """Restore the session if a change fails: a change replaces parts and does not alter them."""
         before = vars(self).copy()
         try:
             yield
@@ -324,32 +322,33 @@ class Session:
                 most = min(self._most(len(log) - done), until - self.tick)
                 inputs = self._inputs.rows(self.tick, most)
             except InputError:
-                if done:  # first hand over what there is; the next call will say it
+                if done:  # return these rows first; the next call raises the error
                     break
                 raise
             done += self._run(inputs, log[done : done + len(inputs.t)])
             before = self.signals
             try:
-                self._make_planned()
-            except SpheretwinError:  # the next call makes it again, and says it
+                self._apply_events()
+            except SpheretwinError:  # the next call applies them again, and raises the error
                 break
             if self.signals != before:
                 break
         return done
 
-    def _outside(self) -> InputGenerator:
+    def _input_generator(self) -> InputGenerator:
         return InputGenerator(self.scenario, self._config.user_trajectory, len(self.actuator.groups))
 
-    def _waiting(self) -> tuple[Change, ...]:
+    def _pending(self) -> tuple[Change, ...]:
+        """Return the changes of the events that have not occurred yet."""
         return self._planned[len(self.events) :]
 
     def _most(self, ticks: int) -> int:
-        """Ticks that can be run at once: an event ends them."""
-        return min([ticks, *(change.tick - self.tick for change in self._waiting()[:1])])
+        """Return the number of ticks up to the next event, at most `ticks`."""
+        return min([ticks, *(change.tick - self.tick for change in self._pending()[:1])])
 
-    def _make_planned(self) -> None:
-        """Make the changes of all events whose tick has come."""
-        for change in self._waiting():
+    def _apply_events(self) -> None:
+        """Apply the changes of all events that are due."""
+        for change in self._pending():
             if change.tick > self.tick or self._status != Status.RUNNING:
                 break
             with self._all_or_nothing():
@@ -363,11 +362,11 @@ class Session:
         started = time.perf_counter()
         try:
             ticks, code = self._runtime.run(inputs, log)
-        except BaseException as error:  # a law in plain Python: the state is somewhere within a tick
+        except BaseException as error:  # a law in plain Python: the tick is incomplete
             self._status = Status.DIVERGED
             if isinstance(error, Exception | KeyboardInterrupt):
                 raise
-            raise LawError.of(self.law.name, self.t_s, error) from error  # it would end the process
+            raise LawError.of(self.law.name, self.t_s, error) from error  # `error` would end the process
         self.loop_s += time.perf_counter() - started
         self.tick += ticks
         self._status = BY_CODE[code]
@@ -376,30 +375,14 @@ class Session:
     def _change(self, name: str, value: Any) -> None:
         before, self._config = self._config, self._config.with_change(name, value)
         scenario, user_law = self.scenario, self._config.user_law
-        # What comes from outside is no part of the machine.
-        outside = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
-        built = before._replace(scenario=before.scenario.model_copy(update=outside))
+        # Trajectory and disturbance are inputs: the runtime does not depend on them.
+        inputs = {"trajectory": scenario.trajectory, "disturbance": scenario.disturbance}
+        built = before._replace(scenario=before.scenario.model_copy(update=inputs))
         if built != self._config or user_law not in (None, self.law):
             self._runtime = self._runtime.transfer_to(scenario, self._config.files, user_law)
-            self._seen = with_more(self._seen, self.signals)
+            self._logged = with_more(self._logged, self.signals)
         self._own_laws = self._own_laws.with_law(user_law)
-        self._inputs.scenario = scenario  # last: it is altered, and what fails must have changed nothing
-
-    def _check_plan(self) -> None:
-        """Find out before the first tick what an event would only be refused for at its own.
-
-        Raises
-        ------
-        InputError
-            An event sets what cannot be set under this law, along this trajectory, with these files.
-        """
-        seen, made = self._seen, 0
-        try:
-            for in_force in self._config.with_changes(self._planned):
-                seen, made = with_more(seen, in_force.signals), made + 1
-        except InputError as error:
-            at_s = self._planned[made].tick * self.scenario.controller.period_s
-            raise InputError(f"{error}, as the event at {at_s:g} s sets it") from None
+        self._inputs.scenario = scenario  # last, because it is altered: a failure above changes nothing
 
     def _restore(self, snapshot: Snapshot, user_law: Law | None) -> None:
         files = scenario_files.reload_files(self._config.files, self.scenario, snapshot.scenario)
@@ -407,16 +390,10 @@ class Session:
         self._config = self._config._replace(scenario=snapshot.scenario, files=files, user_law=user_law)
         self._runtime = Runtime(self.scenario, files, self._config.law)
         self._runtime.restore(snapshot.runtime)
-        self._seen = with_more(self._seen, self.signals)
-        self.begun_as, self._planned = snapshot.begun_as, scheduled_changes(snapshot.begun_as)
+        self._logged = with_more(self._logged, self.signals)
+        self.initial_scenario = snapshot.initial_scenario
+        self._planned = scheduled_changes(self.initial_scenario)
         self.tick, self._status = snapshot.tick, snapshot.status
         self.journal, self.events = snapshot.journal, snapshot.events
-        self._inputs = self._outside()
+        self._inputs = self._input_generator()
         self._inputs.restore(snapshot.inputs)
-
-
-def _recorded(value: Any) -> Any:
-    """A value as JSON holds it, and as a scenario takes it: nothing of the caller's own, which may change."""
-    if isinstance(value, Law):
-        return active_config.name_of_user_object(value.name)
-    return json.loads(json.dumps(value, default=as_plain))

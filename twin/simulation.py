@@ -1,4 +1,4 @@
-"""One run of a scenario to its end: a session, advanced chunk by chunk, and whoever follows it."""
+"""Simulation of a scenario to its end: a session, advanced chunk by chunk, and the sinks of its telemetry."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ LIVE_CHUNK_S = 0.02
 
 
 class Sink(Protocol):
-    """Whatever follows a run while it goes on: a recorder, a progress bar, a file."""
+    """Receiver of a run while it runs: a recorder, a progress bar, a file."""
 
     def write(self, rows: Table) -> None:
-        """Take the rows of one chunk, which do not change any more."""
+        """Receive the rows of one chunk, which do not change later."""
 
     def note(self, t_s: float, text: str) -> None:
-        """Take note of what happened before the tick at `t_s`."""
+        """Receive a message about an event before the tick at `t_s`."""
 
     def finish(self, status: Status) -> None:
-        """Take note of how the run ended."""
+        """Receive the final status."""
 
 
 def simulate(
@@ -57,15 +57,15 @@ def simulate(
     Parameters
     ----------
     scenario : Scenario or str or Path
-        From `scenario.load`, built in Python, the name of a shipped one, or the path of a TOML file.
+        From `scenario.load` or built in Python; the name of a shipped scenario or the path of a TOML file.
     changes : mapping, optional
         Values by dotted name, such as ``{"controller.law": "pd"}``.
     law : Law, optional
-        Runs instead of the law that the scenario names.
+        Replaces the law of the scenario.
     sinks : sequence of Sink
-        Handed the telemetry while the run goes on.
+        Receive the telemetry while the run runs.
     trajectory : object with ``sample(t)``, optional
-        Followed instead of the trajectory that the scenario names.
+        Replaces the trajectory of the scenario.
 
     Raises
     ------
@@ -75,17 +75,17 @@ def simulate(
     """
     scenario = _scenario(scenario, changes or {})
     with Session(scenario, law, trajectory) as session:
-        record = record_of(session)  # with the digests of the files when the run starts
-        if scenario.event:  # which may change the columns
-            kept = TelemetryBuffer(session.signals, scenario.ticks)
-            status = follow(session, scenario.ticks, [kept, *sinks])
-            telemetry = kept.table
+        record = record_of(session)  # now: with the digests of the files at the start
+        if scenario.event:  # an event may change the columns
+            buffer = TelemetryBuffer(session.signals, scenario.ticks)
+            status = follow(session, scenario.ticks, [buffer, *sinks])
+            telemetry = buffer.table
         else:
             log = allocated(scenario.ticks, width(session.signals))
             status = follow(session, scenario.ticks, sinks, log=log)
             telemetry = Table(session.signals, log[: session.tick])
         return Run(
-            session.begun_as,
+            session.initial_scenario,
             status,
             telemetry,
             session.loop_s,
@@ -113,53 +113,53 @@ def follow(
     live: bool = False,
     stop_requested: Callable[[], bool] = lambda: False,
 ) -> Status:
-    """Advance a session to a tick, and hand every chunk on.
+    """Advance a session to a tick, and pass every chunk to the sinks.
 
     Parameters
     ----------
     session : Session
-        At tick 0, or further on.
+        Session at tick 0 or at a later tick.
     ticks : int
-        Where to end.
+        Last tick.
     sinks : iterable of Sink
-        Each is handed the telemetry chunk by chunk, in memory of its own.
+        Each receives the telemetry chunk by chunk.
     log : (ticks, width) array, optional
-        Where to keep the rows; not kept unless given.
+        Result: the rows of the telemetry.
     journal : sequence of Change
-        Changes to make on the way, each before its tick.
+        Changes during the run, each applied before its tick.
     live : bool
-        Keep pace with the clock, in chunks of 20 ms.
+        True for the pace of the clock, in chunks of 20 ms.
     stop_requested : callable
-        Asked between chunks; True ends the run with the status ``interrupted``.
+        Called between chunks; True ends the run with the status ``interrupted``.
 
     Returns
     -------
     Status
-        How the run ended.
+        Final status.
 
     Raises
     ------
     InputError
-        Reference or disturbance would be lost on the way; a change of the journal is none.
+        Reference or disturbance is not finite during the run, or a change of the journal is invalid.
     """
-    sinks, waiting = list(sinks), list(journal)
-    session.check_horizon(_known_to(ticks, waiting))
+    sinks, pending = list(sinks), list(journal)
+    session.check_horizon(_known_to(ticks, pending))
     chunk = _chunk_ticks(session.scenario, live)
     started, first = time.perf_counter(), session.t_s
-    noted, told = _note_events(session, 0, sinks), FaultMessages()
+    reported, messages = _report_events(session, 0, sinks), FaultMessages()
     while session.tick < ticks and not session.ended and not stop_requested():
-        _make(session, ticks, waiting, sinks)
-        last = min(session.tick + chunk, ticks, *(change.tick for change in waiting[:1]))
+        _apply_due(session, ticks, pending, sinks)
+        last = min(session.tick + chunk, ticks, *(change.tick for change in pending[:1]))
         rows = _advance(session, last, log)
-        lines = told.of(rows)
+        lines = messages.of(rows)
         for sink in sinks:
             sink.write(rows)
             for t_s, text in lines:
                 sink.note(t_s, text)
-        noted = _note_events(session, noted, sinks)
+        reported = _report_events(session, reported, sinks)
         if live:
             _sleep_until(started + session.t_s - first)
-    _make(session, ticks, waiting, sinks)  # what came after the last tick is in the journal too
+    _apply_due(session, ticks, pending, sinks)  # the journal also contains changes after the last tick
     status = session.status
     if status == Status.RUNNING:
         status = Status.COMPLETED if session.tick >= ticks else Status.INTERRUPTED
@@ -168,28 +168,28 @@ def follow(
     return status
 
 
-def _note_events(session: Session, noted: int, sinks: Sequence[Sink]) -> int:
-    """Tell of the events made since then; returns how many there have been."""
-    for change in session.events[noted:]:
+def _report_events(session: Session, reported: int, sinks: Sequence[Sink]) -> int:
+    """Report the events after the first `reported` ones to the sinks; return the number of all events."""
+    for change in session.events[reported:]:
         for sink in sinks:
             sink.note(change.tick * session.scenario.controller.period_s, change_text(change))
     return len(session.events)
 
 
-def _known_to(ticks: int, waiting: Sequence[Change]) -> int:
-    """Tick up to which reference and disturbance are those of the present scenario."""
-    return min([ticks, *(change.tick for change in waiting)])
+def _known_to(ticks: int, pending: Sequence[Change]) -> int:
+    """Return the tick up to which the present scenario determines reference and disturbance."""
+    return min([ticks, *(change.tick for change in pending)])
 
 
-def _make(session: Session, ticks: int, waiting: list[Change], sinks: Sequence[Sink]) -> None:
-    """Make the changes whose tick has come, and wait for them no more."""
-    while waiting and waiting[0].tick <= session.tick:
-        change = waiting.pop(0)
+def _apply_due(session: Session, ticks: int, pending: list[Change], sinks: Sequence[Sink]) -> None:
+    """Apply the changes that are due, and remove them from the pending ones."""
+    while pending and pending[0].tick <= session.tick:
+        change = pending.pop(0)
         session.set(change.name, change.value)
         for sink in sinks:
             sink.note(session.t_s, change_text(change))
-        if session.tick < _known_to(ticks, waiting):
-            session.check_horizon(_known_to(ticks, waiting))
+        if session.tick < _known_to(ticks, pending):
+            session.check_horizon(_known_to(ticks, pending))
 
 
 def _advance(session: Session, last: int, log: NDArray[np.float64] | None) -> Table:

@@ -63,7 +63,7 @@ class Snapshot:
     """State of a session at one tick; it can be pickled."""
 
     scenario: ResolvedScenario
-    begun_as: ResolvedScenario
+    initial_scenario: ResolvedScenario
     user_law: str | None
     files: str
     """Digest of model and torque curves."""

@@ -181,7 +181,7 @@ def run_seconds(scenario: Scenario, folder: Path | None, rate_Hz: float | None =
             if folder is None:
                 follow(session, scenario.ticks, [])
                 return
-            path, facts = folder / f"run{next(names)}.rrd", facts_of(session.begun_as)
+            path, facts = folder / f"run{next(names)}.rrd", facts_of(session.initial_scenario)
             with Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
                 follow(session, scenario.ticks, [recorder])
             path.unlink()

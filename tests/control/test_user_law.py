@@ -118,7 +118,7 @@ def test_every_form_runs_records_and_replays(file, name, tmp_path, capsys):
     assert capsys.readouterr().err == ""
     file.write_text(FILE + "\n# edited since\n")
     assert cli.main(["simulate", "--replay", str(first)]) == 2
-    assert "mine.py as it was when the run was made" in capsys.readouterr().err
+    assert "mine.py as it was at the start of the run" in capsys.readouterr().err
 
 
 def test_all_forms_of_one_law_agree(file):
@@ -234,7 +234,9 @@ def test_a_signal_of_an_odd_name_is_recorded_quietly(tmp_path, capfd):
     law = Law("odd", step, [], np.zeros(3), (Signal("a b", "1", 3, "odd", ANGLES),))
     with Session(scenarios.load("hold"), law) as session:
         path = tmp_path / "odd.rrd"
-        with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
+        with Recorder(
+            session.actuator, session.signals, facts_of(session.initial_scenario), path=path
+        ) as recorder:
             recorder.write(session.advance(10))
     assert capfd.readouterr().err == ""
     assert os.path.getsize(path) > 0

@@ -17,14 +17,14 @@ def begun(**changes):
 
 def test_facts_are_the_resolved_scenario_s():
     session = begun()
-    facts = facts_of(session.begun_as)
+    facts = facts_of(session.initial_scenario)
     assert (facts.name, facts.law, facts.duration_s) == ("tilt", session.law.name, 0.02)
-    assert facts.description == session.begun_as.description
+    assert facts.description == session.initial_scenario.description
     assert facts.current_limit_A == session.actuator.group.current_limit_A
     assert facts.payload_kg == 0.05
-    assert facts.gravity_m_s2 == session.begun_as.plant.gravity_m_s2 == 9.81
+    assert facts.gravity_m_s2 == session.initial_scenario.plant.gravity_m_s2 == 9.81
     assert facts.mjcf == actuators.MJCF_PATH
-    assert facts_of(begun(**{"drive.current_limit_A": 4.0}).begun_as).current_limit_A == 4.0
+    assert facts_of(begun(**{"drive.current_limit_A": 4.0}).initial_scenario).current_limit_A == 4.0
 
 
 def test_a_model_of_the_user_s_is_the_one_that_is_drawn(tmp_path):
@@ -34,8 +34,8 @@ def test_a_model_of_the_user_s_is_the_one_that_is_drawn(tmp_path):
 
 def test_sections_hold_every_field_once():
     session = begun()
-    fields = session.begun_as.model_dump(mode="json")
-    sections = facts_of(session.begun_as).sections
+    fields = session.initial_scenario.model_dump(mode="json")
+    sections = facts_of(session.initial_scenario).sections
     assert sections["run"]["duration"] == 0.02
     assert not {"name", "description"} & set(sections["run"])
     for name, value in fields.items():

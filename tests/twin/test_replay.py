@@ -78,7 +78,7 @@ def test_another_file_than_the_run_s_is_refused_on_one_line(folder, name, edit):
     path = written(folder / "a.parquet", [("nominal.torque_curve", "later.csv")])
     replay.read(path)
     edit(folder / name)
-    with pytest.raises(InputError, match="as it was when the run was made") as told:
+    with pytest.raises(InputError, match="as it was at the start of the run") as told:
         replay.read(path)
     assert str(folder / name) in f"{told.value}"
     assert "\n" not in f"{told.value}"
@@ -141,7 +141,7 @@ def test_a_file_that_the_run_could_not_read_and_that_exists_now_is_refused(folde
     table, _ = read_parquet(path)
     table.write_parquet(path, record | {"files": json.dumps(files)})
     (folder / "later").rename(folder / "p.csv")
-    with pytest.raises(InputError, match=r"plant\.torque_curve .*p\.csv as it was when the run was made"):
+    with pytest.raises(InputError, match=r"plant\.torque_curve .*p\.csv as it was at the start of the run"):
         replay.read(path)
 
 

@@ -22,7 +22,7 @@ def run():
 def followed(ticks):
     """Summary of a session that was followed for some ticks."""
     with Session(scenarios.load("hold", {"duration": 0.2})) as session:
-        figures = Figures(PlannedRun(session.begun_as, session.actuator, 200))
+        figures = Figures(PlannedRun(session.initial_scenario, session.actuator, 200))
         status = follow(session, ticks, [figures])
         return summary(session, status, figures.values(), figures.warnings())
 
@@ -70,7 +70,7 @@ def test_what_fails_or_is_no_json_is_told_with_its_name(run):
         InputError, match="metric mine: expected a figure, it raised ValueError: line one line"
     ):
         figures_of(run, {"mine": failing})
-    with pytest.raises(InputError, match="metric mine: expected what JSON holds, received <function"):
+    with pytest.raises(InputError, match="metric mine: expected a value in JSON types, received <function"):
         figures_of(run, {"mine": lambda run: failing})
 
 

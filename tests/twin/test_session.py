@@ -105,7 +105,7 @@ def test_a_recording_is_named_by_the_law_that_ran(tmp_path):
 
     live = session(compiled_law("cautious"), name="hold")
     path = tmp_path / "run.rrd"
-    with Recorder(live.actuator, live.signals, facts_of(live.begun_as), path=path) as sink:
+    with Recorder(live.actuator, live.signals, facts_of(live.initial_scenario), path=path) as sink:
         follow(live, 20, [sink])
     batches = [chunk.to_record_batch() for chunk in RrdReader(path).stream()]
     names = [batch.column(NAME).to_pylist() for batch in batches if NAME in batch.schema.names]

@@ -254,10 +254,10 @@ def test_a_trajectory_of_the_user_s_is_not_taken_for_a_shape():
 
     hold_.__name__ = "hold"
     with Session(hold(), trajectory=hold_()) as session:
-        assert session.begun_as.trajectory.shape == "hold of the user's"
+        assert session.initial_scenario.trajectory.shape == "hold of the user's"
     named = Law("pd", lambda *_: None, [], [])
     with Session(hold(), named) as session:
-        assert session.begun_as.controller.law == "pd of the user's"
+        assert session.initial_scenario.controller.law == "pd of the user's"
 
 
 POSES = "t_s,alpha_rad,beta_rad,gamma_rad\n0,0,0,0\n0.1,0.1,0,0\n"

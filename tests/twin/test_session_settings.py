@@ -100,7 +100,7 @@ def test_a_law_object_may_replace_a_shipped_one_and_back(kind):
     table = changed.advance(50)
     np.testing.assert_array_equal(table["calls"], np.arange(1, 51))
     assert changed.scenario.controller.law == "mine"
-    assert changed.begun_as.controller.law == "afsm"
+    assert changed.initial_scenario.controller.law == "afsm"
     assert changed.journal == (Change(100, "controller.law", "mine"),)
     with pytest.raises(InputError, match="shipped law"):
         changed.set("controller.reaching_gain", 5.0)

@@ -43,7 +43,7 @@ def test_a_restored_session_goes_on_bit_for_bit(law, engine, at):
     other.advance(77)
     other.restore(pickle.loads(pickle.dumps(taken)))
     assert rows(other.advance(BLOCK_TICKS + 100)) == expected
-    assert other.begun_as == original.begun_as
+    assert other.initial_scenario == original.initial_scenario
 
 
 @pytest.mark.parametrize("bad", [None, 3, "snapshot", {}, object()])

@@ -83,7 +83,7 @@ class UserMetrics:
         """Return the figures by name; None if a function failed, so that the other figures are not lost."""
         if self._telemetry is None:
             return {}
-        run = Run(session.begun_as, status, self._telemetry.table, session.loop_s, session.actuator)
+        run = Run(session.initial_scenario, status, self._telemetry.table, session.loop_s, session.actuator)
         return {name: self._value(name, metric, run) for name, metric in self._functions.items()}
 
     def _value(self, name: str, metric: UserMetric, run: Run) -> Any:
@@ -155,7 +155,7 @@ def run(options: argparse.Namespace) -> bool:
     outputs.check([path for path in (options.record, options.telemetry) if path])
     outputs.check_rate(options.record_rate, options.record, plan.scenario.controller.period_s)
     with interruptible() as stop_requested, Session(plan.scenario) as session:
-        figures = Figures(PlannedRun(session.begun_as, session.actuator, plan.ticks))
+        figures = Figures(PlannedRun(session.initial_scenario, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
         sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
         files = Outputs(
@@ -224,7 +224,7 @@ def _report(
     as_json: bool,
 ) -> None:
     """Print the figures, and the reason if the run did not complete."""
-    scenario = session.begun_as
+    scenario = session.initial_scenario
     planned_s = plan.ticks * scenario.controller.period_s
     if as_json:
         print_json(run_summary)

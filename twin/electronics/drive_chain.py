@@ -9,17 +9,13 @@ the controller its output.
 
 from __future__ import annotations
 
-from math import exp, expm1
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
 
-from spheretwin.control.law import Positive
 from spheretwin.electronics.amplifier import (
     Amplifier,
-    AmplifierSection,
     Flow,
     advance_open_short,
     amplifier,
@@ -31,7 +27,6 @@ from spheretwin.electronics.coil import (
     DRIVEN,
     OPEN,
     SHORTED,
-    CoilSection,
     GroupCoils,
     advance_temperature,
     back_emf,
@@ -39,106 +34,14 @@ from spheretwin.electronics.coil import (
     is_overheated,
     update_resistance,
 )
-from spheretwin.electronics.converters import DacSection
-from spheretwin.electronics.delay import Delay, DelaySection, delay, due, latch
-from spheretwin.electronics.drive_stage import DriveSetup, DriveStage
+from spheretwin.electronics.current_lag import CurrentLag, advance_lag, current_lag
+from spheretwin.electronics.delay import Delay, delay, due, latch
+from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
+from spheretwin.electronics.drive_stage import DriveSetup
 from spheretwin.electronics.stages import FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
+from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity
-
-
-class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
-    """Parameters of the drive; each stage is ideal by default, and the coils are those of the model.
-
-    The bases that are a `DriveStage` are the list of the stages, in the order in which commands pass them.
-    """
-
-    time_constant_s: Annotated[float, Field(ge=0, le=1e3)] | None = Field(
-        None, description="current lag L/R of amplifiers without a supply, s; 0 for none"
-    )
-    current_limit_A: Positive | None = Field(None, description="largest group current of the amplifiers, A")
-
-    @model_validator(mode="after")
-    def _one_lag(self) -> DriveSection:
-        if self.supply_V is not None and self.time_constant_s is not None:
-            raise ValueError(
-                "expected either a supply_V, whose amplifiers have a bandwidth, or a time_constant_s,"
-                f" received {self.supply_V!r} V and {self.time_constant_s!r} s"
-            )
-        return self
-
-    @property
-    def converts(self) -> bool:
-        """True if the setpoint of the amplifiers can differ from the command."""
-        return self.delay_s > 0 or not all(kind.ideal(self) for kind in STAGES.values())
-
-
-STAGES: dict[str, type[DriveStage]] = {
-    kind.stage: kind for kind in DriveSection.__bases__ if issubclass(kind, DriveStage)
-}
-"""Classes of the drive stages by their names, in the order in which the commands pass them."""
-
-
-class ResolvedDrive(DriveSection):
-    """Drive of a run: coils and limit are given, and the lag if there is no supply."""
-
-    resistance_ohm: Positive
-    inductance_H: Positive
-    current_limit_A: Positive
-
-    @property
-    def lag_s(self) -> float:
-        """Time constant of the currents while no voltage is at its limit."""
-        return cast("float", self.time_constant_s) if self.supply_V is None else 1 / self.bandwidth_rad_s
-
-
-class CurrentLag(NamedTuple):
-    """First-order lag, solved exactly over one physics step with the command held."""
-
-    decay: float
-    """Share of the distance to the command that remains after a step."""
-    mean_share: float
-    """Share of that distance that remains on average over the step."""
-    current_limit_A: float
-    """Limit of the amplifiers, for any command."""
-
-
-def current_lag(time_constant_s: float, step_s: float, current_limit_A: float) -> CurrentLag:
-    """Return the lag for a time constant L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
-    if time_constant_s == 0:
-        return CurrentLag(0.0, 0.0, current_limit_A)
-    steps = step_s / time_constant_s
-    return CurrentLag(exp(-steps), -expm1(-steps) / steps, current_limit_A)
-
-
-@allocation_free
-def advance_lag(
-    lag: CurrentLag,
-    command: NDArray[np.float64],
-    current: NDArray[np.float64],
-    mean: NDArray[np.float64],
-) -> None:
-    """Advance the currents by one physics step.
-
-    Parameters
-    ----------
-    lag : CurrentLag
-        Lag of the groups.
-    command : (n,) array, A
-        Held over the step; the amplifiers follow it up to their limit.
-    current : (n,) array, A
-        At the start of the step; on return, at its end.
-    mean : (n,) array, A
-        Result: mean over the step, which acts on the rotor.
-    """
-    limit = lag.current_limit_A
-    for j in range(command.shape[0]):
-        target = min(max(command[j], -limit), limit)
-        distance = current[j] - target
-        mean[j] = target + lag.mean_share * distance
-        current[j] = target + lag.decay * distance
-
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ class DriveSetup(NamedTuple):
 class DriveStage(BaseModel):
     """Parameters of one stage; ideal by default.
 
-    A new stage is a subclass and a base of `drive_chain.DriveSection`, whose bases are the list of all
+    A new stage is a subclass and a base of `drive_section.DriveSection`, whose bases are the list of all
     stages, in the order in which commands pass them. `build` returns a named tuple that has a field ``on``
     and a `stages.FaultLine` ``line`` for its faults. All stages share one section: methods are called on the
     class of a stage, with that section as argument.

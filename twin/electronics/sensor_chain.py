@@ -149,6 +149,16 @@ def accuracy(section: SensorsSection) -> tuple[Triple, Triple]:
     return (noise_rad, noise_rad, 0.0), (step_rad, step_rad, count_rad)
 
 
+def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
+    """Return the nominal values of the sensors, by field of `nominal`."""
+    noise_rad, resolution_rad = accuracy(sensors)
+    return {
+        "angle_noise_rad": noise_rad,
+        "angle_resolution_rad": resolution_rad,
+        "current_noise_A": sensors.current.noise_A,
+    }
+
+
 @allocation_free
 def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
     """Write measured angles (rad) and true rates (rad/s) into the first rows of `measurement` (3, 3).

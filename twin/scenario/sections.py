@@ -19,11 +19,10 @@ from spheretwin.control.supervision.fault_detector import DetectorSection
 from spheretwin.control.supervision.watchdog import WatchdogSection
 from spheretwin.control.user_law import parameters_of
 from spheretwin.disturbances import Disturbance
-from spheretwin.electronics.data_sheet import drive_sheet, sensor_sheet
 from spheretwin.electronics.delay import delay
-from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
+from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
 from spheretwin.electronics.prototype import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
-from spheretwin.electronics.sensor_chain import SensorsSection
+from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 from spheretwin.faults.fault import Fault, check_gains
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.plant.step import ENGINES

@@ -78,7 +78,7 @@ def compare(expected: str, ours: Ending, theirs: Ending, way_out: str) -> float:
 def _rms(rows: Rows, row: Row, engine: str) -> Ending:
     scenario = rows.scenario(row, engine)
     with rows.session(scenario) as session:
-        metric = RmsError(PlannedRun(session.begun_as, session.actuator, scenario.ticks))
+        metric = RmsError(PlannedRun(session.initial_scenario, session.actuator, scenario.ticks))
         status = follow(session, scenario.ticks, [follower({"rms_error_rad": metric})])
         return status, metric.value() or []
 

@@ -196,7 +196,7 @@ class Rows:
 
     def _follow(self, row: Row, scenario: Scenario, session: Session) -> Result:
         metrics = {
-            name: METRICS[name](PlannedRun(session.begun_as, session.actuator, scenario.ticks))
+            name: METRICS[name](PlannedRun(session.initial_scenario, session.actuator, scenario.ticks))
             for name in self.metrics
         }
         sinks: list[Sink] = [follower(metrics)]
@@ -213,7 +213,7 @@ class Rows:
         figures = {name: metric.value() for name, metric in metrics.items()}
         complaints: list[str] = []
         if buffer:
-            run = Run(session.begun_as, status, buffer.table, session.loop_s, session.actuator)
+            run = Run(session.initial_scenario, status, buffer.table, session.loop_s, session.actuator)
             figures |= {name: _own_value(name, metric, run, complaints) for name, metric in self._own.items()}
         reason = session.reason.text if session.reason else None
         return Result(str(status), reason, "; ".join(complaints) or None, figures)

@@ -78,9 +78,9 @@ class Prepared:
 
 
 def _flown(session: Session) -> dict[str, object]:
-    planned = PlannedRun(session.begun_as, session.actuator, session.begun_as.ticks)
+    planned = PlannedRun(session.initial_scenario, session.actuator, session.initial_scenario.ticks)
     metrics = {name: METRICS[name](planned) for name in FIGURES}
-    table = session.advance(session.begun_as.ticks)
+    table = session.advance(session.initial_scenario.ticks)
     for metric in metrics.values():
         metric.write(table)
     return {name: metric.value() for name, metric in metrics.items()}

@@ -23,8 +23,7 @@ from spheretwin.control.supervision.fault_detector import (
 from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, zero_flow
 from spheretwin.electronics.coil import CoilSection, group_coils
 from spheretwin.electronics.converters import convert, dac
-from spheretwin.electronics.data_sheet import drive_sheet
-from spheretwin.electronics.drive_chain import DriveSection, ResolvedDrive
+from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
 from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
 from spheretwin.models.base.state import restore_state, save_state
 from spheretwin.models.kinematics import rate_jacobian

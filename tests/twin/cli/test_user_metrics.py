@@ -104,8 +104,8 @@ def test_a_function_that_fails_costs_neither_figures_nor_files(file, tmp_path, c
     ("name", "told"),
     [
         ("leaving", "it raised SystemExit: 0"),
-        ("a_set", "expected what JSON holds, received {1, 2}"),
-        ("endless", "expected what JSON holds, received [[...]]"),
+        ("a_set", "expected a value in JSON types, received {1, 2}"),
+        ("endless", "expected a value in JSON types, received [[...]]"),
         ("too_long", "received a number of too many digits"),
         ("unwritable", "received a value of class Unwritable, which raises KeyError when it is written"),
         ("sly", "received a value of class Sly, which raises LookupError when it is written"),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from spheretwin.electronics import random_streams
-from spheretwin.electronics.drive_chain import STAGES as DRIVE_STAGES
+from spheretwin.electronics.drive_section import STAGES as DRIVE_STAGES
 from spheretwin.electronics.random_streams import errors, stream_key, uniforms
 from spheretwin.electronics.sensor_chain import STAGES as SENSOR_STAGES
 from spheretwin.faults.schedule import part_names

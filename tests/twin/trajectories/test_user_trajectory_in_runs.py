@@ -62,7 +62,7 @@ def test_a_snapshot_goes_on_along_it_and_not_along_another():
         ahead = session.advance(80).values.tobytes()
         session.restore(kept)
         assert session.advance(80).values.tobytes() == ahead
-        with pytest.raises(InputError, match="that it follows itself, received one along Spiral"):
+        with pytest.raises(InputError, match="with the trajectory of this session, received one with Spiral"):
             plain.restore(kept)
 
 

@@ -56,9 +56,9 @@ def recorded(path, name, fields, view="overview"):
     """Recording of a brief run, and how it ended."""
     fields = {"duration": 0.3, "plant.engine": "lagrangian", **fields}
     with Session(scenarios.load(name, fields)) as session:
-        facts = facts_of(session.begun_as)
+        facts = facts_of(session.initial_scenario)
         with Recorder(session.actuator, session.signals, facts, path=path, shown=view) as recorder:
-            return path, follow(session, session.begun_as.ticks, [recorder])
+            return path, follow(session, session.initial_scenario.ticks, [recorder])
 
 
 @pytest.fixture(scope="module", params=RUNS)

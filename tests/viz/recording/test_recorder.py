@@ -50,7 +50,11 @@ def test_signals_that_a_law_brings_on_the_way_change_no_component(tmp_path):
     changes = [{"t_s": at, "set": "controller.law", "value": law} for at, law in ((0.1, "afsm"), (0.2, "pd"))]
     fields = {"controller.law": "pd", "duration": 0.3, "plant.engine": "lagrangian", "event": changes}
     with Session(scenarios.load("sinusoid", fields)) as session:
-        facts, ticks, begun = facts_of(session.begun_as), session.begun_as.ticks, session.signals
+        facts, ticks, begun = (
+            facts_of(session.initial_scenario),
+            session.initial_scenario.ticks,
+            session.signals,
+        )
         with Recorder(session.actuator, begun, facts, path=tmp_path / "run.rrd") as recorder:
             follow(session, ticks, [recorder])
     types = {}

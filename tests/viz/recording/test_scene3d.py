@@ -31,7 +31,9 @@ def recorded(path, name, **changes):
     """Telemetry and status of a run that was recorded."""
     session = Session(scenarios.load(name, {"plant.engine": "lagrangian", **changes}))
     rows = []
-    with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
+    with Recorder(
+        session.actuator, session.signals, facts_of(session.initial_scenario), path=path
+    ) as recorder:
         recorder.write(first := session.advance(1))
         rows.append(first.values.copy())
         while session.status == "running" and session.tick < session.scenario.ticks:
@@ -146,7 +148,7 @@ def test_gravity_of_the_model_s_own_along_another_line_pulls_along_it(tmp_path, 
     mine.write_text(text.replace("<option ", '<option gravity="3 -2 -5" '), encoding="utf-8")
     session = Session(scenarios.load("hold", {"plant.engine": "lagrangian"}))
     facts = dataclasses.replace(
-        facts_of(session.begun_as), mjcf=mine, gravity_m_s2=None, payload_kg=PAYLOAD_kg
+        facts_of(session.initial_scenario), mjcf=mine, gravity_m_s2=None, payload_kg=PAYLOAD_kg
     )
     rows = Table(session.signals, np.zeros((1, width(session.signals))))
     rows["q_rad"][:] = pose = np.array([0.3, -0.5, 1.1])
@@ -201,7 +203,7 @@ def test_a_failure_is_marked_where_it_happens(tmp_path, actuator):
 def test_a_run_that_is_complete_or_interrupted_has_no_mark(tmp_path, loaded):
     assert mark(loaded[0]) == []
     session = Session(scenarios.load("hold", {"plant.engine": "lagrangian"}))
-    facts, path = facts_of(session.begun_as), tmp_path / "run.rrd"
+    facts, path = facts_of(session.initial_scenario), tmp_path / "run.rrd"
     with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
         recorder.write(session.advance(5))
         recorder.finish("interrupted")
@@ -211,7 +213,7 @@ def test_a_run_that_is_complete_or_interrupted_has_no_mark(tmp_path, loaded):
 @pytest.mark.parametrize("lost", [np.nan, 1e99, np.inf])
 def test_a_run_that_diverged_is_marked_at_its_last_pose(tmp_path, actuator, lost):
     session = Session(scenarios.load("hold", {"plant.engine": "lagrangian"}))
-    facts, path = facts_of(session.begun_as), tmp_path / "run.rrd"
+    facts, path = facts_of(session.initial_scenario), tmp_path / "run.rrd"
     rows = session.advance(40)
     last = rows["q_rad"][30].copy()
     rows["q_rad"][31:] = lost
@@ -229,7 +231,9 @@ def size(path, duration_s, **changes):
     """Bytes of a recording of the sinusoid."""
     fields = {"plant.engine": "lagrangian", "duration": duration_s, **changes}
     session = Session(scenarios.load("sinusoid", fields))
-    with Recorder(session.actuator, session.signals, facts_of(session.begun_as), path=path) as recorder:
+    with Recorder(
+        session.actuator, session.signals, facts_of(session.initial_scenario), path=path
+    ) as recorder:
         follow(session, session.scenario.ticks, [recorder])
     return path.stat().st_size
 

@@ -16,7 +16,7 @@ def size_and_raw(path, duration_s, rate_Hz):
     """Bytes of a recording, and of the numbers of all of its run's rows."""
     changes = {"plant.engine": "lagrangian", "duration": duration_s}
     with Session(scenarios.load("sinusoid", changes)) as session:
-        facts, ticks = facts_of(session.begun_as), session.begun_as.ticks
+        facts, ticks = facts_of(session.initial_scenario), session.initial_scenario.ticks
         with Recorder(session.actuator, session.signals, facts, path=path, rate_Hz=rate_Hz) as recorder:
             follow(session, ticks, [recorder])
         raw = ticks * width(session.signals) * np.float64().itemsize

@@ -77,7 +77,7 @@ def test_a_recording_has_a_lane_for_what_fails_and_a_line_in_its_log(tmp_path):
         "watchdog.on": True,
     }
     with Session(scenarios.load("hold", fields)) as session:
-        facts, path = facts_of(session.begun_as), tmp_path / "run.rrd"
+        facts, path = facts_of(session.initial_scenario), tmp_path / "run.rrd"
         with Recorder(session.actuator, session.signals, facts, path=path) as recorder:
             assert follow(session, 200, [recorder]) == "failsafe"
     states, lines = {}, []

@@ -42,7 +42,7 @@ def variant(request, tmp_path, monkeypatch):
         dataclasses.replace(signal, size=groups, labels=labels) if signal.unit == "A" else signal
         for signal in session.signals
     )
-    return dataclasses.replace(facts_of(session.begun_as), mjcf=path), actuator, signals
+    return dataclasses.replace(facts_of(session.initial_scenario), mjcf=path), actuator, signals
 
 
 def one_row_each(path, entity, component):
