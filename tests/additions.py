@@ -323,9 +323,11 @@ def turn(stage, measurement, noise):
     ),
     "drive stage": Addition(
         "",
-        '''from typing import ClassVar
+        '''from typing import ClassVar, NamedTuple
 
 from spheretwin.electronics.drive_stage import pass_line
+from spheretwin.electronics.stages import FaultLine, fault_line
+from spheretwin.models.base.compiled import part_of_its_caller
 
 
 class FilterSection(DriveStage):
