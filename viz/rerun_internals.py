@@ -207,14 +207,18 @@ class LogEncoder:
         self, entity: str, static: bool, components: Mapping[rr.ComponentDescriptor, pa.Array]
     ) -> Chunk:
         columns = [
-            rr.ComponentColumn(descriptor, _Encoded(array), lengths=[len(array)])
+            rr.ComponentColumn(descriptor, ArrowComponent(array), lengths=[len(array)])
             for descriptor, array in components.items()
         ]
         return Chunk.from_columns(entity, [] if static or not self._index else [self._index], columns)
 
 
-class _Encoded(NamedTuple):
-    """Encoded component."""
+class ArrowComponent(NamedTuple):
+    """Component whose values are an Arrow array.
+
+    Rerun's own form for unknown types requires one type for each name in a whole process,
+    and runs differ in their signals.
+    """
 
     array: pa.Array
 

@@ -237,7 +237,7 @@ def _plots() -> ModuleType:
 
 
 def _draw(plots: ModuleType, folder: Path, surveyed: TorqueSurvey) -> list[Path]:
-    from spheretwin.viz.figures.crosscheck import save  # Matplotlib is optional
+    from spheretwin.viz.figures.style import save  # Matplotlib is optional
 
     workspace, on_grid, worst = surveyed.workspace, surveyed.on_grid, surveyed.worst
     limit_A = surveyed.actuator.group.current_limit_A

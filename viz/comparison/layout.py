@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import NamedTuple
 
 import rerun.blueprint as rrb
@@ -11,7 +10,7 @@ from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import ROTOR
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
-from spheretwin.viz.layout.view import EVENTS, STATES
+from spheretwin.viz.layout.view import EVENTS, STATES, application_of
 from spheretwin.viz.layout.views import eye
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import TRAIL_S
@@ -56,7 +55,7 @@ class ComparisonView(NamedTuple):
 
 def application(view: ComparisonView) -> str:
     """Return the application id of recordings with one layout: a viewer keeps one layout for each."""
-    return f"spheretwin-runs-{hashlib.sha256(repr(view).encode()).hexdigest()[:12]}"
+    return application_of("spheretwin-runs", repr(view))
 
 
 def layout(view: ComparisonView) -> rrb.Blueprint:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +19,7 @@ from spheretwin.viz.comparison.merged_recording import recorded
 from spheretwin.viz.comparison.runs import on_dark
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
+from spheretwin.viz.layout.view import application_of
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import TRAIL_S, shaft_tip
 
@@ -44,7 +44,7 @@ def write(path: Path, trajectories: Mapping[str, LawTrajectory], actuator: Actua
     Parameters
     ----------
     path : Path
-    flights : mapping of label to LawTrajectory
+    trajectories : mapping of label to LawTrajectory
         At least one.
     actuator : Actuator
         Actuator whose shaft tip is drawn.
@@ -56,8 +56,8 @@ def write(path: Path, trajectories: Mapping[str, LawTrajectory], actuator: Actua
     InputError, SpheretwinError
         The file cannot be written there.
     """
-    digest = hashlib.sha256(repr((name, list(trajectories))).encode()).hexdigest()[:12]
-    with recorded(path, f"spheretwin-flights-{digest}", _layout(trajectories)) as recording:
+    application = application_of("spheretwin-trajectories", repr((name, list(trajectories))))
+    with recorded(path, application, _layout(trajectories)) as recording:
         recording.send_recording_name(name)
         recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         longest = max(trajectories.values(), key=lambda trajectory: len(trajectory.t_s))

@@ -13,8 +13,17 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
 from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octave_maxima
-from spheretwin.viz.figures.crosscheck import BROKEN, FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.style import MOST_POINTS, name_runs, plain, run_styles
+from spheretwin.viz.figures.style import (
+    BROKEN,
+    FAINT,
+    INK,
+    MOST_POINTS,
+    WIDTH_in,
+    name_runs,
+    panel_column,
+    plain,
+    run_styles,
+)
 from spheretwin.viz.quantities import Array, ScalarQuantity
 
 MOST_COLUMNS = 1000
@@ -29,7 +38,7 @@ def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 1.2 + 2.3 * len(runs)), layout="constrained")
-    panels = figure.subplots(len(runs), 1, sharex=True, squeeze=False)[:, 0]
+    panels = panel_column(figure, len(runs))
     largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs) or 1.0
     for panel, run in zip(panels, runs, strict=True):
         few = decimate_largest(run.table["current_A"], MOST_COLUMNS)
@@ -96,7 +105,7 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 7.0), layout="constrained")
-    panels = figure.subplots(len(ANGLES), 1, sharex=True, squeeze=False)[:, 0]
+    panels = panel_column(figure, len(ANGLES))
     for axis, (panel, name) in enumerate(zip(panels, ANGLES, strict=True)):
         panel.set_xscale("log")
         panel.set_yscale("log")
@@ -127,7 +136,7 @@ def over_time(
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 1.3 + 1.75 * len(quantities)), layout="constrained")
-    panels = figure.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0]
+    panels = panel_column(figure, len(quantities))
     for panel, quantity in zip(panels, quantities, strict=True):
         for run, of_run in zip(runs, run_styles(runs), strict=True):
             _draw(panel, run, quantity.values(run.rows), label=run.label, **of_run.line())

@@ -10,8 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.crosscheck import FAINT, INK, SERIES, WIDTH_in, save
-from spheretwin.viz.figures.style import LawStyle, on_errors, styles
+from spheretwin.viz.figures.style import (
+    FAINT,
+    INK,
+    SERIES,
+    LawStyle,
+    WIDTH_in,
+    faint_grid,
+    on_errors,
+    save,
+    styles,
+)
 
 Array = NDArray[np.float64]
 
@@ -147,9 +156,7 @@ def margins(
             axes.xaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_major_formatter("{x:g}")
         axes.set_xlabel(panel.name)
-        axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        faint_grid(axes)
     figure.supylabel(quantity, fontsize="medium")
     handles = [
         grid.flat[0].plot([], [], style.marker, markersize=6, label=labels[law], **style.line())[0]
@@ -256,9 +263,7 @@ def estimators(bandwidths_rad_s: Array, curves: Mapping[str, Curve], title: str)
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_ylabel(quantity)
-        axes.grid(visible=True, which="both", color=FAINT, alpha=0.35, linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        faint_grid(axes, which="both")
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     above.set_title(f"{title}\ndots measured, lines derived, dashed the defaults", fontsize="medium")
     below.set_xlabel("bandwidth, rad/s")

@@ -1,35 +1,32 @@
-"""Figures for a page: matplotlib without its global state, one function a figure.
+"""Figures of the cross-check: values over their bounds, spreads, differences, orders and drifts.
 
-Axes have the colours of the recordings; every series is named, every axis has its unit, and a bound is
-drawn as a dashed line with what it bounds.
+Every series is named, every axis has its unit, and a bound is a dashed line with its value.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.theme import AXIS_COLOURS
+from spheretwin.viz.figures.style import (
+    AXES,
+    BROKEN,
+    INK,
+    SERIES,
+    WIDTH_in,
+    common_legend,
+    faint_grid,
+    panel_column,
+)
 
 Array = NDArray[np.float64]
 
-AXES = tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in AXIS_COLOURS)
-# Colours of Okabe and Ito: distinct for the colour-blind.
-SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00")
-INK, FAINT, BROKEN = "#30343a", "#a4aab3", "#c8102e"
-
-WIDTH_in = 8.0
-DPI = 150
 LEAST_SHARE = 1e-14  # of a bound: less is drawn as this much
 NOTHING = 1e-18  # what a difference of exactly zero is drawn as, on a logarithmic axis
 
@@ -47,22 +44,6 @@ class Bounded(NamedTuple):
 
     values: Array
     bound: float | None
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, or as SVG under that suffix; the same figure gives the same bytes.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written there.
-    """
-    with whole_file(path) as temporary:
-        if path.suffix == ".svg":
-            with rc_context({"svg.hashsalt": path.name}):
-                figure.savefig(temporary, format="svg", metadata={"Date": None})
-        else:
-            figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
 
 
 def margins(values: Mapping[str, float], title: str) -> Figure:
@@ -196,7 +177,7 @@ def drifts(t_s: Array, panels: Mapping[str, Mapping[str, Bounded]], title: str) 
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 2.1 * len(panels)), layout="constrained")
-    for axes, (quantity, series) in zip(_column(figure, len(panels)), panels.items(), strict=True):
+    for axes, (quantity, series) in zip(panel_column(figure, len(panels)), panels.items(), strict=True):
         for colour, (name, drift) in zip(SERIES, series.items(), strict=False):
             axes.plot(t_s, _positive(drift.values), color=colour, linewidth=1, label=name)
             _draw_bound(axes, drift.bound, "", colour)
@@ -241,11 +222,7 @@ def closed_loops(
         _draw_bound(bottom, apart[law].bound, "rad")
         _finish(top, "", "tracking error, rad", law)
         _finish(bottom, "time, s", "|difference|, rad", "")
-    named: dict[str, Artist] = {}
-    for axes in (above[0], below[0]):
-        handles, labels = axes.get_legend_handles_labels()
-        named |= dict(zip(labels, handles, strict=True))
-    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=4)
+    common_legend(figure, (above[0], below[0]), ncols=4)
     figure.suptitle(title, fontsize="medium")
     return figure
 
@@ -253,10 +230,6 @@ def closed_loops(
 def _positive(values: Array) -> Array:
     """Sizes for a logarithmic axis, with gaps where they are zero."""
     return np.where(values == 0, np.nan, np.abs(values))
-
-
-def _column(figure: Figure, count: int) -> Iterator[Axes]:
-    yield from figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
 
 
 def _draw_bound(axes: Axes, bound: float | None, unit: str, colour: str = INK) -> None:
@@ -270,136 +243,4 @@ def _finish(axes: Axes, x: str, y: str, title: str) -> None:
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize="medium")
-    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-__all__ = ["Ramped", "Resting", "hinge_friction", "save"]
-
-
-SLOWEST_rad_s, FASTEST_rad_s, FASTEST_AT_STOP_rad_s = 1e-4, 2.0, 0.3  # of the logarithmic axes
-UP, BACK = 0.06, 0.8  # shares of the largest rate at which arrows show the direction of the ramp
-AROUND_STOP_ms = 60.0
-
-
-class Ramped(NamedTuple):
-    """A ramp of torque up and back, a row a step, and the creep under a constant torque below the level."""
-
-    torque_Nm: Array  # (n,)
-    rates_rad_s: Mapping[str, Array]  # (n,) by way
-    ideal_rad_s: Array  # (n,)
-    level_Nm: float
-    push_Nm: float
-    creep_rad_s: Mapping[str, float]
-
-
-class Resting(NamedTuple):
-    """Coasting to rest; a row a step."""
-
-    t_s: Array  # (m,)
-    rates_rad_s: Mapping[str, Array]  # (m,) by way
-    ideal_rad_s: Array  # (m,)
-    ideal_stop_s: float
-
-
-def hinge_friction(bearings: Mapping[str, tuple[Ramped, Resting]], title: str) -> Figure:
-    """Draw a column for each bearing: rate against a slow torque, coasting against ideal friction, stopping.
-
-    Each way has one colour; ideal friction is dashed.
-
-    Parameters
-    ----------
-    bearings : mapping of bearing to Ramped and Resting
-    title : str
-    """
-    figure = Figure(figsize=(WIDTH_in, 8.6), layout="constrained")
-    rows = figure.subplots(3, len(bearings), squeeze=False, sharey="row")
-    for (above, middle, below), (name, (ramped, resting)) in zip(rows.T, bearings.items(), strict=True):
-        _ramp(above, ramped)
-        _coast(middle, resting)
-        _stop(below, resting)
-        above.set_title(f"{name}\nslow torque, up and back", fontsize="medium")
-        middle.set_title(f"coasting from {resting.ideal_rad_s[0]:g} rad/s", fontsize="medium")
-        below.set_title("coming to rest", fontsize="medium")
-    for axes, quantity in zip(
-        rows[:, 0], ("rate, rad/s", "rate less ideal, mrad/s", "rate, rad/s"), strict=True
-    ):
-        axes.set_ylabel(quantity)
-    named: dict[str, Artist] = {}
-    for axes in rows[0]:
-        handles, labels = axes.get_legend_handles_labels()
-        named |= dict(zip(labels, handles, strict=True))
-    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=3)
-    figure.suptitle(title, fontsize="medium")
-    return figure
-
-
-def _ramp(axes: Axes, ramped: Ramped) -> None:
-    torque_mNm = 1e3 * ramped.torque_Nm
-    for colour, way, rate in _ways(ramped.rates_rad_s):
-        axes.plot(torque_mNm, _clipped(rate), color=colour, label=way)
-        axes.plot(1e3 * ramped.push_Nm, ramped.creep_rad_s[way], "o", color=colour, markersize=5)
-    _ideal(axes, torque_mNm, _clipped(ramped.ideal_rad_s))
-    axes.axvline(1e3 * ramped.level_Nm, color=FAINT, linewidth=1.2, label="Coulomb level")
-    axes.plot([], [], "o", color=INK, markersize=5, label="settled at half the level")
-    ideal, fastest = ramped.ideal_rad_s, int(np.argmax(ramped.ideal_rad_s))
-    _arrow(axes, torque_mNm, ideal, int(np.argmax(ideal >= UP * ideal[fastest])))
-    _arrow(axes, torque_mNm, ideal, fastest + int(np.argmax(ideal[fastest:] <= BACK * ideal[fastest])))
-    _slow_rates(axes, FASTEST_rad_s)
-    _label_axes(axes, "torque, mN·m")
-
-
-def _coast(axes: Axes, resting: Resting) -> None:
-    for colour, _, rate in _ways(resting.rates_rad_s):
-        axes.plot(resting.t_s, 1e3 * (rate - resting.ideal_rad_s), color=colour)
-    axes.axhline(0, color=INK, linewidth=1.1, linestyle=(0, (4, 4)))
-    axes.axvline(resting.ideal_stop_s, color=FAINT, linewidth=0.8, linestyle=":")
-    _label_axes(axes, "time, s")
-
-
-def _stop(axes: Axes, resting: Resting) -> None:
-    after_ms = 1e3 * (resting.t_s - resting.ideal_stop_s)
-    shown = np.abs(after_ms) <= AROUND_STOP_ms
-    for colour, _, rate in _ways(resting.rates_rad_s):
-        axes.plot(after_ms[shown], _clipped(rate[shown]), color=colour)
-    _ideal(axes, after_ms[shown], _clipped(resting.ideal_rad_s[shown]))
-    _slow_rates(axes, FASTEST_AT_STOP_rad_s)
-    _label_axes(axes, "time after the ideal stop, ms")
-
-
-def _slow_rates(axes: Axes, fastest_rad_s: float) -> None:
-    axes.set_yscale("log")
-    axes.set_ylim(SLOWEST_rad_s, fastest_rad_s)
-
-
-def _arrow(axes: Axes, x: Array, y: Array, row: int) -> None:
-    """An arrow's head on a curve, towards the rows that follow."""
-    ahead = row + max(1, len(x) // 100)
-    axes.annotate(
-        "",
-        xy=(x[ahead], y[ahead]),
-        xytext=(x[row], y[row]),
-        arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 0, "mutation_scale": 14},
-    )
-
-
-def _ways(rates_rad_s: Mapping[str, Array]) -> Iterator[tuple[str, str, Array]]:
-    for colour, (way, rate) in zip(SERIES, rates_rad_s.items(), strict=False):
-        yield colour, way, rate
-
-
-def _ideal(axes: Axes, x: Array, rate_rad_s: Array) -> None:
-    axes.plot(x, rate_rad_s, color=INK, linewidth=1.1, linestyle=(0, (4, 4)), label="ideal friction")
-
-
-def _clipped(rate_rad_s: Array) -> Array:
-    """Return rates for a logarithmic axis: smaller ones lie on its edge, and zero below it."""
-    return np.maximum(rate_rad_s, 0.1 * SLOWEST_rad_s)
-
-
-def _label_axes(axes: Axes, x: str) -> None:
-    axes.set_xlabel(x)
-    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes)

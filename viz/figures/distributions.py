@@ -12,8 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
 from spheretwin.viz.figures.maps import fit_scale
+from spheretwin.viz.figures.style import (
+    FAINT,
+    INK,
+    WIDTH_in,
+    faint_grid,
+)
 from spheretwin.viz.theme import law_colours
 
 Array = NDArray[np.float64]
@@ -148,6 +153,4 @@ def _plain(axes: Axes, x: str, title: str) -> None:
     axes.set_xlabel(x, fontsize="small")
     axes.set_title(title, fontsize="medium")
     axes.tick_params(labelsize="small")
-    axes.grid(visible=True, color=FAINT, alpha=0.3, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes, 0.3)

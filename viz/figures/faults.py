@@ -11,7 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.crosscheck import FAINT, INK, SERIES, WIDTH_in
+from spheretwin.viz.figures.style import (
+    FAINT,
+    INK,
+    SERIES,
+    WIDTH_in,
+)
 
 Array = NDArray[np.float64]
 

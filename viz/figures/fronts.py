@@ -11,8 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.style import LawStyle, styles
+from spheretwin.viz.figures.style import (
+    FAINT,
+    INK,
+    LawStyle,
+    WIDTH_in,
+    faint_grid,
+    panel_column,
+    styles,
+)
 from spheretwin.viz.theme import law_colour
 
 Array = NDArray[np.float64]
@@ -135,7 +142,7 @@ def progress(by_label: Mapping[str, Trials], objectives: Sequence[str], title: s
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 1.4 + 2.4 * len(objectives)), layout="constrained")
-    panels = figure.subplots(len(objectives), 1, sharex=True, squeeze=False)[:, 0]
+    panels = panel_column(figure, len(objectives))
     for place, (panel, name) in enumerate(zip(panels, objectives, strict=True)):
         for label, trials in by_label.items():
             _progress(panel, label, trials, place)
@@ -209,6 +216,4 @@ def _finish(panel: Axes, values: Sequence[Array], which: str) -> None:
         low, high = float(of_all.min()), float(of_all.max())
         limits = (low / 1.15, min(high, DECADES_ON * low) * 1.15)
         (panel.set_xlim if which == "x" else panel.set_ylim)(*limits)
-    panel.grid(visible=True, which="both", color=FAINT, alpha=0.3, linewidth=0.6)
-    panel.set_axisbelow(True)
-    panel.spines[["top", "right"]].set_visible(False)
+    faint_grid(panel, 0.3, which="both")

@@ -13,7 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
+from spheretwin.viz.figures.style import (
+    FAINT,
+    INK,
+    WIDTH_in,
+    faint_grid,
+)
 from spheretwin.viz.theme import law_colours
 
 Array = NDArray[np.float64]
@@ -187,9 +192,7 @@ def lines(
     axes.set_xlabel(axis_name)
     axes.set_ylabel(quantity)
     axes.set_title(title, fontsize="medium")
-    axes.grid(visible=True, which="both", color=FAINT, alpha=0.3, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes, 0.3, which="both")
     axes.legend(frameon=False)
     return figure
 

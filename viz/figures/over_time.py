@@ -12,8 +12,14 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.style import on_errors, styles
+from spheretwin.viz.figures.style import (
+    INK,
+    WIDTH_in,
+    faint_grid,
+    on_errors,
+    panel_column,
+    styles,
+)
 from spheretwin.viz.theme import law_colour
 
 Array = NDArray[np.float64]
@@ -130,9 +136,7 @@ def _on_logarithmic(panel: Axes, which: Literal["x", "y"]) -> None:
     (panel.set_yscale if which == "y" else panel.set_xscale)("log")
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter(NullFormatter())
-    panel.grid(visible=True, which="both", axis=which, color=FAINT, alpha=0.3, linewidth=0.6)
-    panel.set_axisbelow(True)
-    panel.spines[["top", "right"]].set_visible(False)
+    faint_grid(panel, 0.3, which="both", axis=which)
 
 
 LEAST_mrad = 0.2  # less is drawn as this much, on a logarithmic axis
@@ -170,7 +174,7 @@ def errors(by_label: Mapping[str, ErrorBand], window_s: float, hinges: Sequence[
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 7.4), layout="constrained")
-    panels = figure.subplots(len(hinges), 1, sharex=True, squeeze=False)[:, 0]
+    panels = panel_column(figure, len(hinges))
     looks = styles([course.law for course in by_label.values()])
     highest = max(float(np.nanmax(1e3 * course.error_rad)) for course in by_label.values())
     longest = max(course.error_rad.shape[1] for course in by_label.values())
@@ -223,9 +227,7 @@ def angles(by_label: Mapping[str, AngleTraces], hinges: Sequence[str], title: st
             if not motion.whole:
                 panel.plot(motion.t_s[-1], motion.q_rad[-1, hinge], "x", color=colour, markersize=9,
                            markeredgewidth=2)  # fmt: skip
-            panel.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
-            panel.set_axisbelow(True)
-            panel.spines[["top", "right"]].set_visible(False)
+            faint_grid(panel)
         column[0].set_title(f"({chr(ord('a') + place)}) {label}", fontsize="medium")
         column[-1].set_xlabel("time, s")
     for panel, name in zip(grid[:, 0], hinges, strict=True):

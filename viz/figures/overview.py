@@ -11,8 +11,14 @@ from matplotlib.figure import Figure
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import decimate_extremes
-from spheretwin.viz.figures.crosscheck import AXES, DPI, INK, WIDTH_in
-from spheretwin.viz.figures.style import MOST_POINTS, plain
+from spheretwin.viz.figures.style import (
+    AXES,
+    DPI,
+    INK,
+    MOST_POINTS,
+    WIDTH_in,
+    plain,
+)
 
 
 def overview(table: Table, title: str) -> Figure:

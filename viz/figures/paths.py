@@ -11,8 +11,12 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from numpy.typing import NDArray
 
-from spheretwin.viz.figures.crosscheck import FAINT, INK, WIDTH_in
-from spheretwin.viz.figures.style import styles
+from spheretwin.viz.figures.style import (
+    INK,
+    WIDTH_in,
+    faint_grid,
+    styles,
+)
 
 Array = NDArray[np.float64]
 
@@ -91,9 +95,7 @@ def _plan(axes: Axes, path: TipPath, colour: str, sides: tuple[float, float]) ->
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-aside, aside)
     axes.set_xlabel("x, mm")
-    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes)
 
 
 def _ends(axes: Axes, path: TipPath, colour: str, which: slice) -> None:

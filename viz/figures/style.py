@@ -1,29 +1,79 @@
-"""A figure of a page."""
+"""Style of figures: colours, sizes, grids and legends, the looks of runs and laws, and the files.
+
+Matplotlib is used without its global state. Axes have the colours of the recordings.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
+from spheretwin.models.base.files import whole_file
 from spheretwin.viz.comparison.runs import ComparedRun, run_colours
-from spheretwin.viz.figures.crosscheck import FAINT
-from spheretwin.viz.theme import law_colours, law_marks
+from spheretwin.viz.theme import AXIS_COLOURS, law_colours, law_marks
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+Array = NDArray[np.float64]
 
+AXES = tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in AXIS_COLOURS)
+# Colours of Okabe and Ito: distinct for the colour-blind.
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00")
+INK, FAINT, BROKEN = "#30343a", "#a4aab3", "#c8102e"
+
+WIDTH_in = 8.0
+DPI = 150
 
 MOST_POINTS = 3000
 """Points of a line: a print of 20 cm has fewer dots."""
 
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2)), (0, (2, 1)))
 """Dashes by the place of a run: runs are distinct in grey print."""
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG, or as SVG under that suffix; the same figure gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written there.
+    """
+    with whole_file(path) as temporary:
+        if path.suffix == ".svg":
+            with rc_context({"svg.hashsalt": path.name}):
+                figure.savefig(temporary, format="svg", metadata={"Date": None})
+        else:
+            figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": None})
+
+
+def faint_grid(axes: Axes, alpha: float = 0.35, **options: Any) -> None:
+    """Draw a faint grid behind the data, and remove the box."""
+    axes.grid(visible=True, color=FAINT, alpha=alpha, linewidth=0.6, **options)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def panel_column(figure: Figure, count: int) -> NDArray[Any]:
+    """Return panels below one another with a common x axis."""
+    panels: NDArray[Any] = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    return panels
+
+
+def common_legend(figure: Figure, panels: Iterable[Axes], ncols: int) -> None:
+    """Draw one legend for several panels: each label once."""
+    named: dict[str, Artist] = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        named |= dict(zip(labels, handles, strict=True))
+    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=ncols)
 
 
 class RunStyle(NamedTuple):
@@ -47,9 +97,7 @@ def plain(axes: Axes, y: str) -> None:
     """Set a quantity with its unit as the label, a faint grid, and no box."""
     axes.set_ylabel(y, fontsize="small")
     axes.tick_params(labelsize="small")
-    axes.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes)
 
 
 def name_runs(figure: Figure, axes: Axes) -> None:
@@ -58,8 +106,6 @@ def name_runs(figure: Figure, axes: Axes) -> None:
     figure.legend(lines, labels, loc="outside lower left", ncols=1 if len(labels) > 3 else len(labels),
                   frameon=False, fontsize="small", handlelength=3.4)  # fmt: skip
 
-
-Array = NDArray[np.float64]
 
 mrad_per_degree = 1e3 * np.pi / 180
 MANY = 2000.0
@@ -90,9 +136,7 @@ def on_errors(panels: Sequence[Axes], lowest_mrad: float, highest_mrad: float) -
         panel.set_yscale("log")
         panel.set_ylim(lowest_mrad, highest_mrad)
         _ticks(panel, lowest_mrad, highest_mrad)
-        panel.grid(visible=True, color=FAINT, alpha=0.35, linewidth=0.6)
-        panel.set_axisbelow(True)
-        panel.spines[["top", "right"]].set_visible(False)
+        faint_grid(panel)
     degrees = panels[-1].twinx()
     degrees.set_yscale("log")
     degrees.set_ylim(lowest_mrad / mrad_per_degree, highest_mrad / mrad_per_degree)

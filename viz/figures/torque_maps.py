@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 
 from spheretwin.models.design.capability import Capability
 from spheretwin.models.design.workspace import Workspace
-from spheretwin.viz.figures.crosscheck import INK, SERIES, WIDTH_in
+from spheretwin.viz.figures.style import (
+    INK,
+    SERIES,
+    WIDTH_in,
+)
 
 Array = NDArray[np.float64]
 

@@ -56,7 +56,12 @@ def application(view: View) -> str:
     """
     names = [(signal.name, bool(signal.states)) for signal in view.own]
     key = repr((*view._replace(own=()), names))
-    return f"spheretwin-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
+    return application_of("spheretwin", key)
+
+
+def application_of(name: str, key: str) -> str:
+    """Return an application id: a name and the digest of what makes a layout its own."""
+    return f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
 
 
 TIMELINE = "sim_time"

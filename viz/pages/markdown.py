@@ -92,12 +92,12 @@ def save_drawings(folder: Path, drawings: Iterable[Drawing], *, vector: bool = F
     InputError
         A file cannot be written there.
     """
-    from spheretwin.viz.figures import crosscheck
+    from spheretwin.viz.figures.style import save
 
     for drawing in drawings:
-        crosscheck.save(drawing.figure, folder / drawing.file)
+        save(drawing.figure, folder / drawing.file)
         if vector:
-            crosscheck.save(drawing.figure, (folder / drawing.file).with_suffix(".svg"))
+            save(drawing.figure, (folder / drawing.file).with_suffix(".svg"))
 
 
 def save_text(path: Path, text: str) -> Path:

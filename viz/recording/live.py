@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from uuid import uuid4
-
 import rerun as rr
 
 from spheretwin.models.actuator import Actuator
@@ -13,7 +11,6 @@ from spheretwin.models.telemetry.signals import Signal
 from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.layout.layout import opening_layout
 from spheretwin.viz.layout.view import OVERVIEW
-from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.recording.viewer_server import Broadcast, ViewerServer
 from spheretwin.viz.rerun_internals import HEADER_BYTES, messages
@@ -34,14 +31,8 @@ class LiveView(Stream):
 
     Parameters
     ----------
-    actuator : Actuator
-        Drawn; has as many groups as the telemetry has currents.
-    signals : tuple of Signal
-        Columns of the telemetry.
-    facts : RunFacts
-        For the text panel, the axes and the drawing.
-    shown : str
-        The view that is open at first, one of `VIEWS`.
+    actuator, signals, facts, shown
+        As for `Stream`.
 
     Raises
     ------
@@ -54,8 +45,8 @@ class LiveView(Stream):
     def __init__(
         self, actuator: Actuator, signals: tuple[Signal, ...], facts: RunFacts, *, shown: str = OVERVIEW
     ) -> None:
-        subject = RecordingSubject(actuator, signals, facts, True, shown, uuid4().hex, LIVE_RATE_Hz)
-        super().__init__(subject, FirstRows(LIVE_RATE_Hz))
+        selection = FirstRows(LIVE_RATE_Hz)
+        super().__init__(actuator, signals, facts, selection, live=True, shown=shown, rate_Hz=LIVE_RATE_Hz)
         self._together = max(1, round(_TOGETHER_S / facts.sections["controller"]["period_s"]))
         self._bytes = rr.binary_stream(self.recording)
         self._broadcast = Broadcast()

@@ -19,6 +19,7 @@ from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.layout.view import CHECKSUM, OVERVIEW, TIMELINE, TOTAL, View
+from spheretwin.viz.rerun_internals import ArrowComponent
 from spheretwin.viz.scene.meshes import Meshes, read_meshes
 from spheretwin.viz.scene.static import size_of
 
@@ -132,45 +133,28 @@ def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
     return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
 
 
-class StructComponent:
-    """Values with named fields, as a component.
-
-    Rerun's own form for unknown types requires one type for each name in a whole process,
-    and runs differ in their signals.
-    """
-
-    def __init__(self, fields: Mapping[str, pa.Array]) -> None:
-        self._array = pa.StructArray.from_arrays(list(fields.values()), list(fields))
-
-    def as_arrow_array(self) -> pa.Array:
-        """Return the array; Rerun calls this."""
-        return self._array
+def struct_component(fields: Mapping[str, pa.Array]) -> ArrowComponent:
+    """Return values with named fields as a component."""
+    return ArrowComponent(pa.StructArray.from_arrays(list(fields.values()), list(fields)))
 
 
-class IntegerComponent:
-    """Whole numbers as a component."""
-
-    def __init__(self, values: Sequence[int] | NDArray[np.uint64]) -> None:
-        self._array = pa.array(values, type=pa.uint64())
-
-    def as_arrow_array(self) -> pa.Array:
-        """Return the array; Rerun calls this."""
-        return self._array
+def _integers(values: Sequence[int] | NDArray[np.uint64]) -> ArrowComponent:
+    return ArrowComponent(pa.array(values, type=pa.uint64()))
 
 
 def checksums(values: NDArray[np.uint64]) -> rr.ComponentColumn:
     """Return the component with number and checksum of each line."""
-    return rr.ComponentColumn(CHECKSUM, IntegerComponent(values))
+    return rr.ComponentColumn(CHECKSUM, _integers(values))
 
 
 def range_checksum(first: int, count: int, checksum: int) -> rr.ComponentColumn:
     """Return the component with the checksum of some rows, by the number of the first and their count."""
-    return rr.ComponentColumn(CHECKSUM, IntegerComponent([first, count, checksum]), lengths=[3])
+    return rr.ComponentColumn(CHECKSUM, _integers([first, count, checksum]), lengths=[3])
 
 
 def total(count: int) -> rr.DescribedComponentBatch:
     """Return the component with the number of rows or lines of a complete recording."""
-    return rr.DescribedComponentBatch(IntegerComponent([count]), rr.ComponentDescriptor(TOTAL))
+    return rr.DescribedComponentBatch(_integers([count]), rr.ComponentDescriptor(TOTAL))
 
 
 def vectors(values: NDArray[np.float64], size: int) -> pa.Array:

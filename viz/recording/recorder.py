@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from uuid import uuid4
 
 import rerun as rr
 
@@ -15,7 +14,6 @@ from spheretwin.models.telemetry.signals import Signal
 from spheretwin.viz.decimation import FirstAndExtremeRows, RowSelection
 from spheretwin.viz.layout.view import OVERVIEW
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
-from spheretwin.viz.recording.part import RecordingSubject
 from spheretwin.viz.recording.stream import Stream
 
 # Rerun keeps some bytes of each chunk until the end of a recording. Chunks therefore grow, up to this.
@@ -35,18 +33,10 @@ class Recorder(Stream):
 
     Parameters
     ----------
-    actuator : Actuator
-        Drawn; has as many groups as the telemetry has currents.
-    signals : tuple of Signal
-        Columns of the telemetry.
-    facts : RunFacts
-        For the text panel, the axes and the drawing.
+    actuator, signals, facts, shown, rate_Hz
+        As for `Stream`.
     path : Path
         Recording to write.
-    shown : str
-        The view that is open at first, one of `VIEWS`.
-    rate_Hz : float, optional
-        Rate of the rows that are kept besides the extremes; every row unless given.
 
     Raises
     ------
@@ -64,9 +54,8 @@ class Recorder(Stream):
         shown: str = OVERVIEW,
         rate_Hz: float | None = None,
     ) -> None:
-        row_selection = FirstAndExtremeRows(rate_Hz) if rate_Hz else RowSelection()
-        subject = RecordingSubject(actuator, signals, facts, False, shown, uuid4().hex, rate_Hz)
-        super().__init__(subject, row_selection)
+        selection = FirstAndExtremeRows(rate_Hz) if rate_Hz else RowSelection()
+        super().__init__(actuator, signals, facts, selection, live=False, shown=shown, rate_Hz=rate_Hz)
         self._path = path
         self._output = OutputFile(path)
         self._pipe = _pipe_to(self._output) if PIPE_PATHS.is_dir() else None

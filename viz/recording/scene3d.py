@@ -11,6 +11,7 @@ from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
+from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, strips, time_index
 from spheretwin.viz.scene.meshes import COILS, FAILURE, FAILURE_TEXT, TORQUES, WORLD
 from spheretwin.viz.scene.motion import (
@@ -32,8 +33,8 @@ LARGEST_rad = 1e6
 """Beyond it a pose is meaningless, and its sine has no correct digits."""
 
 
-class Frames:
-    """Picks the first tick of each frame, chunk by chunk, where it has a pose.
+class Frames(FirstRows):
+    """Selects the first row of each frame, if it has a pose.
 
     Parameters
     ----------
@@ -42,15 +43,12 @@ class Frames:
     """
 
     def __init__(self, rate_Hz: float = FRAME_RATE_Hz) -> None:
-        self._rate_Hz = rate_Hz
-        self._next = 0
+        super().__init__(rate_Hz)
 
     def of(self, rows: Table) -> NDArray[np.intp]:
         """Return the places of the rows of a chunk that are drawn."""
-        frame = np.floor(rows["t_s"] * self._rate_Hz + 1e-6).astype(np.int64)
-        new = np.flatnonzero(frame >= np.concatenate([[self._next], frame[:-1] + 1]))
-        self._next = max(self._next, int(frame[-1]) + 1)
-        return new[posed(rows["q_rad"][new])]
+        first = self.first_places(rows["t_s"])
+        return first[posed(rows["q_rad"][first])]
 
 
 def posed(q: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -22,13 +22,14 @@ from spheretwin.viz.recording.part import (
     RecordingPart,
     RecordingSubject,
     RowSet,
-    StructComponent,
     no_vectors,
     range_checksum,
+    struct_component,
     time_index,
     total,
     vectors,
 )
+from spheretwin.viz.rerun_internals import ArrowComponent
 
 FACTS = "facts"
 FACTS_CHECKSUM = f"{FACTS}_{CHECKSUM}"
@@ -151,14 +152,14 @@ class Signals(RecordingPart):
 @lru_cache(maxsize=16)
 def _description(arrival: int, signals: tuple[Signal, ...]) -> list[rr.DescribedComponentBatch]:
     """Return what readers and viewers need to know of signals that arrived together."""
-    styles = StructComponent({signal.name: _style(signal) for signal in signals if signal.name != TIME})
+    styles = struct_component({signal.name: _style(signal) for signal in signals if signal.name != TIME})
     style_batch = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
     return [*signals_as_json(arrival, signals), style_batch]
 
 
-def _values(rows: Table, signals: list[Signal], names: set[str]) -> StructComponent:
+def _values(rows: Table, signals: list[Signal], names: set[str]) -> ArrowComponent:
     """Return the values of signals that arrived together; null for those that the rows no longer have."""
-    return StructComponent(
+    return struct_component(
         {
             signal.name: vectors(rows[signal.name], signal.size)
             if signal.name in names

@@ -9,11 +9,15 @@ from contextlib import suppress
 from threading import Lock, Semaphore
 from types import TracebackType
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import rerun as rr
 
+from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import without_breaks
+from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import RowSelection
@@ -53,10 +57,20 @@ class Stream(ABC):
 
     Parameters
     ----------
-    subject : RecordingSubject
-        Run to record.
+    actuator : Actuator
+        Drawn; has as many groups as the telemetry has currents.
+    signals : tuple of Signal
+        Columns of the telemetry.
+    facts : RunFacts
+        For the text panel, the axes and the drawing.
     row_selection : RowSelection
         Selects the rows for the parts that do not need all.
+    live : bool
+        True if it is a live view.
+    shown : str
+        The view that is open at first, one of `VIEWS`.
+    rate_Hz : float, optional
+        Rate of the rows that are kept besides the extremes; every row unless given.
 
     Attributes
     ----------
@@ -75,7 +89,18 @@ class Stream(ABC):
         A mesh of the model cannot be read.
     """
 
-    def __init__(self, subject: RecordingSubject, row_selection: RowSelection) -> None:
+    def __init__(
+        self,
+        actuator: Actuator,
+        signals: tuple[Signal, ...],
+        facts: RunFacts,
+        row_selection: RowSelection,
+        *,
+        live: bool,
+        shown: str,
+        rate_Hz: float | None,
+    ) -> None:
+        subject = RecordingSubject(actuator, signals, facts, live, shown, uuid4().hex, rate_Hz)
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
         _ = subject.meshes  # a run needs none; a missing one is reported before there is a file
         self.view = subject.view

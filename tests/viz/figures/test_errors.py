@@ -7,7 +7,7 @@ from matplotlib.image import imread
 
 from spheretwin.control.laws import LAWS
 from spheretwin.viz import theme
-from spheretwin.viz.figures import crosscheck, maps, over_time
+from spheretwin.viz.figures import maps, over_time, style
 
 WINDOWS = 0.1 + np.linspace(0, 1, 40)[None, :, None] + 0.1 * np.arange(3)[:, None, None] * np.ones((1, 1, 2))
 SIZES = np.array([0.1, 0.3, 0.2])
@@ -41,7 +41,7 @@ def heated():
 def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        crosscheck.save(draw(), path)
+        style.save(draw(), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     inked = np.any(imread(paths[0])[:, :, :3] < 0.9, axis=2)
     assert 0.003 < inked.mean() < 0.8

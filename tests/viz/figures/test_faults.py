@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from spheretwin.viz.figures import crosscheck, faults
+from spheretwin.viz.figures import faults, style
 
 SHARES = {"told": {1: 1.0, 2: 0.9, 9: 0.4}, "not told": {1: 0.6, 2: 0.3}}
 TRIANGLE = np.array([[1.0, np.nan, np.nan], [2.5, 1.5, np.nan], [np.nan, 8.0, 2.0]])
@@ -31,7 +31,7 @@ def clouds():
 def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, draw):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        crosscheck.save(draw(), path)
+        style.save(draw(), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     inked = np.any(imread(paths[0])[:, :, :3] < 0.9, axis=2)
     assert 0.003 < inked.mean() < 0.8
@@ -76,9 +76,9 @@ def test_points_without_numbers_are_left_out_and_bounds_are_dashed():
 
 def test_panels_without_a_point_or_a_square_are_drawn_too(tmp_path):
     empty = faults.triangles({"told": np.full((3, 3), np.nan)}, "group", "ratio", 2.0, "pairs")
-    crosscheck.save(empty, tmp_path / "empty.png")
+    style.save(empty, tmp_path / "empty.png")
     cloud = faults.clouds({"told": [(0.5, 3.0, 9)]}, ("torque", "error", "groups"), (1.0, 2.0), "clouds")
-    crosscheck.save(cloud, tmp_path / "cloud.png")
+    style.save(cloud, tmp_path / "cloud.png")
 
 
 def test_what_remains_falls_at_each_time_and_ends_at_what_never_comes():

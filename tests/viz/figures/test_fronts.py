@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.figures import crosscheck, fronts
+from spheretwin.viz.figures import fronts, style
 
 TRIALS = fronts.Trials(
     law="pid",
@@ -32,7 +32,7 @@ def test_every_trial_is_drawn_once_and_the_best_so_far_only_gets_better(tmp_path
         best = series["pid, best so far"][:, 1]
         assert np.all(np.diff(best) <= 0)
         assert best[-1] == np.nanmin(TRIALS.values[TRIALS.completed, place])
-    crosscheck.save(figure, tmp_path / "trials.png")
+    style.save(figure, tmp_path / "trials.png")
 
 
 def test_of_what_is_to_be_large_the_best_so_far_grows():
@@ -48,7 +48,7 @@ def test_the_front_is_drawn_with_its_start_and_its_fresh_seeds(tmp_path):
     np.testing.assert_array_equal(series["pid, front"], [[1, 6], [2, 5], [3, 1]])
     np.testing.assert_array_equal(series["pid, front under fresh seeds"], TRIALS.fresh)
     np.testing.assert_array_equal(series["pid, start"], [[3, 1]])
-    crosscheck.save(figure, tmp_path / "front.png")
+    style.save(figure, tmp_path / "front.png")
 
 
 @pytest.mark.parametrize("kind", ["progress", "front"])
@@ -56,5 +56,5 @@ def test_without_a_completed_trial_there_is_still_a_figure(tmp_path, kind):
     none = np.zeros(6, dtype=bool)
     lost = TRIALS._replace(completed=none, best=none, values=np.full((6, 2), np.nan), fresh=np.empty((0, 2)))
     figure = getattr(fronts, kind)({"pid": lost}, OBJECTIVES, "nothing")
-    crosscheck.save(figure, tmp_path / "nothing.png")
+    style.save(figure, tmp_path / "nothing.png")
     assert (tmp_path / "nothing.png").stat().st_size > 0

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from spheretwin.viz.figures import crosscheck
+from spheretwin.viz.figures import hinge_friction, style
 
 UP = np.linspace(0, 3e-3, 200)
 TORQUE = np.concatenate([UP, UP[-2::-1]])
@@ -16,13 +16,13 @@ COAST = np.maximum(2 - T, 0)
 
 def bearing(level):
     rates = {"ours": IDEAL + 5 * TORQUE, "theirs": IDEAL + 0.5 * TORQUE}
-    ramped = crosscheck.Ramped(TORQUE, rates, IDEAL, level, level / 2, {"ours": 5e-3, "theirs": 5e-4})
+    ramped = hinge_friction.Ramped(TORQUE, rates, IDEAL, level, level / 2, {"ours": 5e-3, "theirs": 5e-4})
     late = {"ours": COAST + 1e-3, "theirs": COAST + np.where(T > 1.9, 1e-3, 0)}
-    return ramped, crosscheck.Resting(T, late, COAST, 2.0)
+    return ramped, hinge_friction.Resting(T, late, COAST, 2.0)
 
 
 def drawn() -> Figure:
-    return crosscheck.hinge_friction({"soft": bearing(2e-3), "hard": bearing(2.5e-3)}, "friction")
+    return hinge_friction.hinge_friction({"soft": bearing(2e-3), "hard": bearing(2.5e-3)}, "friction")
 
 
 @pytest.fixture
@@ -33,10 +33,10 @@ def figure() -> Figure:
 def test_same_bearings_give_the_same_bytes(tmp_path):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        crosscheck.save(drawn(), path)
+        style.save(drawn(), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     pixels = imread(paths[0])
-    assert pixels.shape[1] == crosscheck.WIDTH_in * crosscheck.DPI
+    assert pixels.shape[1] == style.WIDTH_in * style.DPI
     inked = np.any(pixels[:, :, :3] < 0.9, axis=2)
     assert 0.003 < inked.mean() < 0.6
 
@@ -60,7 +60,7 @@ def test_each_way_has_one_colour_and_is_named_once(figure):
     assert names == ["ours", "theirs", "ideal friction", "Coulomb level", "settled at half the level"]
     for axes in figure.axes:
         colours = [line.get_color() for line in axes.get_lines()]
-        assert {crosscheck.SERIES[0], crosscheck.SERIES[1], crosscheck.INK} <= set(colours)
+        assert {style.SERIES[0], style.SERIES[1], style.INK} <= set(colours)
 
 
 def test_torque_is_in_mNm_with_the_level_and_the_creep_where_they_are(figure):
@@ -74,8 +74,8 @@ def test_torque_is_in_mNm_with_the_level_and_the_creep_where_they_are(figure):
 
 def test_rest_lies_below_what_the_axis_shows(figure):
     ideal = next(line for line in figure.axes[0].get_lines() if line.get_label() == "ideal friction")
-    assert min(ideal.get_ydata()) == 0.1 * crosscheck.SLOWEST_rad_s
-    assert figure.axes[0].get_ylim()[0] == crosscheck.SLOWEST_rad_s
+    assert min(ideal.get_ydata()) == 0.1 * hinge_friction.SLOWEST_rad_s
+    assert figure.axes[0].get_ylim()[0] == hinge_friction.SLOWEST_rad_s
 
 
 def test_coasting_is_drawn_beside_ideal_and_its_end_about_the_ideal_stop(figure):

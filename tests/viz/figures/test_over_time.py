@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.figures import conditions, crosscheck, over_time, paths
+from spheretwin.viz.figures import conditions, over_time, paths, style
 from spheretwin.viz.figures.style import styles
 from spheretwin.viz.theme import law_colour
 
@@ -95,7 +95,7 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
     for folder in ("one", "other"):
         (tmp_path / folder).mkdir()
         path = tmp_path / folder / f"errors.{suffix}"
-        crosscheck.save(drawn(), path)
+        style.save(drawn(), path)
         found.append(path.read_bytes())
     assert found[0] == found[1]
     assert (b"<svg" in found[0]) == (suffix == "svg")

@@ -6,8 +6,8 @@ from matplotlib.colors import to_rgb
 
 import spheretwin as st
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.figures.crosscheck import AXES
 from spheretwin.viz.figures.overview import overview
+from spheretwin.viz.figures.style import AXES
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.figures import crosscheck
+from spheretwin.viz.figures import crosscheck, style
 from spheretwin.viz.theme import AXIS_COLOURS
 
 T = np.linspace(0, 1, 50)
@@ -41,10 +41,10 @@ FIGURES = {
 def test_figure_is_drawn_and_the_same_figure_gives_the_same_bytes(tmp_path, name):
     paths = [tmp_path / "a.png", tmp_path / "b.png"]
     for path in paths:
-        crosscheck.save(FIGURES[name](), path)
+        style.save(FIGURES[name](), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     pixels = imread(paths[0])
-    assert pixels.shape[1] == crosscheck.WIDTH_in * crosscheck.DPI
+    assert pixels.shape[1] == style.WIDTH_in * style.DPI
     inked = np.any(pixels[:, :, :3] < 0.9, axis=2)
     assert 0.003 < inked.mean() < 0.6
 
@@ -71,9 +71,9 @@ def test_axes_have_the_colours_of_the_recordings():
 
 def test_a_broken_bound_stands_out():
     colours = {line.get_label(): line.get_color() for line in FIGURES["margins"]().axes[0].get_lines()}
-    assert colours["broken"] == crosscheck.BROKEN != colours["kept"]
+    assert colours["broken"] == style.BROKEN != colours["kept"]
 
 
 def test_a_figure_that_cannot_be_written_is_bad_input(tmp_path):
     with pytest.raises(InputError, match="writable path"):
-        crosscheck.save(FIGURES["margins"](), tmp_path / "missing" / "figure.png")
+        style.save(FIGURES["margins"](), tmp_path / "missing" / "figure.png")
