@@ -30,16 +30,9 @@ from spheretwin.models.telemetry.signals import Signal, with_more
 from spheretwin.plant.mujoco_rotor import integrator_name
 from spheretwin.scenario.changes import first_tick, scheduled_changes, with_change
 from spheretwin.scenario.files import Files, files_of, nominal_curve, reload_files
+from spheretwin.scenario.plant_sections import PlantSection, ResolvedNominal, ResolvedPlant
 from spheretwin.scenario.reading import as_plain
-from spheretwin.scenario.sections import (
-    PlantSection,
-    ResolvedNominal,
-    ResolvedPlant,
-    ResolvedScenario,
-    Scenario,
-    UserController,
-    UserPath,
-)
+from spheretwin.scenario.sections import ResolvedScenario, Scenario, UserController, UserPath
 from spheretwin.trajectories import SHAPES
 from spheretwin.trajectories.rounding import Triple
 from spheretwin.trajectories.trajectory import Sampled, UserTrajectory, checked

@@ -29,7 +29,8 @@ from spheretwin.plant.friction import Friction, friction
 from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.plant.step import ENGINES, Plant
 from spheretwin.scenario.files import Files
-from spheretwin.scenario.sections import ResolvedPlant, ResolvedScenario
+from spheretwin.scenario.plant_sections import ResolvedPlant
+from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.shared_buffers import SharedBuffers, drive_of
 
 Array = NDArray[np.float64]

@@ -23,7 +23,8 @@ from spheretwin.faults.fault_injector import FaultInjector
 from spheretwin.faults.schedule import FaultSchedule, noise_streams
 from spheretwin.models.actuator import Actuator
 from spheretwin.plant.step import Plant
-from spheretwin.scenario.sections import ResolvedNominal, ResolvedScenario, Scenario
+from spheretwin.scenario.plant_sections import ResolvedNominal
+from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
 Array = NDArray[np.float64]
 

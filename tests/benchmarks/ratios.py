@@ -30,7 +30,8 @@ from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_m
 from spheretwin.models.telemetry.signals import width
 from spheretwin.plant.mujoco_rotor import MujocoRotor
 from spheretwin.provenance import facts_of
-from spheretwin.scenario.sections import HARDWARE, Scenario
+from spheretwin.scenario.hardware import HARDWARE
+from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.simulation import follow, simulate
 from spheretwin.viz.recording.recorder import Recorder

@@ -116,7 +116,7 @@ class Bench:
         return self._cycle.state
 
     def history(self) -> dict[str, NDArray[np.float64]]:
-        """Rows of the last 10 s at 50 Hz, by signal: (n,) or (n, size) arrays, oldest first; a copy.
+        """Return a copy of the rows of the last 10 s at 50 Hz, as (n,) or (n, size) arrays, oldest first.
 
         ``t_s``, ``q_rad``, ``q_ref_rad``, ``error_rad``, ``torque_command_Nm``, ``torque_Nm``,
         ``disturbance_Nm``, ``current_command_A``, ``current_A``, ``allocation_scale``, and the rates.
@@ -124,24 +124,21 @@ class Bench:
         return (self._bench_state.player or self._bench_state).history.read()
 
     def scenario_toml(self) -> str:
-        """The present settings as a scenario file."""
+        """Return the present settings as a scenario file."""
         return as_toml(self._bench_state.driver.settings)
 
     def command_line(self) -> str:
-        """The present settings as a command line."""
+        """Return the present settings as a command line."""
         return as_command(self._bench_state.driver.settings)
 
     def fields(self) -> list[tuple[str, Any, str]]:
-        """Every field of the scenario in force: dotted name, value, meaning.
+        """Return every field of the active scenario: dotted name, value, meaning.
 
         The trajectory is the one that is set, whatever the mode.
         """
-        in_force, own = (
-            self._bench_state.driver.session.scenario,
-            self._bench_state.driver.settings.trajectory,
-        )
-        rows = fields_of(in_force.model_copy(update={"trajectory": own}))
-        return [(name, value, field.description or "") for name, value, field in rows]
+        driver = self._bench_state.driver
+        active = driver.session.scenario.model_copy(update={"trajectory": driver.settings.trajectory})
+        return [(name, value, field.description or "") for name, value, field in fields_of(active)]
 
     def advance(self, ticks: int) -> int:
         """Execute the waiting commands, then run control ticks, at once; return how many were run.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,16 +24,6 @@ from spheretwin.scenario.sections import Scenario
 from spheretwin.scenario.writing import as_toml
 from spheretwin.session import Session
 from spheretwin.trajectories.rounding import Triple
-
-HELLO = command("hello", Operators.register, by=By.CLIENT)
-BEAT = command("beat", Operators.register, by=By.CLIENT)
-ASK = command("ask", Operators.ask, by=By.CLIENT)
-LEAVE = command("leave", Operators.leave, by=By.CLIENT)
-GRANT = command("grant", Operators.grant, by=By.CLIENT, arguments={"to": (Text, ...)})
-
-
-def _snapshot(bench_state: BenchState, _: None, name: str) -> None:
-    bench_state.driver.snapshot(name)
 
 
 def _restore(bench_state: BenchState, _: None, name: str) -> None:
@@ -84,18 +75,6 @@ def _save(bench_state: BenchState, _: None, file: str) -> None:
     """Do nothing more: the preparation writes the file."""
 
 
-SNAPSHOT = command("snapshot", _snapshot, arguments={"name": (Text, "last")})
-RESTORE = command("restore", _restore, arguments={"name": (Text, "last")})
-RECORD = command(
-    "record",
-    _record,
-    prepare=_open_files,
-    arguments={"recording": (Text | None, None), "telemetry": (Text | None, None)},
-)
-KEEP = command("keep", _keep, replace_equal=())
-SAVE = command("save", _save, prepare=_write_scenario, arguments={"file": (Text, ...)})
-
-
 Current = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
@@ -109,37 +88,8 @@ def _mode(method: Callable[..., None]) -> Callable[..., None]:
     return action
 
 
-OFF = command("off", _mode(Driver.off), replace_equal=())
-HOLD = command("hold", _mode(Driver.hold), replace_equal=())
-POINT = command("point", _mode(Driver.point), replace_equal=(), arguments={"pose_rad": (Triple, ...)})
-TRAJECTORY = command(
-    "trajectory",
-    _mode(Driver.trajectory),
-    replace_equal=(),
-    arguments={"fields": (dict[str, JsonValue] | None, None)},
-)
-JOG = command("jog", _mode(Driver.jog), replace_equal=(), arguments={"rates_rad_s": (Triple, ...)})
-MANUAL = command(
-    "manual",
-    _mode(Driver.manual),
-    replace_equal=(),
-    arguments={
-        "currents_A": (tuple[Current, ...] | None, None),
-        "group": (Place | None, None),
-        "current_A": (Current, 1.0),
-    },
-)
-
-
-def _open_player(bench_state: BenchState, file: str) -> Callable[[], Player]:
-    return lambda: Player(Path(file))
-
-
 def _replay(bench_state: BenchState, player: Player, file: str) -> None:
     bench_state.player = player
-
-
-REPLAY = command("replay", _replay, prepare=_open_player, arguments={"file": (Text, ...)})
 
 
 Speed = Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
@@ -151,10 +101,6 @@ NewRun = tuple[Scenario, Session]
 def _start(bench_state: BenchState, _: None) -> None:
     bench_state.check_can_run("start")
     bench_state.running = True
-
-
-def _pause(bench_state: BenchState, _: None) -> None:
-    bench_state.pause()
 
 
 def _step(bench_state: BenchState, _: None, ticks: int) -> None:
@@ -195,21 +141,6 @@ def _load_scenario(bench_state: BenchState, source: str, overrides: dict[str, An
     return load
 
 
-START = command("start", _start, replace_equal=(), cancelled_by_stop=True)
-PAUSE = command("pause", _pause, replace_equal=())
-STEP = command("step", _step, cancelled_by_stop=True, arguments={"ticks": (Ticks, 1)})
-SPEED = command("speed", _speed, replace_equal=(), arguments={"factor": (Speed, ...)})
-STOP = command("stop", _stop, by=By.ANYONE, urgent=True)
-RESET = command("reset", _restart, replace_equal=(), prepare=_present_scenario, cancelled_by_stop=True)
-LOAD = command(
-    "load",
-    _restart,
-    prepare=_load_scenario,
-    cancelled_by_stop=True,
-    arguments={"source": (Text, ...), "overrides": (dict[str, JsonValue], {})},
-)
-
-
 PositiveLimit = Annotated[float, Field(ge=1e-3, le=1e6)]
 
 # Sections from which nothing is built or compiled.
@@ -219,18 +150,6 @@ CHEAP = ("trajectory", "disturbance")
 def _limits(bench_state: BenchState, _: None, **given: float | None) -> None:
     driver = bench_state.driver
     driver.limits = Limits(*(given[field] or own for field, own in driver.limits._asdict().items()))
-
-
-def _set(bench_state: BenchState, _: None, name: str, value: Any) -> None:
-    bench_state.driver.set(name, value)
-
-
-def _add_fault(bench_state: BenchState, _: None, fault: dict[str, Any]) -> None:
-    bench_state.driver.set(FAULT, fault)
-
-
-def _clear_faults(bench_state: BenchState, _: None, place: int | None) -> None:
-    bench_state.driver.clear_faults(place)
 
 
 def _trial(bench_state: BenchState, name: str, value: Any) -> Callable[[], None] | None:
@@ -248,75 +167,106 @@ def _trial(bench_state: BenchState, name: str, value: Any) -> Callable[[], None]
     return try_out
 
 
-def _trial_of_fault(bench_state: BenchState, fault: dict[str, Any]) -> Callable[[], None] | None:
-    return _trial(bench_state, FAULT, fault)
-
-
-LIMITS = command(
-    "limits",
-    _limits,
-    replace_equal=(),
-    arguments={
-        "rate_rad_s": (PositiveLimit | None, None),
-        "acceleration_rad_s2": (PositiveLimit | None, None),
-    },
-)
-SET = command(
-    "set",
-    _set,
-    replace_equal=("name",),
-    prepare=_trial,
-    arguments={"name": (Text, ...), "value": (JsonValue, ...)},
-)
-ADD_FAULT = command(
-    "add_fault", _add_fault, prepare=_trial_of_fault, arguments={"fault": (dict[str, JsonValue], ...)}
-)
-CLEAR_FAULTS = command("clear_faults", _clear_faults, arguments={"place": (Place | None, None)})
-
-
 COMMANDS: dict[str, Command] = {
-    command.name: command
-    for command in (
-        START,
-        PAUSE,
-        STEP,
-        SPEED,
-        STOP,
-        RESET,
-        LOAD,
-        SNAPSHOT,
-        RESTORE,
-        OFF,
-        HOLD,
-        POINT,
-        TRAJECTORY,
-        JOG,
-        MANUAL,
-        REPLAY,
-        LIMITS,
-        SET,
-        ADD_FAULT,
-        CLEAR_FAULTS,
-        RECORD,
-        KEEP,
-        SAVE,
-        HELLO,
-        BEAT,
-        ASK,
-        LEAVE,
-        GRANT,
+    definition.name: definition
+    for definition in (
+        command("start", _start, replace_equal=(), cancelled_by_stop=True),
+        command("pause", lambda bench_state, _: bench_state.pause(), replace_equal=()),
+        command("step", _step, cancelled_by_stop=True, arguments={"ticks": (Ticks, 1)}),
+        command("speed", _speed, replace_equal=(), arguments={"factor": (Speed, ...)}),
+        command("stop", _stop, by=By.ANYONE, urgent=True),
+        command("reset", _restart, replace_equal=(), prepare=_present_scenario, cancelled_by_stop=True),
+        command(
+            "load",
+            _restart,
+            prepare=_load_scenario,
+            cancelled_by_stop=True,
+            arguments={"source": (Text, ...), "overrides": (dict[str, JsonValue], {})},
+        ),
+        command(
+            "snapshot",
+            lambda bench_state, _, name: bench_state.driver.snapshot(name),
+            arguments={"name": (Text, "last")},
+        ),
+        command("restore", _restore, arguments={"name": (Text, "last")}),
+        command("off", _mode(Driver.off), replace_equal=()),
+        command("hold", _mode(Driver.hold), replace_equal=()),
+        command("point", _mode(Driver.point), replace_equal=(), arguments={"pose_rad": (Triple, ...)}),
+        command(
+            "trajectory",
+            _mode(Driver.trajectory),
+            replace_equal=(),
+            arguments={"fields": (dict[str, JsonValue] | None, None)},
+        ),
+        command("jog", _mode(Driver.jog), replace_equal=(), arguments={"rates_rad_s": (Triple, ...)}),
+        command(
+            "manual",
+            _mode(Driver.manual),
+            replace_equal=(),
+            arguments={
+                "currents_A": (tuple[Current, ...] | None, None),
+                "group": (Place | None, None),
+                "current_A": (Current, 1.0),
+            },
+        ),
+        command(
+            "replay",
+            _replay,
+            prepare=lambda bench_state, file: partial(Player, Path(file)),
+            arguments={"file": (Text, ...)},
+        ),
+        command(
+            "limits",
+            _limits,
+            replace_equal=(),
+            arguments={
+                "rate_rad_s": (PositiveLimit | None, None),
+                "acceleration_rad_s2": (PositiveLimit | None, None),
+            },
+        ),
+        command(
+            "set",
+            lambda bench_state, _, name, value: bench_state.driver.set(name, value),
+            replace_equal=("name",),
+            prepare=_trial,
+            arguments={"name": (Text, ...), "value": (JsonValue, ...)},
+        ),
+        command(
+            "add_fault",
+            lambda bench_state, _, fault: bench_state.driver.set(FAULT, fault),
+            prepare=lambda bench_state, fault: _trial(bench_state, FAULT, fault),
+            arguments={"fault": (dict[str, JsonValue], ...)},
+        ),
+        command(
+            "clear_faults",
+            lambda bench_state, _, place: bench_state.driver.clear_faults(place),
+            arguments={"place": (Place | None, None)},
+        ),
+        command(
+            "record",
+            _record,
+            prepare=_open_files,
+            arguments={"recording": (Text | None, None), "telemetry": (Text | None, None)},
+        ),
+        command("keep", _keep, replace_equal=()),
+        command("save", _save, prepare=_write_scenario, arguments={"file": (Text, ...)}),
+        command("hello", Operators.register, by=By.CLIENT),
+        command("beat", Operators.register, by=By.CLIENT),
+        command("ask", Operators.ask, by=By.CLIENT),
+        command("leave", Operators.leave, by=By.CLIENT),
+        command("grant", Operators.grant, by=By.CLIENT, arguments={"to": (Text, ...)}),
     )
 }
 """All commands by name; `Bench` describes each."""
 
 
 def find_command(name: object) -> Command:
-    """Command of a name.
+    """Return the command of a name.
 
     Raises
     ------
     InputError
-        It is unknown.
+        No command has this name.
     """
     if not isinstance(name, str) or name not in COMMANDS:
         raise InputError(

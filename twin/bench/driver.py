@@ -11,8 +11,9 @@ from spheretwin.models.base.errors import InputError, exception_text
 from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import record_of
 from spheretwin.scenario.changes import FAULT, is_fixed, with_change
+from spheretwin.scenario.hardware import hardware_fields
 from spheretwin.scenario.reading import override, validated
-from spheretwin.scenario.sections import Scenario, hardware_fields
+from spheretwin.scenario.sections import Scenario
 from spheretwin.session import Session
 from spheretwin.snapshot import Snapshot
 from spheretwin.trajectories.trajectory import Shape

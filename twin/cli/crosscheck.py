@@ -41,7 +41,7 @@ def declare(parser: Parser) -> None:
 
 
 def run(options: argparse.Namespace) -> bool:
-    """Run the verb; return True if every bound is kept."""
+    """Run the verb; return True if no bound is broken."""
     actuators.load(options.mjcf)  # before the folder is created
     warn_about_model(options.mjcf)
     if options.out:

@@ -110,7 +110,7 @@ def _add_curve(part: Parser) -> None:
 
 
 def run_check(options: argparse.Namespace) -> bool:
-    """Run the part; return True if every bound is kept."""
+    """Run the part; return True if no bound is broken."""
     actuator = actuators.load(options.mjcf, options.csv)
     verdict = field_check.judge(actuator, options.poses, options.seed, tracked("direct sums"))
     warn_about_model(options.mjcf)
@@ -132,7 +132,7 @@ def run_check(options: argparse.Namespace) -> bool:
 
 
 def run_curve(options: argparse.Namespace) -> bool:
-    """Run the part; return True if every bound is kept."""
+    """Run the part; return True if no bound is broken."""
     if options.csv and options.out:
         raise InputError("command line: expected --out or --csv, received both")
     if options.csv:
@@ -207,7 +207,7 @@ def _judge(csv: Path, mjcf: Path, as_json: bool) -> bool:
 
 
 def run_map(options: argparse.Namespace) -> bool:
-    """Run the part; return True if every bound is kept."""
+    """Run the part; return True if no bound is broken."""
     plots = _plots() if options.out else None
     actuator = actuators.load(options.mjcf, options.csv)
     if options.out:
@@ -246,10 +246,10 @@ def _draw(plots: ModuleType, folder: Path, surveyed: TorqueSurvey) -> list[Path]
         "best_Nm": worst["best"].capability.best_Nm,
         "copper_W_per_Nm2": worst["singular_value"].capability.copper_W_per_Nm2,
     }
-    drawn = {
+    figures = {
         "capability_map.png": plots.capability_map(workspace, on_grid, limit_A),
         "capability_by_tilt.png": plots.capability_by_tilt(workspace, on_grid, by_tilt, limit_A),
     }
-    for name, figure in drawn.items():
+    for name, figure in figures.items():
         save(figure, folder / name)
-    return [folder / name for name in drawn]
+    return [folder / name for name in figures]

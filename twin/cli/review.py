@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> bool:
         comparison.merge(runs, options.merge)
     page = comparison.write_figures(runs, summaries, options.figures) if options.figures else None
     if options.json:
-        _print_json(reviewed, held=options.tolerance is not None)
+        _print_json(reviewed, has_tolerances=options.tolerance is not None)
     else:
         tables.print_runs(summaries)
         tables.print_written([path for path in (options.export, options.merge, page) if path])
@@ -97,9 +97,9 @@ def _check(options: argparse.Namespace) -> None:
         comparison.check_figures(options.figures)
 
 
-def _print_json(reviewed: Review, *, held: bool) -> None:
-    """Print the runs, their differences, and where each first leaves what each signal is allowed."""
-    within = not any(reviewed.exceeded) if held else None
+def _print_json(reviewed: Review, *, has_tolerances: bool) -> None:
+    """Print the runs, their differences, and the first time at which each signal exceeds its tolerance."""
+    within = not any(reviewed.exceeded) if has_tolerances else None
     print_json(
         {
             "runs": reviewed.figures,

@@ -36,7 +36,8 @@ from spheretwin.crosscheck.hinge import (
 from spheretwin.crosscheck.part import Part
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.scenario.sections import PROTOTYPE_BEARINGS, PlantSection
+from spheretwin.scenario.hardware import PROTOTYPE_BEARINGS
+from spheretwin.scenario.plant_sections import PlantSection
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Array, Case, Experiment, Finding, Outcomes, ResultTable, Section
 from spheretwin.run import Run
-from spheretwin.scenario.sections import PlantSection
+from spheretwin.scenario.plant_sections import PlantSection
 
 SCENARIOS = ("sinusoid", "nutation", "tilt", "hold")
 SAMPLE_s = 0.01

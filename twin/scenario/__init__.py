@@ -9,8 +9,9 @@ from spheretwin.control.laws import LAWS
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.user_code import is_reference
 from spheretwin.scenario.changes import check_events, fields_with
+from spheretwin.scenario.hardware import hardware_defaults
 from spheretwin.scenario.reading import override, resolve_paths, validated
-from spheretwin.scenario.sections import Scenario, hardware_defaults
+from spheretwin.scenario.sections import Scenario
 from spheretwin.trajectories import SHAPES
 
 

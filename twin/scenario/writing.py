@@ -11,8 +11,9 @@ from typing import Any
 from pydantic import BaseModel
 
 from spheretwin.scenario.changes import fields_with
+from spheretwin.scenario.hardware import hardware_defaults
 from spheretwin.scenario.reading import override, read, shipped, validated
-from spheretwin.scenario.sections import Scenario, hardware_defaults
+from spheretwin.scenario.sections import Scenario
 
 # A shipped scenario with few fields: other scenarios are written as differences from it.
 PLAIN = "tilt"

@@ -29,7 +29,8 @@ from spheretwin.scenario import reading
 from spheretwin.scenario.changes import check_events, fields_with, is_tag
 from spheretwin.scenario.fields import INDEX, every_field, new_name
 from spheretwin.scenario.files import Files, files_of, named_files
-from spheretwin.scenario.sections import Scenario, hardware_defaults, scenario_with
+from spheretwin.scenario.hardware import hardware_defaults
+from spheretwin.scenario.sections import Scenario, scenario_with
 from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
 from spheretwin.study.axes import Axis

@@ -72,14 +72,14 @@ def angle(value_rad: float) -> str:
 
 
 def print_scenarios(descriptions: Mapping[str, str]) -> None:
-    """Print what scenarios there are, a line each."""
+    """Print the scenarios, one line each."""
     width = max(map(len, descriptions))
     for name, description in descriptions.items():
         tables.terminal_console().print(f"{name:{width}}  {escape(description)}", soft_wrap=True)
 
 
 def print_files(record: Path | None, telemetry: Path | None) -> None:
-    """Print where a run's files are and how to open them."""
+    """Print the paths of the files of a run, and the command that opens the recording."""
     console = tables.terminal_console()
     if telemetry:
         console.print(f"telemetry  {escape(str(telemetry))}", soft_wrap=True)
@@ -89,7 +89,7 @@ def print_files(record: Path | None, telemetry: Path | None) -> None:
 
 
 def print_study(name: str, result: dict[str, Any], summary: dict[str, Any]) -> None:
-    """Print what a study found: rows by status, then each figure's median and 95 % range, a column a law."""
+    """Print the results of a study: median and 95 % range of each figure, rows by status, for each law."""
     figures = [figure for figure in next(iter(summary.values()), {}) if figure != "statuses"]
     table = tables.new_table(
         f"{name}: {result['rows']} of {result['of']} rows", "median (95 % range)", *summary
@@ -115,7 +115,7 @@ def _spread(figure: dict[str, Any]) -> str:
 
 
 def print_written(paths: Sequence[Path]) -> None:
-    """Print where other files were written."""
+    """Print the paths of written files."""
     for path in paths:
         tables.terminal_console().print(f"written  {escape(str(path))}", soft_wrap=True)
 
@@ -214,7 +214,7 @@ def _print_differences(runs: Sequence[dict[str, Any]]) -> None:
 
 
 def differences(runs: Sequence[dict[str, Any]]) -> Iterator[list[str]]:
-    """Facts and figures, each with a cell a run: of the others also how far each is from the first's."""
+    """Yield facts and figures, one cell for each run; the others with their difference from the first."""
     for name in FACTS:
         yield [name, *("–" if run[name] is None else f"{run[name]}" for run in runs)]
     for row in ROWS:
@@ -238,7 +238,7 @@ def _figure(value: float | None, unit: str) -> str:
 
 
 def _with_difference(first: float | None, value: float | None, unit: str) -> str:
-    """A figure, and below it how far it is from the first, absolute and in percent."""
+    """Return a figure, and below it the difference from the first, absolute and in percent."""
     if first is None or value is None:
         return _figure(value, unit)
     if (difference := value - first) == 0:

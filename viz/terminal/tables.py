@@ -28,7 +28,7 @@ def terminal_console() -> Console:
 
 
 def new_table(title: str, first: str, *others: str, lines: bool = False) -> Table:
-    """A table under its title: what a row is about at the left, figures at the right.
+    """Return a table with a title: labels in the left column, figures in the others.
 
     Without a terminal it is Markdown.
 
@@ -55,7 +55,7 @@ def new_table(title: str, first: str, *others: str, lines: bool = False) -> Tabl
 
 
 def three_digits(value: float) -> str:
-    """A figure with three significant digits, without a power of ten."""
+    """Return a figure with three significant digits, without a power of ten."""
     if not math.isfinite(value):
         return "–"
     if abs(value) < LEAST:

@@ -11,7 +11,7 @@ from spheretwin.electronics.random_streams import noise_table
 from spheretwin.electronics.sensor_chain import noise_streams, sense, sensor_chain
 from spheretwin.models.base.errors import InputError
 from spheretwin.scenario import reading
-from spheretwin.scenario.sections import HARDWARE
+from spheretwin.scenario.hardware import HARDWARE
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 

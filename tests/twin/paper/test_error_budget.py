@@ -9,7 +9,7 @@ from spheretwin.paper import error_budget
 from spheretwin.paper.error_budget import ALL, ESTIMATOR, IDEAL, PROTOTYPE, STAGES, WITH_RATES, WITHOUT_ERROR
 from spheretwin.paper.experiment import Outcomes
 from spheretwin.paper.runner import make_plan, run_plan
-from spheretwin.scenario.sections import PROTOTYPE_NOMINAL
+from spheretwin.scenario.hardware import PROTOTYPE_NOMINAL
 from spheretwin.simulation import simulate
 from tests.twin.paper.cases import outcome
 
