@@ -159,15 +159,15 @@ class MeanLoad(Metric):
 
     def __init__(self, planned):
         super().__init__(planned)
-        self.total, self.rows = np.zeros(3), 0
+        self.total = np.zeros(3)
 
-    def write(self, rows):
+    def add(self, rows):
+        """Add the rows of one chunk."""
         add_rows(np.ascontiguousarray(rows["disturbance_Nm"]), self.total)
-        self.rows += len(rows)
 
     def value(self):
         """[3] in N·m; None without a row."""
-        return (self.total / self.rows).tolist() if self.rows else None
+        return (self.total / self._rows).tolist() if self._rows else None
 ''',
         "twin/metrics.py",
         (
@@ -325,7 +325,7 @@ def turn(stage, measurement, noise):
         "",
         '''from typing import ClassVar, NamedTuple
 
-from spheretwin.electronics.drive_stage import pass_line
+from spheretwin.electronics.stages import pass_line
 from spheretwin.electronics.stages import FaultLine, fault_line
 from spheretwin.models.base.compiled import part_of_its_caller
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from spheretwin.electronics.current_lag import current_lag
+from spheretwin.electronics.coil import current_lag
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.compiled import rounding_each
 from spheretwin.models.telemetry.signals import ANGLES
@@ -58,11 +58,11 @@ class Metric(ABC):
 
     def write(self, rows: Table) -> None:
         """Process the rows of one chunk, at least one."""
-        self._add(rows)
+        self.add(rows)
         self._rows += len(rows)
 
     @abstractmethod
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
         """Process the rows of one chunk; `_rows` is the number of rows before it."""
 
     @abstractmethod
@@ -116,7 +116,8 @@ class CopperLoss(Metric):
         self._squares = np.zeros(len(planned.actuator.groups))
         self._logged_W = np.zeros(len(planned.actuator.groups))
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         if any(signal.name == "copper_loss_W" for signal in rows.signals):
             add_rows(np.ascontiguousarray(rows["copper_loss_W"]), self._logged_W)
         elif not self._follows:
@@ -151,7 +152,8 @@ class CurrentVariation(Metric):
         self._variation = np.zeros(groups)
         self._last = np.zeros(groups)
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         command = rows["current_command_A"]
         if not self._rows:
             self._last = command[0].copy()
@@ -172,7 +174,8 @@ class MaxAbsCurrent(Metric):
         super().__init__(planned)
         self._largest = -np.inf
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         self._largest = max(self._largest, float(np.abs(rows["current_A"]).max()))
 
     def value(self) -> float | None:
@@ -191,7 +194,8 @@ class RmsTorque(Metric):
         super().__init__(planned)
         self._squares = np.zeros(3)
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         add_rows(rows["torque_Nm"] ** 2, self._squares)
 
     def value(self) -> float | None:
@@ -210,7 +214,8 @@ class SaturatedFraction(Metric):
         super().__init__(planned)
         self._saturated = self._rank_lost = 0
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         self._saturated += int(np.count_nonzero(saturated(rows)))
         self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
 
@@ -244,7 +249,8 @@ class MaxAbsError(Metric):
         super().__init__(planned)
         self._largest = np.full(3, -np.inf)
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         self._largest = np.maximum(self._largest, np.abs(rows["error_rad"]).max(axis=0))
 
     def value(self) -> list[float] | None:
@@ -264,7 +270,8 @@ class RmsError(Metric):
         super().__init__(planned)
         self._squares = SquaresByPiece(planned.ticks)
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         self._squares.add(rows["error_rad"])
 
     def value(self) -> list[float] | None:
@@ -332,7 +339,8 @@ class SettlingTime(Metric):
         super().__init__(planned)
         self._last_outside = np.full(3, -1)
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         outside = np.abs(rows["error_rad"]) > BAND_rad
         last = self._rows + len(rows) - 1 - np.argmax(outside[::-1], axis=0)
         self._last_outside = np.where(outside.any(axis=0), last, self._last_outside)
@@ -358,7 +366,8 @@ class Overshoot(Metric):
         super().__init__(planned)
         self._start, self._largest = np.zeros(3), np.zeros(3)
 
-    def _add(self, rows: Table) -> None:
+    def add(self, rows: Table) -> None:
+        """Process the rows of one chunk."""
         error = rows["error_rad"]
         if not self._rows:
             self._start = error[0].copy()

@@ -32,9 +32,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from spheretwin.electronics.coil import OPEN, GroupCoils, Relaxation, relaxation
-from spheretwin.electronics.drive_stage import DriveSetup, DriveStage
 from spheretwin.electronics.random_streams import errors
-from spheretwin.electronics.stages import FaultLine, fault_line
+from spheretwin.electronics.stages import DriveSetup, DriveStage, FaultLine, fault_line
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 
 # No motion of the rotor induces as much; the bound keeps squares of currents finite.

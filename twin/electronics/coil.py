@@ -1,4 +1,4 @@
-"""Coils of the groups: temperature-dependent resistance, inductance and back-EMF.
+"""Currents of the coil groups: with a supply by resistance, inductance and back-EMF, otherwise by a lag.
 
 A group obeys ``L di/dt = v - R i - e`` with the voltage v at its ends. The turning rotor induces
 ``e = G_t^T w``: the electrical power e i equals the power of the torque ``G_t i`` at the rate w, to the last
@@ -8,7 +8,7 @@ resistance.
 
 from __future__ import annotations
 
-from math import expm1, factorial, inf
+from math import exp, expm1, factorial, inf
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -228,3 +228,50 @@ def back_emf(
         for i in range(3):
             turned += torque_matrix[i, j] * rate_S[i]
         emf[j] = gain[j] * turned
+
+
+class CurrentLag(NamedTuple):
+    """First-order lag, solved exactly over one physics step with the command held."""
+
+    decay: float
+    """Share of the distance to the command that remains after a step."""
+    mean_share: float
+    """Share of that distance that remains on average over the step."""
+    current_limit_A: float
+    """Limit of the amplifiers, for any command."""
+
+
+def current_lag(time_constant_s: float, step_s: float, current_limit_A: float) -> CurrentLag:
+    """Return the lag for a time constant L/R (s; 0: ideal amplifiers), a physics step (s) and a limit (A)."""
+    if time_constant_s == 0:
+        return CurrentLag(0.0, 0.0, current_limit_A)
+    steps = step_s / time_constant_s
+    return CurrentLag(exp(-steps), -expm1(-steps) / steps, current_limit_A)
+
+
+@allocation_free
+def advance_lag(
+    lag: CurrentLag,
+    command: NDArray[np.float64],
+    current: NDArray[np.float64],
+    mean: NDArray[np.float64],
+) -> None:
+    """Advance the currents by one physics step.
+
+    Parameters
+    ----------
+    lag : CurrentLag
+        Lag of the groups.
+    command : (n,) array, A
+        Held over the step; the amplifiers follow it up to their limit.
+    current : (n,) array, A
+        At the start of the step; on return, at its end.
+    mean : (n,) array, A
+        Result: mean over the step, which acts on the rotor.
+    """
+    limit = lag.current_limit_A
+    for j in range(command.shape[0]):
+        target = min(max(command[j], -limit), limit)
+        distance = current[j] - target
+        mean[j] = target + lag.mean_share * distance
+        current[j] = target + lag.decay * distance

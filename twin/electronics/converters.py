@@ -23,10 +23,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from spheretwin.electronics.drive_stage import DriveSetup, DriveStage
 from spheretwin.electronics.random_streams import errors
-from spheretwin.electronics.sensor_stage import SensorSetup, SensorStage, TickNoise
-from spheretwin.electronics.stages import FaultLine, fault_line, through
+from spheretwin.electronics.stages import (
+    DriveSetup,
+    DriveStage,
+    FaultLine,
+    SensorSetup,
+    SensorStage,
+    TickNoise,
+    fault_line,
+    through,
+)
 from spheretwin.electronics.transducers import CHANNELS
 from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.models.base.state import push

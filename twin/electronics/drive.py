@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from numpy.typing import NDArray
 
 from spheretwin.electronics import drive_chain as chain
-from spheretwin.electronics.current_lag import CurrentLag, advance_lag, current_lag
+from spheretwin.electronics.coil import CurrentLag, advance_lag, current_lag
 from spheretwin.electronics.drive_chain import DriveChain, DriveFaults, drive_chain
 from spheretwin.electronics.drive_section import ResolvedDrive
 from spheretwin.models.base.compiled import implements, part_of_its_caller

@@ -27,18 +27,19 @@ from spheretwin.electronics.coil import (
     DRIVEN,
     OPEN,
     SHORTED,
+    CurrentLag,
     GroupCoils,
+    advance_lag,
     advance_temperature,
     back_emf,
+    current_lag,
     group_coils,
     is_overheated,
     update_resistance,
 )
-from spheretwin.electronics.current_lag import CurrentLag, advance_lag, current_lag
 from spheretwin.electronics.delay import Delay, delay, due, latch
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
-from spheretwin.electronics.drive_stage import DriveSetup
-from spheretwin.electronics.stages import FaultLine, chained, fault_line, through
+from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fault_line, through
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity

@@ -11,7 +11,7 @@ from spheretwin.electronics.amplifier import AmplifierSection
 from spheretwin.electronics.coil import CoilSection
 from spheretwin.electronics.converters import DacSection
 from spheretwin.electronics.delay import DelaySection
-from spheretwin.electronics.drive_stage import DriveStage
+from spheretwin.electronics.stages import DriveStage
 
 
 class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):

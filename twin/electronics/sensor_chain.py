@@ -16,8 +16,7 @@ from pydantic import BaseModel, Field
 
 from spheretwin.electronics.converters import AdcSection
 from spheretwin.electronics.random_streams import Streams
-from spheretwin.electronics.sensor_stage import SensorSetup, SensorStage, TickNoise
-from spheretwin.electronics.stages import chained
+from spheretwin.electronics.stages import SensorSetup, SensorStage, TickNoise, chained
 from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.trajectories.rounding import CONFIG, Triple

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
 from spheretwin.electronics.random_streams import uniforms
-from spheretwin.electronics.sensor_stage import SensorSetup, SensorStage, TickNoise
-from spheretwin.electronics.stages import FaultLine, fault_line, through
+from spheretwin.electronics.stages import FaultLine, SensorSetup, SensorStage, TickNoise, fault_line, through
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.trajectories.rounding import CONFIG
 

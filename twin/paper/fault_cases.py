@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spheretwin import scenario as scenarios
-from spheretwin.electronics.prototype import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models import actuator
 from spheretwin.models.telemetry.status import Status
 from spheretwin.paper.experiment import Case
+from spheretwin.scenario.hardware import PROTOTYPE_DRIVE, PROTOTYPE_SENSORS
 from spheretwin.scenario.sections import Scenario
 
 COUNT_rad = tau / PROTOTYPE_SENSORS["sensors.encoder.counts"]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spheretwin.disturbances import Draws
-from spheretwin.electronics.current_lag import CurrentLag, current_lag
+from spheretwin.electronics.coil import CurrentLag, current_lag
 from spheretwin.models import actuator as actuators
 from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator

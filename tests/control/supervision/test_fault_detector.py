@@ -24,10 +24,10 @@ from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_
 from spheretwin.electronics.coil import CoilSection, group_coils
 from spheretwin.electronics.converters import convert, dac
 from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
-from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
 from spheretwin.models.base.state import restore_state, save_state
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
+from spheretwin.scenario.hardware import PROTOTYPE_DRIVE
 
 COUNT, R_OHM, L_H, PERIOD_S = 18, 1.3, 0.9e-3, 1e-3
 PROTOTYPE = NominalCurrents(

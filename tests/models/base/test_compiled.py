@@ -180,6 +180,7 @@ def test_file_in_place_of_the_folder_is_done_without(package):
 
 def test_full_disk_is_done_without(package):
     environment = {**os.environ, "PYTHONPATH": str(package), "SPHERETWIN_CACHE_DIR": str(package / "cache")}
+    environment["PYTHONDONTWRITEBYTECODE"] = "1"  # Python itself keeps bytecode that the limit has cut
     full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))\n"
     assert python(full + RUN, **environment).split() == ["41", "0", "0"]
     assert entries(package) == []

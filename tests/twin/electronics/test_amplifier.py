@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_coils, reset_sums, zero_flow
-from spheretwin.electronics.coil import CoilSection, group_coils
-from spheretwin.electronics.current_lag import advance_lag, current_lag
+from spheretwin.electronics.coil import CoilSection, advance_lag, current_lag, group_coils
 
 STEP_S = 5e-4
 SUPPLY = {"supply_V": 24.0, "drop_up_V": 4.8, "drop_down_V": 4.6}

@@ -9,7 +9,7 @@ from spheretwin.electronics.amplifier import AmplifierSection, amplifier, drive_
 from spheretwin.electronics.coil import CoilSection, advance_temperature, back_emf, group_coils
 from spheretwin.electronics.converters import DacSection, convert, dac
 from spheretwin.electronics.delay import DelaySection, delay, due, latch
-from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
+from spheretwin.scenario.hardware import PROTOTYPE_DRIVE
 
 STEP_S, SUBSTEPS, GROUPS, LIMIT_A = 5e-4, 2, 18, 8.0
 PERIOD_S = STEP_S * SUBSTEPS

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.electronics.sensor_stage import SensorSetup
+from spheretwin.electronics.stages import SensorSetup
 from spheretwin.electronics.transducers import EncoderSection, counted
 
 COUNTS = st.integers(1, 2**20)

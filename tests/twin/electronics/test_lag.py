@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from spheretwin.electronics.current_lag import advance_lag, current_lag
+from spheretwin.electronics.coil import advance_lag, current_lag
 
 
 @pytest.mark.parametrize("time_constant_s", [1e-4, 6.9e-4, 5e-2])

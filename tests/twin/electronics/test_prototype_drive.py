@@ -9,11 +9,11 @@ from spheretwin.electronics.amplifier import drive_coils
 from spheretwin.electronics.coil import back_emf
 from spheretwin.electronics.delay import due
 from spheretwin.electronics.drive_chain import begin, drive_chain, end
-from spheretwin.electronics.prototype import PROTOTYPE_DRIVE
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import inertia_matrix
 from spheretwin.models.magnetics import torque_matrix
+from spheretwin.scenario.hardware import PROTOTYPE_DRIVE
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
 

@@ -10,11 +10,11 @@ from numba.core.runtime import _nrt_python, rtsys
 from scipy.optimize import minimize_scalar
 
 from spheretwin import electronics
-from spheretwin.electronics.prototype import PROTOTYPE_SENSORS
 from spheretwin.electronics.random_streams import noise_rows, noise_table, stream_key, width_of
 from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
 from spheretwin.models.base.compiled import compiled
 from spheretwin.scenario.fields import every_field
+from spheretwin.scenario.hardware import PROTOTYPE_SENSORS
 
 NO_NOISE = np.empty(0)
 STAGES = {
