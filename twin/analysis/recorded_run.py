@@ -46,19 +46,19 @@ def logged(
 ) -> tuple[Change, ...]:
     """Changes that a log tells of and no plan; what was set without a line of the log is not among them."""
     expected = [(change.tick, change_text(change)) for change in planned(scenario, period_s, ticks)]
-    found = []
+    changes = []
     for t_s, _, text in log:
         name, between, value = text.partition(_BETWEEN)
         tick = round(t_s / period_s)
         if (tick, text) in expected:
             expected.remove((tick, text))
         elif between and all(part.isidentifier() for part in name.split(".")):
-            found.append(Change(tick, name, _value(value)))
-    return tuple(found)
+            changes.append(Change(tick, name, _value(value)))
+    return tuple(changes)
 
 
 def _value(text: str) -> Any:
-    """What Python writes so, or the text itself."""
+    """Return the value that Python writes so, or the text itself."""
     try:
         return ast.literal_eval(text)
     except (ValueError, SyntaxError, MemoryError, RecursionError):
@@ -71,7 +71,7 @@ _RATE = "record_rate_Hz"
 
 @dataclass(frozen=True)
 class Reviewed:
-    """What the file of a run says.
+    """Content of the file of a run.
 
     Attributes
     ----------
@@ -126,23 +126,23 @@ def read(path: Path) -> Reviewed:
     InputError
         There is none, it is none of these, or not a row of it is whole.
     """
-    found = recovery.find_run_file(path)
+    file = recovery.find_run_file(path)
     try:
-        if found.suffix in recovery.RECORDINGS or recovery.is_recording(found):
-            return _of_recording(found)
-        if found.is_dir():
-            with recovery.joined_telemetry(found) as joined:
+        if file.suffix in recovery.RECORDINGS or recovery.is_recording(file):
+            return _of_recording(file)
+        if file.is_dir():
+            with recovery.joined_telemetry(file) as joined:
                 table, metadata = read_parquet(joined)
-            return _of_telemetry(found, table, metadata, whole=False, checked=recovery.are_checked(found))
-        table, metadata = read_parquet(found)
-        return _of_telemetry(found, table, metadata, whole=True, checked=has_checksums(found))
+            return _of_telemetry(file, table, metadata, whole=False, checked=recovery.are_checked(file))
+        table, metadata = read_parquet(file)
+        return _of_telemetry(file, table, metadata, whole=True, checked=has_checksums(file))
     except KeyError as error:
         raise InputError(
-            f"review {found}: expected the file of a run, received one without {shown(error.args[0])}"
+            f"review {file}: expected the file of a run, received one without {shown(error.args[0])}"
         ) from None
     except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):
         raise InputError(
-            f"review {found}: expected the file of a run, received one that cannot be read"
+            f"review {file}: expected the file of a run, received one that cannot be read"
         ) from None
 
 
@@ -185,9 +185,9 @@ def of_the_actuator(run: Reviewed) -> ActiveConfig:
     InputError
         The scenario is none of this version.
     """
-    kept = ("name", "duration", "seed", "plant", "drive")
+    shared_fields = ("name", "duration", "seed", "plant", "drive")
     fields = {
-        **{name: run.record.scenario[name] for name in kept},
+        **{name: run.record.scenario[name] for name in shared_fields},
         "controller": {"law": "pd", "period_s": run.period_s},
         "trajectory": {"shape": "hold"},
     }
@@ -241,14 +241,14 @@ def events(run: Reviewed) -> list[Event]:
     """Events of a run in the order of time, its end last: the same from either of its files."""
     ended = run.record.status
     if run.log:
-        found, end = list(run.log[:-1] if ended else run.log), list(run.log[-1:] if ended else ())
+        events, end = list(run.log[:-1] if ended else run.log), list(run.log[-1:] if ended else ())
     else:
         log = Events()
-        found = log.of(run.every_tick) if len(run.table) else []
-        found += [(t_s, Level.INFO, text) for t_s, text in FaultMessages().of(run.every_tick)]
-        found += [(each.tick * run.period_s, Level.INFO, change_text(each)) for each in _changes(run)]
+        events = log.of(run.every_tick) if len(run.table) else []
+        events += [(t_s, Level.INFO, text) for t_s, text in FaultMessages().of(run.every_tick)]
+        events += [(change.tick * run.period_s, Level.INFO, change_text(change)) for change in _changes(run)]
         end = [log.end(ended)] if ended else []
-    return [*sorted(found, key=lambda event: (event[0], event[2])), *end]
+    return [*sorted(events, key=lambda event: (event[0], event[2])), *end]
 
 
 def _changes(run: Reviewed) -> Iterator[Change]:

@@ -76,7 +76,7 @@ class BenchStatus:
         Names of the snapshots.
     recording : tuple of str
         Files that are being written.
-    kept : tuple of str
+    completed_files : tuple of str
         Files that were completed last.
     note : str or None
         Last event without a command, as the reason why a recording ended.
@@ -131,7 +131,7 @@ class BenchStatus:
     journal: int
     snapshots: tuple[str, ...]
     recording: tuple[str, ...]
-    kept: tuple[str, ...]
+    completed_files: tuple[str, ...]
     note: str | None
     operator: str | None
     watching: tuple[str, ...]
@@ -247,7 +247,7 @@ def bench_status(bench_state: BenchState) -> BenchStatus:
         journal=len(session.journal),
         snapshots=tuple(driver.snapshots),
         recording=recording.paths,
-        kept=recording.completed_files,
+        completed_files=recording.completed_files,
         note=bench_state.note,
         operator=operators.operator,
         watching=operators.watching,

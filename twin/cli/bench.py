@@ -289,7 +289,7 @@ def _record(bench: Bench, recording: Path | None) -> None:
 def _report(bench: Bench) -> bool:
     """Print the recorded files and failed recordings; return True if none failed."""
     state = bench.state()
-    runs.print_written([Path(file) for file in state.kept])
+    runs.print_written([Path(file) for file in state.completed_files])
     if state.recording:
         print(f"spheretwin: not completed: {', '.join(state.recording)}", file=sys.stderr)
     return not state.recording

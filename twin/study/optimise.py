@@ -1,4 +1,4 @@
-"""What ``[optimise]`` of a study says: gains and their ranges, objectives, and how they are looked for."""
+"""Section ``[optimise]`` of a study: gains with ranges, objectives, and the search."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_FRESH = 1000
 HINGES = ("alpha", "beta", "gamma")
 
 SWITCH, ON = ", on", 0.5
-"""What the name of a switch ends in, and the value from which its gain is on: half of its range."""
+"""Suffix of the name of a switch, and the value from which its gain is on: half of its range."""
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 
@@ -64,7 +64,7 @@ class Gain(BaseModel):
             raise ValueError("expected a name of a gain that sets several fields, received none")
         if not self.low < self.high:
             raise ValueError(f"expected low below high, received {self.low:g} and {self.high:g}")
-        if self.low <= 0 and (self.log or any(each.power != 1 for each in self.sets)):
+        if self.low <= 0 and (self.log or any(setting.power != 1 for setting in self.sets)):
             raise ValueError(f"expected low above 0 of a logarithm or a power, received {self.low:g}")
         if self.start is not None and not self.low <= self.start <= self.high:
             raise ValueError(f"expected start from {self.low:g} to {self.high:g}, received {self.start:g}")
@@ -128,16 +128,16 @@ class Objective(BaseModel):
     @property
     def places(self) -> list[int]:
         """Places of its entries."""
-        return [HINGES.index(each) for each in self.of]
+        return [HINGES.index(hinge) for hinge in self.of]
 
     @property
     def sign(self) -> float:
-        """What it is multiplied by to be minimised."""
+        """Factor with which the objective is minimised."""
         return 1.0 if self.direction == "minimise" else -1.0
 
 
 class Optimise(BaseModel):
-    """How the gains of a study's laws are looked for.
+    """Search for the gains of the laws of a study.
 
     A trial runs every row of the study that is of its law: the seeds, and all points of the axes.
     """
@@ -174,7 +174,9 @@ class Optimise(BaseModel):
 
     @model_validator(mode="after")
     def _fits(self) -> Optimise:
-        objectives = [(each.metric, tuple(sorted(each.of)), each.over) for each in self.objective]
+        objectives = [
+            (objective.metric, tuple(sorted(objective.of)), objective.over) for objective in self.objective
+        ]
         if len(set(objectives)) < len(objectives):
             raise ValueError(f"expected different objectives, received {self.objective[0].called} twice")
         fields = type(self).model_fields
@@ -207,9 +209,9 @@ def of_row(objective: Objective, figure: Any) -> float | None:
     """A figure of one run as one number to be minimised; None where it is none."""
     entries = figure if isinstance(figure, list) else [figure]
     chosen = [entries[place] for place in objective.places] if objective.of and len(entries) == 3 else entries
-    if not chosen or not all(_is_number(each) for each in chosen):
+    if not chosen or not all(_is_number(value) for value in chosen):
         return None
-    return max(objective.sign * float(each) for each in chosen)
+    return max(objective.sign * float(value) for value in chosen)
 
 
 def of_rows(objective: Objective, known: Sequence[float], rows: int) -> float:
@@ -233,7 +235,7 @@ def of_rows(objective: Objective, known: Sequence[float], rows: int) -> float:
 
 def best_within(values: Mapping[int, Sequence[float]], limit: float) -> int | None:
     """Trial with the least first objective among those whose second is within a limit; None without any."""
-    within = [number for number, each in values.items() if each[1] <= limit]
+    within = [number for number, pair in values.items() if pair[1] <= limit]
     return min(within, key=lambda number: (*values[number], number), default=None)
 
 

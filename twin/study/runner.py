@@ -123,11 +123,11 @@ def run_study(
     make_folder(folder)
     rows = Rows(study, _telemetry_folder(study, folder))
     check(grid, rows)
-    wanted = min(len(grid), limit or len(grid))
+    planned = min(len(grid), limit or len(grid))
     with Journal(folder / journal.NAME, digest_of(rows), len(grid)) as stored:
-        resumed, missing = stored.done(), wanted - stored.done(wanted)
+        resumed, missing = stored.done(), planned - stored.done(planned)
         work = Work(rows)
-        todo = (number for number in range(wanted) if not stored.has(number))
+        todo = (number for number in range(planned) if not stored.has(number))
         order = Order(todo, missing, grid, work, threads, address, stop_requested)
         try:
             first = _fill(stored, resumed + missing, chosen, order, done)
@@ -155,7 +155,7 @@ def run_study(
 
 
 def _fill(
-    journal: Journal, wanted: int, engine: Engine, order: Order, done: Callable[[int, int], None]
+    journal: Journal, planned: int, engine: Engine, order: Order, done: Callable[[int, int], None]
 ) -> float | None:
     """Run the missing rows; return the time at which the first one was finished.
 
@@ -166,7 +166,7 @@ def _fill(
     """
     work, interrupted = order.work, order.stop_requested
     finished = journal.done()
-    done(finished, wanted)
+    done(finished, planned)
     first = None
     stopping = order._replace(stop_requested=lambda: bool(work.faults) or interrupted())
     with closing(engine.run(stopping)) as results:
@@ -175,7 +175,7 @@ def _fill(
             if result is not None:
                 journal.add(row, result)
                 finished += 1
-                done(finished, wanted)
+                done(finished, planned)
     if work.faults:
         raise work.faults[0]
     return first

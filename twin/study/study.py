@@ -171,9 +171,9 @@ def repeated(values: Iterable[Any]) -> list[Any]:
 def _alike(value: Any) -> Any:
     """A number as a broken one, lists and tables through."""
     if isinstance(value, list | tuple):
-        return [_alike(each) for each in value]
+        return [_alike(item) for item in value]
     if isinstance(value, Mapping):
-        return {name: _alike(each) for name, each in value.items()}
+        return {name: _alike(item) for name, item in value.items()}
     is_whole = isinstance(value, int) and not isinstance(value, bool)
     return float(value) if is_whole and abs(value) < 2**53 else value
 

@@ -69,7 +69,7 @@ def test_an_error_of_a_file_is_reported_and_the_run_continues(tmp_path, monkeypa
         assert made.advance(50) == 50
         done(made, "keep")
         assert made.advance(50) == 50
-    assert made.state().kept == ()
+    assert made.state().completed_files == ()
     assert made.state().note == "the disk is full"
 
 

@@ -106,7 +106,7 @@ def test_a_bench_is_driven_from_a_browser(tmp_path):
         until(bench, lambda state: not np.any(state.current_command_A))
         tab.click("text=keep")
         tab.click("text=Stop and complete the files")
-        until(bench, lambda state: state.kept == (str(kept),))
+        until(bench, lambda state: state.completed_files == (str(kept),))
         assert errors(tab) == []
         assert tab.outside == []
     again = tmp_path / "again.parquet"

@@ -42,7 +42,7 @@ STATE = {
     "pending": (),
     "snapshots": (),
     "recording": (),
-    "kept": (),
+    "completed_files": (),
     "note": None,
     "operator": None,
     "watching": (),

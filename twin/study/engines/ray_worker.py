@@ -123,7 +123,7 @@ def _differ(name: str, ours: dict[str, str], theirs: dict[str, str]) -> bool:
 
 
 def _difference_text(name: str, ours: dict[str, str], theirs: dict[str, str]) -> str:
-    """What differs: by name alone where it is a digest, which says nothing to anyone."""
+    """Return the differences; of digests only the names."""
     if name in ("study", "files", "sources"):
         return name
     return f"{name} ({ours.get(name, 'none')} for {theirs.get(name, 'none')})"

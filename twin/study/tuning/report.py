@@ -31,7 +31,7 @@ def drawings(name: str, result: TuningResult, objectives: Sequence[Objective]) -
     by_label = {law.law: _trials(law, objectives) for law in result.laws if law.trials}
     if not by_label:
         return []
-    names = [each.called for each in objectives]
+    names = [objective.called for objective in objectives]
     figures = [
         Drawing(
             "trials.png",
@@ -48,7 +48,7 @@ def drawings(name: str, result: TuningResult, objectives: Sequence[Objective]) -
 def _trials(law: LawResult, objectives: Sequence[Objective]) -> fronts.Trials:
     from spheretwin.viz.figures import fronts
 
-    signs = np.array([each.sign for each in objectives])
+    signs = np.array([objective.sign for objective in objectives])
     best = {trial.finished.number for trial in law.best}
     lost = [np.nan] * len(objectives)
     values = [lost if trial.tried.ended == Ended.LOST else trial.tried.values for trial in law.trials]
@@ -72,7 +72,7 @@ FIELDS = ("trial", "gains", "fields", "values")
 def summary(result: TuningResult, objectives: Sequence[Objective]) -> dict[str, Any]:
     """Summary by law: statuses of its trials, its start, and its best or its front."""
     return {
-        "objectives": [each.model_dump(mode="json") for each in objectives],
+        "objectives": [objective.model_dump(mode="json") for objective in objectives],
         "laws": {law.law: _of_law(law, objectives) for law in result.laws},
         "trials": result.trials,
         "of": result.of,
@@ -103,7 +103,7 @@ def _of_law(law: LawResult, objectives: Sequence[Objective]) -> dict[str, Any]:
     counts = Counter(trial.tried.ended for trial in law.trials)
     lost = [trial.tried.reason for trial in law.trials if trial.tried.ended == Ended.LOST]
     return {
-        "ended": {str(each): counts[each] for each in Ended},
+        "ended": {str(ending): counts[ending] for ending in Ended},
         "lost": lost[0] if lost else None,
         "rows": sum(len(trial.tried.by_row) for trial in law.trials),
         "start": _trial_figures(law.start, objectives) if law.start else None,
@@ -198,7 +198,7 @@ def markdown(
     whole = summary(result, optimise.objective)
     used = ", ".join(f"{name} {version}" for name, version in versions.items())
     lines = [f"# {study.name}", "", study.description, "", *_what(study), ""]
-    lines += [pieces.figure(each) for each in figures]
+    lines += [pieces.figure(figure) for figure in figures]
     for law, of_law in whole["laws"].items():
         lines += [f"## {law}", "", _counted(of_law), "", *_chosen(of_law), ""]
     lines += [f"Made by `{command}` with {used}.", ""]
@@ -209,10 +209,12 @@ def _what(study: Study) -> list[str]:
     """Objectives, method and ranges."""
     optimise = section_of(study)
     ranges = [
-        [each.called, each.law or "all", *_range(each), _sets(each.settings), each.reason]
-        for each in optimise.gain
+        [gain.called, gain.law or "all", *_range(gain), _sets(gain.settings), gain.reason]
+        for gain in optimise.gain
     ]
-    objectives = " and ".join(f"*{each.called}*, to {each.direction}" for each in optimise.objective)
+    objectives = " and ".join(
+        f"*{objective.called}*, to {objective.direction}" for objective in optimise.objective
+    )
     fresh = (
         f" *Fresh* are {optimise.fresh} further seeds, which no trial was chosen by."
         if optimise.fresh
@@ -242,10 +244,10 @@ def _range(gain: Gain) -> list[str]:
 
 def _sets(settings: Sequence[Any]) -> str:
     return ", ".join(
-        f"{each.field}"
-        + (f" · {each.factor:g}" if each.factor != 1 else "")
-        + (f" (power {each.power:g})" if each.power != 1 else "")
-        for each in settings
+        f"{setting.field}"
+        + (f" · {setting.factor:g}" if setting.factor != 1 else "")
+        + (f" (power {setting.power:g})" if setting.power != 1 else "")
+        for setting in settings
     )
 
 
@@ -258,21 +260,21 @@ def _counted(of_law: Mapping[str, Any]) -> str:
 def _chosen(of_law: Mapping[str, Any]) -> list[str]:
     """The start, and the best or the front: gains, fields, objectives."""
     labelled = [("start", of_law["start"])] if of_law["start"] else []
-    labelled += [(str(each["trial"]), each) for each in of_law["best"]]
-    values = next((list(each["values"]) for _, each in labelled if each["values"]), None)
+    labelled += [(str(candidate["trial"]), candidate) for candidate in of_law["best"]]
+    values = next((list(candidate["values"]) for _, candidate in labelled if candidate["values"]), None)
     if values is None:
         return ["No trial completed."]
     columns = dict.fromkeys(
-        [*labelled[0][1]["gains"], *(field for _, each in labelled for field in each["fields"])]
+        [*labelled[0][1]["gains"], *(field for _, candidate in labelled for field in candidate["fields"])]
     )
-    is_fresh = any(each["fresh"] or each["fresh_reason"] for _, each in labelled)
-    head = ["trial", *columns, *values, *(f"{each}, fresh" for each in values if is_fresh)]
+    is_fresh = any(candidate["fresh"] or candidate["fresh_reason"] for _, candidate in labelled)
+    head = ["trial", *columns, *values, *(f"{name}, fresh" for name in values if is_fresh)]
     body = []
-    for label, each in labelled:
-        numbers = {**each["gains"], **each["fields"]}
+    for label, candidate in labelled:
+        numbers = {**candidate["gains"], **candidate["fields"]}
         values_of = map(numbers.get, columns)
         cells = ["off" if value is None else f"{value:.4g}" for value in values_of]
-        for figures in [each["values"], *([each["fresh"]] if is_fresh else [])]:
+        for figures in [candidate["values"], *([candidate["fresh"]] if is_fresh else [])]:
             cells += [f"{figures[name]:.4g}" if figures else "lost" for name in values]
         body.append([label, *cells])
     return pieces.table(head, body, [False, *(True for _ in head[1:])])

@@ -175,9 +175,10 @@ class Proposer:
         self._law, self._gains, self._optimise, self._seed, self._rows = law, gains, optimise, seed, rows
         self._storage = storage
         directions = [
-            "minimize" if each.direction == "minimise" else "maximize" for each in optimise.objective
+            "minimize" if objective.direction == "minimise" else "maximize"
+            for objective in optimise.objective
         ]
-        if law in {each.study_name for each in storage.get_all_studies()}:
+        if law in {existing.study_name for existing in storage.get_all_studies()}:
             self._study = self._optuna.load_study(study_name=law, storage=storage)
         else:
             self._study = self._optuna.create_study(study_name=law, storage=storage, directions=directions)

@@ -14,7 +14,7 @@ from spheretwin.study.row import Result, Rows
 
 
 class Ended(StrEnum):
-    """How a trial ended."""
+    """End of a trial."""
 
     COMPLETED = "completed"
     PRUNED = "pruned"
@@ -56,7 +56,7 @@ def run_trial(
     rows: Rows,
     conditions: Sequence[Row],
     fields: Mapping[str, float],
-    wanted: Sequence[Objective],
+    objectives: Sequence[Objective],
     has_lost: Callable[[Sequence[float]], bool],
     stop_requested: Callable[[], bool],
 ) -> Tried | None:
@@ -69,7 +69,7 @@ def run_trial(
         Rows of its law.
     fields : mapping
         Value of each field that its gains set.
-    wanted : sequence of Objective
+    objectives : sequence of Objective
     has_lost : callable
         Whether a trial whose objectives are at least these has lost.
     stop_requested : callable
@@ -79,11 +79,11 @@ def run_trial(
         if stop_requested():
             return None
         result = rows.run(with_fields(row, fields))
-        numbers = [optimise.of_row(objective, figure_of(result, objective)) for objective in wanted]
-        if reason := _reason_of_loss(row, result, wanted, numbers):
-            return Tried(Ended.LOST, reason, _values(wanted, by_row, len(conditions)), by_row)
+        numbers = [optimise.of_row(objective, figure_of(result, objective)) for objective in objectives]
+        if reason := _reason_of_loss(row, result, objectives, numbers):
+            return Tried(Ended.LOST, reason, _values(objectives, by_row, len(conditions)), by_row)
         by_row.append([number for number in numbers if number is not None])
-        values = _values(wanted, by_row, len(conditions))
+        values = _values(objectives, by_row, len(conditions))
         if len(by_row) < len(conditions) and has_lost(values):
             return Tried(Ended.PRUNED, "", values, by_row)
     return Tried(Ended.COMPLETED, "", values, by_row)
@@ -100,19 +100,19 @@ def figure_of(result: Result, objective: Objective) -> object:
 
 
 def _reason_of_loss(
-    row: Row, result: Result, wanted: Sequence[Objective], numbers: Sequence[float | None]
+    row: Row, result: Result, objectives: Sequence[Objective], numbers: Sequence[float | None]
 ) -> str:
     if result.status != Status.COMPLETED:
         more = result.error or result.reason
         return f"row {row.number}: {result.status}{f', {more}' if more else ''}"
-    for objective, value in zip(wanted, numbers, strict=True):
+    for objective, value in zip(objectives, numbers, strict=True):
         if value is None:
             return f"row {row.number}: no {objective.metric}{f', {result.error}' if result.error else ''}"
     return ""
 
 
-def _values(wanted: Sequence[Objective], by_row: Sequence[Sequence[float]], rows: int) -> list[float]:
+def _values(objectives: Sequence[Objective], by_row: Sequence[Sequence[float]], rows: int) -> list[float]:
     return [
         optimise.of_rows(objective, [values[i] for values in by_row], rows)
-        for i, objective in enumerate(wanted)
+        for i, objective in enumerate(objectives)
     ]

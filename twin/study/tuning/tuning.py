@@ -252,7 +252,7 @@ def tune(
     laws = [_Law(study, rows, law) for law in study.law or (None,)]
     gains.check(study, rows, [(law.gains, law.conditions[0]) for law in laws])
     make_folder(folder)
-    wanted = trials or optimise.planned
+    planned = trials or optimise.planned
     with sampler.opened(folder / sampler.NAME) as storage:
         digest = _digest(rows, optimise)
         for law in laws:
@@ -261,7 +261,7 @@ def tune(
             )
         resumed = sum(len(law.proposer.finished) for law in laws)
         try:
-            _fill(laws, wanted, threads, done, stop_requested)
+            _fill(laws, planned, threads, done, stop_requested)
         finally:
             trials_of_laws = [
                 (law.called, law.gains, law.proposer.finished, law.proposer.best) for law in laws
@@ -272,7 +272,7 @@ def tune(
     return TuningResult(
         laws=results,
         trials=finished,
-        of=max(wanted * len(laws), finished),
+        of=max(planned * len(laws), finished),
         resumed=resumed,
         wall_s=time.perf_counter() - started,
         table=folder / NAME,
@@ -291,11 +291,11 @@ class _Law:
         self.gains: tuple[Gain, ...] = gains.gains_of(study, law, rows)
         self.conditions: list[Row] = [row for row in Grid(rows.study) if row.law == law]
 
-    def batches(self, wanted: int) -> Iterator[range]:
+    def batches(self, planned: int) -> Iterator[range]:
         """Numbers of the trials that are proposed together and not all finished."""
         finished = {trial.number for trial in self.proposer.finished}
-        for first in range(0, wanted, self._optimise.together):
-            batch = range(first, min(first + self._optimise.together, wanted))
+        for first in range(0, planned, self._optimise.together):
+            batch = range(first, min(first + self._optimise.together, planned))
             if not finished.issuperset(batch):
                 yield batch
 
@@ -357,11 +357,11 @@ class _Law:
 
 
 def _fill(
-    laws: Sequence[_Law], wanted: int, threads: int | None, done: Callable[[int, int], None], stop: Stop
+    laws: Sequence[_Law], planned: int, threads: int | None, done: Callable[[int, int], None], stop: Stop
 ) -> None:
     """Run the missing trials."""
-    total = wanted * len(laws)
-    finished = sum(min(len(law.proposer.finished), wanted) for law in laws)
+    total = planned * len(laws)
+    finished = sum(min(len(law.proposer.finished), planned) for law in laws)
     done(finished, total)
 
     def report() -> None:
@@ -370,7 +370,7 @@ def _fill(
         done(finished, total)
 
     for law in laws:
-        for i, batch in enumerate(law.batches(wanted)):
+        for i, batch in enumerate(law.batches(planned)):
             if stop():
                 return
             if i == 0:

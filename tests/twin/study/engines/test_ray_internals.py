@@ -2,14 +2,11 @@
 
 import sys
 
-import pytest
-
-from spheretwin.study.engines import ray_internals
-
-ray = pytest.importorskip("ray")
+from spheretwin.study.engines import ray_cluster, ray_internals
 
 
 def test_a_silenced_driver_prints_no_message_of_a_node(monkeypatch, capsys):
+    ray = ray_cluster._ray(local=True)  # on import Ray reads how a cluster authenticates
     worker = ray._private.worker
     assert hasattr(worker, "_worker_logs_enabled"), "Ray has no switch _worker_logs_enabled any more"
     monkeypatch.setattr(worker, "_worker_logs_enabled", True)
