@@ -248,13 +248,17 @@ NOT_FOR_A_RUN = (
 
 
 def test_a_run_imports_nothing_that_it_does_not_need():
-    asked = (
+    script = (
         "import sys; from spheretwin import cli;"
         "code = cli.main(['simulate', 'hold', '--duration', '0.01', '--json']);"
-        f"found = sorted(set({NOT_FOR_A_RUN.split()!r}) & set(sys.modules));"
-        "sys.exit(f'{code} {found}')"
+        f"imported = sorted(set({NOT_FOR_A_RUN.split()!r}) & set(sys.modules));"
+        "sys.exit(f'{code} {imported}')"
     )
-    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, cwd="/", check=False)
+    # The first run may have to compile, and the compiler imports more.
+    _, done = [
+        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd="/", check=False)
+        for _ in range(2)
+    ]
     assert done.stderr.splitlines()[-1] == "0 []"
 
 
