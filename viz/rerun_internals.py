@@ -236,6 +236,7 @@ class EncodedLayout(rrb.Blueprint):
     def __init__(self, *parts: rrb.BlueprintPart) -> None:
         super().__init__(*parts, auto_views=False, auto_layout=False)
         self._encoder = LogEncoder(rr.TimeColumn("blueprint", sequence=[0]))
+        # The method asks for a `RecordingStream`; it uses only the methods that `LogEncoder` has.
         super()._log_to_stream(self._encoder)  # type: ignore[arg-type]
         self._chunks = self._encoder.chunks()
 
@@ -348,6 +349,7 @@ def read_assets() -> dict[str, Asset]:
             stderr=subprocess.DEVNULL,
         ) as process:
             assets = {path: _read(port, path, process) for path in FILES}
+            # mypy does not know that `stdin=PIPE` above makes it a stream.
             process.stdin.close()  # type: ignore[union-attr]
     except OSError as error:
         raise SpheretwinError(

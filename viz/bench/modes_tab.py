@@ -182,6 +182,7 @@ class ModesTab:
 
     def _keys(self, gui: viser.GuiApi) -> None:
         for key, axis, sign in _ARROWS:
+            # The hotkeys in `_ARROWS` are those of viser's literal type, which it does not export.
             command = gui.add_command(f"{AXES[axis]} {sign * STEP_DEG:+g}°", hotkey=key)  # type: ignore[arg-type]
 
             @command.on_trigger

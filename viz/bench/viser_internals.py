@@ -61,10 +61,12 @@ def with_guard(guard: Callable[[ServerArguments], servers.serve]) -> Iterator[No
         )
 
     with _server_lock:
+        # mypy refuses to replace a class by a function; viser only calls it, with these arguments.
         plain, servers.serve = servers.serve, create  # type: ignore[misc, assignment]
         try:
             yield
         finally:
+            # mypy refuses any assignment to a class of a module; this restores the original.
             servers.serve = plain  # type: ignore[misc]
     if not guarded.is_set():
         raise SpheretwinError(

@@ -27,7 +27,11 @@ def test_numba_has_the_private_names(owner, name):
     assert hasattr(owner, name), f"numba {numba.__version__} has no {owner}.{name}: see numba_internals.py"
 
 
-@pytest.mark.skipif(not COMPILES, reason="nothing is compiled")
+# With NUMBA_DISABLE_JIT functions stay plain Python: numba's internals are not used then.
+needs_compiler = pytest.mark.skipif(not COMPILES, reason="NUMBA_DISABLE_JIT: no function is compiled")
+
+
+@needs_compiler
 def test_the_option_nrt_switches_allocation_off():
     @compiled
     def allocate():
@@ -42,7 +46,7 @@ def test_the_option_nrt_switches_allocation_off():
         allocate_without()
 
 
-@pytest.mark.skipif(not COMPILES, reason="nothing is compiled")
+@needs_compiler
 def test_a_compiled_function_reads_the_cache_of_this_package(monkeypatch):
     @compiled
     def double(x):

@@ -10,13 +10,14 @@ from hashlib import blake2b
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from spheretwin import scenario as scenarios
 from spheretwin.faults.targets import TARGETS
 from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.session import Session
+from tests.twin.electronics.slow_residual import residual_of
 
 PERIOD_S, GROUPS, SEED, TICKS, CONVERSIONS = 1e-3, 18, 21, 400, 3
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(30)
@@ -139,21 +140,8 @@ class Copy:
 
     @staticmethod
     def residual(channel):
-        order = np.arange(1, 5)
-        phases = drawn("sensors.potentiometer", channel).uniform(0, 2 * np.pi, 4)
-
-        def shape(turn):
-            return np.sum(np.cos(np.multiply.outer(turn, order) + phases) / order**2, axis=-1)
-
-        grid = np.linspace(-np.pi, np.pi, 10_000)
-        top = grid[np.argmax(np.abs(shape(grid)))]
-        found = minimize_scalar(
-            lambda turn: -abs(shape(turn)),
-            bounds=(top - 1e-3, top + 1e-3),
-            method="bounded",
-            options={"xatol": 1e-9},
-        )
-        return lambda angle: np.radians(0.02) / -found.fun * shape(angle * 2 * np.pi / np.radians(300))
+        shape = residual_of(drawn("sensors.potentiometer", channel).uniform(0, 2 * np.pi, 4))
+        return lambda angle: np.radians(0.02) * shape(angle * 2 * np.pi / np.radians(300))
 
     def acting(self, kind, place=None):
         """Faults of a kind at this tick, in the order of the plan: mode, value, name of the part."""

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numba.core.runtime import _nrt_python, rtsys
-from scipy.optimize import minimize_scalar
 
 from spheretwin import electronics
 from spheretwin.electronics.random_streams import noise_rows, noise_table, stream_key, width_of
@@ -15,6 +14,7 @@ from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, s
 from spheretwin.models.base.compiled import compiled
 from spheretwin.scenario.fields import every_field
 from spheretwin.scenario.hardware import PROTOTYPE_SENSORS
+from tests.twin.electronics.slow_residual import residual_of
 
 NO_NOISE = np.empty(0)
 STAGES = {
@@ -113,25 +113,11 @@ def test_rates_are_the_true_ones_and_what_was_handed_over_is_kept():
 
 
 def slow_residual(fields, seed, channel, angle):
-    """The residual as its definition reads, its peak found on a grid and searched for further."""
-    order = np.arange(1, 5)
-    phases = np.random.default_rng([seed, stream_key("sensors.potentiometer"), channel]).uniform(
-        0, 2 * np.pi, 4
-    )
-
-    def shape(turn):
-        return np.sum(np.cos(np.multiply.outer(turn, order) + phases) / order**2, axis=-1)
-
-    grid = np.linspace(-np.pi, np.pi, 10_000)
-    top = grid[np.argmax(np.abs(shape(grid)))]
-    found = minimize_scalar(
-        lambda turn: -abs(shape(turn)),
-        bounds=(top - 1e-3, top + 1e-3),
-        method="bounded",
-        options={"xatol": 1e-9},
-    )
+    """Residual of a channel at an angle, with the phases of its random stream."""
+    stream = np.random.default_rng([seed, stream_key("sensors.potentiometer"), channel])
+    residual = residual_of(stream.uniform(0, 2 * np.pi, 4))
     turn = 2 * np.pi * angle / fields.electrical_angle_rad
-    return fields.nonlinearity_rad / -found.fun * shape(turn)
+    return fields.nonlinearity_rad * residual(turn)
 
 
 def slow_chain(section, seed, q):
