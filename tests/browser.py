@@ -277,27 +277,29 @@ class Page:
         """What can be read on it."""
         return self.evaluate("document.body.innerText")
 
-    def at(self, place):
-        """Middle of an element, pixels; a place that is a pair of numbers already stays.
-
-        Parameters
-        ----------
-        place : str or (float, float)
-            A CSS selector, `text=WORDS` for the innermost element with these words, or x and y.
-        """
-        return self.evaluate(_MIDDLE % json.dumps(place)) if isinstance(place, str) else place
-
     def click(self, place):
-        """Press and let go the left button."""
+        """Press and release the left button.
+
+        An element is clicked once it rests and nothing covers its middle. A press that misses it, because it
+        moved meanwhile, is kept from what is there now, and repeated.
+        """
         self.front()
-        x, y = self._found(place)
-        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
-            self._mouse(kind, x, y, clickCount=0 if kind == "mouseMoved" else 1)
+        until = time.monotonic() + PATIENCE_S
+        while True:
+            x, y = self._place(place)
+            if isinstance(place, str):
+                self.evaluate(_GUARD)
+            for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+                self._mouse(kind, x, y, clickCount=0 if kind == "mouseMoved" else 1)
+            if not isinstance(place, str) or self.evaluate(_END_GUARD):
+                return
+            if time.monotonic() > until:
+                raise BrowserError(f"no click reached {place}")
 
     def drag(self, start, end, steps=10, pause_s=0.03):
         """Press at one place, move to another in steps, let go there; a pause after each lets it be drawn."""
         self.front()
-        (x, y), (to_x, to_y) = self._found(start), self._found(end)
+        (x, y), (to_x, to_y) = self._place(start), self._place(end)
         self._mouse("mouseMoved", x, y)
         time.sleep(pause_s)
         self._mouse("mousePressed", x, y, clickCount=1)
@@ -355,38 +357,66 @@ class Page:
         if not url.startswith(WITHIN):
             self.requests.append(url)
 
-    def _found(self, place):
-        """Where it is once it is there, and no longer slides into its place."""
-        until, found = time.monotonic() + PATIENCE_S, None
-        while True:
-            before, found = found, self.at(place)
-            if found is not None and (found == before or not isinstance(place, str)):
-                return found
-            if time.monotonic() > until:
-                raise BrowserError(f"nothing on the page at {place}")
-            time.sleep(0.05)
+    def _place(self, place):
+        """Middle of an element, pixels, once it rests and can be pressed; x and y stay as they are."""
+        if not isinstance(place, str):
+            return place
+        return self.wait_for(_MIDDLE % json.dumps(place))
 
     def _mouse(self, kind, x, y, **more):
         button = "none" if kind == "mouseMoved" and "buttons" not in more else "left"
         self.command("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, **more)
 
 
-_MIDDLE = """(() => {
+# Middle of an element whose box is the same in two frames and whose middle nothing else covers. The last
+# element that was looked for stays known to the page.
+_MIDDLE = """(async () => {
   const place = %s;
-  let element = null;
-  if (place.startsWith("text=")) {
+  const find = () => {
+    if (!place.startsWith("text=")) return document.querySelector(place);
     const words = place.slice(5);
     const all = [...document.querySelectorAll("body *")].filter(
       (each) => each.innerText?.trim() === words && each.getClientRects().length);
-    element = all[all.length - 1];
-  } else {
-    element = document.querySelector(place);
-  }
+    return all[all.length - 1];
+  };
+  const frame = () => new Promise(requestAnimationFrame);
+  const box = (element) => {
+    const {x, y, width, height} = element.getBoundingClientRect();
+    return [x, y, width, height];
+  };
+  const element = window.pressed = find();
   if (!element) return null;
   element.scrollIntoView({block: "nearest"});
-  const box = element.getBoundingClientRect();
-  return [box.x + box.width / 2, box.y + box.height / 2];
+  await frame();
+  const before = box(element);
+  await frame();
+  const [x, y, width, height] = box(element);
+  const same = element.isConnected && width && height && before.join() === [x, y, width, height].join();
+  const middle = [x + width / 2, y + height / 2];
+  return same && element.contains(document.elementFromPoint(...middle)) ? middle : null;
 })()"""
+
+# Between these two, events of the mouse reach only the element that was looked for.
+_GUARD = """(() => {
+  const {pressed} = window;
+  const kinds = ["pointerdown", "mousedown", "pointerup", "mouseup", "click"];
+  let clicked = false;
+  const guard = (event) => {
+    if (!pressed.contains(event.target)) {
+      event.stopImmediatePropagation();
+      event.preventDefault();
+    } else {
+      clicked ||= event.type === "click";
+    }
+  };
+  for (const kind of kinds) window.addEventListener(kind, guard, true);
+  window.endGuard = () => {
+    for (const kind of kinds) window.removeEventListener(kind, guard, true);
+    return clicked;
+  };
+  return true;
+})()"""
+_END_GUARD = "endGuard()"
 
 _DRAWN = """new Promise((done) => {
   const draw = (left) => left ? requestAnimationFrame(() => draw(left - 1)) : done(true);

@@ -17,6 +17,9 @@ from spheretwin.models.base.errors import InputError
 # Whatever the width of the terminal, and whether or not the tests run in the background of a shell,
 # which ignores interruptions there: what they start has neither from them.
 os.environ.pop("COLUMNS", None)
+# Rerun reads this when it is first imported: as in the command line, it writes no log of its own, whichever
+# test imports it.
+os.environ["RUST_LOG"] = "off"
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Derandomised: a failure on one machine is a failure on every machine. No deadline: machines are shared.

@@ -1,7 +1,10 @@
 """Damaged files of a run: a flipped bit is reported on one line, or it changes nothing that is read."""
 
 import json
+import os
 import random
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -22,6 +25,9 @@ from tests.twin.analysis.runs import PLANT, WITH_EVENTS, written
 
 # The path of a file below the folder of a test, and a sentence.
 LONGEST_LINE = 600
+
+# Kind of the message with the name of a run or of a layout.
+NAME = 1
 
 # What a user is told of damage names the place.
 PLACES = ("row group 0", "footer", "entity ", "at byte ", "chunk ", "so damaged that Rerun crashes")
@@ -104,6 +110,24 @@ def test_rows_that_a_recording_leaves_out_are_no_damage(decimated, tmp_path, cap
         assert passed(path, content, whole, capfd), f"bit {bit}"
 
 
+def test_rerun_writes_no_line_of_its_own(decimated, tmp_path):
+    """Rerun reports some damage that changes no telemetry in its own log, as that of the layout's name."""
+    content, path = bytearray(decimated.read_bytes()), tmp_path / "run.rrd"
+    *_, layout = (place for place in places_of_messages(decimated) if content[place] == NAME)
+    content[content.index(b"spheretwin-", layout)] ^= 1 << 3  # {pheretwin-
+    path.write_bytes(content)
+    environment = {name: value for name, value in os.environ.items() if name != "RUST_LOG"}
+    done = subprocess.run(
+        [sys.executable, "-m", "spheretwin", "review", str(path), "--json"],
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"spheretwin: warning: {path} keeps 60 rows a second")
+    assert (done.returncode, same_run(read(path), read(decimated))) == (cli.DONE, True)
+
+
 def test_every_bit_of_the_footer_counts(files, tmp_path):
     """The footer states where columns are, how they are encoded, and what was run."""
     content, path = files[0].read_bytes(), tmp_path / "run.parquet"
@@ -173,7 +197,7 @@ def test_a_flipped_bit_of_a_recording_without_an_end_costs_no_row_behind_it(file
     whole = read(path)
     assert not whole.whole
     assert len(whole.table) >= 1000
-    messages = extent_of_messages(path)
+    messages = places_of_messages(path)
     for place in messages[1:-1][:: len(messages) // 12]:
         for bit in (0, 3, 8, 17, 30, 64, 66, 70, 80, 85, 100):  # kind, then length
             damaged = bytearray(content[: int(0.8 * len(content))])
@@ -183,7 +207,7 @@ def test_a_flipped_bit_of_a_recording_without_an_end_costs_no_row_behind_it(file
             assert run is None or same_run(run, whole), f"message at {place}, bit {bit}"
 
 
-def extent_of_messages(path):
+def places_of_messages(path):
     """Places of the messages of a recording."""
     content, places = path.read_bytes(), [12]
     while places[-1] + 16 <= len(content):
