@@ -1,4 +1,8 @@
-"""Colours: one for each axis, each law and each coil group, and a scale for signed currents."""
+"""Colours: one for each axis, each law and each role, and a scale for signed currents.
+
+Lines are drawn on the grounds of the viewer's dark and light theme, on pages, and on the ground of 3D views.
+Their colours have a contrast of at least 3:1 to each of these (WCAG 2), and differ for colour-blind readers.
+"""
 
 import colorsys
 from collections.abc import Sequence
@@ -9,51 +13,55 @@ from numpy.typing import NDArray
 Colour = tuple[int, int, int]
 Dash = str | tuple[int, tuple[int, ...]]
 
-AXIS_COLOURS: tuple[Colour, ...] = ((235, 87, 87), (76, 190, 120), (86, 140, 245))
-"""α or x, β or y, γ or z."""
+AXIS_COLOURS: tuple[Colour, ...] = ((208, 16, 8), (0, 166, 132), (112, 60, 240))
+"""α or x, β or y, γ or z: red, teal green, violet blue.
+
+The CIE76 difference of any two is at least 40 under deuteranopia, protanopia and tritanopia.
+"""
 
 BACKGROUND: Colour = (20, 22, 26)
-TRACE: Colour = (255, 190, 60)
+TRACE: Colour = (230, 112, 20)
 NORTH: Colour = (150, 155, 163)
 SOUTH: Colour = (44, 47, 54)
-COIL_TORQUE: Colour = (224, 92, 178)
-LOAD: Colour = (26, 168, 160)
-PAYLOAD: Colour = (26, 168, 160)
+COIL_TORQUE: Colour = (152, 80, 72)
+LOAD: Colour = (184, 136, 80)
+PAYLOAD: Colour = (184, 136, 80)
 """Weight on the shaft, and its torque."""
-DESIRED_TRACE: Colour = (130, 136, 146)
+DESIRED_TRACE: Colour = (168, 136, 184)
+"""Path of the desired tip, and secondary lines: mauve."""
 
-COMMAND: Colour = (240, 240, 240)
-"""Commands and references, drawn thin over the actual values."""
+COMMAND: Colour = (110, 101, 104)
+"""Commands and references, drawn thin over the actual values: grey."""
 
-PLAIN: Colour = (200, 204, 212)
+PLAIN: Colour = (124, 146, 136)
 """Lines of no axis and no current."""
 
-GROUP: Colour = (160, 130, 110)
+GROUP: Colour = (150, 116, 84)
 """Each of many coil groups, where only their spread matters."""
 
-ESTIMATE: Colour = (255, 190, 60)
-"""Measurements, estimates and predictions of the controller."""
+ESTIMATE: Colour = (230, 112, 20)
+"""Measurements, estimates and predictions of the controller: orange."""
 
-FINE: Colour = (48, 84, 70)
-WARNING: Colour = (214, 140, 30)
-FAILURE: Colour = (205, 60, 150)
+FINE: Colour = (64, 120, 120)
+WARNING: Colour = (176, 120, 72)
+FAILURE: Colour = (232, 40, 216)
 """States; red is an axis, and a current."""
 
 LAW_COLOURS: dict[str, str] = {
-    "pd": "#0072b2",
-    "pid": "#e69f00",
-    "lqi": "#8c3315",
-    "computed_torque": "#2d00b2",
-    "backstepping_sliding_mode": "#ffa6ff",
-    "adrc": "#400040",
-    "super_twisting": "#426654",
-    "adaptive_fuzzy": "#009e73",
-    "afsm": "#d55e00",
-    "afsm_eso": "#000000",
+    "pd": "#0098f0",
+    "pid": "#c88000",
+    "lqi": "#b88880",
+    "computed_torque": "#8050b0",
+    "backstepping_sliding_mode": "#ff38a8",
+    "adrc": "#b000ff",
+    "super_twisting": "#587048",
+    "adaptive_fuzzy": "#70a050",
+    "afsm": "#a84810",
+    "afsm_eso": "#407888",
 }
-"""Colours of the shipped laws by name, distinct for the colour-blind and by their lightness in grey.
+"""Colours of the shipped laws by name: of no axis, no command and no state.
 
-Okabe and Ito's for the paper's laws and PID; the others are where these leave most room.
+Within the contrasts of this module, these ten differ most for normal and colour-blind sight.
 """
 
 LAW_MARKS: dict[str, tuple[str, Dash]] = {
@@ -70,9 +78,9 @@ LAW_MARKS: dict[str, tuple[str, Dash]] = {
 }
 """Marker and dash of the same laws, in Matplotlib's notation: they are distinct in grey print."""
 
-OTHER_LAW = "#8a5a9e"
+OTHER_LAW = "#904898"
 
-SPARE = ("#56b4e9", "#cc79a7", "#7a7a1a", "#30343a", "#a65628")
+SPARE = ("#e85838", "#a800d0", "#c80838", "#c06060", "#2060ff")
 """Colours for laws whose own colour is in use."""
 
 _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
@@ -83,7 +91,7 @@ _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
     ("H", "--"),
 )
 
-_NEGATIVE, _IDLE, _POSITIVE = (60, 130, 255), (150, 110, 84), (255, 70, 50)
+_NEGATIVE, _ZERO, _POSITIVE = (48, 112, 224), (128, 128, 128), (230, 76, 24)
 
 
 def mixed(colour: Colour, other: Colour, share: float) -> Colour:
@@ -91,6 +99,12 @@ def mixed(colour: Colour, other: Colour, share: float) -> Colour:
     red, green, blue = (
         round((1 - share) * own + share * its) for own, its in zip(colour, other, strict=True)
     )
+    return red, green, blue
+
+
+def rgb(colour: str) -> Colour:
+    """Return a page's colour as red, green, blue."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return red, green, blue
 
 
@@ -109,19 +123,52 @@ def law_colours(laws: Sequence[str]) -> dict[str, str]:
     return colours
 
 
+def run_colours(laws: Sequence[str]) -> list[str]:
+    """Return a colour for each run, as a page writes it: no two are the same.
+
+    The first run of a law has the law's own colour; another one has a spare colour, then that of a law
+    without a run.
+
+    Parameters
+    ----------
+    laws : sequence of str
+        Law of each run.
+    """
+    own = [law_colour(law) for law in laws]
+    spare = [colour for colour in (*SPARE, *LAW_COLOURS.values(), OTHER_LAW) if colour not in own]
+    if len({*own, *spare}) < len(laws):
+        return _spaced_hues(len(laws))
+    colours: list[str] = []
+    for colour in own:
+        colours.append(spare.pop(0) if colour in colours else colour)
+    return colours
+
+
+_LUMINANCE = (0.2126, 0.7152, 0.0722)
+_MIDDLE = 0.2
+"""Share of white's luminance: it has a contrast of 4:1 to black and to white."""
+
+
+def _spaced_hues(count: int) -> list[str]:
+    """Return colours of evenly spaced hues and one luminance."""
+    lightness = np.linspace(0.2, 0.8, 200)
+    colours = []
+    for place in range(count):
+        shares = np.array([colorsys.hls_to_rgb(place / count, value, 0.8) for value in lightness])
+        linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+        middle = shares[np.searchsorted(linear @ _LUMINANCE, _MIDDLE)]
+        colours.append("#{:02x}{:02x}{:02x}".format(*np.round(255 * middle).astype(int)))
+    return colours
+
+
 def law_marks(laws: Sequence[str]) -> dict[str, tuple[str, Dash]]:
     """Return marker and dash for each law: those of its name, or spare ones."""
     spare = iter(_SPARE_MARKS)
     return {law: LAW_MARKS.get(law) or next(spare, _SPARE_MARKS[-1]) for law in laws}
 
 
-def group_colours(count: int) -> list[Colour]:
-    """Evenly spaced hues."""
-    return [_rgb(j / count) for j in range(count)]
-
-
 def current_colours(current: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:
-    """Colour of signed currents: blue for negative, copper when idle, red for positive.
+    """Return the colours of signed currents on a linear scale: blue negative, grey zero, orange-red positive.
 
     Parameters
     ----------
@@ -135,12 +182,6 @@ def current_colours(current: NDArray[np.float64], limit: float) -> NDArray[np.ui
     (..., 3) uint8 array
         Red, green, blue.
     """
-    # The root shows small currents, which are most of them.
-    share = np.sqrt(np.clip(np.abs(current) / limit, 0, 1))[..., None]
+    share = np.clip(np.abs(current) / limit, 0, 1)[..., None]
     full = np.where(current[..., None] < 0, _NEGATIVE, _POSITIVE)
-    return np.round((1 - share) * np.array(_IDLE) + share * full).astype(np.uint8)
-
-
-def _rgb(hue: float) -> Colour:
-    red, green, blue = colorsys.hsv_to_rgb(hue, 0.6, 0.95)
-    return round(255 * red), round(255 * green), round(255 * blue)
+    return np.round((1 - share) * np.array(_ZERO) + share * full).astype(np.uint8)

@@ -27,7 +27,7 @@ from spheretwin.viz.comparison.layout import (
     application,
     layout,
 )
-from spheretwin.viz.comparison.runs import ComparedRun, leaders, on_dark, run_colours
+from spheretwin.viz.comparison.runs import ComparedRun, leaders
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.plots import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
@@ -155,7 +155,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
         tuple(run.name for run in runs if run.events),
         size_of(subjects[0].actuator),
     )
-    colours = [on_dark(colour) for colour in run_colours([run.law for run in runs])]
+    colours = [theme.rgb(colour) for colour in theme.run_colours([run.law for run in runs])]
     with recorded(path, application(view), layout(view)) as recording:
         recording.send_recording_name(f"{len(runs)} runs")
         recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)

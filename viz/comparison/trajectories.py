@@ -16,7 +16,6 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import send_line, send_path, send_point, style_path, style_point
 from spheretwin.viz.comparison.merged_recording import recorded
-from spheretwin.viz.comparison.runs import on_dark
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
 from spheretwin.viz.layout.view import application_of
@@ -65,7 +64,7 @@ def write(path: Path, trajectories: Mapping[str, LawTrajectory], actuator: Actua
         _send_tip(recording, DESIRED, longest.t_s, desired, theme.DESIRED_TRACE)
         colours = theme.law_colours([trajectory.law for trajectory in trajectories.values()])
         for label, trajectory in trajectories.items():
-            _send_trajectory(recording, label, trajectory, actuator, on_dark(colours[trajectory.law]))
+            _send_trajectory(recording, label, trajectory, actuator, theme.rgb(colours[trajectory.law]))
     return path
 
 

@@ -60,7 +60,7 @@ def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
     return figure
 
 
-MARKS = {Level.INFO: ("|", INK), Level.WARN: ("^", "#e69f00"), Level.ERROR: ("X", BROKEN)}
+MARKS = {Level.INFO: ("|", INK), Level.WARN: ("^", "#b07848"), Level.ERROR: ("X", BROKEN)}
 
 
 def events_figure(runs: Sequence[ComparedRun], title: str) -> Figure:

@@ -18,15 +18,15 @@ from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
 from spheretwin.models.base.files import whole_file
-from spheretwin.viz.comparison.runs import ComparedRun, run_colours
-from spheretwin.viz.theme import AXIS_COLOURS, law_colours, law_marks
+from spheretwin.viz.comparison.runs import ComparedRun
+from spheretwin.viz.theme import AXIS_COLOURS, law_colours, law_marks, run_colours
 
 Array = NDArray[np.float64]
 
 AXES = tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in AXIS_COLOURS)
-# Colours of Okabe and Ito: distinct for the colour-blind.
-SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00")
-INK, FAINT, BROKEN = "#30343a", "#a4aab3", "#c8102e"
+# Distinct for normal and colour-blind sight: CIE76 differences of 35 and more.
+SERIES = ("#648cf0", "#e66e00", "#8c00ff", "#96966e", "#a04682")
+INK, FAINT, BROKEN = "#30343a", "#848a93", "#c8102e"
 
 WIDTH_in = 8.0
 DPI = 150

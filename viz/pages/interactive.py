@@ -11,10 +11,11 @@ import plotly.graph_objects as plotly
 from plotly.offline import get_plotlyjs
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, run_colours
+from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
 from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octave_maxima
 from spheretwin.viz.pages import html
 from spheretwin.viz.quantities import Array, ScalarQuantity
+from spheretwin.viz.theme import run_colours
 
 # The browser contacts no host.
 POLICY = (

@@ -227,7 +227,7 @@ def _log(recording: rr.RecordingStream, lane: str, changes: list[Change]) -> Non
 
 
 # Axes, commands and estimates have the same colours in every plot.
-KEY = "α red, β green, γ blue; white commands and references, amber measurements and estimates"
+KEY = "α red, β green, γ blue; grey commands and references, orange measurements and estimates"
 
 
 class Summary:

@@ -1,0 +1,193 @@
+"""Colours: contrast on every ground, difference for every reader, and names that are true.
+
+Luminance, contrast, CIELAB and the simulation of colour blindness are implemented here once more.
+"""
+
+import colorsys
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from spheretwin.viz import theme
+from spheretwin.viz.figures import style
+from spheretwin.viz.recording.status import KEY
+
+GROUNDS = {
+    "viewer, dark": (13, 13, 13),
+    "viewer, light": (255, 255, 255),
+    "page, dark": (0x15, 0x18, 0x1C),
+    "3D view": theme.BACKGROUND,
+}
+
+# Machado, Oliveira and Fernandes (2009), severity 1.0, on linear red, green and blue.
+VISION = {
+    "normal": np.eye(3),
+    "protanopia": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deuteranopia": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "tritanopia": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
+}
+
+BODIES = ("BACKGROUND", "NORTH", "SOUTH")
+"""Surfaces of 3D views, which lights shade."""
+
+
+def linear(colour):
+    return [c / 255 / 12.92 if c / 255 <= 0.04045 else ((c / 255 + 0.055) / 1.055) ** 2.4 for c in colour]
+
+
+def contrast(colour, ground):
+    """Contrast ratio of WCAG 2."""
+    low, high = sorted(np.dot((0.2126, 0.7152, 0.0722), linear(each)) for each in (colour, ground))
+    return (high + 0.05) / (low + 0.05)
+
+
+def cielab(shares):
+    """CIELAB of linear red, green and blue, white D65."""
+    of_xyz = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
+                       [0.0193339, 0.1191920, 0.9503041]])  # fmt: skip
+    x, y, z = (of_xyz @ np.clip(shares, 0, 1)) / (of_xyz @ np.ones(3))
+    f = [math.cbrt(t) if t > (6 / 29) ** 3 else t / (3 * (6 / 29) ** 2) + 4 / 29 for t in (x, y, z)]
+    return 116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])
+
+
+def difference(one, other):
+    """The least CIE76 difference over all kinds of sight."""
+    return min(
+        math.dist(cielab(np.array(matrix) @ linear(one)), cielab(np.array(matrix) @ linear(other)))
+        for matrix in VISION.values()
+    )
+
+
+def rgb(text):
+    return tuple(int(text[i : i + 2], 16) for i in (1, 3, 5))
+
+
+def least_difference(colours):
+    return min(difference(*pair) for pair in combinations(colours, 2))
+
+
+def roles():
+    """Every colour of the theme, by its name."""
+    named = {}
+    for name, value in vars(theme).items():
+        if name.isupper() and not name.startswith("_") and name not in BODIES:
+            if name in ("LAW_COLOURS", "SPARE", "OTHER_LAW"):
+                texts = (
+                    value.values() if name == "LAW_COLOURS" else (value,) if name == "OTHER_LAW" else value
+                )
+                named |= {f"{name} {text}": rgb(text) for text in texts}
+            elif name == "AXIS_COLOURS":
+                named |= {f"axis {axis}": colour for axis, colour in zip("αβγ", value, strict=True)}
+            elif isinstance(value, tuple) and all(isinstance(entry, int) for entry in value):
+                named[name] = value
+    return named
+
+
+LAWS = [rgb(colour) for colour in theme.LAW_COLOURS.values()]
+ROLES = (theme.COMMAND, theme.ESTIMATE, theme.DESIRED_TRACE)
+
+
+def test_the_known_contrast_and_difference_of_two_colours():
+    # #777777 on white has 4.48:1 (WebAIM); sRGB red is L 53.24, a 80.09, b 67.20 (Lindbloom).
+    assert contrast((0x77, 0x77, 0x77), (255, 255, 255)) == pytest.approx(4.48, abs=0.005)
+    np.testing.assert_allclose(cielab(linear((255, 0, 0))), (53.24, 80.09, 67.20), atol=0.01)
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_every_line_has_a_contrast_of_three_on_every_ground(ground):
+    assert len(roles()) >= 30
+    ratios = {name: contrast(colour, GROUNDS[ground]) for name, colour in roles().items()}
+    assert {name: ratio for name, ratio in ratios.items() if ratio < 3} == {}
+
+
+@pytest.mark.parametrize("count", [8, 17, 40])
+def test_colours_of_many_runs_of_one_law_are_distinct_and_have_this_contrast(count):
+    colours = theme.run_colours(["afsm"] * count)
+    assert len(set(colours)) == count
+    assert min(contrast(rgb(colour), ground) for colour in colours for ground in GROUNDS.values()) >= 3
+
+
+def test_lines_of_figures_have_this_contrast_on_white():
+    for colour in (*style.SERIES, *style.AXES, style.INK, style.FAINT, style.BROKEN):
+        assert contrast(rgb(colour), (255, 255, 255)) >= 3, colour
+
+
+def test_axes_differ_for_every_reader():
+    assert least_difference(theme.AXIS_COLOURS) >= 40
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_lines_of_one_plot_differ_for_every_reader(axis):
+    # Within these contrasts, lightness L* is from 42 to 62: greys differ by no more than 20.
+    assert least_difference([theme.AXIS_COLOURS[axis], *ROLES]) >= 15
+
+
+def test_states_differ_for_every_reader():
+    assert least_difference([theme.FINE, theme.ESTIMATE, theme.WARNING, theme.FAILURE]) >= 25
+
+
+def test_marks_of_the_scene_differ_for_every_reader():
+    marks = (theme.TRACE, theme.DESIRED_TRACE, theme.COIL_TORQUE, theme.LOAD, theme.FAILURE)
+    assert least_difference([*theme.AXIS_COLOURS, *marks]) >= 17
+
+
+def test_laws_differ_for_every_reader_and_have_the_colour_of_no_role():
+    assert least_difference(LAWS) >= 17
+    assert least_difference([*LAWS, *map(rgb, theme.SPARE), rgb(theme.OTHER_LAW)]) >= 10
+    for law in (*LAWS, *map(rgb, theme.SPARE), rgb(theme.OTHER_LAW)):
+        assert min(difference(law, role) for role in (theme.COMMAND, theme.DESIRED_TRACE)) >= 10
+        assert difference(law, theme.FAILURE) >= 12
+
+
+def test_series_of_figures_differ_for_every_reader():
+    assert least_difference([rgb(colour) for colour in style.SERIES]) >= 35
+
+
+def hue_name(colour):
+    hue, saturation, _ = colorsys.rgb_to_hsv(*(value / 255 for value in colour))
+    if saturation < 0.15:
+        return "grey"
+    ends = {15: "red", 45: "orange", 75: "yellow", 175: "green", 200: "cyan", 270: "blue", 345: "magenta"}
+    return next((name for end, name in ends.items() if 360 * hue < end), "red")
+
+
+def test_the_key_names_the_colours():
+    axes = [f"{axis} {hue_name(colour)}" for axis, colour in zip("αβγ", theme.AXIS_COLOURS, strict=True)]
+    command, estimate = hue_name(theme.COMMAND), hue_name(theme.ESTIMATE)
+    assert f"{', '.join(axes)}; {command} commands and references, {estimate} measurements" in KEY
+
+
+def test_the_scale_of_currents_is_linear_with_a_neutral_zero():
+    shares = np.linspace(-1.25, 1.25, 41)
+    colours = theme.current_colours(8.0 * shares, 8.0).astype(float)
+    negative, zero, positive = (
+        theme.current_colours(np.array([a]), 8.0)[0].astype(float) for a in (-8, 0, 8)
+    )
+    assert len(set(zero)) == 1
+    assert hue_name(negative) == "blue"
+    assert positive[0] > 2 * max(positive[1:])
+    for share, colour in zip(np.clip(shares, -1, 1), colours, strict=True):
+        full = negative if share < 0 else positive
+        np.testing.assert_allclose(colour, zero + abs(share) * (full - zero), atol=0.5)  # eight bits
+
+
+def test_currents_differ_from_zero_and_by_their_sign_for_every_reader_and_are_visible():
+    negative, zero, positive = theme.current_colours(np.array([-1.0, 0.0, 1.0]), 1.0).tolist()
+    assert difference(negative, positive) >= 100
+    assert min(difference(negative, zero), difference(positive, zero)) >= 30
+    for colour in (negative, zero, positive):
+        assert min(contrast(colour, ground) for ground in GROUNDS.values()) >= 3
