@@ -127,6 +127,8 @@ class Contents:
         InputError
             There are none, or they are damaged.
         """
+        if self._facts is None and self.checked:
+            raise self._damaged(f"entity {SCENARIO}, component {FACTS}")
         if self._facts is None:
             raise InputError(
                 f"recording {self._path}: expected one of a run, received one without a run's facts"

@@ -128,6 +128,16 @@ def test_rerun_writes_no_line_of_its_own(decimated, tmp_path):
     assert (done.returncode, same_run(read(path), read(decimated))) == (cli.DONE, True)
 
 
+def test_facts_that_are_lost_are_reported_as_damage(files, tmp_path):
+    """A message of another kind is skipped: what it has is missing in a recording with checksums."""
+    content, path = bytearray(files[1].read_bytes()), tmp_path / "run.rrd"
+    facts = content.index(b"scenario")
+    content[max(place for place in places_of_messages(files[1]) if place < facts)] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="in entity scenario, component facts: the file is damaged"):
+        read(path)
+
+
 def test_every_bit_of_the_footer_counts(files, tmp_path):
     """The footer states where columns are, how they are encoded, and what was run."""
     content, path = files[0].read_bytes(), tmp_path / "run.parquet"
