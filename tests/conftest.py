@@ -28,7 +28,10 @@ hypothesis.settings.load_profile("reproducible")
 
 
 LONG_FILES = (
-    "test_ray_cluster.py", "test_crosscheck.py", "test_adding.py", "test_cli.py", "test_page.py",
+    "test_ray_cluster.py", "test_ray_ends.py", "test_ray_refusals.py", "test_crosscheck.py", "test_cli.py",
+    "test_page.py", "test_magnetics_command.py", "test_interruption.py", "test_processes.py",
+    "test_compiled.py", "test_bench_in_browser.py", "test_user_models.py", "test_comparison.py",
+    "test_live.py", "test_recorder_files.py", "test_adding.py",
 )  # fmt: skip
 """Files of few and long tests. They begin first, so that at the end no worker waits for another."""
 
@@ -40,8 +43,8 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers():
-    """Return one worker more than there are cores: tests that wait for processes leave a core free."""
-    return (os.cpu_count() or 1) + 1
+    """Return two workers more than there are cores: tests that wait for processes leave a core free."""
+    return (os.cpu_count() or 1) + 2
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """The command as its users meet it: a process, its exit code, its two streams."""
 
 import contextlib
-import hashlib
 import json
 import os
 import re
@@ -17,7 +16,6 @@ import pytest
 from spheretwin import cli
 from spheretwin.models.base import cache
 from spheretwin.models.telemetry.table import read_parquet
-from tests.package_copy import INSTALLED_AS, ROOT
 from tests.waiting import PATIENCE_S
 
 COMMAND = [sys.executable, "-m", "spheretwin"]
@@ -25,6 +23,15 @@ COMMAND = [sys.executable, "-m", "spheretwin"]
 
 def run_command(*arguments):
     return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True)
+
+
+def called(capfd, *arguments):
+    """Run the command in this process; return its exit code and what it wrote to its two streams."""
+    try:
+        code = cli.main([*map(str, arguments)])
+    except SystemExit as ended:  # --help ends in argparse
+        code = ended.code
+    return code, *capfd.readouterr()
 
 
 def started(*arguments):
@@ -60,10 +67,12 @@ def test_run_prints_a_table_and_writes_its_files(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["n.parquet", "n.rrd"]
 
 
-def test_json_stands_alone_on_stdout():
-    done = run_command("simulate", "hold", "--json", "--controller.law", "pd", "--duration", "0.2")
-    assert done.returncode == 0
-    figures = json.loads(done.stdout)
+def test_json_stands_alone_on_stdout(capfd):
+    code, stdout, _ = called(
+        capfd, "simulate", "hold", "--json", "--controller.law", "pd", "--duration", "0.2"
+    )
+    assert code == 0
+    figures = json.loads(stdout)
     assert figures["status"] == "completed"
     assert figures["scenario"]["controller"]["law"] == "pd"
     for name in ("max_abs_error_rad", "rms_error_rad", "tail_rms_error_rad"):
@@ -73,23 +82,23 @@ def test_json_stands_alone_on_stdout():
 
 
 def test_same_command_same_bytes_other_seed_other_bytes(tmp_path):
-    def written(name, *flags):
+    def written(run, name, seed):
         path = tmp_path / name
-        run_command("simulate", "nutation", "--duration", "0.3", "--telemetry", path, *flags)
+        run(["simulate", "nutation", "--duration", "0.3", "--telemetry", str(path), "--seed", seed])
         return path.read_bytes()
 
-    first = written("a.parquet", "--seed", "1")
-    assert written("b.parquet", "--seed", "1") == first
-    assert written("c.parquet", "--seed", "2") != first
+    first = written(cli.main, "a.parquet", "1")
+    assert written(lambda arguments: run_command(*arguments), "b.parquet", "1") == first  # another process
+    assert written(cli.main, "c.parquet", "2") != first
 
 
-def test_left_workspace_exits_1_and_keeps_the_run(tmp_path):
+def test_left_workspace_exits_1_and_keeps_the_run(tmp_path, capfd):
     path = tmp_path / "run.parquet"
     flags = ["--controller.law", "pd", "--disturbance.load", "5", "--telemetry", path, "--json"]
-    done = run_command("simulate", "sinusoid", *flags)
-    assert done.returncode == 1
-    assert json.loads(done.stdout)["status"] == "left_workspace"
-    assert "left_workspace" in one_line(done.stderr)
+    code, stdout, stderr = called(capfd, "simulate", "sinusoid", *flags)
+    assert code == 1
+    assert json.loads(stdout)["status"] == "left_workspace"
+    assert "left_workspace" in one_line(stderr)
     assert len(read_parquet(path)[0]) > 100
 
 
@@ -188,8 +197,11 @@ def _answers(host, port):
 INSTALLED = [str(Path(sys.executable).with_name("spheretwin"))]
 
 
-@pytest.mark.parametrize("command", [COMMAND, INSTALLED], ids=["module", "installed"])
-@pytest.mark.parametrize("arguments", [["fly"], ["simulate", "hold", "--plant.mjcf", "missing.xml"]])
+@pytest.mark.parametrize(
+    ("command", "arguments"),
+    [(COMMAND, ["fly"]), (INSTALLED, ["simulate", "hold", "--plant.mjcf", "missing.xml"])],
+    ids=["module", "installed"],
+)
 def test_a_refused_process_says_so_on_one_line_and_exits_2(command, arguments):
     done = subprocess.run([*command, *arguments], capture_output=True, text=True)
     assert done.returncode == 2
@@ -197,13 +209,18 @@ def test_a_refused_process_says_so_on_one_line_and_exits_2(command, arguments):
     assert arguments[-1] in one_line(done.stderr)
 
 
-def test_help_lists_verbs_options_and_fields():
-    assert "simulate" in run_command("--help").stdout
-    assert "--out" in run_command("magnetics", "curve", "--help").stdout
-    fields = run_command("simulate", "tilt", "--help")
-    assert fields.returncode == 0
+def help_of(capfd, *arguments):
+    code, stdout, stderr = called(capfd, *arguments, "--help")
+    assert (code, stderr) == (0, "")
+    return stdout
+
+
+def test_help_lists_verbs_options_and_fields(capfd):
+    assert "simulate" in help_of(capfd)
+    assert "--out" in help_of(capfd, "magnetics", "curve")
+    fields = help_of(capfd, "simulate", "tilt")
     for flag in ("--record", "--controller.law", "--plant.modelling-error", "--trajectory.rate-rad-s"):
-        assert flag in fields.stdout
+        assert flag in fields
 
 
 def test_reader_that_leaves_is_no_error():
@@ -218,25 +235,33 @@ def test_console_script_is_this_command():
     assert project["scripts"] == {"spheretwin": "spheretwin.cli:main"}
 
 
-def cache_of_one_run(folder):
-    """Cache that only one command writes: the same one for the same sources, beside the usual one if any."""
-    files = sorted(path for name in INSTALLED_AS for path in (ROOT / name).rglob("*.py"))
-    sources = b"".join(path.read_bytes() for path in files)
-    usual = cache.cache_folder()
-    return (usual.parent if usual else folder) / f"one-run-{hashlib.sha256(sources).hexdigest()[:16]}"
+# Prints the entries of the compile cache that one run compiles or loads.
+ENTRIES_OF_A_RUN = """
+import sys
+from spheretwin import cli
+from spheretwin.models.base import cache
+
+folder, opened = str(cache.cache_folder()), set()
+sys.addaudithook(lambda event, given: event == "open" and opened.add(str(given[0])))
+cli.main(["simulate", "hold", "--duration", "0.01", "--json"])
+sys.stderr.write("\\n".join(path for path in sorted(opened) if path.startswith(folder)))
+"""
 
 
 def test_what_is_not_chosen_is_not_compiled(tmp_path):
-    """The bounded allocation alone would take longer to compile than all the rest."""
-    folder = cache_of_one_run(tmp_path)
-    environment = {**os.environ, "SPHERETWIN_CACHE_DIR": str(folder)}
-    command = [*COMMAND, "simulate", "hold", "--duration", "0.01"]
-    subprocess.run(command, env=environment, capture_output=True, check=True)
-    entries = [path.name for path in folder.rglob("*") if path.is_file()]
-    assert any("allocate" in name or "allocation" in name for name in entries)
-    assert any("mujoco_rotor" in name for name in entries)
-    for part in ("bounded", "simplex", "plant-lagrangian"):
-        assert not [name for name in entries if part in name], part
+    """The bounded allocation alone would take longer to compile than all the rest.
+
+    An entry names the modules of all functions in it, also of those that it contains.
+    """
+    usual = cache.cache_folder()
+    environment = {**os.environ, "SPHERETWIN_CACHE_DIR": str(usual.parent if usual else tmp_path)}
+    command = [sys.executable, "-c", ENTRIES_OF_A_RUN]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    entries = [path.read_bytes() for path in map(Path, run.stderr.splitlines()) if path.is_file()]
+    for module in ("loop", "control.allocation.least_norm", "plant.mujoco_rotor"):
+        assert any(f"spheretwin.{module}".encode() in entry for entry in entries), module
+    for module in ("control.allocation.bounded", "control.allocation.simplex", "plant.lagrangian_rotor"):
+        assert not any(f"spheretwin.{module}".encode() in entry for entry in entries), module
 
 
 # What comes with an extra, and what takes long to import though a run needs nothing of it.
@@ -278,8 +303,6 @@ def test_the_command_alone_imports_no_verb(option):
     assert "spheretwin" in process.stdout
 
 
-def test_every_verb_has_help_and_a_description():
+def test_every_verb_has_help_and_a_description(capfd):
     for verb in cli.VERBS:
-        process = run_command(verb, "--help")
-        assert process.returncode == 0, process.stderr
-        assert process.stdout.startswith(f"usage: spheretwin {verb}")
+        assert help_of(capfd, verb).startswith(f"usage: spheretwin {verb}")
