@@ -14,41 +14,50 @@ from spheretwin.models.telemetry.table import Table
 Array = NDArray[np.float64]
 
 
-class DecimatedSeries(NamedTuple):
-    """Values at equal distances."""
+class Envelope(NamedTuple):
+    """Bounds and means of a column over bins of rows; NaN for a bin without a number."""
 
-    values: Array  # (m,)
-    stride: float
-    """Rows for each of the numbers; 1 if none was omitted."""
+    starts: NDArray[np.int64]
+    """First row of each bin; bins have equal sizes, except the last."""
+    low: Array
+    high: Array
+    mean: Array
 
 
-def decimate_extremes(values: Array, most: int) -> DecimatedSeries:
-    """Return a column unchanged, or the lowest and highest value of each block of rows, the earlier first.
+def envelope(values: Array, most: int) -> Envelope:
+    """Reduce a column to at most `most` bins.
 
     Parameters
     ----------
     values : (n,) array
         A NaN is no value.
     most : int
-        Largest number of values, at least 2.
+        Largest number of bins.
     """
-    if len(values) <= most:
-        return DecimatedSeries(values, 1.0)
-    blocks, size = _blocks(values[:, None], most // 2)
-    block = blocks[:, :, 0]
-    none = np.isnan(block)
-    low, high = np.argmin(np.where(none, np.inf, block), 1), np.argmax(np.where(none, -np.inf, block), 1)
-    places = np.sort(np.stack([low, high], axis=1), axis=1)
-    return DecimatedSeries(np.take_along_axis(block, places, axis=1).ravel(), size / 2)
+    starts = np.arange(0, len(values), -(-len(values) // most))
+    is_number = ~np.isnan(values)
+    count = np.add.reduceat(is_number, starts, dtype=np.int64)
+    total = np.add.reduceat(np.where(is_number, values, 0.0), starts)
+    mean = np.divide(total, count, out=np.full(len(starts), np.nan), where=count > 0)
+    return Envelope(starts, np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts), mean)
 
 
-def decimate_largest(values: Array, most: int) -> DecimatedSeries:
-    """Reduce columns (n, k) to at most `most` rows (m, k): of each block, the value farthest from zero."""
-    if len(values) <= most:
-        return DecimatedSeries(values, 1.0)
-    blocks, size = _blocks(values, most)
-    places = np.argmax(np.where(np.isnan(blocks), -1.0, np.abs(blocks)), axis=1)
-    return DecimatedSeries(np.take_along_axis(blocks, places[:, None], axis=1)[:, 0], float(size))
+class Cells(NamedTuple):
+    """Means and standard deviations of columns over cells of rows."""
+
+    starts: NDArray[np.int64]
+    """First row of each cell; cells have equal sizes, except the last."""
+    mean: Array
+    deviation: Array
+
+
+def mean_and_deviation(values: Array, most: int) -> Cells:
+    """Reduce columns (n, k) to at most `most` cells (m, k)."""
+    starts = np.arange(0, len(values), -(-len(values) // most))
+    sizes = np.diff(starts, append=len(values))[:, None]
+    mean = np.add.reduceat(values, starts, axis=0) / sizes
+    residual = values - np.repeat(mean, sizes[:, 0], axis=0)
+    return Cells(starts, mean, np.sqrt(np.add.reduceat(residual**2, starts, axis=0) / sizes))
 
 
 def octave_maxima(frequency: Array, values: Array, lines_per_octave: int) -> tuple[Array, Array]:
@@ -69,14 +78,6 @@ def octave_maxima(frequency: Array, values: Array, lines_per_octave: int) -> tup
     ends = np.append(starts[1:], len(values))
     rows = [first + int(np.argmax(values[first:last])) for first, last in zip(starts, ends, strict=True)]
     return frequency[rows], values[rows]
-
-
-def _blocks(values: Array, most: int) -> tuple[Array, int]:
-    """Return rows (n, k) in blocks (b, size, k) of one size; the last is filled up with its own last row."""
-    size = -(-len(values) // most)
-    missing = -len(values) % size
-    filled = np.concatenate([values, np.repeat(values[-1:], missing, axis=0)])
-    return filled.reshape(-1, size, values.shape[1]), size
 
 
 Places = NDArray[np.intp]

@@ -1,43 +1,43 @@
-"""Decimation keeps lowest, highest and largest values, compared with loops over every block."""
+"""Decimation keeps bounds, means and highest lines, compared with loops over every bin."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octave_maxima
+from spheretwin.viz.decimation import envelope, mean_and_deviation, octave_maxima
 
 numbers = st.floats(-1e6, 1e6) | st.just(np.nan)
 
 
-@given(st.lists(numbers, min_size=1, max_size=60), st.integers(2, 70))
-def test_every_lowest_and_highest_is_kept_where_it_is(values, most):
-    column = np.array(values)
-    few = decimate_extremes(column, most)
-    assert len(few.values) <= most
-    if len(column) <= most:
-        assert few.stride == 1
-        assert few.values is column
-        return
-    size = int(2 * few.stride)
-    assert size == -(-len(column) // (most // 2))
-    for block, pair in enumerate(few.values.reshape(-1, 2)):
-        rows = column[block * size : (block + 1) * size]
-        finite = rows[~np.isnan(rows)]
-        if len(finite):
-            assert (min(pair), max(pair)) == (finite.min(), finite.max())
-            first, last = (list(rows).index(each) for each in pair)
-            assert first <= last or pair[0] == pair[1]
+@given(st.lists(numbers, min_size=1, max_size=60), st.integers(1, 70))
+def test_an_envelope_has_the_bounds_and_the_mean_of_every_bin(values, most):
+    bins = envelope(np.array(values), most)
+    size = -(-len(values) // most)
+    assert list(bins.starts) == list(range(0, len(values), size))
+    assert len(bins.starts) <= most
+    for place, start in enumerate(bins.starts):
+        present = [value for value in values[start : start + size] if not np.isnan(value)]
+        drawn = (bins.low[place], bins.high[place], bins.mean[place])
+        if present:
+            assert drawn[:2] == (min(present), max(present))
+            # A sum of 60 numbers below 1e6.
+            assert drawn[2] == pytest.approx(sum(present) / len(present), abs=1e-8)
+        else:
+            assert np.isnan(drawn).all()
 
 
-def test_the_strongest_of_each_column_keeps_its_sign():
+def test_cells_have_mean_and_standard_deviation_of_each_column():
     values = np.random.default_rng(0).normal(size=(103, 4))
-    few = decimate_largest(values, 20)
-    assert few.stride == 6  # 103 rows in at most 20
-    for block, row in enumerate(few.values):
-        rows = values[6 * block : 6 * block + 6]
-        assert np.array_equal(row, rows[np.abs(rows).argmax(axis=0), range(4)])
-    assert decimate_largest(values, 200).values is values
+    cells = mean_and_deviation(values, 20)
+    assert list(cells.starts) == list(range(0, 103, 6))  # 103 rows in at most 20
+    for place, start in enumerate(cells.starts):
+        rows = values[start : start + 6]
+        np.testing.assert_allclose(cells.mean[place], rows.mean(axis=0), atol=1e-15)
+        np.testing.assert_allclose(cells.deviation[place], rows.std(axis=0), atol=1e-15)
+    every = mean_and_deviation(values, 200)
+    assert np.array_equal(every.mean, values)
+    assert not every.deviation.any()
 
 
 @pytest.mark.parametrize("each", [1, 7, 48])

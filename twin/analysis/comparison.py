@@ -1,98 +1,33 @@
-"""Comparison of runs: differences of their figures, labels, merged recording and page of figures."""
+"""Comparison of runs: labels, merged recording and page of figures."""
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spheretwin.analysis.differences import LONGEST_VALUE, common_conditions, scenario_differences
 from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.analysis.run_summary import amplitudes, peaks
 from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError, shortened, shown
 from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
-from spheretwin.viz.comparison.runs import ComparedRun, Spectrum, leaders
+from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, Spectrum, leaders
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.quantities import QuantityRows, ScalarQuantity, scalar_quantities
 from spheretwin.viz.terminal.runs import differences as table_rows
 
-# Numbers of which no difference is meaningful.
-NOT_COMPARED = ("seed",)
-
-
-def differences(figures: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return, for each run but the first, every number of both reports minus that of the first.
-
-    Entry by entry for lists; None if one of the two has no value.
-
-    Parameters
-    ----------
-    figures : sequence of mapping
-        Report of each run.
-    """
-    first, *others = figures
-    return [
-        {
-            "path": other["path"],
-            **{
-                name: _difference(first[name], value)
-                for name, value in other.items()
-                if name in first and name not in NOT_COMPARED and _are_numbers(first[name], value)
-            },
-        }
-        for other in others
-    ]
-
-
-def _are_numbers(first: Any, value: Any) -> bool:
-    """True if both are numbers, lists of numbers of one length, or one of these and None."""
-    if isinstance(first, list) and isinstance(value, list):
-        return len(first) == len(value) and all(map(_are_numbers, first, value))
-    numbers = [item for item in (first, value) if item is not None]
-    of_lists = all(isinstance(item, list) and all(_is_number(entry) for entry in item) for item in numbers)
-    return bool(numbers) and (all(map(_is_number, numbers)) or (len(numbers) == 1 and of_lists))
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _difference(first: Any, value: Any) -> Any:
-    if first is None or value is None:
-        return None
-    if isinstance(first, list):
-        return [_difference(*pair) for pair in zip(first, value, strict=True)]
-    return value - first
-
-
-# Fields listed first, in the notation of the paper.
-FIRST_FIELDS = {
-    "plant.modelling_error": "m",
-    "disturbance.load": "L",
-    "hardware": "hardware",
-    "fault": "fault",
-    "name": "scenario",
-    "seed": "seed",
-}
 MOST_DIFFERENCES, LEGEND_LENGTH = 6, 48
 """Differences in a label, and characters of a legend's line."""
-LONGEST_VALUE, LONGEST_STEM = 24, 40
-"""Characters of a value in a label, and of a file's name."""
-
-# Fields that follow from another one: if that one differs, they are not listed.
-IMPLIED_FIELDS = {
-    "name": ("description", "duration", "trajectory."),
-    "controller.law": ("controller.",),
-    "plant.modelling_error": ("plant.modelling_torque_Nm",),
-    "hardware": ("sensors.", "estimator.", "drive.", "watchdog.", "plant.", "nominal."),
-}
+LONGEST_STEM = 40
+"""Characters of a file's name."""
 
 
 def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
@@ -106,9 +41,14 @@ def labels(runs: Sequence[Reviewed], longest: int = 10**6) -> list[str]:
     longest : int
         Characters of a label; number, file and law are always included.
     """
-    parts_of_runs = differing_fields([run.record.scenario for run in runs])
+    differences = [
+        (name, values)
+        for name, values in scenario_differences([run.record.scenario for run in runs])
+        if name != "law"
+    ][:MOST_DIFFERENCES]
     run_labels = []
-    for place, (run, parts) in enumerate(zip(runs, parts_of_runs, strict=True), start=1):
+    for place, run in enumerate(runs, start=1):
+        parts = [f"{name} {shortened(values[place - 1], LONGEST_VALUE)}" for name, values in differences]
         stem, law = shortened(run.path.stem, LONGEST_VALUE), _law(run)
         label = f"{place} {stem}" if stem == law else f"{place} {stem}: {law}"
         for part in parts:
@@ -124,43 +64,6 @@ def names(runs: Sequence[Reviewed]) -> list[str]:
     """Return a unique word for each run, without characters that have a meaning in a path."""
     stems = [shortened(re.sub(r"[^\w-]+", "_", run.path.stem), LONGEST_STEM) for run in runs]
     return [f"run_{place}_{stem.replace('…', '_')}" for place, stem in enumerate(stems, start=1)]
-
-
-def differing_fields(scenarios: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """Return the fields that differ among scenarios, with their values in each, at most six."""
-    flat = [dict(_fields(scenario)) for scenario in scenarios]
-    all_names = list(dict.fromkeys([*FIRST_FIELDS, *(name for fields in flat for name in fields)]))
-    different = [name for name in all_names if len({fields.get(name, "none") for fields in flat}) > 1]
-    implied = [part for name, parts in IMPLIED_FIELDS.items() if name in different for part in parts]
-    shown_fields = [
-        name for name in different if name in FIRST_FIELDS or not any(map(name.startswith, implied))
-    ]
-    return [
-        [
-            f"{FIRST_FIELDS.get(name, name)} {fields.get(name, 'none')}"
-            for name in shown_fields[:MOST_DIFFERENCES]
-        ]
-        for fields in flat
-    ]
-
-
-def _fields(value: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
-    """Dotted names and values, each as a text."""
-    for name, inside in value.items():
-        if isinstance(inside, Mapping):
-            yield from _fields(inside, f"{before}{name}.")
-        else:
-            yield before + name, shortened(_text(inside), LONGEST_VALUE)
-
-
-def _text(value: Any) -> str:
-    """Return a value as text: a whole number without a point, for entries of a list their names."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, list) and all(isinstance(item, Mapping) for item in value):
-        words = [" ".join(word for word in item.values() if isinstance(word, str)) for item in value]
-        return " + ".join(words) or "none"
-    return f"{value:g}" if isinstance(value, float) and value == float(f"{value:g}") else json.dumps(value)
 
 
 SUFFIX = ".rrd"
@@ -209,7 +112,7 @@ def merge(runs: Sequence[Reviewed], path: Path) -> None:
         for run, of in zip(runs, map(of_the_actuator, runs), strict=True)
     ]
     with np.errstate(all="ignore"):  # numbers in damaged files may have any size
-        merged_recording.write(path, drawn_runs, subjects, _runs_text(runs))
+        merged_recording.write(path, drawn_runs, subjects, _runs_text(runs, drawn_runs))
 
 
 def compared_runs(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list[ComparedRun]:
@@ -238,10 +141,31 @@ def compared_runs(runs: Sequence[Reviewed], *, every_tick: bool = False) -> list
             run.period_s,
             _rows(run, run.every_tick if every_tick else run.table),
             run.metadata,
-            tuple(events(run)),
+            tuple(run_events := events(run)),
+            _early_end(run, run_events),
         )
         for run, name, label in run_texts
     ]
+
+
+def _early_end(run: Reviewed, events: Sequence[Event]) -> EarlyEnd | None:
+    """Return time and reason of the end of a run that is not complete."""
+    status = run.record.status
+    if status is Status.COMPLETED:
+        return None
+    if status is None:
+        return EarlyEnd(float(run.table["t_s"][-1]), "not closed", "the file was not closed")
+    return EarlyEnd(float(run.table["t_s"][-1]), status.replace("_", " "), events[-1][2])
+
+
+def _difference_table(runs: Sequence[Reviewed]) -> list[str]:
+    """Return the fields in which scenarios differ as lines of a Markdown table, a column for each run."""
+    rows = scenario_differences([run.record.scenario for run in runs])
+    if not rows:
+        return ["The scenarios of the runs are equal."]
+    head = ["field", *(f"run {place}" for place in range(1, len(runs) + 1))]
+    cells = [[_plain(cell) for cell in (name, *values)] for name, values in rows]
+    return markdown.table(head, cells, [False] * len(head))
 
 
 def _rows(run: Reviewed, table: Table) -> QuantityRows:
@@ -267,11 +191,17 @@ def _law(run: Reviewed) -> str:
     return str(run.record.scenario["controller"]["law"])
 
 
-def _runs_text(runs: Sequence[Reviewed]) -> str:
-    """Return a description of each run in Markdown, with the label that it has in every plot."""
-    status = (f"{run.record.status or 'not closed'} at {run.simulated_s:.3f} s" for run in runs)
-    lines = [f"- **{label}**, {ended}" for label, ended in zip(labels(runs), status, strict=True)]
-    return "\n".join([*lines, "", "The thin white line is the reference."])
+def _runs_text(runs: Sequence[Reviewed], drawn_runs: Sequence[ComparedRun]) -> str:
+    """Return a description of the runs in Markdown: labels, ends, differences of scenarios."""
+    conditions = common_conditions([run.record.scenario for run in runs])
+    lines = [f"**{_plain(conditions)}**", ""]
+    for label, run in zip(labels(runs), drawn_runs, strict=True):
+        end = run.early_end
+        text = f"**{end.status} at {end.t_s:.3f} s**: {end.reason}" if end else "completed"
+        lines.append(f"- {_plain(label)}, {text}")
+    lines += ["", "## Differences of the scenarios", "", *_difference_table(runs), ""]
+    lines.append("The thin grey line is the reference. A cross marks the end of a run that is not complete.")
+    return "\n".join(lines)
 
 
 if TYPE_CHECKING:
@@ -312,9 +242,11 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
     tables = [run.table for run in drawn_runs]
     leading, quantities = leaders(tables), scalar_quantities(tables)
     spectra = [_spectra(run) for run in runs]
-    title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs"
+    conditions = common_conditions([run.record.scenario for run in runs])
+    title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs: {conditions}"
     with np.errstate(all="ignore"):  # what damage leaves of numbers may be of any size
-        markdown.save_drawings(into, _drawings(drawn_runs, leading, quantities, spectra), vector=True)
+        drawings = _drawings(drawn_runs, leading, quantities, spectra, conditions)
+        markdown.save_drawings(into, drawings, vector=True)
         over_time = interactive.over_time(drawn_runs, leading, quantities)
     content = interactive.page(
         title,
@@ -322,7 +254,7 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
         over_time,
         interactive.error_spectra(drawn_runs, spectra),
         _above(title, drawn_runs, interactive.points_per_line(drawn_runs, leading, quantities)),
-        _below(drawn_runs, figures),
+        _below(runs, drawn_runs, figures),
     )
     return markdown.save_text(into / PAGE, content)
 
@@ -343,17 +275,24 @@ def _drawings(
     leading: Sequence[int],
     quantities: Sequence[ScalarQuantity],
     spectra: Sequence[list[Spectrum]],
+    conditions: str,
 ) -> Iterator[Drawing]:
     from spheretwin.viz.figures.comparison import currents, events_figure, over_time
     from spheretwin.viz.figures.comparison import spectra as of_errors
     from spheretwin.viz.pages.markdown import Drawing
 
+    def named(title: str) -> str:
+        return f"{title}: {conditions}" if conditions else title
+
     for group, inside in groupby(quantities, key=lambda quantity: quantity.group):
         title = TITLES[group]
-        yield Drawing(f"{group}.png", title, over_time(runs, leading, list(inside), title))
-    yield Drawing("currents.png", title := "Currents of all groups", currents(runs, title))
-    yield Drawing("spectra.png", title := "Spectra of the tracking errors", of_errors(runs, spectra, title))
-    yield Drawing("events.png", title := "Events", events_figure(runs, title))
+        yield Drawing(f"{group}.png", title, over_time(runs, leading, list(inside), named(title)))
+    title = "Currents of all groups"
+    yield Drawing("currents.png", title, currents(runs, named(title)))
+    title = "Spectra of the tracking errors"
+    yield Drawing("spectra.png", title, of_errors(runs, spectra, named(title)))
+    title = "Events"
+    yield Drawing("events.png", title, events_figure(runs, named(title)))
 
 
 def _spectra(run: Reviewed) -> list[Spectrum]:
@@ -373,14 +312,19 @@ def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
         " buttons switch runs. The wide grey line is the reference.",
     ]
     if thin:
-        lines.append("Long runs are drawn by the lowest and highest value of every few ticks.")
+        lines.append(
+            "Long runs are drawn by the lowest and highest value of every few ticks, a band, and their mean."
+        )
     return "\n".join(lines)
 
 
-def _below(runs: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
-    head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in runs)]
+def _below(runs: Sequence[Reviewed], drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
+    head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in drawn)]
     rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures)]
-    return "\n".join(["## Figures", "", *markdown.table(head, rows, [False] + [True] * len(runs))])
+    lines = ["## Figures", "", *markdown.table(head, rows, [False] + [True] * len(runs)), ""]
+    if len(runs) > 1:
+        lines += ["## Differences of the scenarios", "", *_difference_table(runs)]
+    return "\n".join(lines)
 
 
 def _plain(text: str) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from spheretwin.analysis import tolerances
-from spheretwin.analysis.comparison import differences
+from spheretwin.analysis.differences import differences
 from spheretwin.analysis.recorded_run import Reviewed, read
 from spheretwin.analysis.run_summary import figures
 from spheretwin.analysis.tolerances import Exceeded, exceeded

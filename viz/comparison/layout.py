@@ -15,14 +15,17 @@ from spheretwin.viz.layout.views import eye
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.motion import TRAIL_S
 
-COMPARE, RUNS, TIP = "compare", "runs", "tip"
-"""Parts of the paths of entities, after the name of a run, except `RUNS`."""
+COMPARE, END, TIP = "compare", "end", "tip"
+"""Parts of the paths of entities, after the name of a run."""
+
+RUNS, LEGEND = "runs", "legend"
+"""Entities of all runs: their description, and their colours with labels."""
 
 REFERENCE = "what_was_asked"
 """Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
 
-# Plots that share a row are too narrow for names; the plot with its own row shows them.
-NAMED, BESIDE_TEXTS = "whole", "more"
+LARGE, BESIDE_TEXTS = "whole", "more"
+"""Groups of the plot that is higher than the others, and of plots in tabs with the texts."""
 
 
 class Plot(NamedTuple):
@@ -49,6 +52,8 @@ class ComparisonView(NamedTuple):
     """Names of the runs with changes of state."""
     logs: tuple[str, ...]
     """Names of the runs with events."""
+    failed: tuple[str, ...]
+    """Names of the runs that are not complete."""
     size: float
     """Size of the first run's actuator, which is drawn completely."""
 
@@ -70,8 +75,8 @@ def layout(view: ComparisonView) -> rrb.Blueprint:
     )
     return blueprint(
         rrb.Horizontal(
-            rrb.Vertical(_bodies(view), texts, row_shares=[3, 1]),
-            rrb.Vertical(*rows, row_shares=[4 if group == NAMED else 3 for group in groups]),
+            rrb.Vertical(_bodies(view), _legend(view), texts, row_shares=[5, 0.5 + 0.45 * len(view.runs), 3]),
+            rrb.Vertical(*rows, row_shares=[4 if group == LARGE else 3 for group in groups]),
             column_shares=[2, 3],
             name="compare",
         )
@@ -79,18 +84,22 @@ def layout(view: ComparisonView) -> rrb.Blueprint:
 
 
 def _plots(view: ComparisonView, group: str) -> list[rrb.TimeSeriesView]:
-    return [_plot(view, plot, legend=group == NAMED) for plot in view.plots if plot.group == group]
+    return [_plot(view, plot) for plot in view.plots if plot.group == group]
 
 
-def _plot(view: ComparisonView, plot: Plot, *, legend: bool) -> rrb.TimeSeriesView:
+def _plot(view: ComparisonView, plot: Plot) -> rrb.TimeSeriesView:
     reference_lines = [f"/{REFERENCE}/{run}/{plot.name}" for run in view.leaders] if plot.desired else []
     return rrb.TimeSeriesView(
         origin="/",
-        contents=[*reference_lines, *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs)],
+        contents=[
+            *reference_lines,
+            *(f"/{run}/{COMPARE}/{plot.name}" for run in view.runs),
+            *(f"/{run}/{END}/{plot.name}" for run in view.failed),
+        ],
         name=plot.title,
         axis_x=time_axis(view.duration_s),
         axis_y=rrb.ScalarAxis(range=plot.limits),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(visible=False),
         interaction=rrb.PlotInteraction(tooltip_mode="All"),
     )
 
@@ -107,6 +116,14 @@ def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
         line_grid=False,
         eye_controls=eye(view.size),
         overrides={f"{tip}/path": time_range(TRAIL_S) for tip in tips},
+    )
+
+
+def _legend(view: ComparisonView) -> rrb.Spatial2DView:
+    """View of the colours and labels of the runs: a legend within a plot would cover lines."""
+    bounds = rrb.VisualBounds2D(x_range=[-0.1, 1.1], y_range=[-0.5, len(view.runs) - 0.1])
+    return rrb.Spatial2DView(
+        origin=f"/{LEGEND}", name="runs", visual_bounds=bounds, background=list(theme.BACKGROUND)
     )
 
 

@@ -16,9 +16,11 @@ from rerun.chunk import Chunk
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import Tip, body, send_line
+from spheretwin.viz.comparison.ghosts import Array, Tip, body, send_line
 from spheretwin.viz.comparison.layout import (
     COMPARE,
+    END,
+    LEGEND,
     REFERENCE,
     RUNS,
     TIP,
@@ -27,13 +29,14 @@ from spheretwin.viz.comparison.layout import (
     application,
     layout,
 )
+from spheretwin.viz.comparison.ranges import LEAST, PlotRange, plot_range
 from spheretwin.viz.comparison.runs import ComparedRun, leaders
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.plots import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import ScalarQuantity, scalar_quantities
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
-from spheretwin.viz.recording.part import RecordingPart, RecordingSubject
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
@@ -107,8 +110,8 @@ def recorded(path: Path, application: str, layout: rrb.Blueprint) -> Iterator[rr
             raise pipe.error
 
 
-# Least half range, for values near zero; and steps that fit in the lowest of the plots.
-LEAST, STEPS = 1e-3, 6
+STEPS = 6
+"""Steps that can be labelled in the lowest of the plots."""
 
 
 def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingSubject], text: str) -> Path:
@@ -137,28 +140,23 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
         _ = subject.meshes  # a missing one is reported before there is a file
     tables = [run.table for run in runs]
     quantities, leading = scalar_quantities(tables), leaders(tables)
+    ranges = [plot_range(runs, [quantity.values(run.rows) for run in runs]) for quantity in quantities]
     view = ComparisonView(
         tuple(run.name for run in runs),
         tuple(runs[place].name for place in leading),
-        tuple(
-            Plot(
-                quantity.name,
-                quantity.heading,
-                quantity.group,
-                quantity.desired is not None,
-                _limits(quantity, runs),
-            )
-            for quantity in quantities
-        ),
+        tuple(_plot(quantity, of_quantity) for quantity, of_quantity in zip(quantities, ranges, strict=True)),
         max(float(table["t_s"][-1]) for table in tables),
         tuple(run.name for run in runs if StateChanges().of(run.table)),
         tuple(run.name for run in runs if run.events),
+        tuple(run.name for run in runs if run.early_end),
         size_of(subjects[0].actuator),
     )
     colours = [theme.rgb(colour) for colour in theme.run_colours([run.law for run in runs])]
     with recorded(path, application(view), layout(view)) as recording:
         recording.send_recording_name(f"{len(runs)} runs")
+        text = "\n".join([text, *_outside(quantities, ranges)])
         recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+        _log_legend(recording, runs, colours)
         for place, (run, subject, colour) in enumerate(zip(runs, subjects, colours, strict=True)):
             below = cast(rr.RecordingStream, SubtreeStream(recording, run.name))
             parts = [
@@ -168,14 +166,13 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
                 StateLanes(subject),
             ]
             _write_run(below, run, parts)
-            for quantity in quantities:
-                entity, t_s, values = (
-                    f"{COMPARE}/{quantity.name}",
-                    run.table["t_s"],
-                    quantity.values(run.rows),
-                )
+            for quantity, plot in zip(quantities, view.plots, strict=True):
+                values = quantity.values(run.rows)
                 width = THICK if quantity.desired else MIDDLE  # the reference is drawn over it
-                send_line(below, entity, run.label, t_s, values, colour, width)
+                entity = f"{COMPARE}/{quantity.name}"
+                send_line(below, entity, run.label, run.table["t_s"], values, colour, width)
+                if run.early_end:
+                    _send_end(below, f"{END}/{quantity.name}", run, np.clip(values, *plot.limits), colour)
         for place in leading:
             run, reference = runs[place], SubtreeStream(recording, f"{REFERENCE}/{runs[place].name}")
             _write_reference(
@@ -216,13 +213,52 @@ def _write_reference(
             )
 
 
-def _limits(quantity: ScalarQuantity, runs: Sequence[ComparedRun]) -> tuple[float, float]:
-    """Range of all values of all runs, in which numbers can be read."""
-    if quantity.limits:
-        return quantity.limits
-    values = np.concatenate([quantity.values(run.rows) for run in runs])
-    finite = values[np.isfinite(values)]
-    return labelled(float(np.min(finite, initial=0.0)), float(np.max(finite, initial=0.0)), LEAST, STEPS)
+def _plot(quantity: ScalarQuantity, of_quantity: PlotRange) -> Plot:
+    """Return the plot of a quantity; its title states that values are outside of its range."""
+    low, high, outside = of_quantity
+    limits, title = quantity.limits, quantity.heading
+    if not limits:
+        limits = labelled(low, high, LEAST, STEPS)
+        title += ", cut" if outside else ""
+    return Plot(quantity.name, title, quantity.group, quantity.desired is not None, limits)
+
+
+def _outside(quantities: Sequence[ScalarQuantity], ranges: Sequence[PlotRange]) -> list[str]:
+    """Return lines of Markdown that state the values outside of the ranges."""
+    lines = [
+        f"- {quantity.heading.replace('[', '(').replace(']', ')')}: {item.text()}"
+        for quantity, of_quantity in zip(quantities, ranges, strict=True)
+        for item in of_quantity.outside
+        if not quantity.limits
+    ]
+    return ["", "## Values outside of the axes of plots marked as cut", "", *lines] if lines else []
+
+
+def _log_legend(
+    recording: rr.RecordingStream, runs: Sequence[ComparedRun], colours: Sequence[theme.Colour]
+) -> None:
+    """Log the colour and the label of each run below one another: a 2D view's y points down."""
+    places = np.arange(len(runs), dtype=np.float64)
+    ends = [[[0.0, y], [1.0, y]] for y in places]
+    lines = rr.LineStrips2D(
+        ends,
+        colors=list(colours),
+        labels=[run.legend for run in runs],
+        show_labels=True,
+        radii=rr.Radius.ui_points(2.0),
+    )
+    recording.log(LEGEND, lines, static=True)
+
+
+def _send_end(
+    recording: rr.RecordingStream, entity: str, run: ComparedRun, values: Array, colour: theme.Colour
+) -> None:
+    """Send a cross at the last value of a run that is not complete, within the limits of the plot."""
+    finite = np.flatnonzero(np.isfinite(values))[-1:]
+    if len(finite):
+        look = rr.SeriesPoints(names=[run.legend], colors=[colour], markers=["Cross"], marker_sizes=[6.0])
+        recording.log(entity, look, static=True)
+        recording.send_columns(entity, time_index(run.table["t_s"][finite]), [scalars(values[finite], 1)])
 
 
 def _write_part(recording: rr.RecordingStream, run: ComparedRun, part: RecordingPart) -> None:

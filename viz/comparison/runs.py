@@ -16,6 +16,14 @@ Event = tuple[float, Level, str]
 """Simulated time in s, level, text."""
 
 
+class EarlyEnd(NamedTuple):
+    """End of a run that is not complete."""
+
+    t_s: float
+    status: str
+    reason: str
+
+
 class ComparedRun(NamedTuple):
     """Run of a comparison."""
 
@@ -31,11 +39,18 @@ class ComparedRun(NamedTuple):
     record: Mapping[str, str]
     """Metadata of its telemetry file."""
     events: Sequence[Event]
+    early_end: EarlyEnd | None = None
 
     @property
     def table(self) -> Table:
         """Its telemetry."""
         return self.rows.table
+
+    @property
+    def legend(self) -> str:
+        """Label, and how a run that is not complete ended."""
+        end = self.early_end
+        return f"{self.label}; {end.status} at {end.t_s:.3g} s" if end else self.label
 
 
 # Times of ticks at different rates are products that differ in their last bits, and angles with them.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,14 +10,15 @@ from matplotlib.figure import Figure
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level
+from spheretwin.viz.comparison.ranges import plot_range
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
-from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octave_maxima
+from spheretwin.viz.decimation import mean_and_deviation, octave_maxima
 from spheretwin.viz.figures.style import (
     BROKEN,
     FAINT,
     INK,
-    MOST_POINTS,
     WIDTH_in,
+    draw_line,
     name_runs,
     panel_column,
     plain,
@@ -26,11 +26,16 @@ from spheretwin.viz.figures.style import (
 )
 from spheretwin.viz.quantities import Array, ScalarQuantity
 
-MOST_COLUMNS = 1000
+MOST_CELLS = 200
+"""Cells of a row of an image."""
+
+LEGEND_ROW_in = 0.16
 
 
 def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
-    """Draw them on one scale: blue is negative, red positive.
+    """Draw the mean of each cell on one scale, blue negative and red positive; below it a lane of variation.
+
+    The variation is the standard deviation of the ticks within a cell, of the group where it is largest.
 
     Parameters
     ----------
@@ -38,24 +43,29 @@ def currents(runs: Sequence[ComparedRun], title: str) -> Figure:
     title : str
     """
     figure = Figure(figsize=(WIDTH_in, 1.2 + 2.3 * len(runs)), layout="constrained")
-    panels = panel_column(figure, len(runs))
+    panels = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False, height_ratios=[7, 1] * len(runs))[
+        :, 0
+    ]
     largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs) or 1.0
-    for panel, run in zip(panels, runs, strict=True):
-        few = decimate_largest(run.table["current_A"], MOST_COLUMNS)
-        groups = few.values.shape[1]
-        start_s = float(run.table["t_s"][0])
-        end_s = start_s + run.period_s * few.stride * len(few.values)
-        place = (start_s, end_s, groups - 0.5, -0.5)
-        scale = {"cmap": "RdBu_r", "vmin": -largest_A, "vmax": largest_A, "interpolation": "nearest"}
-        image = panel.imshow(few.values.T, extent=place, aspect="auto", **scale)
+    scale = {"cmap": "RdBu_r", "vmin": -largest_A, "vmax": largest_A}
+    lane_scale = {"cmap": "Greys", "vmin": 0.0, "vmax": largest_A / 2}
+    for panel, lane, run in zip(panels[::2], panels[1::2], runs, strict=True):
+        cells = mean_and_deviation(run.table["current_A"], MOST_CELLS)
+        groups, t_s = cells.mean.shape[1], run.table["t_s"]
+        edges_s = np.append(t_s[cells.starts], t_s[-1] + run.period_s)
+        means = panel.pcolormesh(edges_s, np.arange(groups + 1) - 0.5, cells.mean.T, **scale)
+        variation = np.max(cells.deviation, axis=1)[None]
+        deviations = lane.pcolormesh(edges_s, [0.0, 1.0], variation, **lane_scale)
+        panel.set_ylim(groups - 0.5, -0.5)
         panel.set_ylabel("group", fontsize="small")
         panel.set_yticks(range(0, groups, max(1, groups // 6)))
         panel.tick_params(labelsize="small")
-        panel.set_title(run.label, fontsize="small", loc="left")
-    ends_s = [float(run.table["t_s"][-1]) for run in runs]
-    panels[-1].set_xlim(min(float(run.table["t_s"][0]) for run in runs), max(ends_s) + runs[0].period_s)
+        panel.set_title(run.legend, fontsize="small", loc="left")
+        lane.set_yticks([0.5], ["variation"], fontsize="small")
     panels[-1].set_xlabel("time, s")
-    figure.colorbar(image, ax=list(panels), label="current, A", shrink=0.9, aspect=30)
+    bar: dict[str, Any] = {"shrink": 0.9, "aspect": 30}
+    figure.colorbar(means, ax=list(panels), label="mean current of a cell, A", **bar)
+    figure.colorbar(deviations, ax=list(panels), label="standard deviation within a cell, A", **bar)
     figure.suptitle(title, fontsize="medium")
     return figure
 
@@ -127,34 +137,70 @@ def over_time(
 ) -> Figure:
     """Draw quantities over time; the reference is a thin dark line over the others.
 
+    A run with more ticks than the figure has dots is drawn by the bounds and the mean of every few ticks. The
+    range is that of the settled runs; the panel states the values outside. Errors as one angle are drawn once
+    more on a logarithmic axis, complete.
+
     Parameters
     ----------
     runs : sequence of ComparedRun
     leading : sequence of int
         Places of the runs that show the reference.
-    quantities : sequence of Quantity
+    quantities : sequence of ScalarQuantity
     title : str
     """
-    figure = Figure(figsize=(WIDTH_in, 1.3 + 1.75 * len(quantities)), layout="constrained")
-    panels = panel_column(figure, len(quantities))
-    for panel, quantity in zip(panels, quantities, strict=True):
-        for run, of_run in zip(runs, run_styles(runs), strict=True):
-            _draw(panel, run, quantity.values(run.rows), label=run.label, **of_run.line())
+    panels_of = [(quantity, False) for quantity in quantities]
+    panels_of += [(quantity, True) for quantity in quantities if quantity.group == "whole"]
+    height_in = 1.3 + 1.75 * len(panels_of) + LEGEND_ROW_in * len(runs)
+    figure = Figure(figsize=(WIDTH_in, height_in), layout="constrained")
+    panels = panel_column(figure, len(panels_of))
+    for panel, (quantity, logarithmic) in zip(panels, panels_of, strict=True):
+        of_runs = [quantity.values(run.rows) for run in runs]
+        limits = quantity.limits or (None if logarithmic else _state_range(panel, runs, of_runs))
+        if logarithmic:
+            panel.set_yscale("log")
+            of_runs = [np.where(values > 0, values, np.nan) for values in of_runs]
+        for run, of_run, values in zip(runs, run_styles(runs), of_runs, strict=True):
+            draw_line(panel, run.table["t_s"], values, label=run.legend, **of_run.line())
+            if run.early_end:
+                _mark_end(panel, run, values, limits, of_run.colour)
         for place in leading:
             if quantity.desired:
                 name = "reference" if len(leading) == 1 else f"reference of {runs[place].label}"
                 look = {"label": name, "color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
-                _draw(panel, runs[place], quantity.desired(runs[place].rows), **look)
-        if quantity.limits:
-            panel.set_ylim(*quantity.limits)
-        plain(panel, quantity.heading.replace(" [", ",\n").removesuffix("]"))
-    panels[0].set_title(title, fontsize="medium")
+                draw_line(panel, runs[place].table["t_s"], quantity.desired(runs[place].rows), **look)
+        if limits:
+            panel.set_ylim(*limits)
+        unit = f"{quantity.unit}, logarithmic" if logarithmic else quantity.unit
+        plain(panel, f"{quantity.title},\n{unit}")
+    figure.suptitle(title, fontsize="medium")
     panels[-1].set_xlabel("time, s")
     name_runs(figure, panels[0])
     return figure
 
 
-def _draw(panel: Axes, run: ComparedRun, values: Array, **look: Any) -> None:
-    few, start_s = decimate_extremes(values, MOST_POINTS), run.table["t_s"][0]
-    t_s = start_s + run.period_s * few.stride * np.arange(len(few.values))
-    panel.plot(t_s, few.values, **look)
+def _state_range(panel: Axes, runs: Sequence[ComparedRun], of_runs: Sequence[Array]) -> tuple[float, float]:
+    """Return the range of the settled runs, and state in the panel's title the values outside of it."""
+    low, high, outside = plot_range(runs, of_runs)
+    if outside:
+        texts = [item.text() for item in outside]
+        lines = [", ".join(texts[first : first + 2]) for first in range(0, len(texts), 2)]
+        panel.set_title("outside of the axis: " + ",\n".join(lines), fontsize="x-small", loc="right")
+    return low, high
+
+
+def _mark_end(
+    panel: Axes, run: ComparedRun, values: Array, limits: tuple[float, float] | None, colour: str
+) -> None:
+    """Mark the end of a run that is not complete at its last value, within the range."""
+    finite = values[np.isfinite(values)]
+    if len(finite):
+        last = np.clip(finite[-1], *limits) if limits else finite[-1]
+        mark: dict[str, Any] = {
+            "color": colour,
+            "markersize": 8,
+            "markeredgecolor": INK,
+            "clip_on": False,
+            "zorder": 5,
+        }
+        panel.plot(run.table["t_s"][-1], last, "X", **mark)

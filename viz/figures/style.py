@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.base.files import whole_file
 from spheretwin.viz.comparison.runs import ComparedRun
+from spheretwin.viz.decimation import envelope
 from spheretwin.viz.theme import AXIS_COLOURS, law_colours, law_marks, run_colours
 
 Array = NDArray[np.float64]
@@ -31,10 +32,16 @@ INK, FAINT, BROKEN = "#30343a", "#848a93", "#c8102e"
 WIDTH_in = 8.0
 DPI = 150
 
-MOST_POINTS = 3000
-"""Points of a line: a print of 20 cm has fewer dots."""
-
-DASHES: tuple[Any, ...] = ("-", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2)), (0, (2, 1)))
+DASHES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1)),
+    (0, (3, 1, 1, 1)),
+    (0, (1, 1)),
+    (0, (9, 2)),
+    (0, (2, 1)),
+    (0, (7, 1, 1, 1)),
+    (0, (4, 1, 1, 1, 1, 1)),
+)
 """Dashes by the place of a run: runs are distinct in grey print."""
 
 
@@ -59,6 +66,39 @@ def faint_grid(axes: Axes, alpha: float = 0.35, **options: Any) -> None:
     axes.grid(visible=True, color=FAINT, alpha=alpha, linewidth=0.6, **options)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+MOST_BINS = 1000
+"""Bins of a line: a print of 20 cm has few more dots."""
+
+
+def draw_line(axes: Axes, t_s: Array, values: Array, **look: Any) -> None:
+    """Draw every tick, or of a long run the band of the bounds and the mean of every few ticks.
+
+    Both reach from the first tick to the last.
+
+    Parameters
+    ----------
+    axes : Axes
+    t_s, values : (n,) arrays
+    **look
+        Properties of the line, with its color.
+    """
+    if len(values) <= MOST_BINS:
+        axes.plot(t_s, values, **look)
+        return
+    bins = envelope(values, MOST_BINS)
+    edges_s = np.append(t_s[bins.starts], t_s[-1])
+    low, high = (np.append(bound, bound[-1]) for bound in (bins.low, bins.high))
+    band: dict[str, Any] = {
+        "facecolor": (look["color"], 0.25),
+        "edgecolor": (look["color"], 0.6),
+        "linewidth": 0.3,
+    }
+    axes.fill_between(edges_s, low, high, step="post", **band)
+    middles_s = (edges_s[1:] + edges_s[:-1]) / 2
+    means = np.concatenate([values[:1], bins.mean, values[-1:]])
+    axes.plot(np.concatenate([t_s[:1], middles_s, t_s[-1:]]), means, **look)
 
 
 def panel_column(figure: Figure, count: int) -> NDArray[Any]:

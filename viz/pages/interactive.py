@@ -11,11 +11,12 @@ import plotly.graph_objects as plotly
 from plotly.offline import get_plotlyjs
 
 from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.viz.comparison.ranges import plot_range
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
-from spheretwin.viz.decimation import decimate_extremes, decimate_largest, octave_maxima
+from spheretwin.viz.decimation import envelope, mean_and_deviation, octave_maxima
 from spheretwin.viz.pages import html
 from spheretwin.viz.quantities import Array, ScalarQuantity
-from spheretwin.viz.theme import run_colours
+from spheretwin.viz.theme import rgb, run_colours
 
 # The browser contacts no host.
 POLICY = (
@@ -184,17 +185,22 @@ def over_time(
     panels = []
     for quantity in quantities:
         reference_lines = [
-            _line(runs[place], place, quantity.desired(runs[place].rows), most, REFERENCE_COLOUR, 4.0)
+            trace
             for place in leading
             if quantity.desired
+            for trace in _lines(
+                runs[place], place, quantity.desired(runs[place].rows), most, REFERENCE_COLOUR, 4.0
+            )
         ]
+        of_runs = [quantity.values(run.rows) for run in runs]
         lines = [
-            _line(run, place, quantity.values(run.rows), most, colour, 1.3)
-            for place, (run, colour) in enumerate(zip(runs, colours, strict=True))
+            trace
+            for place, (run, colour, values) in enumerate(zip(runs, colours, of_runs, strict=True))
+            for trace in _lines(run, place, values, most, colour, 1.3)
         ]
         for trace in reference_lines:
             trace.hoverinfo, trace.hovertemplate = "skip", None
-        axis = {"range": quantity.limits} if quantity.limits else {}
+        axis = {"range": quantity.limits or plot_range(runs, of_runs)[:2]}
         panels.append(PlotPanel(_text(quantity.heading), [*reference_lines, *lines], axis))
     panels += _currents(runs)
     panels.append(_events(runs, colours))
@@ -241,36 +247,51 @@ def error_spectra(runs: Sequence[ComparedRun], spectra: Sequence[Sequence[Spectr
     return stacked(panels, "frequency [Hz]", type="log")
 
 
-def _line(
+def _lines(
     run: ComparedRun, place: int, values: Array, most: int, colour: str, width: float
-) -> plotly.Scatter:
-    few = decimate_extremes(values, most)
-    return plotly.Scatter(
-        x0=float(run.table["t_s"][0]),
-        dx=run.period_s * few.stride,
-        y=_small(few.values),
-        mode="lines",
-        line={"color": colour, "width": width},
-        meta=f"{place}",
-        hovertemplate="%{y:.4g}<extra></extra>",
-    )
+) -> list[plotly.Scatter]:
+    """Return every tick as one line, or the bounds of every few ticks as a band and their mean."""
+    t_s, line = run.table["t_s"], {"color": colour, "width": width}
+    common = {"mode": "lines", "meta": f"{place}"}
+    hover = "%{y:.4g}<extra></extra>"
+    if len(values) <= most:
+        return [plotly.Scatter(x0=float(t_s[0]), dx=run.period_s, y=_small(values), line=line,
+                               hovertemplate=hover, **common)]  # fmt: skip
+    bins = envelope(values, most // 3)
+    width_s = run.period_s * int(bins.starts[1])
+    step = {"x0": float(t_s[0]), "dx": width_s, "hoverinfo": "skip"}
+    edge = {"color": colour, "width": 0.5, "shape": "hv"}
+    low, high = (np.append(bound, bound[-1]) for bound in (bins.low, bins.high))
+    band = {"fill": "tonexty", "fillcolor": f"rgba{(*rgb(colour), 0.3)}"}
+    middles_s = np.concatenate([t_s[bins.starts[:-1]] + width_s / 2, t_s[-1:]])
+    return [
+        plotly.Scatter(y=_small(low), line=edge, **step, **common),
+        plotly.Scatter(y=_small(high), line=edge, **step, **band, **common),
+        plotly.Scatter(x=_small(middles_s), y=_small(bins.mean), line=line, hovertemplate=hover, **common),
+    ]
 
 
 def _currents(runs: Sequence[ComparedRun]) -> list[PlotPanel]:
-    """Return a panel for each run: a row for each group, blue negative, red positive, on one scale."""
+    """Return a panel for each run: mean currents, blue negative and red positive, and a row of variation."""
     largest_A = max(float(np.nanmax(np.abs(run.table["current_A"]))) for run in runs)
     panels = []
     for place, run in enumerate(runs):
         groups = run.table["current_A"].shape[1]
-        few = decimate_largest(
-            run.table["current_A"], min(MOST_COLUMNS, MOST_CURRENTS // (groups * len(runs)))
+        most = min(MOST_COLUMNS, MOST_CURRENTS // (groups * len(runs)))
+        cells = mean_and_deviation(run.table["current_A"], most)
+        ends_s = np.append(run.table["t_s"][cells.starts], run.table["t_s"][-1] + run.period_s)
+        common = {"x": _small(ends_s), "showscale": False, "meta": f"{place}"}
+        hover = "group %{y}: mean %{z:.3g} A<extra></extra>"
+        means = plotly.Heatmap(z=_small(cells.mean.T), colorscale=BLUE_TO_RED, zmin=-largest_A,
+                               zmax=largest_A, hovertemplate=hover, **common)  # fmt: skip
+        hover = "standard deviation up to %{z:.3g} A<extra></extra>"
+        lane = plotly.Heatmap(z=_small(np.max(cells.deviation, axis=1)[None]), y=[groups + 0.5], dy=1.0,
+                              colorscale="Greys", zmin=0.0, zmax=largest_A / 2, hovertemplate=hover,
+                              **common)  # fmt: skip
+        title = f"mean currents by group up to ±{largest_A:.3g} A, below their variation: {_text(run.legend)}"
+        panels.append(
+            PlotPanel(title, [means, lane], {"range": (groups + 1, -0.5), "dtick": max(1, groups // 6)})
         )
-        step_s, hover = run.period_s * few.stride, "group %{y}: %{z:.3g} A<extra></extra>"
-        trace = plotly.Heatmap(z=_small(few.values.T), x0=float(run.table["t_s"][0]) + step_s / 2, dx=step_s,
-                               colorscale=BLUE_TO_RED, zmin=-largest_A, zmax=largest_A, showscale=False,
-                               meta=f"{place}", hovertemplate=hover)  # fmt: skip
-        title = f"currents by group, up to ±{largest_A:.3g} A: {_text(run.label)}"
-        panels.append(PlotPanel(title, [trace], {"autorange": "reversed", "dtick": max(1, groups // 6)}))
     return panels
 
 

@@ -127,7 +127,12 @@ def test_every_series_of_every_run_is_on_the_page_to_seven_digits(files, page):
             assert found, (quantity.name, place)
             assert all(trace["dx"] == run.period_s for trace in found)
     maps = [trace for trace in traces if trace["type"] == "heatmap"]
-    assert [trace["z"]["shape"] for trace in maps] == ["18, 400", "18, 150"]
+    assert [trace["z"]["shape"] for trace in maps] == ["18, 400", "1, 400", "18, 150", "1, 150"]
+    for run, means, variation in zip(runs, maps[::2], maps[1::2], strict=True):
+        shown = decoded(means["z"]).reshape(18, -1)
+        # Every tick is a cell: single precision.
+        np.testing.assert_allclose(shown, run.table["current_A"].T, rtol=1e-6, atol=1e-7)
+        assert not decoded(variation["z"]).any()
 
 
 def test_the_axes_have_units_and_the_buttons_name_the_runs(page):
@@ -169,9 +174,18 @@ def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypat
     text = (tmp_path / comparison.PAGE).read_text(encoding="utf-8")
     assert "drawn by the lowest and highest value" in text
     traces = [each for each in figures_of(Sources(text))["over-time"]["data"] if each["type"] == "scatter"]
-    (largest,) = {float(decoded(each["y"]).max()) for each in traces[:1]}
+    low, high, mean = traces[:3]
     quantity = scalar_quantities([read(files[0]).table])[0]
-    assert largest == np.float32(quantity.values(compared_runs([read(files[0])])[0].rows).max())
+    run = compared_runs([read(files[0])])[0]
+    values = quantity.values(run.rows)
+    size = -(-len(values) // (50 // 3))
+    blocks = [values[first : first + size] for first in range(0, len(values), size)]
+    for trace, bound in ((low, np.min), (high, np.max), (mean, np.mean)):
+        shown = decoded(trace["y"])[: len(blocks)]
+        np.testing.assert_allclose(shown, [bound(block) for block in blocks], rtol=1e-6)
+    assert high["fill"] == "tonexty"
+    assert (low["x0"], low["dx"]) == (high["x0"], high["dx"]) == (0.0, pytest.approx(size * run.period_s))
+    assert decoded(mean["x"])[-1] == pytest.approx(run.table["t_s"][-1])
 
 
 @pytest.mark.parametrize("library", ["matplotlib", "plotly"])
@@ -219,3 +233,32 @@ def test_the_page_shows_the_spectra_in_mrad(files, page):
             ]
         )
         np.testing.assert_allclose(sorted(tops), sorted(told), rtol=1e-6)
+
+
+def test_the_page_has_the_differences_of_the_scenarios_and_the_ranges_of_settled_runs(
+    files, page, drawn_into
+):
+    text = (drawn_into / comparison.PAGE).read_text(encoding="utf-8")
+    _, _, table = text.partition("Differences of the scenarios</h2>")
+    cells = [re.sub("<[^>]*>", "", cell) for cell in re.findall("<t[hd][^>]*>(.*?)</t[hd]>", table)]
+    rows = [cells[first : first + 3] for first in range(0, len(cells), 3)]
+    assert rows[0] == ["field", "run 1", "run 2"]
+    assert ["L", "1", "2"] in rows
+    assert ["duration", "0.4", "0.3"] in rows
+    assert ["controller.period_s", "0.001", "0.002"] in rows
+    layout = figures_of(page)["over-time"]["layout"]
+    runs = compared_runs([read(path) for path in files])
+    for place, quantity in enumerate(scalar_quantities([run.table for run in runs]), start=1):
+        values = [quantity.values(run.rows) for run in runs]
+        low, high = layout[f"yaxis{place if place > 1 else ''}"]["range"]
+        if quantity.limits:
+            assert (low, high) == quantity.limits
+        else:
+            settled = [half[len(half) // 2 :] for half in values]
+            assert low <= min(half.min() for half in settled)
+            assert high >= max(half.max() for half in settled)
+
+
+def test_titles_of_figures_name_the_common_conditions(files, drawn_into):
+    svg = (drawn_into / "error.svg").read_text(encoding="utf-8")
+    assert "Tracking error of each hinge: scenario hold, m 0, hardware ideal" in svg  # L differs

@@ -1,6 +1,6 @@
-"""Labels of runs in a legend: only the differing fields."""
+"""Fields in which scenarios differ, with their values; conditions on which they agree."""
 
-from spheretwin.analysis.comparison import differing_fields
+from spheretwin.analysis.differences import common_conditions, scenario_differences
 
 SCENARIO = {
     "name": "tilt",
@@ -20,35 +20,44 @@ def but(**sections):
     }  # fmt: skip
 
 
-def test_runs_of_one_scenario_differ_in_nothing():
-    assert differing_fields([SCENARIO, SCENARIO]) == [[], []]
+def test_equal_scenarios_differ_in_nothing():
+    assert scenario_differences([SCENARIO, SCENARIO]) == []
 
 
-def test_what_the_paper_varies_has_its_names_and_comes_first():
-    told = differing_fields(
-        [SCENARIO, but(plant={"modelling_error": 0.0, "payload_kg": 0.1}, disturbance={"load": 2.0})]
-    )
-    assert told == [["m 0.2", "L 0", "plant.payload_kg 0.05"], ["m 0", "L 2", "plant.payload_kg 0.1"]]
+def test_variations_of_the_paper_have_its_names_and_come_first():
+    other = but(plant={"modelling_error": 0.0, "payload_kg": 0.1}, disturbance={"load": 2.0})
+    assert scenario_differences([SCENARIO, other]) == [
+        ("m", ["0.2", "0"]),
+        ("L", ["0", "2"]),
+        ("plant.payload_kg", ["0.05", "0.1"]),
+    ]
 
 
-def test_gains_are_labels_for_runs_of_one_law_only():
+def test_gains_are_listed_for_runs_of_one_law_only():
     other = but(controller={"stiffness": [3.0, 2.0]})
-    assert differing_fields([SCENARIO, other])[1] == ["controller.stiffness [3.0, 2.0]"]
-    assert differing_fields([SCENARIO, but(controller={"law": "pid", "kp": 1.0})]) == [[], []]
+    assert scenario_differences([SCENARIO, other]) == [("controller.stiffness", ["[1.0, 2.0]", "[3.0, 2.0]"])]
+    pid = but(controller={"law": "pid", "kp": 1.0})
+    assert scenario_differences([SCENARIO, pid]) == [("law", ["pd", "pid"])]
 
 
 def test_fields_implied_by_the_hardware_are_not_listed():
     other = but(hardware="prototype", sensors={"adc": {"bits": 12}})
-    assert differing_fields([SCENARIO, other]) == [["hardware ideal"], ["hardware prototype"]]
+    assert scenario_differences([SCENARIO, other]) == [("hardware", ["ideal", "prototype"])]
 
 
-def test_a_field_that_one_lacks_is_none_there():
-    assert differing_fields([SCENARIO, {**SCENARIO, "watch": 1}]) == [["watch none"], ["watch 1"]]
+def test_a_missing_field_is_none():
+    assert scenario_differences([SCENARIO, {**SCENARIO, "watch": 1}]) == [("watch", ["none", "1"])]
 
 
-def test_faults_in_labels_have_their_targets():
+def test_faults_are_listed_with_their_targets():
     faults = [{"target": "coil.07", "mode": "open", "start_s": 1.0}, {"target": "group.3", "mode": "stuck"}]
-    assert differing_fields([{**SCENARIO, "fault": faults}, {**SCENARIO, "fault": []}]) == [
-        ["fault coil.07 ope…roup.3 stuck"],
-        ["fault none"],
+    assert scenario_differences([{**SCENARIO, "fault": faults}, {**SCENARIO, "fault": []}]) == [
+        ("fault", ["coil.07 open + group.3 stuck", "none"])
     ]
+
+
+def test_common_conditions_are_those_of_every_scenario():
+    assert common_conditions([SCENARIO]) == "scenario tilt, L 0, m 0.2, hardware ideal"
+    other = but(disturbance={"load": 2.0}, hardware="prototype")
+    assert common_conditions([SCENARIO, other]) == "scenario tilt, m 0.2"
+    assert common_conditions([{"name": "a"}, {"name": "b"}]) == ""

@@ -7,15 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pyarrow as pa
 import pytest
+import rerun as rr
 from rerun.chunk import RrdReader
 
 from spheretwin import cli
 from spheretwin.analysis import comparison
-from spheretwin.analysis.recorded_run import read
+from spheretwin.analysis.recorded_run import events, read
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, read_parquet
+from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Ghost
+from spheretwin.viz.layout.extents import number
 from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import SCALAR_QUANTITIES
 from tests.twin.analysis.runs import written
@@ -45,11 +49,21 @@ def merged(files, tmp_path_factory):
     return Merged(out)
 
 
+@pytest.fixture(scope="module")
+def failed(files, tmp_path_factory):
+    """A complete run merged with one that leaves the workspace."""
+    folder = tmp_path_factory.mktemp("failed")
+    path, _ = written(folder, "failed", **{"duration": 1.0, "controller.law": "pd", "disturbance.load": 60})
+    out = folder / "all.rrd"
+    assert cli.main(["review", str(files["slow"]), str(path), "--merge", str(out)]) == 0
+    return read(path), Merged(out)
+
+
 class Merged:
     """What a merged recording holds, read chunk by chunk."""
 
     def __init__(self, path):
-        self.path, self.entities, self.columns, self.names = path, set(), {}, {}
+        self.path, self.entities, self.columns, self.names, self.static = path, set(), {}, {}, {}
         for chunk in RrdReader(path).stream():
             self.entities.add(chunk.entity_path)
             batch = chunk.to_record_batch()
@@ -59,6 +73,9 @@ class Merged:
                 rows = batch.column("values_0").flatten()
                 for field in rows.type:
                     self.take(batch, f"{chunk.entity_path}:{field.name}", rows.field(field.name))
+            for column in batch.schema.names:
+                if ":" in column and "Scalars" not in column and "indicator" not in column:
+                    self.static.setdefault((chunk.entity_path, column), batch.column(column).to_pylist())
             if "SeriesLines:names" in batch.schema.names:
                 self.names[chunk.entity_path] = batch.column("SeriesLines:names").to_pylist()[0]
 
@@ -142,6 +159,116 @@ def test_every_run_has_a_body_and_one_alone_has_the_whole_actuator(merged):
 
 def test_nothing_but_the_file_is_left(merged):
     assert os.listdir(merged.path.parent) == ["all.rrd"]
+
+
+def rgb(packed):
+    return packed >> 24, packed >> 16 & 255, packed >> 8 & 255
+
+
+def colours(merged, entity, kind):
+    (row,) = merged.static[entity, kind]
+    return [rgb(packed) for packed in row]
+
+
+def test_lines_have_the_colours_of_their_runs_and_the_viewer_draws_every_extreme(merged):
+    names = ("first", "moved", "slow", "other")
+    expected = [theme.rgb(colour) for colour in theme.run_colours(["afsm", "afsm", "afsm", "pd"])]
+    for place, (name, colour) in enumerate(zip(names, expected, strict=True), start=1):
+        entity = f"/run_{place}_{name}/compare/error_α_mrad"
+        assert colours(merged, entity, "SeriesLines:colors") == [colour]
+        (policy,) = merged.static[entity, "SeriesLines:aggregation_policy"]
+        assert policy == [rr.components.AggregationPolicy.MinMax.value]
+        assert colours(merged, f"/run_{place}_{name}/tip/point", "Points3D:colors") == [colour]
+    assert colours(merged, "/legend", "LineStrips2D:colors") == expected
+    assert colours(merged, "/what_was_asked/run_3_slow/angle_β_rad", "SeriesLines:colors") == [theme.COMMAND]
+
+
+def test_every_line_has_every_row_to_the_end_of_its_run(files, merged):
+    for place, (name, path) in enumerate(files.items(), start=1):
+        run = read(path)
+        for quantity in SCALAR_QUANTITIES:
+            entity = f"/run_{place}_{name}/compare/{quantity.name}"
+            if entity in merged.entities:
+                assert np.array_equal(merged.t_ns(entity), np.round(run.table["t_s"] * 1e9))
+        error = merged.values(f"/run_{place}_{name}/compare/error_β_mrad")[:, 0]
+        assert np.array_equal(error, 1e3 * run.table["error_rad"][:, 1])
+        torque = merged.values(f"/run_{place}_{name}/compare/torque_asked_Nm")[:, 0]
+        np.testing.assert_allclose(torque, np.linalg.norm(run.table["torque_command_Nm"], axis=1))
+
+
+def test_the_legend_is_a_view_of_its_own_and_plots_have_none(merged):
+    (labels,) = merged.static["/legend", "LineStrips2D:labels"]
+    assert [label.split(":")[0] for label in labels] == ["1 first", "2 moved", "3 slow", "4 other"]
+    (strips,) = merged.static["/legend", "LineStrips2D:strips"]
+    assert [strip[0][1] for strip in strips] == [0.0, 1.0, 2.0, 3.0]  # below one another
+    reader = RrdReader(merged.path)
+    visible = [
+        value
+        for chunk in reader.stream(store=reader.blueprints()[0])
+        for name in chunk.to_record_batch().schema.names
+        if name == "PlotLegend:visible"
+        for value in chunk.to_record_batch().column(name).to_pylist()
+    ]
+    assert visible
+    assert set(map(tuple, visible)) == {(False,)}
+
+
+def test_the_text_names_runs_ends_and_the_differences_of_their_scenarios(merged, failed):
+    ((text,),) = merged.static["/runs", "TextDocument:text"]
+    assert "**scenario hold, m 0, hardware ideal**" in text
+    assert "- 4 other: pd, L 2, duration 0.2" in text
+    assert "completed" in text
+    assert "| field | run 1 | run 2 | run 3 | run 4 |" in text
+    assert "| L | 1 | 1 | 1 | 2 |" in text
+    assert "| law | afsm | afsm | afsm | pd |" in text
+    assert "| duration | 0.3 | 0.3 | 0.5 | 0.2 |" in text
+    run, of_failed = failed
+    ((text,),) = of_failed.static["/runs", "TextDocument:text"]
+    end_s, _, reason = events(run)[-1]
+    assert f"**left workspace at {end_s:.3f} s**: {reason}" in text
+
+
+def test_the_end_of_a_failed_run_is_a_cross_at_its_last_value_in_every_plot(failed):
+    run, merged = failed
+    assert run.record.status is Status.LEFT_WORKSPACE
+    ends = [entity for entity in merged.entities if "/end/" in entity]
+    assert {entity.split("/")[1] for entity in ends} == {"run_2_failed"}
+    assert len(ends) == len([entity for entity in merged.entities if "/run_2_failed/compare/" in entity])
+    for entity in ends:
+        assert list(merged.t_ns(entity)) == [round(run.table["t_s"][-1] * 1e9)]
+        line = merged.values(entity.replace("/end/", "/compare/"))
+        low, high = limits(merged, entity)
+        assert merged.values(entity)[0, 0] == pytest.approx(np.clip(line[-1, 0], low, high))
+        (name,) = merged.static[entity, "SeriesPoints:names"]
+        assert name[0].endswith(f"; left workspace at {run.table['t_s'][-1]:.3g} s")
+
+
+def limits(merged, entity):
+    """Range of the plot that contains an entity."""
+    reader = RrdReader(merged.path)
+    ranges, queries = {}, {}
+    for chunk in reader.stream(store=reader.blueprints()[0]):
+        batch, (view, _, part) = chunk.to_record_batch(), chunk.entity_path.rpartition("/")
+        if part == "ScalarAxis":
+            ranges[view] = batch.column("ScalarAxis:range").to_pylist()[0][0]
+        if part == "ViewContents":
+            queries[view] = batch.column("ViewContents:query").to_pylist()[0]
+    (view,) = (view for view, query in queries.items() if entity in query)
+    return ranges[view]
+
+
+def test_a_failed_run_does_not_flatten_the_other_and_the_text_states_its_values(failed):
+    _, merged = failed
+    low, high = limits(merged, "/run_1_slow/compare/error_α_mrad")
+    complete = merged.values("/run_1_slow/compare/error_α_mrad")
+    settled = complete[len(complete) // 2 :]
+    assert low <= settled.min() <= settled.max() <= high
+    assert high - low < np.ptp(complete) / 4  # the transient is not within
+    of_failed = merged.values("/run_2_failed/compare/error_α_mrad")
+    farthest = of_failed[np.argmax(np.abs(of_failed))][0]
+    assert abs(farthest) > 2 * max(abs(low), abs(high))
+    ((text,),) = merged.static["/runs", "TextDocument:text"]
+    assert f"- error of α (mrad): run 2 reaches {number(farthest)} (" in text
 
 
 # --- what is refused

@@ -1,0 +1,57 @@
+"""Ranges of plots of several runs: settled runs are legible, and values outside are stated."""
+
+import numpy as np
+import pytest
+
+from spheretwin.viz.comparison.ranges import plot_range
+from tests.viz.comparison.compared import T_s, run_of
+
+
+def range_of(*runs):
+    return plot_range(runs, [run.table["q_rad"][:, 0] for run in runs])
+
+
+def test_values_of_similar_size_are_all_within_the_range():
+    values = 1.0 + np.sin(7 * T_s)
+    low, high, outside = range_of(run_of(values))
+    assert outside == ()
+    # A margin of a tenth of the span about its middle.
+    assert (low, high) == pytest.approx(
+        (values.min() - 0.05 * np.ptp(values), values.max() + 0.05 * np.ptp(values))
+    )
+
+
+def test_a_transient_is_outside_and_stated():
+    settled, transient = 0.01 * np.sin(40 * T_s), np.where(T_s < 0.3, 2.0 - T_s, 0.0)
+    low, high, outside = range_of(run_of(0 * T_s), run_of(settled + transient))
+    assert -0.012 < low < -0.01 < 0.01 < high < 0.012
+    (item,) = outside
+    assert (item.run, item.from_s) == (2, 0.0)
+    assert item.value == pytest.approx(2.0, abs=0.02)
+    assert item.until_s == pytest.approx(0.299)
+    assert item.text() == "run 2 reaches 2 (0 s to 0.299 s)"
+
+
+def test_a_failed_run_does_not_flatten_the_others():
+    diverged = -np.exp(np.minimum(8 * T_s[:2000], 12.0))
+    low, high, outside = range_of(run_of(0.1 * np.sin(9 * T_s)), run_of(diverged, status="diverged"))
+    assert (low, high) == pytest.approx((-0.11, 0.11), rel=1e-3)
+    assert [(item.run, item.value) for item in outside] == [(2, diverged.min())]
+
+
+def test_failed_runs_alone_are_shown_without_their_ends():
+    diverged = np.where(T_s < 3.9, np.sin(9 * T_s), -1e6)
+    low, high, outside = range_of(run_of(diverged, status="diverged"))
+    assert -1.2 < low < -0.9 < 0.9 < high < 1.2
+    assert outside[0].value == -1e6
+
+
+@pytest.mark.parametrize("values", [[np.nan, np.inf], [0.0, 0.0]])
+def test_a_run_without_numbers_or_of_zeros_has_a_range(values):
+    low, high, outside = range_of(run_of(np.array(values)))
+    assert (low, high, outside) == (-1e-3, 1e-3, ())
+
+
+def test_values_without_a_number_are_ignored():
+    values = np.where(T_s > 3.99, np.nan, np.sin(9 * T_s))
+    assert range_of(run_of(values)).outside == ()
