@@ -13,6 +13,7 @@ from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.telemetry.run_record import Change, RunFacts, RunRecord, versions
 from spheretwin.scenario import reading
 from spheretwin.scenario.sections import ResolvedScenario, UserController
+from spheretwin.scenario.writing import changed_fields
 from spheretwin.session import Session
 
 
@@ -33,6 +34,7 @@ def facts_of(scenario: ResolvedScenario) -> RunFacts:
         gravity_m_s2=scenario.plant.gravity_m_s2,
         mjcf=Path(scenario.plant.mjcf or MJCF_PATH),
         sections=_sections(scenario.model_dump(mode="json")),
+        changed=changed_fields(scenario),
     )
 
 

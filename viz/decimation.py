@@ -236,28 +236,9 @@ class CompletedBins(NamedTuple):
     """Least value of each column: (bins, columns)."""
     high: Array
     """Greatest value."""
-    first: Array
-    """Value in the first row."""
-    last: Array
-    """Value in the last row."""
     mean: Array
     last_s: Array
     """Time of the last row of each."""
-
-    def extremes(self) -> Array:
-        """Return the value of the largest magnitude of each column: rare values are kept."""
-        return np.where(self.high >= -self.low, self.high, self.low)
-
-    def pairs(self) -> tuple[Array, Array]:
-        """Return times and values of two rows for each bin: its bounds, in the order of its rise or fall.
-
-        They are at the ends of the bin, so that a steady rise or fall keeps its form.
-        """
-        rises = self.last >= self.first
-        values = np.stack(
-            [np.where(rises, self.low, self.high), np.where(rises, self.high, self.low)], axis=1
-        )
-        return np.stack([self.t_s, self.last_s], axis=1).ravel(), values.reshape(-1, values.shape[2])
 
 
 class TimeBins:
@@ -316,8 +297,6 @@ def _reduce_bins(t_s: Array, values: Array, starts: NDArray[np.int64]) -> Comple
         t_s[starts],
         np.minimum.reduceat(values, starts, axis=0),
         np.maximum.reduceat(values, starts, axis=0),
-        values[starts],
-        values[ends - 1],
         np.add.reduceat(values, starts, axis=0) / (ends - starts)[:, None],
         t_s[ends - 1],
     )

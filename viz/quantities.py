@@ -1,9 +1,8 @@
-"""Heat of all coils together."""
+"""Quantities that recordings derive from telemetry."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -28,15 +27,6 @@ class QuantityRows(NamedTuple):
     current_limit_A: float
 
 
-class Aggregation(Enum):
-    """Aggregation of the rows of a bin to what is drawn."""
-
-    BOTH = "both bounds: the line is as wide as the spread of the values"
-    LEAST = "the least value"
-    GREATEST = "the greatest value"
-    MEAN = "the mean, where single rows say nothing"
-
-
 class Quantity(NamedTuple):
     """Quantity that a recording derives from telemetry."""
 
@@ -54,7 +44,6 @@ class Quantity(NamedTuple):
     """A colour for each entry."""
     needs: str = ""
     """Signal that it needs; empty if none."""
-    aggregation: Aggregation = Aggregation.GREATEST
 
     @property
     def size(self) -> int:
@@ -69,10 +58,9 @@ def by_axis(
     values: Callable[[QuantityRows], Array],
     floor: float,
     needs: str = "",
-    aggregation: Aggregation = Aggregation.BOTH,
 ) -> Quantity:
     """Quantity with an entry for each hinge, in the colours of the axes."""
-    return Quantity(name, unit, meaning, values, floor, ANGLES, theme.AXIS_COLOURS, needs, aggregation)
+    return Quantity(name, unit, meaning, values, floor, ANGLES, theme.AXIS_COLOURS, needs)
 
 
 def copper_loss(rows: QuantityRows) -> Array:
@@ -132,7 +120,6 @@ COUPLING = by_axis(
     "torques of the hinges on each other (6)-(10)",
     coupling_torque,
     floor=0.005,
-    aggregation=Aggregation.MEAN,  # accelerations from tick to tick are mostly the chatter of the command
 )
 
 
@@ -217,7 +204,6 @@ MARGIN = Quantity(
     "share of the commanded torque that the current limit permits in addition",
     torque_margin,
     floor=MOST / 2,
-    aggregation=Aggregation.LEAST,
 )
 
 

@@ -91,6 +91,8 @@ _SPARE_MARKS: tuple[tuple[str, Dash], ...] = (
     ("H", "--"),
 )
 
+_STEADY, _VARYING = (96, 96, 96), (230, 190, 40)
+
 _NEGATIVE, _ZERO, _POSITIVE = (48, 112, 224), (128, 128, 128), (230, 76, 24)
 
 
@@ -185,3 +187,22 @@ def current_colours(current: NDArray[np.float64], limit: float) -> NDArray[np.ui
     share = np.clip(np.abs(current) / limit, 0, 1)[..., None]
     full = np.where(current[..., None] < 0, _NEGATIVE, _POSITIVE)
     return np.round((1 - share) * np.array(_ZERO) + share * full).astype(np.uint8)
+
+
+def variation_colours(deviation: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:
+    """Colour of the variation of currents: neutral where they are steady, yellow at half of the limit.
+
+    Parameters
+    ----------
+    deviation : (...) array, A
+        Standard deviation.
+    limit : float, A
+        Current limit.
+
+    Returns
+    -------
+    (..., 3) uint8 array
+        Red, green, blue.
+    """
+    share = np.clip(2 * deviation / limit, 0, 1)[..., None]
+    return np.round((1 - share) * np.array(_STEADY) + share * np.array(_VARYING)).astype(np.uint8)

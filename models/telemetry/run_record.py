@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -136,6 +136,8 @@ class RunFacts:
         Model file.
     sections : mapping of mappings
         Everything that the run depends on, for display: JSON value by field by section.
+    changed : mapping
+        Values that were chosen, or that differ from their defaults, by dotted name.
     """
 
     name: str
@@ -147,6 +149,7 @@ class RunFacts:
     gravity_m_s2: float | None
     mjcf: Path
     sections: Mapping[str, Mapping[str, Any]]
+    changed: Mapping[str, Any] = field(default_factory=dict)
 
 
 PACKAGES = ("spheretwin", "mujoco", "numba", "numpy", "scipy", "pydantic", "pyarrow", "rerun-sdk")

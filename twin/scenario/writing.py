@@ -18,6 +18,8 @@ from spheretwin.scenario.sections import Scenario
 # A shipped scenario with few fields: other scenarios are written as differences from it.
 PLAIN = "tilt"
 
+_HEADINGS = ("name", "description")
+
 # Families and the fields that select their members.
 FAMILIES = (("trajectory", "shape"), ("controller", "law"), ("estimator", "kind"))
 
@@ -53,6 +55,21 @@ def as_command(scenario: Scenario) -> str:
     return shlex.join(["spheretwin", "simulate", name, *tokens])
 
 
+def changed_fields(scenario: Scenario) -> dict[str, Any]:
+    """Return the fields by dotted name that were chosen, or that differ from a constant default.
+
+    Defaults that follow from files, trajectory or hardware are filled in a resolved scenario: it does not
+    show whether such a value was given.
+    """
+    fields = scenario.model_dump(mode="json")
+    chosen = _chosen(scenario, fields)
+    defaults = _defaults(chosen)
+    changed = {
+        dotted: value for dotted, value in _flat(fields).items() if defaults.get(dotted) not in (None, value)
+    }
+    return {dotted: value for dotted, value in {**chosen, **changed}.items() if dotted not in _HEADINGS}
+
+
 def _chosen(scenario: Scenario, fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields that must be written: hardware set, members of families, fields without default."""
     chosen: dict[str, Any] = {"hardware": fields["hardware"]}
@@ -69,13 +86,18 @@ def _chosen(scenario: Scenario, fields: Mapping[str, Any]) -> dict[str, Any]:
 
 def _differences(fields: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields by dotted name that differ from those of a scenario with only the chosen fields."""
-    base: dict[str, Any] = {}
-    for dotted, value in chosen.items():
-        override(base, dotted, value)
-    defaults = _flat(_completed(base))
+    defaults = _defaults(chosen)
     return {
         dotted: value for dotted, value in _flat(fields).items() if defaults.get(dotted, defaults) != value
     }
+
+
+def _defaults(chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """Return all fields by dotted name of a scenario with only the chosen ones."""
+    base: dict[str, Any] = {}
+    for dotted, value in chosen.items():
+        override(base, dotted, value)
+    return _flat(_completed(base))
 
 
 def _completed(fields: dict[str, Any]) -> dict[str, Any]:

@@ -32,7 +32,7 @@ from spheretwin.viz.comparison.layout import (
 from spheretwin.viz.comparison.ranges import LEAST, PlotRange, plot_range
 from spheretwin.viz.comparison.runs import ComparedRun, leaders
 from spheretwin.viz.layout.extents import labelled
-from spheretwin.viz.layout.plots import MIDDLE, THICK, THIN
+from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import ScalarQuantity, scalar_quantities
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe

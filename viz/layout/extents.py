@@ -124,6 +124,13 @@ def number(value: float) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
+def span_text(low: float, high: float, least: float) -> str:
+    """Return a span as text, to a hundredth of its width; one number where it is constant."""
+    digits = 2 - floor(log10(max(high - low, least)))
+    texts = [number(round(bound, digits) + 0.0) for bound in (low, high)]
+    return " to ".join(dict.fromkeys(texts))
+
+
 def labelled(low: float, high: float, least: float, most: int = LABELLED) -> tuple[float, float]:
     """Return a range around two numbers in which a viewer labels two ticks or more.
 
@@ -212,7 +219,6 @@ _OF_FIXED_RANGE = frozenset(
         "allocation_scale",
         "coil_power_W",
         "copper_loss_W",
-        "voltage_limited",
         "current_limited",
         "time_to_detection_s",
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 import rerun.blueprint as rrb
@@ -28,6 +29,11 @@ def layout(view: View, extents: Extents | None = None) -> rrb.Blueprint:
     """
     encoded, plots = _encoded(view._replace(run=""))
     return encoded.changed(plots.changes(extents)) if extents else encoded
+
+
+def marked_lines(view: View) -> Mapping[tuple[str, ...], str]:
+    """Return the entity of the markers by the signals and quantities whose lines share a plot."""
+    return _encoded(view._replace(run=""))[1].marked
 
 
 @lru_cache(maxsize=4)

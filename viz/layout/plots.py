@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.blueprint import Visualizer
 from rerun.blueprint.archetypes import ViewBlueprint, ViewContents
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
+from rerun.components import AggregationPolicy
 
-from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
-from spheretwin.viz import theme
-from spheretwin.viz.layout.extents import ROOM, Extents, PlotChannel, number
+from spheretwin.models.telemetry.signals import ANGLES, common_signals
+from spheretwin.viz.layout.extents import ROOM, Extents, PlotChannel, number, span_text
+from spheretwin.viz.layout.styles import LINE_LOOKS, MOST_MARKED, THIN
 from spheretwin.viz.layout.view import (
+    DERIVED,
     ENDED,
+    ENVELOPE,
+    HIGH,
+    LOW,
+    MARKS,
+    MEAN,
     STATES,
     STYLES,
     TELEMETRY,
@@ -23,99 +31,26 @@ from spheretwin.viz.layout.view import (
     VALUES,
     View,
     component,
-    derived,
     shown_until_s,
 )
 from spheretwin.viz.quantities import Quantity
 
-LOOKS = ("names", "colors", "widths", "aggregation_policy")
-"""Properties of `rr.SeriesLines` in a style."""
-
-WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
-
-_COMMANDED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
-_ESTIMATED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
-_SECONDARY = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
-
-# Lines are drawn in the order of their names: estimates first, as a rim of the true values,
-# and commands last and thin.
-_ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
-
-
-def signal_style(signal: Signal) -> rr.SeriesLines:
-    """Return names with units, colours and widths of a signal's lines."""
-    names = _names(_short(signal.name), signal.labels or ("",), signal.unit)
-    return _style(names, _colours(signal), _width(signal.name))
-
-
-@cache
-def quantity_style(quantity: Quantity) -> rr.SeriesLines:
-    """Return names with units, colours and width of a derived quantity's lines."""
-    names = _names(_short(quantity.name), quantity.labels, quantity.unit)
-    return _style(names, list(quantity.colours), _width(quantity.name))
-
-
-def _style(names: list[str], colours: list[theme.Colour], width: float) -> rr.SeriesLines:
-    # A command that swings from tick to tick is its mean where ticks share a pixel: this moves the rotor.
-    aggregation = rr.components.AggregationPolicy.Average if width == THIN else None
-    return rr.SeriesLines(
-        names=names, colors=colours, widths=[width] * len(names), aggregation_policy=aggregation
-    )
-
-
-def _names(short: str, labels: tuple[str, ...], unit: str) -> list[str]:
-    return [f"{short} {label} [{unit}]".replace("  ", " ") for label in labels]
-
-
-def _short(name: str) -> str:
-    """Return the name without its unit, which follows in brackets."""
-    for suffix in ("_rad_s", "_mrad", "_rad", "_Nm", "_deg", "_mm", "_A", "_W", "_s"):
-        if name.endswith(suffix):
-            return name.removesuffix(suffix)
-    return name
-
-
-def _colours(signal: Signal) -> list[theme.Colour]:
-    for names, colour in (
-        (_COMMANDED, theme.COMMAND),
-        (_ESTIMATED, theme.ESTIMATE),
-        (_SECONDARY, theme.DESIRED_TRACE),
-    ):
-        if signal.name in names:
-            return [colour] * signal.size
-    if signal.size == 3 and signal.labels in ((), ANGLES, AXES):
-        return list(theme.AXIS_COLOURS)
-    return [theme.PLAIN if signal.size == 1 else theme.GROUP] * signal.size
-
-
-def _width(name: str) -> float:
-    for names, width in ((_ESTIMATED, WIDEST), (_ACTUAL, THICK), (_COMMANDED, THIN)):
-        if name in names:
-            return width
-    return MIDDLE
-
-
 Range = tuple[float, float]
-
-_NO_LEGEND = rrb.PlotLegend(visible=False)
-"""A legend would cover data; titles and the colours of the axes say the same."""
 
 
 class PlotLine(NamedTuple):
-    """Line of a plot: an entity, or a signal of the telemetry; its bounds have this name."""
+    """Lines of a plot: those of a signal, of a derived quantity, or of an entity with its own values."""
 
     entity: str
     name: str
-
-
-def signal(name: str) -> PlotLine:
-    """Return the line of a signal of the telemetry."""
-    return PlotLine(TELEMETRY, name)
+    """Field of the entity's values; its bounds have this name. Empty for an entity with its own values."""
+    size: int = 1
+    """Entries, each a line."""
 
 
 def quantity(of: Quantity) -> PlotLine:
-    """Return the line of a derived quantity."""
-    return PlotLine(derived(of.name), of.name)
+    """Return the lines of a derived quantity."""
+    return PlotLine(DERIVED, of.name, of.size)
 
 
 class Fit(NamedTuple):
@@ -139,13 +74,24 @@ class Plots:
     ----------
     view : View
         Properties of the run.
+
+    Attributes
+    ----------
+    marked : dict of str
+        Entity of the markers by the signals and quantities whose lines share a plot.
     """
 
     def __init__(self, view: View) -> None:
         self.view = view
+        self._sizes = {of.name: of.size for of in (*common_signals(view.groups), *view.own)}
+        self.marked: dict[tuple[str, ...], str] = {}
         self._plots: list[_Plot] = []
         self._states: list[rrb.StateTimelineView] = []
         self._squares: list[tuple[rrb.Spatial2DView, PlotChannel, float]] = []
+
+    def signal(self, name: str) -> PlotLine:
+        """Return the lines of a signal of the telemetry."""
+        return PlotLine(TELEMETRY, name, self._sizes[name])
 
     def about_zero(
         self,
@@ -154,7 +100,6 @@ class Plots:
         *lines: PlotLine,
         least: float,
         axis: int | None = None,
-        key: str = "",
     ) -> rrb.TimeSeriesView:
         """Make a plot with the range of the settled run; its title gives the extent outside.
 
@@ -168,8 +113,6 @@ class Plots:
             Half of the range at least.
         axis : int, optional
             Hinge whose entries are drawn; all unless given.
-        key : str
-            End of the title: identifies the lines.
 
         Notes
         -----
@@ -181,9 +124,9 @@ class Plots:
             limit = extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
             suffix = extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
             reach = (1 + ROOM) * limit
-            return Fit(f"{what} ±{number(limit)} {unit}{suffix}{key}", (-reach, reach))
+            return Fit(f"{what} ±{number(limit)} {unit}{suffix}", (-reach, reach))
 
-        return self._plot(f"{what} [{unit}]{key}", lines, axis, fit)
+        return self._plot(f"{what} [{unit}]", lines, axis, fit)
 
     def above_zero(self, what: str, unit: str, line: PlotLine, *, least: float) -> rrb.TimeSeriesView:
         """Make a plot of a quantity that is never negative, with the range of the settled run."""
@@ -202,17 +145,15 @@ class Plots:
         *lines: PlotLine,
         least: float,
         axis: int | None = None,
-        key: str = "",
     ) -> rrb.TimeSeriesView:
         """Make a plot with the full range of some lines, at least twice `least`."""
 
         def fit(extents: Extents) -> Fit:
             channels = [PlotChannel(line.name, axis) for line in lines]
-            low, high = extents.bounds(*channels)
-            title = f"{what} [{unit}], {number(low)} to {number(high)}{key}"
+            title = f"{what} [{unit}], {span_text(*extents.bounds(*channels), least)}"
             return Fit(title, extents.band(*channels, least=least))
 
-        return self._plot(f"{what} [{unit}]{key}", lines, axis, fit)
+        return self._plot(f"{what} [{unit}]", lines, axis, fit)
 
     def fixed(self, title: str, *lines: PlotLine, low: float, high: float) -> rrb.TimeSeriesView:
         """Make a plot with a range that is known before the run."""
@@ -259,10 +200,16 @@ class Plots:
         fit: Callable[[Extents], Fit] | None,
         axis_y: rrb.ScalarAxis | None = None,
     ) -> rrb.TimeSeriesView:
-        contents = list(dict.fromkeys(f"/{line.entity}" for line in lines))
+        overrides: dict[str | rr.EntityPath, list[Visualizer]] = defaultdict(list)
         # Drawn in this order, as entities are in that of their names.
-        names = sorted(line.name for line in lines if line.entity == TELEMETRY)
-        signals = [rr.SeriesLines().visualizer(mappings=_mappings(name)) for name in names]
+        fields = sorted((line for line in lines if line.name), key=lambda line: line.name)
+        for line in fields:
+            for entity, visualizer in self._visualizers(line):
+                overrides[f"/{entity}"].append(visualizer)
+        contents = list(dict.fromkeys([*overrides, *(f"/{line.entity}" for line in lines if not line.name)]))
+        marked = tuple(line.name for line in fields if line.size <= MOST_MARKED)
+        if len(marked) > 1 or (axis is None and any(1 < line.size <= MOST_MARKED for line in fields)):
+            contents.append(f"/{self.marked.setdefault(marked, f'{MARKS}/{len(self.marked)}')}")
         one = [place == axis for place in range(len(ANGLES))]
         view = rrb.TimeSeriesView(
             origin="/",
@@ -270,12 +217,31 @@ class Plots:
             name=title,
             axis_x=self._time_axis(),
             axis_y=axis_y,
-            plot_legend=_NO_LEGEND,
-            defaults=[] if axis is None else [rr.SeriesLines.from_fields(visible_series=one)],
-            overrides={f"/{TELEMETRY}": signals} if signals else None,
+            # A legend would list what is invisible too, and each row of a map.
+            plot_legend=None if fields and axis is None else rrb.PlotLegend(visible=False),
+            defaults=[]
+            if axis is None
+            else [
+                rr.SeriesLines.from_fields(visible_series=one),
+                rr.SeriesPoints.from_fields(visible_series=one * len(marked)),
+            ],
+            overrides=overrides or None,
         )
         self._plots.append(_Plot(view, contents, fit))
         return view
+
+    def _visualizers(self, line: PlotLine) -> Iterator[tuple[str, Visualizer]]:
+        """Entities and visualizers of lines: of every row, or of an envelope."""
+        if self.view.decimated:
+            for kind, policy in ((LOW, AggregationPolicy.Min), (HIGH, AggregationPolicy.Max)):
+                bound = rr.SeriesLines(
+                    widths=[THIN] * line.size, aggregation_policy=policy, interpolation_mode="StepAfter"
+                )
+                yield ENVELOPE, bound.visualizer(mappings=_mappings(kind, line.name, LINE_LOOKS[:2]))
+            mean = rr.SeriesLines(aggregation_policy="Average", interpolation_mode="StepAfter")
+            yield ENVELOPE, mean.visualizer(mappings=_mappings(MEAN, line.name, LINE_LOOKS[:3]))
+        else:
+            yield line.entity, rr.SeriesLines().visualizer(mappings=_mappings(VALUES, line.name, LINE_LOOKS))
 
     def _time_axis(self) -> rrb.TimeAxis | None:
         """Return an axis over the planned time in a live view.
@@ -300,14 +266,10 @@ def time_range(oldest_s: float, newest_s: float = 0.0) -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
 
 
-def _mappings(name: str) -> list[VisualizerComponentMapping]:
-    """Map the lines of a signal to fields of the telemetry's components."""
-    looks = [f"SeriesLines:{look}" for look in LOOKS]
-    mappings = [_mapping(VALUES, name, "", "Scalars:scalars")]
-    mappings += [
-        _mapping(STYLES, name, f".{look}", target) for look, target in zip(LOOKS, looks, strict=True)
-    ]
-    return mappings
+def _mappings(kind: str, name: str, looks: tuple[str, ...]) -> list[VisualizerComponentMapping]:
+    """Map lines to fields of the components of their entity: values of a kind, and a style."""
+    mappings = [_mapping(kind, name, "", "Scalars:scalars")]
+    return mappings + [_mapping(STYLES, name, f".{look}", f"SeriesLines:{look}") for look in looks]
 
 
 def _mapping(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:

@@ -12,6 +12,9 @@ OVERVIEW = "overview"
 VIEW_NAMES = (OVERVIEW, "control", "coils", "hardware", "compare", "scenario")
 """Tabs of a recording; apart from the views, because Rerun is slow to import."""
 
+# Time before the cursor that the plots of a live view show.
+LIVE_WINDOW_S = 10.0
+
 # Time after an early end that the time axes show, as a share of the time before.
 AFTER_THE_END = 0.15
 
@@ -35,6 +38,13 @@ class View(NamedTuple):
     """Size of the actuator relative to the shipped one; the distance of the camera is proportional to it."""
     run: str = ""
     """Identity of the recording: figures of its run stand in the layout."""
+    decimated: bool = False
+    """True if plots show an envelope, because the recording does not have every row."""
+
+    @property
+    def shown_s(self) -> float:
+        """Length of the time that plots show at once."""
+        return min(self.duration_s, LIVE_WINDOW_S) if self.live else self.duration_s
 
     @property
     def names(self) -> frozenset[str]:
@@ -67,13 +77,15 @@ def application_of(name: str, key: str) -> str:
 TIMELINE = "sim_time"
 TELEMETRY = "telemetry"
 DERIVED = "derived"
+ENVELOPE = "envelope"
+MARKS = "marks"
 SCENARIO = "scenario"
 SUMMARY = "summary"
 EVENTS = "events"
 STATES = "states"
 CURRENT_MAP = "currents/map"
-CURRENT_BARS = "currents/bars"
-CURRENT_BARS_STILL = f"{CURRENT_BARS}/still"
+CURRENT_VARIATION = "currents/variation"
+CURRENT_LIMITS = "currents/limits"
 PHASE_PLANE = "phase_plane"
 ENDED = "ended"
 
@@ -81,7 +93,11 @@ ENDED = "ended"
 VALUES, STYLES, DESCRIBED = "values", "styles", "described"
 """Components of `TELEMETRY`: values of all signals in each row, styles of their lines, descriptions.
 
-The first two are structs with a field a signal: each component would cost some bytes more in every row."""
+The first two are structs with a field a signal: each component would cost some bytes more in every row.
+`DERIVED` (derived quantities of every row) and `MARKS` (markers of lines) have values and styles too."""
+
+LOW, MEAN, HIGH = "low", "mean", "high"
+"""Components of `ENVELOPE` in place of values: bounds and mean of each bin of time."""
 
 CHECKSUM, TOTAL = "checksum", "total"
 """Components of `TELEMETRY` and `EVENTS`: checksums, and how many rows or lines there are.
@@ -99,8 +115,5 @@ def component(kind: str, arrival: int) -> str:
     return f"{kind}_{arrival}"
 
 
-def derived(quantity: str) -> str:
-    """Return the entity of a derived quantity."""
-    import rerun as rr  # slow to import, and the command needs the names of the views
-
-    return f"{DERIVED}/{rr.escape_entity_path_part(quantity)}"
+VARIATION_LANE = 1.4
+"""Place of the variation of the currents in their map, in rows above the last group."""

@@ -8,14 +8,16 @@ import rerun.blueprint as rrb
 
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.viz.layout.extents import PlotChannel
-from spheretwin.viz.layout.plots import PlotLine, Plots, quantity, signal, time_range
+from spheretwin.viz.layout.plots import PlotLine, Plots, quantity, time_range
 from spheretwin.viz.layout.view import (
-    CURRENT_BARS,
+    CURRENT_LIMITS,
     CURRENT_MAP,
+    CURRENT_VARIATION,
     EVENTS,
     PHASE_PLANE,
     SCENARIO,
     SUMMARY,
+    VARIATION_LANE,
 )
 from spheretwin.viz.quantities import (
     COPPER_LOSS,
@@ -44,25 +46,27 @@ RATE_SIGNALS = (
 )
 
 
+ROLES = "● actual, × reference"
+"""Markers of the lines of a hinge; squares mark measurements and estimates, + what a governor makes of it."""
+
+
 def compare(plots: Plots) -> rrb.Container:
     """Angles and rates of each axis with their references; below, the distance between the shaft's tips."""
     angles, rates = _lines(plots, ANGLE_SIGNALS), _lines(plots, RATE_SIGNALS)
     angles_of_each = [
-        plots.whole(name, "rad", *angles, least=LEAST_rad, axis=axis) for axis, name in enumerate(ANGLES)
-    ]
-    rates_of_each = [
-        plots.about_zero(f"rate of {name}", "rad/s", *rates, least=LEAST_rad_s, axis=axis)
+        plots.whole(f"{name}: {ROLES}", "rad", *angles, least=LEAST_rad, axis=axis)
         for axis, name in enumerate(ANGLES)
     ]
+    turning = plots.about_zero(f"rates: {ROLES}", "rad/s", *rates, least=LEAST_rad_s)
     apart = plots.above_zero(
         "tip's distance from its reference", "mm", quantity(TIP_DISTANCE), least=TIP_DISTANCE.floor
     )
-    above = rrb.Horizontal(*angles_of_each), rrb.Horizontal(*rates_of_each)
-    return rrb.Vertical(*above, apart, row_shares=[4, 4, 3], name="compare")
+    above = rrb.Horizontal(*angles_of_each)
+    return rrb.Vertical(above, turning, apart, row_shares=[4, 4, 3], name="compare")
 
 
 def _lines(plots: Plots, names: tuple[str, ...]) -> list[PlotLine]:
-    return [signal(name) for name in names if name in plots.view.names]
+    return [plots.signal(name) for name in names if name in plots.view.names]
 
 
 def scenario(plots: Plots) -> rrb.View:
@@ -81,16 +85,21 @@ def run_line() -> rrb.TextDocumentView:
 def current_map(plots: Plots) -> rrb.TimeSeriesView:
     """Currents as colours: a row for each group, time along it."""
     limit, groups = plots.view.current_limit_A, plots.view.groups
-    title = f"currents of groups 0 (lowest) to {groups - 1}: blue -{limit:g} A, red +{limit:g} A"
-    return plots.fixed(title, PlotLine(CURRENT_MAP, CURRENT_MAP), low=-0.7, high=groups - 0.3)
+    title = (
+        f"mean currents of groups 0 (lowest) to {groups - 1}, -{limit:g} A blue to +{limit:g} A red;"
+        " top: how much they vary"
+    )
+    lines = PlotLine(CURRENT_MAP, ""), PlotLine(CURRENT_VARIATION, "")
+    return plots.fixed(title, *lines, low=-0.7, high=groups + VARIATION_LANE)
 
 
-def current_bars(plots: Plots) -> rrb.Spatial2DView:
-    """Currents of this moment, one bar a group, between the limits."""
-    return rrb.Spatial2DView(
-        origin=f"/{CURRENT_BARS}",
-        name="currents at the cursor, by group, between the limits",
-        visual_bounds=rrb.VisualBounds2D(x_range=[-0.1, 2.1], y_range=[-0.6, 0.7]),
+def current_bars(plots: Plots) -> rrb.BarChartView:
+    """Currents of the row at the cursor, one bar a group, between the limits."""
+    return rrb.BarChartView(
+        origin="/",
+        contents=[f"/{scene.COILS}", f"/{CURRENT_LIMITS}"],
+        name="currents at the cursor [A], by group",
+        plot_legend=rrb.PlotLegend(visible=False),
     )
 
 
@@ -124,24 +133,25 @@ LEAST = {"N·m": 0.01, "rad/s": 0.05, "rad": 0.02, "rad/s²": 0.5}
 
 
 def control(plots: Plots) -> rrb.Container:
-    """Errors and torques of each axis; below, the signals of the law and the coupling of the axes."""
-    errors = [
-        plots.about_zero(f"error {name}", "mrad", quantity(ERROR), least=ERROR.floor, axis=axis)
-        for axis, name in enumerate(ANGLES)
-    ]
-    lines = [signal("torque_command_Nm"), quantity(DELIVERED), signal("disturbance_Nm")]
+    """Errors of the axes; below, torques of each, the signals of the law and the coupling of the axes."""
+    lines = [plots.signal("torque_command_Nm"), quantity(DELIVERED), plots.signal("disturbance_Nm")]
     torques = [
         plots.about_zero(
-            f"torque {name}",
+            f"torque {name}: ● delivered, × command, + load",
             "N·m",
             *lines,
             least=DELIVERED.floor,
             axis=axis,
-            key=", grey load",
         )
         for axis, name in enumerate(ANGLES)
     ]
-    return rrb.Grid(*errors, *torques, *_law_plots(plots), grid_columns=3, name="control")
+    below = rrb.Grid(*torques, *_law_plots(plots), grid_columns=3)
+    return rrb.Vertical(error_of_each_axis(plots), below, row_shares=[1, 2], name="control")
+
+
+def error_of_each_axis(plots: Plots) -> rrb.TimeSeriesView:
+    """Tracking errors of the three hinges."""
+    return plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor)
 
 
 def _law_plots(plots: Plots) -> list[rrb.Container | rrb.View]:
@@ -151,7 +161,7 @@ def _law_plots(plots: Plots) -> list[rrb.Container | rrb.View]:
     if SLIDING in own:
         del own[SLIDING]
         sliding = [
-            plots.about_zero("sliding variables s", "rad/s", signal(SLIDING), least=LEAST["rad/s"]),
+            plots.about_zero("sliding variables s", "rad/s", plots.signal(SLIDING), least=LEAST["rad/s"]),
             phase_plane(plots),
         ]
     units = dict.fromkeys(own_signal.unit for own_signal in own.values())
@@ -162,7 +172,7 @@ def _law_plots(plots: Plots) -> list[rrb.Container | rrb.View]:
 def _plot(plots: Plots, unit: str, own: dict[str, Signal]) -> rrb.TimeSeriesView:
     """Plot of all signals of one unit."""
     names = [name for name, own_signal in own.items() if own_signal.unit == unit]
-    return plots.whole(", ".join(names), unit, *map(signal, names), least=LEAST.get(unit, 1e-3))
+    return plots.whole(", ".join(names), unit, *map(plots.signal, names), least=LEAST.get(unit, 1e-3))
 
 
 def _is_law_signal(of: Signal) -> bool:
@@ -197,21 +207,22 @@ def hardware(plots: Plots) -> rrb.Container:
     names = plots.view.names
     shown = []
     if "coil_temperature_degC" in names:
-        line = signal("coil_temperature_degC")
+        line = plots.signal("coil_temperature_degC")
         shown.append(plots.whole("temperature of the coils", "°C", line, least=LEAST_degC))
     if "voltage_limited" in names:
         title = "share of time with the voltage at its limit"
-        shown.append(plots.fixed(title, signal("voltage_limited"), low=-0.02, high=1.05))
+        shown.append(plots.fixed(title, plots.signal("voltage_limited"), low=-0.02, high=1.05))
     if "supply_power_W" in names:
-        line = signal("supply_power_W")
+        line = plots.signal("supply_power_W")
         shown.append(plots.whole("power of the supply", "W", line, least=LEAST_W))
     if "q_measured_rad" in names:
         title = "measured - true"
         shown.append(plots.about_zero(title, "mrad", quantity(MEASURED_ANGLE), least=MEASURED_ANGLE.floor))
+    if "qdot_estimated_rad_s" in names:
         title = "estimated - true"
         shown.append(plots.about_zero(title, "rad/s", quantity(ESTIMATED_RATE), least=ESTIMATED_RATE.floor))
     if "friction_Nm" in names:
-        shown.append(plots.whole("friction", "N·m", signal("friction_Nm"), least=0.002))
+        shown.append(plots.whole("friction", "N·m", plots.signal("friction_Nm"), least=0.002))
     state_views = [plots.states("states of the components"), log()]
     if not shown:
         return rrb.Vertical(*state_views, name="hardware")
@@ -250,7 +261,7 @@ def overview(plots: Plots) -> rrb.Container:
     left = rrb.Vertical(actuator_view(plots.view.size), current_map(plots), row_shares=[3, 2])
     right = rrb.Vertical(
         plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
-        plots.about_zero("error of each axis", "mrad", quantity(ERROR), least=ERROR.floor),
+        error_of_each_axis(plots),
         plots.fixed(
             f"torque margin [times the commanded], 0 is saturated, {MOST:g} or more is {MOST:g}",
             quantity(MARGIN),

@@ -74,6 +74,7 @@ class RecordingSubject:
             self.shown,
             size_of(self.actuator),
             self.run,
+            decimated=self.rate_Hz is not None,
         )
 
 

@@ -1,11 +1,11 @@
-"""Derived quantities, and at the end of a run the layout with the ranges and titles that are due to it."""
+"""Plotted data besides the telemetry: derived quantities, envelopes, markers, ranges and titles."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from time import monotonic
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
@@ -13,71 +13,40 @@ from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.decimation import CompletedBins, TimeBins
+from spheretwin.viz.decimation import CompletedBins, FirstRows, TimeBins
 from spheretwin.viz.layout.extents import ColumnSelector, ExtentTracker, plotted_signals
-from spheretwin.viz.layout.layout import layout, opening_layout
-from spheretwin.viz.layout.plots import quantity_style
-from spheretwin.viz.layout.view import (
-    CURRENT_BARS,
-    CURRENT_BARS_STILL,
-    CURRENT_MAP,
-    ENDED,
-    PHASE_PLANE,
-    SUMMARY,
-    derived,
+from spheretwin.viz.layout.layout import layout, marked_lines, opening_layout
+from spheretwin.viz.layout.styles import (
+    LineStyle,
+    as_struct,
+    mark_style,
+    quantity_style,
+    signal_style,
 )
-from spheretwin.viz.quantities import ERROR_ANGLE, Aggregation, QuantityRows, quantities_of
-from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
-from spheretwin.viz.recording.status import Summary
+from spheretwin.viz.layout.view import (
+    DERIVED,
+    ENDED,
+    ENVELOPE,
+    HIGH,
+    LOW,
+    MEAN,
+    STYLES,
+    SUMMARY,
+    VALUES,
+    component,
+)
+from spheretwin.viz.quantities import ERROR_ANGLE, QuantityRows, quantities_of
+from spheretwin.viz.recording.part import (
+    RecordingPart,
+    RecordingSubject,
+    scalars,
+    struct_component,
+    time_index,
+    vectors,
+)
+from spheretwin.viz.recording.summary import Summary
 
-PHASE_PLANE_RATE_Hz = 20.0
-
-SLIDING = "sliding_s"
-
-# Longer than the sides of any view of it, rad/s.
-_FAR = 1e3
-
-
-class PhasePlane(RecordingPart):
-    """Points (s - ė, ė) of the axes, both in rad/s: with s = λe + ė (30) the first is λe, for any λ."""
-
-    def __init__(self, subject: RecordingSubject) -> None:
-        super().__init__(subject)
-        self._bins = TimeBins(PHASE_PLANE_RATE_Hz, immediate=subject.live)
-        self._axes_drawn = False
-
-    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
-        """Record what bins the rows of a chunk have completed, where the law has the variable."""
-        if all(signal.name != SLIDING for signal in rows.signals):
-            return
-        if not self._axes_drawn:
-            _log_axes(recording)
-            self._axes_drawn = True
-        error_rate = rows["qdot_rad_s"] - rows["qdot_ref_rad_s"]
-        points = np.concatenate([rows[SLIDING] - error_rate, error_rate], axis=1)
-        self._record(recording, self._bins.add(rows["t_s"], points))
-
-    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
-        """Record the last bin."""
-        self._record(recording, self._bins.flush())
-
-    def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
-        if binned is None:
-            return
-        # Both coordinates of one moment: extremes of each would be a point that never was.
-        x, y = binned.first[:, :3], -binned.first[:, 3:]  # a 2D view's y points down
-        positions = np.stack([x, y], axis=2).reshape(-1, 2)
-        columns = rr.Points2D.columns(positions=positions).partition([3] * len(x))
-        recording.send_columns(PHASE_PLANE, time_index(binned.t_s), columns)
-
-
-def _log_axes(recording: rr.RecordingStream) -> None:
-    ends = [[[-_FAR, 0], [_FAR, 0]], [[0, -_FAR], [0, _FAR]], [[-_FAR, -_FAR], [_FAR, _FAR]]]
-    colours = [theme.DESIRED_TRACE, theme.DESIRED_TRACE, theme.COMMAND]
-    axes = rr.LineStrips2D(ends, colors=colours, radii=rr.Radius.ui_points(0.5))
-    points = rr.Points2D.from_fields(colors=theme.AXIS_COLOURS, radii=rr.Radius.ui_points(2.5))
-    recording.log(PHASE_PLANE, axes, points, static=True)
-
+Array = NDArray[np.float64]
 
 # From beyond any range of a plot to beyond its other end, in steps: a viewer draws with single precision, and
 # would lose a line between two points that are far outside of a narrow range.
@@ -102,8 +71,11 @@ def log_end(recording: rr.RecordingStream, t_s: float) -> None:
     recording.send_columns(ENDED, time_index(times), [scalars(heights, count)])
 
 
-# A bin leaves one row or two: no more than 50 a second.
-QUANTITY_RATE_Hz = 25.0
+ENVELOPE_RATE_Hz = 25.0
+"""Bins a second of envelopes, and of the ranges of all plots."""
+
+MARKS_OF_A_LINE = 16
+"""Markers on each line over the planned time."""
 
 # A file has a layout before the one of its end from then on, in s of the clock: it takes some 100 kB.
 OPENED_AFTER_s = 2.0
@@ -112,38 +84,42 @@ OPENED_AFTER_s = 2.0
 _AS_PLANNED = (Status.COMPLETED, Status.RUNNING)
 
 
-class Quantities(RecordingPart):
-    """Derived quantities, aggregated in bins of time."""
+class PlotData(RecordingPart):
+    """Derived quantities of every row, or envelopes of all plotted lines; markers, ranges and titles."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
         self._quantities = quantities_of({signal.name for signal in subject.signals})
-        self._plotted_signals = plotted_signals(subject.signals)
-        self._column_selector = ColumnSelector(self._plotted_signals)
-        self._extent_tracker = ExtentTracker(
-            {**{quantity.name: quantity.size for quantity in self._quantities}, **self._plotted_signals}
-        )
-        averaged = [
-            quantity.aggregation is Aggregation.MEAN
-            for quantity in self._quantities
-            for _ in range(quantity.size)
-        ]
-        self._averaged = np.array(averaged + [False] * sum(self._plotted_signals.values()))
-        self._bins = TimeBins(QUANTITY_RATE_Hz, immediate=subject.live)
+        signals = plotted_signals(subject.signals)
+        self._column_selector = ColumnSelector(signals)
+        sizes = {**{quantity.name: quantity.size for quantity in self._quantities}, **signals}
+        self._styles = {quantity.name: quantity_style(quantity) for quantity in self._quantities}
+        self._styles |= {
+            signal.name: signal_style(signal) for signal in subject.signals if signal.name in signals
+        }
+        ends = np.cumsum(list(sizes.values())).tolist()
+        self._places = {name: slice(end - sizes[name], end) for name, end in zip(sizes, ends, strict=True)}
+        self._extent_tracker = ExtentTracker(sizes)
+        self._bins = TimeBins(ENVELOPE_RATE_Hz, immediate=subject.live)
+        self._marks = Marks(subject, self._styles, self._places)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
         self._begun_s: float | None = None  # clock at the first rows: all is compiled then
         self._opened = False
 
     def begin(self, recording: rr.RecordingStream) -> None:
-        """Log the styles of the quantities and, in a live view, the facts of the run."""
-        for quantity in self._quantities:
-            recording.log(derived(quantity.name), quantity_style(quantity), static=True)
+        """Log the styles of lines and markers and, in a live view, the facts of the run."""
+        self._marks.begin(recording)
+        if self.subject.view.decimated:
+            _log_styles(recording, ENVELOPE, self._styles)
+        else:
+            names = [quantity.name for quantity in self._quantities]
+            _log_styles(recording, DERIVED, {name: self._styles[name] for name in names})
         if self.subject.live:
             _log_summary(recording, self._summary.running())
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
-        """Record what bins the rows of a chunk have completed."""
+        """Record the derived quantities of the rows of a chunk, or what bins they have completed."""
         self._open(recording)
         facts = self.subject.facts
         given = QuantityRows(
@@ -153,15 +129,22 @@ class Quantities(RecordingPart):
             values = {quantity.name: quantity.values(given) for quantity in self._quantities}
         self._before = Table(rows.signals, rows.values[-1:].copy())
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
+        if not self.subject.view.decimated:
+            _send(recording, DERIVED, rows["t_s"], {VALUES: values})
         columns = np.concatenate([*values.values(), self._column_selector.of(rows)], axis=1)
         self._record(recording, self._bins.add(rows["t_s"], columns))
+        self._marks.add(recording, rows["t_s"], columns)
 
     def finish(self, recording: rr.RecordingStream, status: Status) -> None:
         """Record the last bin, and lay the recording out for what the run has shown."""
-        self._record(recording, self._bins.flush())
+        self._marks.send(recording)
+        binned = self._bins.flush()
+        self._record(recording, binned)
+        if binned and binned.last_s[-1] > binned.t_s[-1] and self.subject.view.decimated:
+            end = CompletedBins(*(column[-1:] for column in binned))
+            self._send_envelope(recording, end._replace(t_s=end.last_s))
         _log_summary(recording, self._summary.ended(status))
-        last_s = self._summary.last_s
-        ended_s = None if status in _AS_PLANNED else last_s
+        ended_s = None if status in _AS_PLANNED else self._summary.last_s
         if ended_s is not None:
             log_end(recording, ended_s)
         recording.send_blueprint(layout(self.subject.view, self._extent_tracker.extents(ended_s)))
@@ -178,94 +161,96 @@ class Quantities(RecordingPart):
     def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
         if binned is None:
             return
-        low, high = (np.where(self._averaged, binned.mean, bound) for bound in (binned.low, binned.high))
-        self._extent_tracker.add(binned.t_s, low, high)
-        t_s, both = binned.pairs()
-        columns = {
-            Aggregation.BOTH: (time_index(t_s), both),
-            Aggregation.LEAST: (time_index(binned.t_s), binned.low),
-            Aggregation.GREATEST: (time_index(binned.t_s), binned.high),
-            Aggregation.MEAN: (time_index(binned.t_s), binned.mean),
-        }
-        first = 0
-        for quantity in self._quantities:
-            index, values = columns[quantity.aggregation]
-            block = np.ascontiguousarray(values[:, first : first + quantity.size])
-            recording.send_columns(derived(quantity.name), index, [scalars(block, quantity.size)])
-            first += quantity.size
+        self._extent_tracker.add(binned.t_s, binned.low, binned.high)
+        if self.subject.view.decimated:
+            self._send_envelope(recording, binned)
+
+    def _send_envelope(self, recording: rr.RecordingStream, binned: CompletedBins) -> None:
+        kinds = {LOW: binned.low, MEAN: binned.mean, HIGH: binned.high}
+        _send(recording, ENVELOPE, binned.t_s, {kind: self._split(block) for kind, block in kinds.items()})
+
+    def _split(self, columns: Array) -> dict[str, Array]:
+        return {name: columns[:, place] for name, place in self._places.items()}
+
+
+class Marks:
+    """Markers on lines that share a plot: one line of three has one at a time, so that they do not coincide.
+
+    Parameters
+    ----------
+    subject : RecordingSubject
+    styles : mapping of str to LineStyle
+        Styles of the lines by the name of the signal or quantity.
+    places : mapping of str to slice
+        Columns of the lines, by the same names.
+    """
+
+    def __init__(
+        self, subject: RecordingSubject, styles: Mapping[str, LineStyle], places: Mapping[str, slice]
+    ) -> None:
+        self._lines, self._styles, self._places = marked_lines(subject.view), styles, places
+        self._rate_Hz = 3 * MARKS_OF_A_LINE / subject.view.shown_s
+        self._firsts = FirstRows(self._rate_Hz)
+        self._live = subject.live
+        self._t_s: list[Array] = []
+        self._values: list[Array] = []
+
+    def begin(self, recording: rr.RecordingStream) -> None:
+        """Log the styles of the markers."""
+        for names, entity in self._lines.items():
+            recording.log(entity, mark_style([self._styles[name] for name in names]), static=True)
+
+    def add(self, recording: rr.RecordingStream, t_s: Array, columns: Array) -> None:
+        """Add the rows of a chunk."""
+        rows = self._firsts.first_places(t_s)
+        self._t_s.append(t_s[rows])
+        self._values.append(columns[rows])
+        # Each entity takes some bytes every time: a file has its markers at the end.
+        if self._live and sum(map(len, self._t_s)) >= 3:
+            self.send(recording)
+
+    def send(self, recording: rr.RecordingStream) -> None:
+        """Send the markers of the rows so far."""
+        t_s = np.concatenate([np.empty(0), *self._t_s])
+        if not len(t_s):
+            return
+        columns = np.concatenate(self._values)
+        self._t_s, self._values = [], []
+        turn = np.round(t_s * self._rate_Hz).astype(np.int64)
+        for names, entity in self._lines.items():
+            values = np.concatenate([columns[:, self._places[name]] for name in names], axis=1)
+            # Entries of one line, and lines of one hinge, have their markers at other times.
+            line, entry = np.divmod(np.arange(values.shape[1]), max(1, values.shape[1] // len(names)))
+            shown = (turn[:, None] + line + entry) % 3 == 0
+            marks = np.where(shown, values, np.nan)
+            recording.send_columns(entity, time_index(t_s), [scalars(marks, marks.shape[1])])
+
+
+def _send(
+    recording: rr.RecordingStream, entity: str, t_s: Array, kinds: Mapping[str, Mapping[str, Array]]
+) -> None:
+    """Send values as structs with a field for each name, in single precision: a plot shows no more."""
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that diverged has larger numbers
+        columns = [
+            rr.ComponentColumn(
+                component(kind, 0),
+                struct_component(
+                    {
+                        name: vectors(values.astype(np.float32), values.shape[1])
+                        for name, values in fields.items()
+                    }
+                ),
+            )
+            for kind, fields in kinds.items()
+        ]
+    recording.send_columns(entity, time_index(t_s), columns)
+
+
+def _log_styles(recording: rr.RecordingStream, entity: str, styles: Mapping[str, LineStyle]) -> None:
+    structs = struct_component({name: as_struct(style) for name, style in styles.items()})
+    batch = rr.DescribedComponentBatch(structs, rr.ComponentDescriptor(component(STYLES, 0)))
+    recording.log(entity, [batch], static=True)
 
 
 def _log_summary(recording: rr.RecordingStream, text: str) -> None:
     recording.log(SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-
-
-Array = NDArray[np.float64]
-
-CURRENT_MAP_RATE_Hz = 12.5
-
-# Height of a row of the map, in points of the screen: rows of 18 groups touch in a panel of some 230 of them.
-ROW_HEIGHT = 12.0
-
-# The bars' panel: as wide as this, as high as 1 between the limits.
-WIDTH = 2.0
-
-
-class Currents(RecordingPart):
-    """Current of the largest magnitude of each group in each bin of time."""
-
-    def __init__(self, subject: RecordingSubject) -> None:
-        super().__init__(subject)
-        self._groups = len(subject.actuator.groups)
-        self._bins = TimeBins(CURRENT_MAP_RATE_Hz, immediate=subject.live)
-
-    def begin(self, recording: rr.RecordingStream) -> None:
-        """Log the names of the rows, the limits and the numbers of the bars."""
-        names = [f"group {group}" for group in range(self._groups)]
-        widths = [ROW_HEIGHT] * self._groups
-        recording.log(CURRENT_MAP, rr.SeriesLines(names=names, widths=widths), static=True)
-        limit_A = self.subject.facts.current_limit_A
-        ends = [[[0.0, y], [WIDTH, y]] for y in (-0.5, 0.0, 0.5)]
-        lines = rr.LineStrips2D(ends, colors=[theme.DESIRED_TRACE] * 3, radii=rr.Radius.ui_points(0.5))
-        places = [[-0.05, -0.5], [-0.05, 0.5], *([x, 0.56] for x in self._places())]
-        labels = [f"+{limit_A:g} A", f"-{limit_A:g} A", *map(str, range(self._groups))]
-        captions = rr.Points2D(places, labels=labels, show_labels=True, radii=0.0, colors=[theme.PLAIN])
-        recording.log(CURRENT_BARS_STILL, lines, captions, static=True)
-        bars = rr.LineStrips2D.from_fields(radii=0.3 * WIDTH / self._groups)
-        recording.log(CURRENT_BARS, bars, static=True)
-
-    def write(self, recording: rr.RecordingStream, rows: Table) -> None:
-        """Record what bins the rows of a chunk have completed."""
-        self._record(recording, self._bins.add(rows["t_s"], rows["current_A"]))
-
-    def finish(self, recording: rr.RecordingStream, status: Status) -> None:
-        """Record the last bin."""
-        self._record(recording, self._bins.flush())
-
-    def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
-        if binned is None:
-            return
-        current_A, index = binned.extremes(), time_index(binned.t_s)
-        limit_A = self.subject.facts.current_limit_A
-        colours = _packed(theme.current_colours(current_A, limit_A))
-        count = [self._groups] * len(current_A)
-        rows = np.tile(np.arange(self._groups, dtype=np.float64), (len(current_A), 1))
-        lines = rr.SeriesLines.columns(colors=colours).partition(count)
-        recording.send_columns(CURRENT_MAP, index, [scalars(rows, self._groups), *lines])
-        bars = rr.LineStrips2D.columns(strips=self._bars(current_A / limit_A), colors=colours)
-        recording.send_columns(CURRENT_BARS, index, bars.partition(count))
-
-    def _places(self) -> Array:
-        return (np.arange(self._groups) + 0.5) * WIDTH / self._groups
-
-    def _bars(self, share: Array) -> pa.Array:
-        """A bar for each current, up from the middle for a positive one: a 2D view's y points down."""
-        ends = np.zeros((*share.shape, 2, 2))
-        ends[..., 0] = self._places()[:, None]
-        ends[..., 1, 1] = -0.5 * share
-        return strips(ends.reshape(-1, 2, 2))
-
-
-def _packed(colours: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """Colours (n, groups, 3) as Rerun packs them, all after one another."""
-    red, green, blue = np.moveaxis(colours.astype(np.uint32), -1, 0)
-    return ((red << 24) | (green << 16) | (blue << 8) | 255).ravel()

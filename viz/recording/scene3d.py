@@ -1,4 +1,4 @@
-"""The actuator itself: where its bodies are, and the current in each coil."""
+"""Poses of the actuator, torques, traces of the tip, and the mark of a failure."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
 from spheretwin.viz.decimation import FirstRows
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, strips, time_index
-from spheretwin.viz.scene.meshes import COILS, FAILURE, FAILURE_TEXT, TORQUES, WORLD
+from spheretwin.viz.scene.meshes import FAILURE, FAILURE_TEXT, TORQUES, WORLD
 from spheretwin.viz.scene.motion import (
     TORQUE_STYLES,
     TRACES,
+    FRAME_RATE_Hz,
     LONGEST_m,
     METRES_PER_Nm,
     TipTrace,
@@ -26,8 +27,6 @@ from spheretwin.viz.scene.motion import (
     shaft_tip,
 )
 from spheretwin.viz.scene.static import labels, size_of, static_scene
-
-FRAME_RATE_Hz = 60.0
 
 LARGEST_rad = 1e6
 """Beyond it a pose is meaningless, and its sine has no correct digits."""
@@ -58,7 +57,7 @@ def posed(q: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 class MovingActuator(RecordingPart):
-    """Meshes, and of every frame the poses and the coils' colours."""
+    """Meshes, and the poses of every frame."""
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)
@@ -78,14 +77,6 @@ class MovingActuator(RecordingPart):
         index = time_index(rows["t_s"][new])
         for body, quaternion in body_quaternions(rows["q_rad"][new]).items():
             recording.send_columns(f"{WORLD}/{body}", index, rr.Transform3D.columns(quaternion=quaternion))
-        recording.send_columns(COILS, index, self._coil_colours(rows["current_A"][new]))
-
-    def _coil_colours(self, current_A: NDArray[np.float64]) -> rr.ComponentColumnList:
-        colours = theme.current_colours(current_A, self.subject.facts.current_limit_A)  # (n, groups, 3)
-        coils = np.empty((len(current_A), len(self.subject.actuator.coil_axes), 3), dtype=np.uint8)
-        for side in range(2):  # both coils of a group carry its current
-            coils[:, self.subject.actuator.groups[:, side]] = colours
-        return rr.Mesh3D.columns(albedo_texture_buffer=coils.reshape(len(coils), -1))
 
 
 # A ball around the tip, and its text on top of a pole, clear of the texts of the torques.

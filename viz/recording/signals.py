@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
 from numpy.typing import NDArray
 
@@ -16,7 +16,7 @@ from spheretwin.models.telemetry.checksums import text_checksum, values_checksum
 from spheretwin.models.telemetry.run_record import RunFacts, versions
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.plots import LOOKS, signal_style
+from spheretwin.viz.layout.styles import as_struct, signal_style
 from spheretwin.viz.layout.view import CHECKSUM, DESCRIBED, SCENARIO, STYLES, TELEMETRY, VALUES, component
 from spheretwin.viz.recording.part import (
     RecordingPart,
@@ -43,7 +43,8 @@ RATE = "record_rate_Hz"
 
 def facts_as_json(facts: RunFacts, rate_Hz: float | None) -> rr.AnyValues:
     """Return the facts of a run, the versions that made it, and the rate of the rows."""
-    text = json.dumps({**asdict(facts), RATE: rate_Hz, "versions": versions()}, default=str)
+    stated = {name: value for name, value in asdict(facts).items() if name != "changed"}  # among the sections
+    text = json.dumps({**stated, RATE: rate_Hz, "versions": versions()}, default=str)
     return rr.AnyValues(facts=text, facts_checksum=text_checksum(text))
 
 
@@ -80,13 +81,39 @@ class ScenarioText(RecordingPart):
 
 
 def _as_markdown(facts: RunFacts) -> str:
-    """A table for each section."""
+    """Tables of the fields: those that were chosen or changed, then those of each section."""
     lines = [f"# {facts.name}", "", facts.description, ""]
+    lines += _table("Chosen, or different from the defaults", facts.changed)
     for title, fields in facts.sections.items():
-        lines += [f"## {title}", "", "| field | value |", "|---|---|"]
-        lines += [f"| {key} | {'' if value is None else value} |" for key, value in fields.items()]
-        lines.append("")
+        lines += _table(title, fields)
     return "\n".join(lines)
+
+
+def _table(title: str, fields: Mapping[str, Any]) -> list[str]:
+    rows = [row for name, value in fields.items() for row in _table_rows(name, value)]
+    return [f"## {title}", "", "| field | value |", "|---|---|", *rows, ""]
+
+
+def _table_rows(name: str, value: Any) -> Iterator[str]:
+    """Rows of a value: one for each entry of a table, and of each table in a list."""
+    if isinstance(value, Mapping):
+        for key, entry in value.items():
+            yield from _table_rows(f"{name}.{key}", entry)
+    elif isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
+        for place, entry in enumerate(value):
+            yield from _table_rows(f"{name}.{place}", entry)
+    else:
+        yield f"| {name} | {_value_text(value)} |"
+
+
+def _value_text(value: Any) -> str:
+    if value is None or value == []:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_value_text, value))
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
 # An axis, and no line over itself.
@@ -152,7 +179,9 @@ class Signals(RecordingPart):
 @lru_cache(maxsize=16)
 def _description(arrival: int, signals: tuple[Signal, ...]) -> list[rr.DescribedComponentBatch]:
     """Return what readers and viewers need to know of signals that arrived together."""
-    styles = struct_component({signal.name: _style(signal) for signal in signals if signal.name != TIME})
+    styles = struct_component(
+        {signal.name: as_struct(signal_style(signal)) for signal in signals if signal.name != TIME}
+    )
     style_batch = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
     return [*signals_as_json(arrival, signals), style_batch]
 
@@ -167,17 +196,3 @@ def _values(rows: Table, signals: list[Signal], names: set[str]) -> ArrowCompone
             for signal in signals
         }
     )
-
-
-def _style(signal: Signal) -> pa.Array:
-    """Return the style of a signal's lines: properties of `rr.SeriesLines` as lists in a struct."""
-    style = signal_style(signal)
-    return pa.StructArray.from_arrays([_look(getattr(style, look)) for look in LOOKS], list(LOOKS))
-
-
-def _look(batch: rr.ComponentBatchLike | None) -> pa.Array:
-    """Return one list; null if the viewer may choose."""
-    if batch is None:
-        return pa.nulls(1, pa.list_(pa.uint8(), 1))
-    values = batch.as_arrow_array()
-    return pa.FixedSizeListArray.from_arrays(values, len(values))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.checksums import line_checksums
-from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import QUIET_S, Event, Events, Level, Status
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
@@ -224,90 +223,3 @@ def _log(recording: rr.RecordingStream, lane: str, changes: list[Change]) -> Non
     if changes:
         t_s, states = zip(*changes, strict=True)
         recording.send_columns(lane, time_index(np.array(t_s)), rr.StateChange.columns(state=list(states)))
-
-
-# Axes, commands and estimates have the same colours in every plot.
-KEY = "α red, β green, γ blue; grey commands and references, orange measurements and estimates"
-
-
-class Summary:
-    """Keeps what the line needs.
-
-    Parameters
-    ----------
-    facts : RunFacts
-        Facts of the run.
-
-    Attributes
-    ----------
-    last_s : float
-        Time of the last row.
-    """
-
-    def __init__(self, facts: RunFacts) -> None:
-        self._facts = facts
-        self.last_s = 0.0
-        self._ticks = 0
-        self._saturated = self._rank_lost = 0
-        self._largest_deg = 0.0
-        self._squares = 0.0
-
-    def add(self, rows: Table, error_deg: NDArray[np.float64]) -> None:
-        """Add the rows of a chunk, with the error angle of each."""
-        self.last_s = float(rows["t_s"][-1])
-        self._ticks += len(rows)
-        self._saturated += int(np.count_nonzero(saturated(rows)))
-        self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
-        finite_deg = error_deg[
-            np.isfinite(error_deg)
-        ]  # the last rows of a run that diverged may hold no numbers
-        self._largest_deg = max(self._largest_deg, float(np.max(finite_deg, initial=0.0)))
-        self._squares += float(np.sum(finite_deg**2))
-
-    def running(self) -> str:
-        """Return the line of a run in progress."""
-        return _with_colour_key(f"{self._run_text()} — running")
-
-    def ended(self, status: Status) -> str:
-        """The line once it has ended."""
-        how = "completed" if status.level is Level.INFO else f"**{status.replace('_', ' ')}**"
-        at = "" if status == Status.COMPLETED else f" at {self.last_s:.3g} s of {self._facts.duration_s:g} s"
-        if not self._ticks:
-            return _with_colour_key(f"{self._run_text()} — {how}")
-        lost = f"; rank lost {_percent(self._rank_lost / self._ticks)} of the time" if self._rank_lost else ""
-        rms_deg = np.sqrt(self._squares / self._ticks)
-        return _with_colour_key(
-            f"{self._run_text()} — {how}{at}; error largest **{self._largest_deg:.3g}°**,"
-            f" RMS **{rms_deg:.3g}°**; saturated {_percent(self._saturated / self._ticks)} of the time{lost}"
-        )
-
-    def _run_text(self) -> str:
-        facts = self._facts
-        parts = [f"**{facts.name}** under **{facts.law}**"]
-        parts += [
-            f"{symbol} = {value:g}"
-            for symbol, section, field in (
-                ("m", "plant", "modelling_error"),
-                ("L", "disturbance", "load"),
-            )
-            if isinstance(value := self._field(section, field), int | float)
-        ]
-        if facts.payload_kg:
-            parts.append(f"payload {facts.payload_kg:g} kg")
-        if hardware := self._field("run", "hardware"):
-            parts.append(f"{hardware} hardware")
-        if faults := self._field("run", "fault"):
-            parts.append(f"{len(faults)} fault{'s' * (len(faults) > 1)} planned")
-        return " · ".join(parts)
-
-    def _field(self, section: str, field: str) -> Any:
-        return self._facts.sections.get(section, {}).get(field)
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %" if 0 < share < 0.1 else f"{100 * share:.0f} %"
-
-
-def _with_colour_key(line: str) -> str:
-    """The line, and below it what the colours mean."""
-    return f"{line}\n\n{KEY}"

@@ -22,8 +22,10 @@ from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import RowSelection
 from spheretwin.viz.layout.view import application
+from spheretwin.viz.recording.currents import CoilCurrents, CurrentMap
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSet
-from spheretwin.viz.recording.plots import Currents, PhasePlane, Quantities
+from spheretwin.viz.recording.phase_plane import PhasePlane
+from spheretwin.viz.recording.plots import PlotData
 from spheretwin.viz.recording.scene3d import Ending, MovingActuator, Torques, Traces
 from spheretwin.viz.recording.signals import ScenarioText, Signals
 from spheretwin.viz.recording.status import LimitLanes, Log, StateLanes
@@ -38,9 +40,10 @@ PARTS: tuple[type[RecordingPart], ...] = (
     StateLanes,
     LimitLanes,
     Log,
-    Currents,
+    CoilCurrents,
+    CurrentMap,
     PhasePlane,
-    Quantities,  # the last: when a run has ended it sends the layout
+    PlotData,  # the last: when a run has ended it sends the layout
 )
 
 

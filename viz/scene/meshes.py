@@ -79,13 +79,13 @@ def _padded(contents: bytes, filling: bytes = b"\0") -> bytes:
 
 
 # Shape of a coil besides its dimensions: a winding between two flanges.
-SECTIONS = 14
+SECTIONS = 10
 FLANGE_SHARE = 0.07  # of the length
 RECESS_SHARE = 0.12  # of the winding's depth
 
 
-def coil_mesh(coil: CoilGeometry, centres: Array, axes: Array, places: list[int], count: int) -> rr.Mesh3D:
-    """Return all coils as one mesh; each has its pixel of a texture, whose bytes change over time.
+def coil_mesh(coil: CoilGeometry, centres: Array, axes: Array) -> rr.Mesh3D:
+    """Return all coils as one mesh; each group has its pixel of a texture, whose bytes change over time.
 
     This is the fastest way to colour dozens of coils at 60 Hz without changing their shape: a mesh entity
     for each costs the viewer three times as long a frame.
@@ -98,25 +98,16 @@ def coil_mesh(coil: CoilGeometry, centres: Array, axes: Array, places: list[int]
         Centres of the coils.
     axes : (n, 3) array
         Unit vectors along them.
-    places : list of int
-        Each one's place among the actuator's coils.
-    count : int
-        Number of the actuator's coils.
     """
     one = revolved_surface(_outline(coil), SECTIONS)
     coil_surfaces = [
         one.placed(_rotation_to(axis), centre) for axis, centre in zip(axes, centres, strict=True)
     ]
-    pixel = np.repeat((np.array(places) + 0.5) / count, len(one.positions))
     whole = merged_surface(coil_surfaces)
     return rr.Mesh3D.from_fields(
         vertex_positions=whole.positions,
         vertex_normals=whole.normals,
         triangle_indices=whole.triangles,
-        vertex_texcoords=np.stack([pixel, np.full_like(pixel, 0.5)], axis=1),
-        albedo_texture_format=rr.components.ImageFormat(
-            width=count, height=1, color_model="RGB", channel_datatype="U8"
-        ),
     )
 
 
@@ -193,6 +184,8 @@ class Meshes:
 
     coils: rr.Mesh3D | None
     """All coils in one mesh, from their dimensions; None if the model draws none."""
+    coil_places: tuple[int, ...]
+    """Place among the actuator's coils of each coil in the mesh, which all have as many vertices."""
     others: dict[str, Piece]
     """Pieces by entity."""
 
@@ -244,16 +237,16 @@ def _meshes(mjcf: Path, _: str) -> Meshes:
     pieces: dict[str, Piece] = {}
     for look, geoms in others.items():
         pieces[_unused_name(_entity(model, look), pieces)] = _piece(model, data, look, geoms)
-    return Meshes(_coils(model, data, coils, mjcf) if coils else None, pieces)
-
-
-def _coils(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], mjcf: Path) -> rr.Mesh3D:
     sites = _sites(model, "coil_")
-    places = [_nearest(data, geom, sites) for geom in geoms]
+    places = tuple(_nearest(data, geom, sites) for geom in coils)
     at = [sites[place] for place in places]
+    return Meshes(_coils(data, at, mjcf) if coils else None, places, pieces)
+
+
+def _coils(data: mujoco.MjData, at: list[int], mjcf: Path) -> rr.Mesh3D:
     axes = data.site_xmat[at].reshape(-1, 3, 3)[:, :, 2]
     _, coil = read_magnet_and_coil(mjcf)
-    return coil_mesh(coil, data.site_xpos[at], axes, places, len(sites))
+    return coil_mesh(coil, data.site_xpos[at], axes)
 
 
 def _look(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> MeshLook:

@@ -12,6 +12,9 @@ from spheretwin.viz import theme
 from spheretwin.viz.scene.meshes import WORLD
 from spheretwin.viz.scene.static import AXES_LENGTH_m
 
+FRAME_RATE_Hz = 60.0
+"""Rate of the poses of a recording."""
+
 
 def body_quaternions(q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """Orientation of each moving body, as (n, 4) quaternions x, y, z, w.

@@ -96,7 +96,7 @@ def static_scene(meshes: Meshes, actuator: Actuator, current_limit_A: float, pay
     recording = LogEncoder()
     recording.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     if meshes.coils:
-        recording.log(COILS, meshes.coils, static=True)
+        recording.log(COILS, meshes.coils, coil_texture(meshes, actuator), static=True)
     for entity, piece in meshes.others.items():
         recording.log(entity, *piece.archetypes(), static=True)
     if payload:
@@ -112,6 +112,24 @@ def static_scene(meshes: Meshes, actuator: Actuator, current_limit_A: float, pay
     currents = current_scale_labels(current_limit_A, size)
     recording.log(f"{CURRENT_SCALE}/labels", currents, static=True)
     return list(recording.chunks().values())
+
+
+def coil_texture(meshes: Meshes, actuator: Actuator) -> rr.Mesh3D:
+    """Return the texture of the coils: a pixel for each group, whose coils carry one current."""
+    groups = len(actuator.groups)
+    group = np.empty(actuator.groups.size)
+    group[actuator.groups] = np.arange(groups)[:, None]
+    assert meshes.coils is not None
+    positions = meshes.coils.vertex_positions
+    assert positions is not None
+    vertices = len(positions.as_arrow_array()) // len(meshes.coil_places)
+    across = np.repeat((group[list(meshes.coil_places)] + 0.5) / groups, vertices)
+    return rr.Mesh3D.from_fields(
+        vertex_texcoords=np.stack([across, np.full_like(across, 0.5)], axis=1),
+        albedo_texture_format=rr.components.ImageFormat(
+            width=groups, height=1, color_model="RGB", channel_datatype="U8"
+        ),
+    )
 
 
 def _payload(actuator: Actuator) -> rr.Cylinders3D:

@@ -11,8 +11,10 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import (
     AFTER_THE_END,
+    HIGH,
+    LOW,
+    MEAN,
     STYLES,
-    TELEMETRY,
     VALUES,
     VIEW_NAMES,
     View,
@@ -93,7 +95,9 @@ def contents(layout):
     for (path, name), values in layout.items():
         if name == "ViewContents:query":
             for line in values[0]:
-                yield line.replace("$origin", origins[path.removesuffix("/ViewContents")]).replace("//", "/")
+                yield line.replace("$origin", origins.get(path.removesuffix("/ViewContents"), "/")).replace(
+                    "//", "/"
+                )
 
 
 def container_names(layout):
@@ -119,17 +123,16 @@ def test_views_show_only_what_the_recording_holds(run):
 
 
 def fields(path):
-    """Fields of the telemetry's structs, nested ones with a dot before them, by component."""
+    """Fields of structs, nested ones with a dot before them, by entity and component."""
     found = {}
     for chunk in RrdReader(path).stream():
-        if chunk.entity_path == f"/{TELEMETRY}":
-            batch = chunk.to_record_batch()
-            for name in batch.schema.names:
-                if name.startswith((VALUES, STYLES)):
-                    for field in batch.schema.field(name).type.value_type:
-                        looks = field.type if name.startswith(STYLES) else []
-                        found.setdefault(name, set()).add(f".{field.name}[]")
-                        found[name] |= {f".{field.name}.{look.name}[]" for look in looks}
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if name.startswith((VALUES, STYLES, LOW, MEAN, HIGH)):
+                for field in batch.schema.field(name).type.value_type:
+                    looks = field.type if name.startswith(STYLES) else []
+                    there = found.setdefault((chunk.entity_path, name), set())
+                    there |= {f".{field.name}[]", *(f".{field.name}.{look.name}[]" for look in looks)}
     return found
 
 
@@ -137,13 +140,18 @@ def test_what_draws_a_signal_finds_its_values_and_its_looks(run):
     path, _ = run
     there = fields(path)
     taken = [
-        each
-        for (_, name), values in layouts(path)[-1].items()
+        (f"/{entity.partition('/overrides/')[2].partition('/visualizers')[0]}", each)
+        for (entity, name), values in layouts(path)[-1].items()
         for mappings in values
         for each in (mappings if name == "VisualizerInstruction:component_map" else [])
     ]
     assert len(taken) > 30
-    assert [each for each in taken if each["selector"] not in there[each["source_component"]]] == []
+    missing = [
+        (entity, each)
+        for entity, each in taken
+        if each["selector"] not in there[entity, each["source_component"]]
+    ]
+    assert missing == []
 
 
 def test_the_whole_layout_has_every_view_in_a_tab(run):
@@ -220,6 +228,7 @@ def test_layouts_differ_by_application():
         view._replace(live=True),
         view._replace(shown="coils"),
         view._replace(run="another"),
+        view._replace(decimated=True),
     ]
     assert len({application(each) for each in (view, *others)}) == 1 + len(others)
     assert application(view) == application(view._replace())

@@ -13,16 +13,17 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import simulate
-from spheretwin.viz import theme
 from spheretwin.viz.decimation import FIRST_CHUNK_S, TimeBins
 from spheretwin.viz.layout.extents import SPANS, ExtentTracker, PlotChannel
-from spheretwin.viz.layout.view import CURRENT_BARS, CURRENT_MAP, SUMMARY, TIMELINE, derived
-from spheretwin.viz.quantities import Aggregation, QuantityRows, quantities_of
-from spheretwin.viz.recording import plots
+from spheretwin.viz.layout.view import SUMMARY
+from spheretwin.viz.quantities import angle_between
 from spheretwin.viz.recording.recorder import Recorder
-from spheretwin.viz.recording.status import LEVELS, LimitSpells, Summary
+from spheretwin.viz.recording.status import LEVELS, LimitSpells
+from spheretwin.viz.recording.summary import Summary
 
 TICK_s = 1e-3
+
+OPEN = {"target": "coil.00", "mode": "open", "start_s": 0.02}
 
 
 @pytest.fixture(scope="module")
@@ -38,67 +39,10 @@ def run(tmp_path_factory):
     return path, session, finished.telemetry
 
 
-def read(path, entity, component):
-    """Times in s and values of one component, in order."""
-    times, values = [], []
-    for chunk in RrdReader(path).stream().filter(content=f"/{entity}"):
-        batch = chunk.to_record_batch()
-        if component in batch.schema.names and TIMELINE in batch.schema.names:
-            times += [each.total_seconds() for each in batch.column(TIMELINE).to_pylist()]
-            values += batch.column(component).to_pylist()
-    order = np.argsort(times, kind="stable")
-    return np.array(times)[order], [values[place] for place in order]
-
-
 def spans(t_s, rate_Hz):
     """Rows of each bin, by a slow copy: ticks that begin within it."""
     number = np.floor(np.round(t_s / TICK_s) * TICK_s * rate_Hz + 1e-9)
     return [np.flatnonzero(number == each) for each in np.unique(number)]
-
-
-def test_every_derived_quantity_is_recorded_with_its_peaks(run):
-    path, session, table = run
-    given_rows = QuantityRows(table, table.rows(0, 1), session.actuator, 8.0)
-    bins = spans(table["t_s"], plots.QUANTITY_RATE_Hz)
-    for quantity in quantities_of({signal.name for signal in table.signals}):
-        whole = quantity.values(given_rows)
-        _, drawn = read(path, derived(quantity.name), "Scalars:scalars")
-        if quantity.aggregation is Aggregation.BOTH:
-            pairs = np.reshape(drawn, (len(bins), 2, quantity.size))
-            least, greatest = pairs.min(axis=1), pairs.max(axis=1)
-            np.testing.assert_array_equal(least, [whole[rows].min(axis=0) for rows in bins])
-            np.testing.assert_array_equal(greatest, [whole[rows].max(axis=0) for rows in bins])
-        else:
-            of = {Aggregation.LEAST: np.min, Aggregation.GREATEST: np.max, Aggregation.MEAN: np.mean}[
-                quantity.aggregation
-            ]
-            expected = [of(whole[rows], axis=0) for rows in bins]
-            # Means are summed in another order.
-            np.testing.assert_allclose(drawn, expected, rtol=1e-12, atol=1e-15)
-
-
-def test_the_map_of_the_currents_has_their_colours(run):
-    path, _, table = run
-    bins = spans(table["t_s"], plots.CURRENT_MAP_RATE_Hz)
-    peaks = np.array(
-        [
-            [row[np.argmax(np.abs(row))] for row in table["current_A"][rows].T]  # of each group
-            for rows in bins
-        ]
-    )
-    colours = theme.current_colours(peaks, 8.0).astype(np.int64)
-    packed = (colours[..., 0] << 24) + (colours[..., 1] << 16) + (colours[..., 2] << 8) + 255
-    for entity, component in ((CURRENT_MAP, "SeriesLines:colors"), (CURRENT_BARS, "LineStrips2D:colors")):
-        times, drawn = read(path, entity, component)
-        np.testing.assert_allclose(times, [table["t_s"][rows[0]] for rows in bins], atol=1e-9)  # whole ns
-        np.testing.assert_array_equal(drawn, packed)
-    _, rows = read(path, CURRENT_MAP, "Scalars:scalars")
-    np.testing.assert_array_equal(rows, np.tile(np.arange(18), (len(bins), 1)))
-    _, bars = read(path, CURRENT_BARS, "LineStrips2D:strips")
-    heights = np.array(bars)[..., 1]  # (bins, groups, 2)
-    np.testing.assert_array_equal(heights[..., 0], 0)
-    # A bar is half a unit at the limit, upward, which is to lower values; single precision.
-    np.testing.assert_allclose(-heights[..., 1], 0.5 * peaks / 8.0, atol=1e-7)
 
 
 ROWS = 400
@@ -118,9 +62,11 @@ def test_bins_are_the_same_whatever_the_chunks(seed, cuts, immediate):
     for name, of in (("low", np.min), ("high", np.max)):
         drawn = np.concatenate([getattr(each, name) for each in parts])
         np.testing.assert_array_equal(drawn, [of(values[rows], axis=0) for rows in expected])
-    extremes = np.concatenate([each.extremes() for each in parts])
-    sizes = [np.abs(values[rows]).max(axis=0) for rows in expected]
-    np.testing.assert_array_equal(np.abs(extremes), sizes)
+    means = np.concatenate([each.mean for each in parts])
+    # Sums in another order.
+    np.testing.assert_allclose(
+        means, [values[rows].mean(axis=0) for rows in expected], rtol=1e-12, atol=1e-15
+    )
 
 
 def test_chunks_of_bins_grow_and_none_is_held_long():
@@ -135,20 +81,6 @@ def test_chunks_of_bins_grow_and_none_is_held_long():
         # Within two bins, of 40 ms, and a chunk of 100 ms.
         assert now_s - last_s <= max(FIRST_CHUNK_S, last_s / 2) + 0.2
         last_s = now_s
-
-
-def rising(rows):
-    t_s = TICK_s * np.arange(len(rows))
-    whole = TimeBins(25.0, immediate=True)
-    first, last = whole.add(t_s, rows), whole.flush()
-    return [np.concatenate(each) for each in zip(first.pairs(), last.pairs(), strict=True)]
-
-
-def test_a_steady_rise_or_fall_keeps_its_form():
-    values = np.stack([np.arange(ROWS), -np.arange(ROWS)], axis=1).astype(np.float64)
-    t_s, drawn = rising(values)
-    np.testing.assert_allclose(drawn[:, 0], t_s / TICK_s, atol=1e-9)
-    np.testing.assert_allclose(drawn[:, 1], -t_s / TICK_s, atol=1e-9)
 
 
 LIMIT_SIGNALS = (
@@ -205,16 +137,68 @@ def test_the_tracker_keeps_all_bounds_in_bounded_memory():
     assert ExtentTracker({"a": 1}).extents(None) is None
 
 
-def test_the_line_of_a_run_says_what_it_is_and_how_good(run):
+def test_the_headline_says_what_was_run_how_it_ended_and_how_good_it_was(run):
     path, session, table = run
     for chunk in RrdReader(path).stream().filter(content=f"/{SUMMARY}"):
         batch = chunk.to_record_batch()
-        told = batch.column("TextDocument:text").to_pylist()[-1][0]
-    for text in ("**nutation** under **afsm**", "m = 0.2", "L = 2", "ideal hardware", "completed", "°**"):
-        assert text in told
+        text = batch.column("TextDocument:text").to_pylist()[-1][0]
+    headline, figures = text.split("\n\n")
+    assert (
+        headline
+        == "### ✔ COMPLETED · nutation under afsm · modelling error m = 0.2 · load L = 2 · ideal hardware"
+    )
+    error_deg = np.degrees(angle_between(table["q_rad"], table["q_ref_rad"]))
+    saturated = np.mean((table["allocation_scale"] > 0) & (table["allocation_scale"] < 1))
+    largest, rms, share = error_deg.max(), np.sqrt(np.mean(error_deg**2)), 100 * saturated
+    assert figures == (
+        f"error: largest **{largest:.3g}°**, RMS **{rms:.3g}°** · saturated {share:.1f} % of the time"
+    )
     summary = Summary(facts_of(session.scenario))
-    assert "running" in summary.running()
-    assert "left workspace" in summary.ended(Status.LEFT_WORKSPACE)
+    assert summary.running().startswith("### ▶ RUNNING · nutation")
+    assert summary.ended(Status.DIVERGED).startswith("### ✖ FAILED · nutation")
     summary.add(table.rows(0, 4), np.array([1.0, 7.0, 5.0, 5.0]))
-    line = summary.ended(Status.LEFT_WORKSPACE)
-    assert "**left workspace** at 0.003 s of 2.6 s; error largest **7°**, RMS **5°**" in line
+    lines = summary.ended(Status.LEFT_WORKSPACE).split("\n\n")[1].split("  \n")
+    alpha, beta, gamma = np.degrees(table["q_rad"][3])
+    assert lines[0] == (
+        "**left workspace at 0.003 s of 2.6 s: a hinge reached the end of its range,"
+        f" α {alpha:.0f}°, β {beta:.0f}°, γ {gamma:.0f}°**"
+    )
+    assert lines[1].startswith("error: largest **7°**, RMS **5°** · saturated")
+
+
+FAULT_SIGNALS = (
+    Signal("t_s", "s", 1, "time"),
+    Signal("q_rad", "rad", 3, "angles"),
+    Signal("allocation_scale", "1", 1, "share"),
+    Signal("fault", "1", 3, "faults", ("coil.00", "coil.01", "encoder.gamma"), ("none", "open", "shorted")),
+    Signal("time_to_detection_s", "s", 2, "time to detection", ("group 0", "group 1")),
+    Signal("failsafe_reason", "1", 1, "reason", (), ("nothing", "a coil is too hot")),
+)
+
+
+@pytest.fixture(scope="module")
+def facts_with_faults():
+    faults = [OPEN, {**OPEN, "target": "coil.02"}, {**OPEN, "target": "coil.01"}]
+    with Session(scenarios.load("hold", {"fault": faults})) as session:
+        return facts_of(session.initial_scenario)
+
+
+@given(st.sets(st.integers(1, 99)))
+def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_faults, cuts):
+    table = Table(FAULT_SIGNALS, np.zeros((100, width(FAULT_SIGNALS))))
+    table["t_s"][:], table["allocation_scale"][:] = TICK_s * np.arange(100), 1.0
+    table["time_to_detection_s"][:] = -1.0
+    table["fault"][20:, 1], table["fault"][40:60, 0] = 2, 1
+    table["time_to_detection_s"][25:, 1] = 0.005
+    table["failsafe_reason"][90:] = 1
+    summary = Summary(facts_with_faults)
+    for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 100], strict=True):
+        summary.add(table.rows(first, last), np.zeros(last - first))
+    headline, lines = summary.ended(Status.FAILSAFE).split("\n\n")
+    assert headline.startswith("### ✖ FAILSAFE · hold")
+    reason, _, faults = lines.split("  \n")
+    assert reason == "**failsafe at 0.099 s of 3 s: a coil is too hot**"
+    assert faults == (
+        "faults: coil.01 shorted from 0.02 s, detected after 5 ms; coil.00 open from 0.04 s, not detected;"
+        " 1 of 3 planned faults did not start"
+    )

@@ -72,19 +72,20 @@ def test_a_variant_is_recorded_with_its_own_groups(variant, tmp_path):
     assert len(styles["current_A"]["colors"]) == groups
 
     (shape,) = one_row_each(path, scene.COILS, "Mesh3D:albedo_texture_format")
-    assert shape[0]["width"] == 2 * groups
+    assert shape[0]["width"] == groups
     textures = one_row_each(path, scene.COILS, "Mesh3D:albedo_texture_buffer")
-    first = np.reshape(np.frombuffer(bytes(textures[0][0]), np.uint8), (2 * groups, 3))
-    expected = theme.current_colours(table["current_A"][0], facts.current_limit_A)
-    for side in range(2):
-        np.testing.assert_array_equal(first[actuator.groups[:, side]], expected)
+    first = np.reshape(np.frombuffer(bytes(textures[0][0]), np.uint8), (groups, 3))
+    np.testing.assert_array_equal(first, theme.current_colours(table["current_A"][0], facts.current_limit_A))
 
 
 def test_the_layout_names_the_number_of_groups_and_is_one_of_its_own():
     views = [View(1.0, 8.0, groups, (), False) for groups in (12, 18, 24)]
     for view in views:
-        told = f"currents of groups 0 (lowest) to {view.groups - 1}: blue -8 A, red +8 A"
-        assert told in titles(layout(view))
+        title = (
+            f"mean currents of groups 0 (lowest) to {view.groups - 1}, -8 A blue to +8 A red;"
+            " top: how much they vary"
+        )
+        assert title in titles(layout(view))
     assert len({application(view) for view in views}) == 3
 
 

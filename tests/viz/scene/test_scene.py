@@ -16,7 +16,7 @@ from spheretwin.models.kinematics import rotation
 from spheretwin.viz import theme
 from spheretwin.viz.scene.meshes import SECTIONS, WORLD, read_meshes
 from spheretwin.viz.scene.motion import body_quaternions, shaft_tip
-from spheretwin.viz.scene.static import ALONG, current_scale, current_scale_labels, size_of
+from spheretwin.viz.scene.static import ALONG, coil_texture, current_scale, current_scale_labels, size_of
 
 poses = st.tuples(*[st.floats(-1.4, 1.4)] * 2, st.floats(-40, 40)).map(lambda q: np.array([q]))
 
@@ -109,21 +109,23 @@ UPPER, LOWER, MIDDLE = (
     ],
     ids=["shipped", "in another order", "not all", "some twice"],
 )
-def test_each_drawn_coil_looks_up_the_pixel_of_the_actuator_s_coil_there(tmp_path, edits):
+def test_each_drawn_coil_looks_up_the_pixel_of_its_group(tmp_path, edits):
     path = edited(tmp_path / "mine.xml", *edits)
-    axes = actuators.load(path).coil_axes
-    mesh = read_meshes(path).coils
-    vertices = positions(mesh)
-    across = np.array(mesh.vertex_texcoords.as_arrow_array().to_pylist())[:, 0]
-    drawn, place = np.unique(across, return_inverse=True)
+    model, meshes = actuators.load(path), read_meshes(path)
+    texture = coil_texture(meshes, model)
+    vertices = positions(meshes.coils)
+    across = np.array(texture.vertex_texcoords.as_arrow_array().to_pylist())[:, 0]
     text = path.read_text(encoding="utf-8")
-    assert len(drawn) == 12 * sum(layer in text for layer in (UPPER, MIDDLE, LOWER))
     shipped = positions(read_meshes(actuators.MJCF_PATH).coils)
     assert 36 * len(vertices) == 12 * text.count('<geom name="coil_') * len(shipped)  # none is left out
-    for i, share in enumerate(drawn):
-        centre = vertices[place == i].mean(axis=0)
-        # Symmetric about the coil's axis, to single precision.
-        assert centre @ axes[int(share * len(axes))] / np.linalg.norm(centre) > 1 - 1e-6
+    centres = vertices.reshape(-1, len(shipped) // 36, 3).mean(axis=1)  # symmetric about the coil's axis
+    coils = np.argmax(centres @ model.coil_axes.T, axis=1)
+    groups = [int(np.flatnonzero((model.groups == coil).any(axis=1))[0]) for coil in coils]
+    shares = across.reshape(len(centres), -1)
+    pixels = (np.array(groups)[:, None] + 0.5) / len(model.groups)
+    np.testing.assert_allclose(shares, np.broadcast_to(pixels, shares.shape), rtol=1e-6)
+    drawn = 12 * sum(layer in text for layer in (UPPER, MIDDLE, LOWER))
+    assert len(set(coils.tolist())) == drawn
 
 
 def test_coils_stand_where_the_model_puts_them_and_fill_their_numbers(actuator):

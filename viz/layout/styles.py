@@ -1,0 +1,132 @@
+"""Styles of the lines of plots: names with units, colours, widths and markers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
+
+import pyarrow as pa
+import rerun as rr
+from rerun.components import AggregationPolicy, MarkerShape
+
+from spheretwin.models.telemetry.signals import ANGLES, AXES, Signal
+from spheretwin.viz import theme
+from spheretwin.viz.quantities import Quantity
+
+LINE_LOOKS = ("names", "colors", "widths", "aggregation_policy")
+"""Properties of `rr.SeriesLines` in a style."""
+
+WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
+
+MOST_MARKED = 3
+"""Entries up to which the lines of a signal have markers: of many coil groups only the spread matters."""
+
+_COMMANDED = ("q_ref_rad", "qdot_ref_rad_s", "torque_command_Nm", "current_command_A")
+_ESTIMATED = ("q_measured_rad", "qdot_estimated_rad_s", "q_predicted_rad", "qdot_predicted_rad_s")
+_SECONDARY = ("disturbance_Nm", "q_governed_rad", "qdot_governed_rad_s", "qddot_governed_rad_s2")
+
+# Lines are drawn in the order of their names: estimates first, as a rim of the true values,
+# and commands last and thin.
+_ACTUAL = ("q_rad", "qdot_rad_s", "torque_delivered_Nm")
+
+_AXIS_MARKERS = (MarkerShape.Circle, MarkerShape.Diamond, MarkerShape.Up)
+
+
+class LineStyle(NamedTuple):
+    """Style of the lines of a signal or quantity, one for each entry."""
+
+    names: list[str]
+    colours: list[theme.Colour]
+    markers: list[MarkerShape]
+    width: float
+
+    def lines(self) -> rr.SeriesLines:
+        """Return the style of the lines: of rows that share a pixel all are drawn, from least to greatest."""
+        return rr.SeriesLines(
+            names=self.names,
+            colors=self.colours,
+            widths=[self.width] * len(self.names),
+            aggregation_policy=AggregationPolicy.MinMax,
+        )
+
+
+def mark_style(styles: Sequence[LineStyle]) -> rr.SeriesPoints:
+    """Return the style of the markers on the lines of some styles."""
+    return rr.SeriesPoints(
+        names=[name for style in styles for name in style.names],
+        colors=[colour for style in styles for colour in style.colours],
+        markers=[marker for style in styles for marker in style.markers],
+    )
+
+
+@cache
+def signal_style(signal: Signal) -> LineStyle:
+    """Return the style of a signal's lines."""
+    names = _names(signal.name, signal.labels or ("",), signal.unit)
+    return LineStyle(names, _colours(signal), _markers(signal.name, signal.size), _width(signal.name))
+
+
+@cache
+def quantity_style(quantity: Quantity) -> LineStyle:
+    """Return the style of the lines of a derived quantity."""
+    names = _names(quantity.name, quantity.labels, quantity.unit)
+    markers = _markers(quantity.name, quantity.size)
+    return LineStyle(names, list(quantity.colours), markers, _width(quantity.name))
+
+
+def as_struct(style: LineStyle) -> pa.Array:
+    """Return a style as lists in a struct, to which a layout can refer."""
+    lines = style.lines()
+    return pa.StructArray.from_arrays([_look(getattr(lines, look)) for look in LINE_LOOKS], list(LINE_LOOKS))
+
+
+def _look(batch: rr.ComponentBatchLike) -> pa.Array:
+    values = batch.as_arrow_array()
+    return pa.FixedSizeListArray.from_arrays(values, len(values))
+
+
+def _names(name: str, labels: tuple[str, ...], unit: str) -> list[str]:
+    return [f"{_short(name)} {label} [{unit}]".replace("  ", " ") for label in labels]
+
+
+def _short(name: str) -> str:
+    """Return the name without its unit, which follows in brackets."""
+    for suffix in ("_rad_s", "_mrad", "_rad", "_Nm", "_deg", "_mm", "_A", "_W", "_s"):
+        if name.endswith(suffix):
+            return name.removesuffix(suffix)
+    return name
+
+
+def _colours(signal: Signal) -> list[theme.Colour]:
+    for names, colour in (
+        (_COMMANDED, theme.COMMAND),
+        (_ESTIMATED, theme.ESTIMATE),
+        (_SECONDARY, theme.DESIRED_TRACE),
+    ):
+        if signal.name in names:
+            return [colour] * signal.size
+    if signal.size == len(ANGLES) and signal.labels in ((), ANGLES, AXES):
+        return list(theme.AXIS_COLOURS)
+    return [theme.PLAIN if signal.size == 1 else theme.GROUP] * signal.size
+
+
+def _markers(name: str, size: int) -> list[MarkerShape]:
+    for names, marker in (
+        (_COMMANDED, MarkerShape.Cross),
+        (_ESTIMATED, MarkerShape.Square),
+        (_SECONDARY, MarkerShape.Plus),
+    ):
+        if name in names:
+            return [marker] * size
+    is_actual = name in _ACTUAL  # with its command in a plot for each hinge
+    return (
+        list(_AXIS_MARKERS) if size == len(_AXIS_MARKERS) and not is_actual else [MarkerShape.Circle] * size
+    )
+
+
+def _width(name: str) -> float:
+    for names, width in ((_ESTIMATED, WIDEST), (_ACTUAL, THICK), (_COMMANDED, THIN)):
+        if name in names:
+            return width
+    return MIDDLE

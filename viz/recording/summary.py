@@ -1,0 +1,168 @@
+"""Headline of a recording: how the run ended, its errors, its faults, and what was run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.telemetry.run_record import RunFacts
+from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.models.telemetry.status import Level, Status
+from spheretwin.models.telemetry.table import Table, rank_lost, saturated
+
+FAULT, TIME_TO_DETECTION, FAILSAFE_REASON = "fault", "time_to_detection_s", "failsafe_reason"
+"""Signals of runs with faults and with a watchdog."""
+
+_SYMBOLS = {Level.INFO: "✔", Level.WARN: "⚠", Level.ERROR: "✖"}
+
+_HEADLINES = {Status.COMPLETED: "COMPLETED", Status.INTERRUPTED: "INTERRUPTED", Status.FAILSAFE: "FAILSAFE"}
+
+
+class _FaultSpell:
+    """Fault of one part: its kind, when it started, and when it was detected."""
+
+    def __init__(self, part: str, kind: str, start_s: float) -> None:
+        self.part, self.kind, self.start_s = part, kind, start_s
+        self.detected_after_s: float | None = None
+
+    def text(self) -> str:
+        """Return the fault as text."""
+        found = (
+            "not detected"
+            if self.detected_after_s is None
+            else f"detected after {1e3 * self.detected_after_s:.3g} ms"
+        )
+        return f"{self.part} {self.kind} from {self.start_s:.3g} s, {found}"
+
+
+class Summary:
+    """Figures of a run for its headline, from its rows.
+
+    Parameters
+    ----------
+    facts : RunFacts
+        Facts of the run.
+
+    Attributes
+    ----------
+    last_s : float
+        Time of the last row.
+    """
+
+    def __init__(self, facts: RunFacts) -> None:
+        self._facts = facts
+        self.last_s = 0.0
+        self._ticks = 0
+        self._saturated = self._rank_lost = 0
+        self._largest_deg = 0.0
+        self._squares = 0.0
+        self._last_deg: NDArray[np.float64] = np.zeros(len(ANGLES))
+        self._failsafe = ""
+        self._faults: dict[str, _FaultSpell] = {}
+
+    def add(self, rows: Table, error_deg: NDArray[np.float64]) -> None:
+        """Add the rows of a chunk, with the error angle of each."""
+        self.last_s = float(rows["t_s"][-1])
+        self._ticks += len(rows)
+        self._saturated += int(np.count_nonzero(saturated(rows)))
+        self._rank_lost += int(np.count_nonzero(rank_lost(rows)))
+        # The last rows of a run that diverged may hold no numbers.
+        finite_deg = error_deg[np.isfinite(error_deg)]
+        self._largest_deg = max(self._largest_deg, float(np.max(finite_deg, initial=0.0)))
+        self._squares += float(np.sum(finite_deg**2))
+        self._last_deg = np.degrees(rows["q_rad"][-1])
+        signals = {signal.name: signal for signal in rows.signals}
+        if FAILSAFE_REASON in signals:
+            reasons = rows[FAILSAFE_REASON].ravel()
+            if reasons[-1]:
+                self._failsafe = signals[FAILSAFE_REASON].states[int(reasons[-1])]
+        if FAULT in signals:
+            self._add_faults(rows, signals[FAULT])
+        if TIME_TO_DETECTION in signals:
+            self._add_detections(rows[TIME_TO_DETECTION][-1])
+
+    def _add_faults(self, rows: Table, signal: Signal) -> None:
+        values = rows[FAULT].reshape(len(rows), -1)
+        for place in np.flatnonzero(values.any(axis=0)):
+            part = signal.labels[place]
+            if part not in self._faults:
+                first = int(np.flatnonzero(values[:, place])[0])
+                kind = signal.states[int(values[first, place])]
+                self._faults[part] = _FaultSpell(part, kind, float(rows["t_s"][first]))
+
+    def _add_detections(self, detected_after_s: NDArray[np.float64]) -> None:
+        for part, fault in self._faults.items():
+            kind, _, number = part.partition(".")
+            if kind in ("coil", "amplifier") and detected_after_s[int(number)] >= 0:
+                fault.detected_after_s = float(detected_after_s[int(number)])
+
+    def running(self) -> str:
+        """Return the text of a run in progress."""
+        return f"### ▶ RUNNING · {self._run_text()}"
+
+    def ended(self, status: Status) -> str:
+        """Return the text of a run that has ended."""
+        headline = _HEADLINES.get(status, "FAILED" if status.level is Level.ERROR else str(status).upper())
+        lines = []
+        if self._ticks:
+            if reason := self._reason(status):
+                lines.append(f"**{reason}**")
+            lines.append(self._figures())
+        lines.extend(self._fault_lines())
+        # Two spaces at the end of a line break it, at half of the distance between paragraphs.
+        return f"### {_SYMBOLS[status.level]} {headline} · {self._run_text()}\n\n" + "  \n".join(lines)
+
+    def _reason(self, status: Status) -> str:
+        if status in (Status.COMPLETED, Status.RUNNING):
+            return ""
+        at = f"{status.replace('_', ' ')} at {self.last_s:.3g} s of {self._facts.duration_s:g} s: "
+        if status == Status.FAILSAFE and self._failsafe:
+            return at + self._failsafe
+        if status == Status.LEFT_WORKSPACE:
+            angles = ", ".join(f"{name} {deg:.0f}°" for name, deg in zip(ANGLES, self._last_deg, strict=True))
+            return f"{at}a hinge reached the end of its range, {angles}"
+        return at + status.text.removesuffix(": the run ends here")
+
+    def _figures(self) -> str:
+        rms_deg = np.sqrt(self._squares / self._ticks)
+        lost = (
+            f" · rank lost {_percent(self._rank_lost / self._ticks)} of the time" if self._rank_lost else ""
+        )
+        return (
+            f"error: largest **{self._largest_deg:.3g}°**, RMS **{rms_deg:.3g}°** ·"
+            f" saturated {_percent(self._saturated / self._ticks)} of the time{lost}"
+        )
+
+    def _fault_lines(self) -> list[str]:
+        planned = len(self._field("run", FAULT) or ())
+        faults = sorted(self._faults.values(), key=lambda fault: (fault.start_s, fault.part))
+        texts = [fault.text() for fault in faults]
+        if planned > len(texts):
+            texts.append(f"{planned - len(texts)} of {planned} planned faults did not start")
+        return [f"faults: {'; '.join(texts)}"] if texts else []
+
+    def _run_text(self) -> str:
+        facts = self._facts
+        parts = [f"{facts.name} under {facts.law}"]
+        parts += [
+            f"{symbol} = {value:g}"
+            for symbol, section, field in (
+                ("modelling error m", "plant", "modelling_error"),
+                ("load L", "disturbance", "load"),
+            )
+            if isinstance(value := self._field(section, field), int | float)
+        ]
+        if facts.payload_kg:
+            parts.append(f"payload {facts.payload_kg:g} kg")
+        if hardware := self._field("run", "hardware"):
+            parts.append(f"{hardware} hardware")
+        return " · ".join(parts)
+
+    def _field(self, section: str, field: str) -> Any:
+        return self._facts.sections.get(section, {}).get(field)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if 0 < share < 0.1 else f"{100 * share:.0f} %"
