@@ -29,7 +29,7 @@ from spheretwin.viz.comparison.layout import (
     application,
     layout,
 )
-from spheretwin.viz.comparison.ranges import LEAST, PlotRange, plot_range
+from spheretwin.viz.comparison.ranges import LEAST, PlotRange, quantity_range
 from spheretwin.viz.comparison.runs import ComparedRun, leaders
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
@@ -114,6 +114,10 @@ STEPS = 6
 """Steps that can be labelled in the lowest of the plots."""
 
 
+EDGE = 0.04
+"""Share of the height of a plot that a mark at its edge takes."""
+
+
 def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingSubject], text: str) -> Path:
     """Write a recording of several runs; returns its path.
 
@@ -140,7 +144,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
         _ = subject.meshes  # a missing one is reported before there is a file
     tables = [run.table for run in runs]
     quantities, leading = scalar_quantities(tables), leaders(tables)
-    ranges = [plot_range(runs, [quantity.values(run.rows) for run in runs]) for quantity in quantities]
+    ranges = [quantity_range(quantity, runs, leading) for quantity in quantities]
     view = ComparisonView(
         tuple(run.name for run in runs),
         tuple(runs[place].name for place in leading),
@@ -172,7 +176,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
                 entity = f"{COMPARE}/{quantity.name}"
                 send_line(below, entity, run.label, run.table["t_s"], values, colour, width)
                 if run.early_end:
-                    _send_end(below, f"{END}/{quantity.name}", run, np.clip(values, *plot.limits), colour)
+                    _send_end(below, f"{END}/{quantity.name}", run, _visible(values, plot.limits), colour)
         for place in leading:
             run, reference = runs[place], SubtreeStream(recording, f"{REFERENCE}/{runs[place].name}")
             _write_reference(
@@ -216,10 +220,8 @@ def _write_reference(
 def _plot(quantity: ScalarQuantity, of_quantity: PlotRange) -> Plot:
     """Return the plot of a quantity; its title states that values are outside of its range."""
     low, high, outside = of_quantity
-    limits, title = quantity.limits, quantity.heading
-    if not limits:
-        limits = labelled(low, high, LEAST, STEPS)
-        title += ", cut" if outside else ""
+    limits = quantity.limits or labelled(low, high, LEAST, STEPS)
+    title = f"{quantity.heading}, cut" if outside else quantity.heading
     return Plot(quantity.name, title, quantity.group, quantity.desired is not None, limits)
 
 
@@ -229,7 +231,6 @@ def _outside(quantities: Sequence[ScalarQuantity], ranges: Sequence[PlotRange]) 
         f"- {quantity.heading.replace('[', '(').replace(']', ')')}: {item.text()}"
         for quantity, of_quantity in zip(quantities, ranges, strict=True)
         for item in of_quantity.outside
-        if not quantity.limits
     ]
     return ["", "## Values outside of the axes of plots marked as cut", "", *lines] if lines else []
 
@@ -248,6 +249,13 @@ def _log_legend(
         radii=rr.Radius.ui_points(2.0),
     )
     recording.log(LEGEND, lines, static=True)
+
+
+def _visible(values: Array, limits: tuple[float, float]) -> Array:
+    """Return values within limits, so far from these that a mark is drawn completely."""
+    low, high = limits
+    edge = EDGE * (high - low)
+    return np.clip(values, low + edge, high - edge)
 
 
 def _send_end(

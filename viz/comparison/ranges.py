@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spheretwin.viz.comparison.runs import ComparedRun
 from spheretwin.viz.layout.extents import CLIPPED_FROM, MARGIN, USUAL, number
+from spheretwin.viz.quantities import ScalarQuantity
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,28 @@ class PlotRange(NamedTuple):
     outside: tuple[Outside, ...]
 
 
-def plot_range(runs: Sequence[ComparedRun], of_runs: Sequence[Array]) -> PlotRange:
+def quantity_range(
+    quantity: ScalarQuantity, runs: Sequence[ComparedRun], leading: Sequence[int]
+) -> PlotRange:
+    """Return the range of a quantity: its own limits, or that of the settled runs and all references.
+
+    Parameters
+    ----------
+    quantity : ScalarQuantity
+    runs : sequence of ComparedRun
+    leading : sequence of int
+        Places of the runs that show the reference.
+    """
+    if quantity.limits:
+        return PlotRange(*quantity.limits, ())
+    desired = quantity.desired
+    references = [desired(runs[place].rows) for place in leading] if desired else []
+    return settled_range(runs, [quantity.values(run.rows) for run in runs], references)
+
+
+def settled_range(
+    runs: Sequence[ComparedRun], of_runs: Sequence[Array], references: Sequence[Array] = ()
+) -> PlotRange:
     """Return a range that contains every value, or the settled runs if that is much larger.
 
     A settled run is the second half and 85 % of the values of a complete run: a transient and a run that
@@ -52,6 +74,8 @@ def plot_range(runs: Sequence[ComparedRun], of_runs: Sequence[Array]) -> PlotRan
     runs : sequence of ComparedRun
     of_runs : sequence of (n,) arrays
         Values of each run; a number that is not finite is no value.
+    references : sequence of (n,) arrays
+        Values that are always within the range.
     """
     finite = [np.where(np.isfinite(values), values, np.nan) for values in of_runs]
     complete = [
@@ -61,7 +85,7 @@ def plot_range(runs: Sequence[ComparedRun], of_runs: Sequence[Array]) -> PlotRan
         (_usual(values), values[:0]) for values in finite if _has_number(values)
     ]
     everything = _bounds([values for values in finite if _has_number(values)])
-    usual = _bounds([np.concatenate(parts) for parts in settled])
+    usual = _bounds([*(np.concatenate(parts) for parts in settled), *references])
     span = max(usual[1] - usual[0], 2 * LEAST)
     low, high = everything if everything[1] - everything[0] <= CLIPPED_FROM * span else usual
     middle, half = (low + high) / 2, max(LEAST, MARGIN * (high - low) / 2)

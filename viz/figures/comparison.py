@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level
-from spheretwin.viz.comparison.ranges import plot_range
+from spheretwin.viz.comparison.ranges import PlotRange, quantity_range
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
 from spheretwin.viz.decimation import mean_and_deviation, octave_maxima
 from spheretwin.viz.figures.style import (
@@ -140,7 +140,7 @@ def over_time(
 
     A run with more ticks than the figure has dots is drawn by the bounds and the mean of every few ticks. The
     range is that of the settled runs; the panel states the values outside. Errors as one angle are drawn once
-    more on a logarithmic axis, complete.
+    more on a logarithmic axis.
 
     Parameters
     ----------
@@ -157,10 +157,12 @@ def over_time(
     panels = panel_column(figure, len(panels_of))
     for panel, (quantity, logarithmic) in zip(panels, panels_of, strict=True):
         of_runs = [quantity.values(run.rows) for run in runs]
-        limits = quantity.limits or (None if logarithmic else _state_range(panel, runs, of_runs))
         if logarithmic:
             panel.set_yscale("log")
             of_runs = [np.where(values > 0, values, np.nan) for values in of_runs]
+            limits = _logarithmic_range(panel, of_runs)
+        else:
+            limits = _stated_range(panel, quantity_range(quantity, runs, leading))
         for run, of_run, values in zip(runs, run_styles(runs), of_runs, strict=True):
             draw_line(panel, run.table["t_s"], values, label=run.legend, **of_run.line())
             if run.early_end:
@@ -170,8 +172,7 @@ def over_time(
                 name = "reference" if len(leading) == 1 else f"reference of {runs[place].label}"
                 look = {"label": name, "color": INK, "linewidth": 0.7, "linestyle": (0, (4, 3))}
                 draw_line(panel, runs[place].table["t_s"], quantity.desired(runs[place].rows), **look)
-        if limits:
-            panel.set_ylim(*limits)
+        panel.set_ylim(*limits)
         unit = f"{quantity.unit}, logarithmic" if logarithmic else quantity.unit
         plain(panel, f"{quantity.title},\n{unit}")
     figure.suptitle(title, fontsize="medium")
@@ -180,9 +181,9 @@ def over_time(
     return figure
 
 
-def _state_range(panel: Axes, runs: Sequence[ComparedRun], of_runs: Sequence[Array]) -> tuple[float, float]:
-    """Return the range of the settled runs, and state in the panel's title the values outside of it."""
-    low, high, outside = plot_range(runs, of_runs)
+def _stated_range(panel: Axes, of_quantity: PlotRange) -> tuple[float, float]:
+    """Return the range of a panel, and state in its title the values outside."""
+    low, high, outside = of_quantity
     if outside:
         texts = [item.text() for item in outside]
         lines = [", ".join(texts[first : first + 2]) for first in range(0, len(texts), 2)]
@@ -190,13 +191,28 @@ def _state_range(panel: Axes, runs: Sequence[ComparedRun], of_runs: Sequence[Arr
     return low, high
 
 
-def _mark_end(
-    panel: Axes, run: ComparedRun, values: Array, limits: tuple[float, float] | None, colour: str
-) -> None:
+DECADES = 6
+"""Decades of a logarithmic axis at most: smaller errors are rounding errors."""
+
+
+def _logarithmic_range(panel: Axes, of_runs: Sequence[Array]) -> tuple[float, float]:
+    """Return the range of all positive values, at most `DECADES`, and state in the title what is below."""
+    values = np.concatenate([*of_runs, [np.nan]])
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return 0.1, 1.0
+    high = 1.5 * float(values.max())
+    low = max(float(values.min()) / 1.5, high / 10**DECADES)
+    if values.min() < low:
+        panel.set_title(f"values below {low:.1g} are below the axis", fontsize="x-small", loc="right")
+    return low, high
+
+
+def _mark_end(panel: Axes, run: ComparedRun, values: Array, limits: tuple[float, float], colour: str) -> None:
     """Mark the end of a run that is not complete at its last value, within the range."""
     finite = values[np.isfinite(values)]
     if len(finite):
-        last = np.clip(finite[-1], *limits) if limits else finite[-1]
+        last = np.clip(finite[-1], *limits)
         mark: dict[str, Any] = {
             "color": colour,
             "markersize": 8,

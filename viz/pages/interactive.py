@@ -11,7 +11,7 @@ import plotly.graph_objects as plotly
 from plotly.offline import get_plotlyjs
 
 from spheretwin.models.telemetry.signals import ANGLES
-from spheretwin.viz.comparison.ranges import plot_range
+from spheretwin.viz.comparison.ranges import quantity_range
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
 from spheretwin.viz.decimation import envelope, mean_and_deviation, octave_maxima
 from spheretwin.viz.pages import html
@@ -200,7 +200,7 @@ def over_time(
         ]
         for trace in reference_lines:
             trace.hoverinfo, trace.hovertemplate = "skip", None
-        axis = {"range": quantity.limits or plot_range(runs, of_runs)[:2]}
+        axis = {"range": quantity_range(quantity, runs, leading)[:2]}
         panels.append(PlotPanel(_text(quantity.heading), [*reference_lines, *lines], axis))
     panels += _currents(runs)
     panels.append(_events(runs, colours))

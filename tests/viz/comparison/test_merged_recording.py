@@ -19,6 +19,7 @@ from spheretwin.models.telemetry.status import Status
 from spheretwin.models.telemetry.table import Table, read_parquet
 from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Ghost
+from spheretwin.viz.comparison.merged_recording import EDGE
 from spheretwin.viz.layout.extents import number
 from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import SCALAR_QUANTITIES
@@ -238,7 +239,8 @@ def test_the_end_of_a_failed_run_is_a_cross_at_its_last_value_in_every_plot(fail
         assert list(merged.t_ns(entity)) == [round(run.table["t_s"][-1] * 1e9)]
         line = merged.values(entity.replace("/end/", "/compare/"))
         low, high = limits(merged, entity)
-        assert merged.values(entity)[0, 0] == pytest.approx(np.clip(line[-1, 0], low, high))
+        edge = EDGE * (high - low)
+        assert merged.values(entity)[0, 0] == pytest.approx(np.clip(line[-1, 0], low + edge, high - edge))
         (name,) = merged.static[entity, "SeriesPoints:names"]
         assert name[0].endswith(f"; left workspace at {run.table['t_s'][-1]:.3g} s")
 

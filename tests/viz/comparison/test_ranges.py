@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from spheretwin.viz.comparison.ranges import plot_range
-from tests.viz.comparison.compared import T_s, run_of
+from spheretwin.viz.comparison.ranges import quantity_range, settled_range
+from tests.viz.comparison.compared import RAMP, VALUE, T_s, run_of
 
 
 def range_of(*runs):
-    return plot_range(runs, [run.table["q_rad"][:, 0] for run in runs])
+    return settled_range(runs, [run.table["q_rad"][:, 0] for run in runs])
 
 
 def test_values_of_similar_size_are_all_within_the_range():
@@ -55,3 +55,18 @@ def test_a_run_without_numbers_or_of_zeros_has_a_range(values):
 def test_values_without_a_number_are_ignored():
     values = np.where(T_s > 3.99, np.nan, np.sin(9 * T_s))
     assert range_of(run_of(values)).outside == ()
+
+
+def test_a_reference_is_within_the_range():
+    """A ramp of the desired angle and a run that is settled at its end only."""
+    desired = np.where(T_s < 1.0, T_s, 1.0)
+    quantity = VALUE._replace(desired=lambda rows: desired)
+    runs = [run_of(desired + 1e-3), run_of(np.where(T_s < 0.1, 50.0, 1.0))]
+    low, high, outside = quantity_range(quantity, runs, [0])
+    assert low < 0
+    assert 1.001 < high < 1.2
+    assert [item.run for item in outside] == [2]
+
+
+def test_limits_of_a_quantity_are_its_range():
+    assert quantity_range(VALUE._replace(limits=(-1.0, 0.5)), [run_of(RAMP)], [0]) == (-1.0, 0.5, ())

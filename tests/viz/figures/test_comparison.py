@@ -116,6 +116,18 @@ def test_the_error_angle_has_a_logarithmic_axis_too_with_every_value():
     assert logarithmic.get_xlabel() == "time, s"
 
 
+def test_a_logarithmic_axis_has_six_decades_at_most_and_says_so():
+    decay = 10.0 ** (-4.0 * T_s)  # to 1e-16
+    panel = comparison.over_time([run_of(decay)], [], [ANGLE], "title").axes[1]
+    low, high = panel.get_ylim()
+    assert high == pytest.approx(1.5)
+    assert low == pytest.approx(1.5e-6)
+    assert panel.get_title(loc="right") == "values below 2e-06 are below the axis"
+    few = comparison.over_time([run_of(decay[:900])], [], [ANGLE], "title").axes[1]
+    assert few.get_ylim()[0] == pytest.approx(decay[899] / 1.5)
+    assert few.get_title(loc="right") == ""
+
+
 def test_the_reference_is_a_thin_dark_line_of_the_leading_run():
     quantity = VALUE._replace(desired=lambda rows: rows.table["q_rad"][:, 0] + 1.0)
     runs = [run_of(RAMP[:500], "1 a"), run_of(RAMP[:900], "2 b")]
