@@ -8,14 +8,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from spheretwin.models.design import direct_summation
-from spheretwin.models.design.direct_summation import Quadrature, Rule
+from spheretwin.models.design.direct_summation import Rule
 from spheretwin.models.design.pole_torque import compute_curve
 from spheretwin.models.design.workspace import pose
 from spheretwin.models.magnetics import torque_matrix
 from spheretwin.models.meshes.solids import revolve
 from spheretwin.models.torque_curve import TorqueCurve
+from tests.models.design.quadrature import COARSE
 
-COARSE = Quadrature(near=Rule(8, 8, 32, 8), far=Rule(6, 6, 24, 4))
 TILTS = np.radians([8.0, 50.0])
 
 

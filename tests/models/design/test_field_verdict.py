@@ -9,13 +9,13 @@ from spheretwin.models.base.checks import broken
 from spheretwin.models.design import direct_summation
 from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
+from tests.models.design.quadrature import COARSE
 
 
 @pytest.fixture
 def coarse(monkeypatch):
-    """Fewer points in the windings: errors of a thousandth, enough to tell right from wrong."""
-    few = direct_summation.Quadrature(direct_summation.Rule(12, 12, 48), direct_summation.Rule(6, 6, 24))
-    monkeypatch.setattr(direct_summation, "STANDARD", few)
+    """Fewer points in the windings."""
+    monkeypatch.setattr(direct_summation, "STANDARD", COARSE)
 
 
 def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):

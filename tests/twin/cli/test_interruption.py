@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from spheretwin import cli
 from spheretwin.models.base.files import OPEN_FILES
 from spheretwin.models.telemetry.table import read_parquet
 
@@ -103,7 +104,7 @@ def ended(process, number):
 
 
 @pytest.mark.parametrize("number", list(CODES))
-def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_path, number):
+def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_path, capfd, number):
     telemetry, recording = tmp_path / "run.parquet", tmp_path / "run.rrd"
     outputs = ["--telemetry", telemetry, "--record", recording]
     lines = ended(
@@ -114,9 +115,9 @@ def test_a_compiled_law_that_never_returns_ends_by_the_second_signal(laws, tmp_p
         assert not target.exists()
         complaint, _, command = line.partition(": spheretwin ")
         assert complaint == f"spheretwin: not complete: {target}; 1000 rows can be recovered"
-        done = subprocess.run([*COMMAND, *command.split()], capture_output=True, text=True)
-        assert (done.returncode, done.stderr) == (0, "")
-        assert "recovered 1000 rows, 1.000 s of the run" in done.stdout
+        code, printed = cli.main(command.split()), capfd.readouterr()
+        assert (code, printed.err) == (0, "")
+        assert "recovered 1000 rows, 1.000 s of the run" in printed.out
     assert len(read_parquet(telemetry)[0]) == 1000
 
 
@@ -152,8 +153,6 @@ def test_rows_that_never_return_end_by_the_second_signal_and_the_study_goes_on(l
 
 
 def test_files_that_are_complete_are_not_named(tmp_path):
-    from spheretwin import cli
-
     before = list(OPEN_FILES.partial())
     outputs = ["--telemetry", str(tmp_path / "run.parquet"), "--record", str(tmp_path / "run.rrd")]
     assert cli.main(["simulate", "hold", "--duration", "0.01", "--json", *outputs]) == 0

@@ -12,6 +12,7 @@ from spheretwin.models import torque_curve
 from spheretwin.models.design import curve_check, direct_summation, pole_torque, torque_map
 from spheretwin.models.design import field_check as field_verdict
 from spheretwin.models.torque_curve import TorqueCurve
+from tests.models.design.quadrature import COARSE
 
 ASSETS = str(actuators.FOLDER / "assets")
 
@@ -118,9 +119,8 @@ def test_computed_curve_that_breaks_a_bound_fails(capsys, monkeypatch):
 
 @pytest.fixture
 def coarse(monkeypatch):
-    """Fewer points in the windings: errors of a thousandth, enough to tell right from wrong."""
-    few = direct_summation.Quadrature(direct_summation.Rule(12, 12, 48), direct_summation.Rule(6, 6, 24))
-    monkeypatch.setattr(direct_summation, "STANDARD", few)
+    """Fewer points in the windings."""
+    monkeypatch.setattr(direct_summation, "STANDARD", COARSE)
 
 
 def test_check_gives_its_verdict_as_json(capsys, coarse, monkeypatch):

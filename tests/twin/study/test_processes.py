@@ -12,7 +12,7 @@ from spheretwin import cli
 from tests.twin.study.cases import found, rows_of, study, table, values
 from tests.waiting import PATIENCE_S, wait_for
 
-COMMAND = [sys.executable, "-m", "spheretwin", "sweep"]
+PROGRAM = [sys.executable, "-m", "spheretwin"]
 LOADS = [0.1 * place for place in range(60)]
 MANY = study(values("disturbance.load", *LOADS), law=[{"law": "pd"}], fields={"duration": 2.0})
 SOURCE = f"""
@@ -29,7 +29,7 @@ def command(tmp_path):
     """What sweeps the study into a folder of the test's."""
     source = tmp_path / "short.toml"
     source.write_text(SOURCE)
-    return [*COMMAND, str(source), "--out", str(tmp_path / "out"), "--json"]
+    return [*PROGRAM, "sweep", str(source), "--out", str(tmp_path / "out"), "--json"]
 
 
 @pytest.fixture(scope="module")
@@ -57,16 +57,16 @@ def journal_lines(folder):
     return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
-def gone_on_with(command, folder, whole):
-    """Run the rest; the table is that of a study that nothing came between."""
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == cli.DONE, done.stderr
+def gone_on_with(command, folder, whole, capfd):
+    """Run the rest in this process; the table is that of a study that nothing came between."""
+    code, (out, err) = cli.main(command[len(PROGRAM) :]), capfd.readouterr()
+    assert code == cli.DONE, err
     assert table(folder) == table(whole)
-    return json.loads(done.stdout)
+    return json.loads(out)
 
 
 @pytest.mark.parametrize("threads", ["1", "2"])
-def test_kill_loses_no_finished_row(tmp_path, command, whole, threads):
+def test_kill_loses_no_finished_row(tmp_path, command, whole, capfd, threads):
     folder = tmp_path / "out"
     process = begun([*command, "--threads", threads], folder)
     process.send_signal(signal.SIGKILL)
@@ -74,11 +74,13 @@ def test_kill_loses_no_finished_row(tmp_path, command, whole, threads):
     kept = journal_lines(folder) - 1
     assert 4 <= kept < len(LOADS)
     assert not (folder / "table.parquet").exists()
-    assert gone_on_with(command, folder, whole)["resumed"] == kept
+    assert gone_on_with(command, folder, whole, capfd)["resumed"] == kept
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(tmp_path, command, whole, number):
+def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(
+    tmp_path, command, whole, capfd, number
+):
     folder = tmp_path / "out"
     process = begun([*command, "--threads", "2"], folder)
     process.send_signal(number)
@@ -88,24 +90,26 @@ def test_an_interruption_finishes_the_rows_in_flight_and_writes_the_table(tmp_pa
     assert 4 <= told["rows"] == journal_lines(folder) - 1 == len(rows_of(folder)) < told["of"] == len(LOADS)
     assert f"interrupted after {told['rows']} of 60 rows; the same command continues from there" in err
     assert "Traceback" not in err
-    assert gone_on_with(command, folder, whole)["resumed"] == told["rows"]
+    assert gone_on_with(command, folder, whole, capfd)["resumed"] == told["rows"]
 
 
-def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, whole):
+def test_a_second_process_is_refused_and_the_first_goes_on(tmp_path, command, whole, capfd):
     folder = tmp_path / "out"
     process = begun([*command, "--threads", "1"], folder)
     process.send_signal(signal.SIGSTOP)  # so that it does not end before the other begins
-    second = subprocess.run(command, capture_output=True, text=True)
+    second, printed = cli.main(command[len(PROGRAM) :]), capfd.readouterr()
     process.send_signal(signal.SIGCONT)
-    assert second.returncode == cli.BAD_INPUT
-    assert second.stderr.startswith("spheretwin: study: expected one process at a time")
-    assert second.stderr.count("\n") == 1
+    assert second == cli.BAD_INPUT
+    assert printed.err.startswith("spheretwin: study: expected one process at a time")
+    assert printed.err.count("\n") == 1
     process.communicate(timeout=PATIENCE_S)
     assert process.returncode == cli.DONE
     assert table(folder) == table(whole)
 
 
-def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(tmp_path, command, whole):
+def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(
+    tmp_path, command, whole, capfd
+):
     # As a full disk, for one process: no file of it may be longer than this.
     def limited():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -119,4 +123,4 @@ def test_where_files_may_not_grow_the_study_ends_in_one_line_and_loses_nothing(t
     assert done.stderr.count("\n") == 1
     kept = journal_lines(folder) - 1
     assert 2 < kept < len(LOADS)
-    assert gone_on_with(command, folder, whole)["resumed"] == kept
+    assert gone_on_with(command, folder, whole, capfd)["resumed"] == kept
