@@ -28,12 +28,12 @@ class QuantityRows(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """Quantity that a recording derives from telemetry."""
+    """Quantity derived from telemetry, for recordings or for a comparison of runs."""
 
     name: str
     """Ends in its unit."""
     unit: str
-    meaning: str
+    title: str
     values: Callable[[QuantityRows], Array]
     """One row for each row of the chunk: (n, size)."""
     floor: float
@@ -42,25 +42,40 @@ class Quantity(NamedTuple):
     """A name for each entry."""
     colours: tuple[theme.Colour, ...] = (theme.PLAIN,)
     """A colour for each entry."""
-    needs: str = ""
-    """Signal that it needs; empty if none."""
+    needs: tuple[str, ...] = ()
+    """Signals that it needs besides those of every run."""
+    group: str = ""
+    """Group of compared quantities that are drawn in one row."""
+    desired: Callable[[QuantityRows], Array] | None = None
+    """Reference of a compared quantity, (n,)."""
+    limits: tuple[float, float] | None = None
+    """Limits of the axis of a compared quantity; those of the values unless given."""
 
     @property
     def size(self) -> int:
         """Numbers a row."""
         return len(self.labels)
 
+    @property
+    def heading(self) -> str:
+        """Title with the unit."""
+        return f"{self.title} [{self.unit}]"
+
+    def column(self, rows: QuantityRows) -> Array:
+        """Return the values of its only entry, (n,)."""
+        return self.values(rows)[:, 0]
+
 
 def by_axis(
     name: str,
     unit: str,
-    meaning: str,
+    title: str,
     values: Callable[[QuantityRows], Array],
     floor: float,
-    needs: str = "",
+    needs: tuple[str, ...] = (),
 ) -> Quantity:
     """Quantity with an entry for each hinge, in the colours of the axes."""
-    return Quantity(name, unit, meaning, values, floor, ANGLES, theme.AXIS_COLOURS, needs)
+    return Quantity(name, unit, title, values, floor, ANGLES, theme.AXIS_COLOURS, needs)
 
 
 def copper_loss(rows: QuantityRows) -> Array:
@@ -182,7 +197,7 @@ ESTIMATED_RATE = by_axis(
     "estimated minus true rates",
     estimated_rate,
     0.01,
-    needs="qdot_estimated_rad_s",
+    needs=("qdot_estimated_rad_s",),
 )
 
 
@@ -218,7 +233,7 @@ MEASURED_ANGLE = by_axis(
     "measured minus true angles",
     measured_angle,
     0.1,
-    needs="q_measured_rad",
+    needs=("q_measured_rad",),
 )
 
 
@@ -251,84 +266,58 @@ QUANTITIES: tuple[Quantity, ...] = (
 
 def quantities_of(names: Collection[str]) -> tuple[Quantity, ...]:
     """Return the quantities of a run with signals of these names."""
-    return tuple(quantity for quantity in QUANTITIES if not quantity.needs or quantity.needs in names)
+    return tuple(quantity for quantity in QUANTITIES if set(quantity.needs) <= set(names))
 
 
-class ScalarQuantity(NamedTuple):
-    """Quantity with one number for each row, drawn for several runs."""
-
-    name: str
-    """Name in paths."""
-    title: str
-    """Short: next to two others it has the width of a sixth of a screen."""
-    unit: str
-    group: str
-    """Group of quantities that are drawn in one row."""
-    needs: tuple[str, ...]
-    """Signals that it is made of."""
-    values: Callable[[QuantityRows], Array]
-    """Its values, (n,)."""
-    desired: Callable[[QuantityRows], Array] | None = None
-    """Reference, (n,)."""
-    limits: tuple[float, float] | None = None
-    """Limits of the axis; those of the values unless given."""
-
-    @property
-    def heading(self) -> str:
-        """Title with the unit."""
-        return f"{self.title} [{self.unit}]"
-
-
-def scalar_quantities(tables: Sequence[Table]) -> list[ScalarQuantity]:
-    """Quantities that all of some runs have."""
+def compared_quantities(tables: Sequence[Table]) -> list[Quantity]:
+    """Return the quantities of a comparison that all runs have."""
     names = [{signal.name for signal in table.signals} for table in tables]
     return [
         quantity
-        for quantity in SCALAR_QUANTITIES
+        for quantity in COMPARED_QUANTITIES
         if all(set(quantity.needs) <= available for available in names)
     ]
 
 
-def _entry(signal: str, axis: int) -> Callable[[QuantityRows], Array]:
-    return lambda rows: rows.table[signal][:, axis]
+Values = Callable[[QuantityRows], Array]
 
 
-def _column(values: Callable[[QuantityRows], Array], place: int = 0) -> Callable[[QuantityRows], Array]:
-    """Return one entry of a quantity of recordings."""
-    return lambda rows: values(rows)[:, place]
+def _entry(values: Values, axis: int) -> Values:
+    """Return one entry of a quantity, (n, 1)."""
+    return lambda rows: values(rows)[:, axis : axis + 1]
 
 
-def _largest(signal: str) -> Callable[[QuantityRows], Array]:
-    return lambda rows: np.abs(rows.table[signal]).max(axis=1)
+def _signal(name: str) -> Values:
+    return lambda rows: rows.table[name]
 
 
-def _commanded_Nm(rows: QuantityRows) -> Array:
-    return np.linalg.norm(rows.table["torque_command_Nm"], axis=1)
+def _norm(values: Values) -> Values:
+    """Return the norm of all entries, (n, 1)."""
+    return lambda rows: np.linalg.norm(values(rows), axis=1, keepdims=True)
 
 
-def _delivered_Nm(rows: QuantityRows) -> Array:
-    return np.linalg.norm(DELIVERED.values(rows), axis=1)
+def _largest_current(rows: QuantityRows) -> Array:
+    return np.abs(rows.table["current_A"]).max(axis=1, keepdims=True)
 
 
-SCALAR_QUANTITIES = (
-    ScalarQuantity("error_angle_deg", "error as one angle", "°", "whole", ("q_rad", "q_ref_rad"),
-             _column(ERROR_ANGLE.values)),
-    *(ScalarQuantity(f"error_{axis}_mrad", f"error of {axis}", "mrad", "error", ("error_rad",),
-               _column(ERROR.values, i)) for i, axis in enumerate(ANGLES)),
-    *(ScalarQuantity(f"angle_{axis}_rad", f"angle {axis}", "rad", "angle", ("q_rad", "q_ref_rad"),
-               _entry("q_rad", i), _entry("q_ref_rad", i)) for i, axis in enumerate(ANGLES)),
-    *(ScalarQuantity(f"sliding_{axis}_rad_s", f"sliding of {axis}", "rad/s", "sliding", ("sliding_s",),
-               _entry("sliding_s", i)) for i, axis in enumerate(ANGLES)),
-    ScalarQuantity(
-        "torque_asked_Nm", "commanded torque", "N·m", "effort", ("torque_command_Nm",), _commanded_Nm
-    ),
-    ScalarQuantity(
-        "largest_current_A", "top current", "A", "effort", ("current_A",), _largest("current_A")
-    ),
-    ScalarQuantity("torque_margin", "torque margin", "1", "effort",
-             ("current_command_A", "allocation_scale"),
-             _column(MARGIN.values), limits=(-0.05 * MOST, 1.05 * MOST)),
-    ScalarQuantity("torque_delivered_Nm", "torque delivered on the hinges", "N·m", "more",
-             ("q_rad", "torque_Nm"), _delivered_Nm),
+def _desired(axis: int) -> Values:
+    return lambda rows: rows.table["q_ref_rad"][:, axis]
+
+
+# Titles are short: next to two others, a plot has the width of a sixth of a screen.
+COMPARED_QUANTITIES: tuple[Quantity, ...] = (
+    ERROR_ANGLE._replace(title="error as one angle", group="whole"),
+    *(Quantity(f"error_{axis}_mrad", "mrad", f"error of {axis}", _entry(ERROR.values, i), ERROR.floor,
+               group="error") for i, axis in enumerate(ANGLES)),
+    *(Quantity(f"angle_{axis}_rad", "rad", f"angle {axis}", _entry(_signal("q_rad"), i), 0.01,
+               group="angle", desired=_desired(i)) for i, axis in enumerate(ANGLES)),
+    *(Quantity(f"sliding_{axis}_rad_s", "rad/s", f"sliding of {axis}", _entry(_signal("sliding_s"), i), 0.01,
+               needs=("sliding_s",), group="sliding") for i, axis in enumerate(ANGLES)),
+    Quantity("torque_command_norm_Nm", "N·m", "commanded torque", _norm(_signal("torque_command_Nm")),
+             DELIVERED.floor, group="effort"),
+    Quantity("largest_current_A", "A", "top current", _largest_current, 0.05, group="effort"),
+    MARGIN._replace(title="torque margin", group="effort", limits=(-0.05 * MOST, 1.05 * MOST)),
+    Quantity("torque_delivered_norm_Nm", "N·m", "torque delivered on the hinges", _norm(DELIVERED.values),
+             DELIVERED.floor, group="more"),
 )  # fmt: skip
 """All, in the order in which they are drawn; groups are contiguous."""

@@ -21,7 +21,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, Spectrum, leaders
 from spheretwin.viz.pages import markdown
-from spheretwin.viz.quantities import QuantityRows, ScalarQuantity, scalar_quantities
+from spheretwin.viz.quantities import Quantity, QuantityRows, compared_quantities
 from spheretwin.viz.terminal.runs import differences as table_rows
 
 MOST_DIFFERENCES, LEGEND_LENGTH = 6, 48
@@ -240,7 +240,7 @@ def write_figures(runs: Sequence[Reviewed], figures: Sequence[dict[str, Any]], i
 
     drawn_runs = compared_runs(runs, every_tick=True)
     tables = [run.table for run in drawn_runs]
-    leading, quantities = leaders(tables), scalar_quantities(tables)
+    leading, quantities = leaders(tables), compared_quantities(tables)
     spectra = [_spectra(run) for run in runs]
     conditions = common_conditions([run.record.scenario for run in runs])
     title = drawn_runs[0].label if len(runs) == 1 else f"{len(runs)} runs: {conditions}"
@@ -273,7 +273,7 @@ def check_figures(into: Path) -> None:
 def _drawings(
     runs: Sequence[ComparedRun],
     leading: Sequence[int],
-    quantities: Sequence[ScalarQuantity],
+    quantities: Sequence[Quantity],
     spectra: Sequence[list[Spectrum]],
     conditions: str,
 ) -> Iterator[Drawing]:

@@ -21,7 +21,7 @@ COMPARE, END, TIP = "compare", "end", "tip"
 RUNS, LEGEND = "runs", "legend"
 """Entities of all runs: their description, and their colours with labels."""
 
-REFERENCE = "what_was_asked"
+REFERENCE = "setpoint"
 """Before the name of a run: a viewer draws lines in the order of their paths, these above all others."""
 
 LARGE, BESIDE_TEXTS = "whole", "more"

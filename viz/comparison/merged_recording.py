@@ -29,12 +29,12 @@ from spheretwin.viz.comparison.layout import (
     application,
     layout,
 )
-from spheretwin.viz.comparison.ranges import LEAST, PlotRange, quantity_range
+from spheretwin.viz.comparison.ranges import PlotRange, quantity_range
 from spheretwin.viz.comparison.runs import ComparedRun, leaders
 from spheretwin.viz.layout.extents import labelled
 from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
-from spheretwin.viz.quantities import ScalarQuantity, scalar_quantities
+from spheretwin.viz.quantities import Quantity, compared_quantities
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
@@ -143,7 +143,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
     for subject in subjects:
         _ = subject.meshes  # a missing one is reported before there is a file
     tables = [run.table for run in runs]
-    quantities, leading = scalar_quantities(tables), leaders(tables)
+    quantities, leading = compared_quantities(tables), leaders(tables)
     ranges = [quantity_range(quantity, runs, leading) for quantity in quantities]
     view = ComparisonView(
         tuple(run.name for run in runs),
@@ -171,7 +171,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
             ]
             _write_run(below, run, parts)
             for quantity, plot in zip(quantities, view.plots, strict=True):
-                values = quantity.values(run.rows)
+                values = quantity.column(run.rows)
                 width = THICK if quantity.desired else MIDDLE  # the reference is drawn over it
                 entity = f"{COMPARE}/{quantity.name}"
                 send_line(below, entity, run.label, run.table["t_s"], values, colour, width)
@@ -197,7 +197,7 @@ def _write_reference(
     recording: rr.RecordingStream,
     run: ComparedRun,
     subject: RecordingSubject,
-    quantities: Sequence[ScalarQuantity],
+    quantities: Sequence[Quantity],
     *,
     alone: bool,
 ) -> None:
@@ -217,15 +217,15 @@ def _write_reference(
             )
 
 
-def _plot(quantity: ScalarQuantity, of_quantity: PlotRange) -> Plot:
+def _plot(quantity: Quantity, of_quantity: PlotRange) -> Plot:
     """Return the plot of a quantity; its title states that values are outside of its range."""
     low, high, outside = of_quantity
-    limits = quantity.limits or labelled(low, high, LEAST, STEPS)
+    limits = quantity.limits or labelled(low, high, quantity.floor, STEPS)
     title = f"{quantity.heading}, cut" if outside else quantity.heading
     return Plot(quantity.name, title, quantity.group, quantity.desired is not None, limits)
 
 
-def _outside(quantities: Sequence[ScalarQuantity], ranges: Sequence[PlotRange]) -> list[str]:
+def _outside(quantities: Sequence[Quantity], ranges: Sequence[PlotRange]) -> list[str]:
     """Return lines of Markdown that state the values outside of the ranges."""
     lines = [
         f"- {quantity.heading.replace('[', '(').replace(']', ')')}: {item.text()}"

@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 
 from spheretwin.viz.comparison.runs import ComparedRun
 from spheretwin.viz.layout.extents import CLIPPED_FROM, MARGIN, USUAL, number
-from spheretwin.viz.quantities import ScalarQuantity
+from spheretwin.viz.quantities import Quantity
 
 Array = NDArray[np.float64]
-
-LEAST = 1e-3
-"""Half of the least range, for values near zero."""
 
 
 class Outside(NamedTuple):
@@ -42,14 +39,12 @@ class PlotRange(NamedTuple):
     outside: tuple[Outside, ...]
 
 
-def quantity_range(
-    quantity: ScalarQuantity, runs: Sequence[ComparedRun], leading: Sequence[int]
-) -> PlotRange:
+def quantity_range(quantity: Quantity, runs: Sequence[ComparedRun], leading: Sequence[int]) -> PlotRange:
     """Return the range of a quantity: its own limits, or that of the settled runs and all references.
 
     Parameters
     ----------
-    quantity : ScalarQuantity
+    quantity : Quantity
     runs : sequence of ComparedRun
     leading : sequence of int
         Places of the runs that show the reference.
@@ -58,11 +53,11 @@ def quantity_range(
         return PlotRange(*quantity.limits, ())
     desired = quantity.desired
     references = [desired(runs[place].rows) for place in leading] if desired else []
-    return settled_range(runs, [quantity.values(run.rows) for run in runs], references)
+    return settled_range(runs, [quantity.column(run.rows) for run in runs], quantity.floor, references)
 
 
 def settled_range(
-    runs: Sequence[ComparedRun], of_runs: Sequence[Array], references: Sequence[Array] = ()
+    runs: Sequence[ComparedRun], of_runs: Sequence[Array], least: float, references: Sequence[Array] = ()
 ) -> PlotRange:
     """Return a range that contains every value, or the settled runs if that is much larger.
 
@@ -74,6 +69,8 @@ def settled_range(
     runs : sequence of ComparedRun
     of_runs : sequence of (n,) arrays
         Values of each run; a number that is not finite is no value.
+    least : float
+        Half of the least range: smaller values must not look large.
     references : sequence of (n,) arrays
         Values that are always within the range.
     """
@@ -86,9 +83,9 @@ def settled_range(
     ]
     everything = _bounds([values for values in finite if _has_number(values)])
     usual = _bounds([*(np.concatenate(parts) for parts in settled), *references])
-    span = max(usual[1] - usual[0], 2 * LEAST)
+    span = max(usual[1] - usual[0], 2 * least)
     low, high = everything if everything[1] - everything[0] <= CLIPPED_FROM * span else usual
-    middle, half = (low + high) / 2, max(LEAST, MARGIN * (high - low) / 2)
+    middle, half = (low + high) / 2, max(least, MARGIN * (high - low) / 2)
     low, high = middle - half, middle + half
     outside = (
         _outside(place, run.table["t_s"], values, low, high)

@@ -25,7 +25,7 @@ from spheretwin.viz.figures.style import (
     plain,
     run_styles,
 )
-from spheretwin.viz.quantities import Array, ScalarQuantity
+from spheretwin.viz.quantities import Array, Quantity
 
 MOST_CELLS = 200
 """Cells of a row of an image."""
@@ -134,7 +134,7 @@ def spectra(runs: Sequence[ComparedRun], of_runs: Sequence[Sequence[Spectrum]], 
 
 
 def over_time(
-    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[ScalarQuantity], title: str
+    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[Quantity], title: str
 ) -> Figure:
     """Draw quantities over time; the reference is a thin dark line over the others.
 
@@ -147,7 +147,7 @@ def over_time(
     runs : sequence of ComparedRun
     leading : sequence of int
         Places of the runs that show the reference.
-    quantities : sequence of ScalarQuantity
+    quantities : sequence of Quantity
     title : str
     """
     panels_of = [(quantity, False) for quantity in quantities]
@@ -156,7 +156,7 @@ def over_time(
     figure = Figure(figsize=(WIDTH_in, height_in), layout="constrained")
     panels = panel_column(figure, len(panels_of))
     for panel, (quantity, logarithmic) in zip(panels, panels_of, strict=True):
-        of_runs = [quantity.values(run.rows) for run in runs]
+        of_runs = [quantity.column(run.rows) for run in runs]
         if logarithmic:
             panel.set_yscale("log")
             of_runs = [np.where(values > 0, values, np.nan) for values in of_runs]

@@ -15,7 +15,7 @@ from spheretwin.viz.comparison.ranges import quantity_range
 from spheretwin.viz.comparison.runs import ComparedRun, Spectrum
 from spheretwin.viz.decimation import envelope, mean_and_deviation, octave_maxima
 from spheretwin.viz.pages import html
-from spheretwin.viz.quantities import Array, ScalarQuantity
+from spheretwin.viz.quantities import Array, Quantity
 from spheretwin.viz.theme import rgb, run_colours
 
 # The browser contacts no host.
@@ -169,7 +169,7 @@ BLUE_TO_RED = [[0, "#2166ac"], [0.5, "#f7f7f7"], [1, "#b2182b"]]
 
 
 def over_time(
-    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[ScalarQuantity]
+    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[Quantity]
 ) -> plotly.Figure:
     """Figure of every quantity, the currents of each run and what happened.
 
@@ -192,7 +192,7 @@ def over_time(
                 runs[place], place, quantity.desired(runs[place].rows), most, REFERENCE_COLOUR, 4.0
             )
         ]
-        of_runs = [quantity.values(run.rows) for run in runs]
+        of_runs = [quantity.column(run.rows) for run in runs]
         lines = [
             trace
             for place, (run, colour, values) in enumerate(zip(runs, colours, of_runs, strict=True))
@@ -208,7 +208,7 @@ def over_time(
 
 
 def points_per_line(
-    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[ScalarQuantity]
+    runs: Sequence[ComparedRun], leading: Sequence[int], quantities: Sequence[Quantity]
 ) -> int:
     """Points that each line may have."""
     lines = sum(len(runs) + (len(leading) if quantity.desired else 0) for quantity in quantities)

@@ -16,7 +16,7 @@ from spheretwin.analysis.comparison import compared_runs
 from spheretwin.analysis.recorded_run import read
 from spheretwin.analysis.run_summary import amplitudes
 from spheretwin.models.base.errors import InputError
-from spheretwin.viz.quantities import scalar_quantities
+from spheretwin.viz.quantities import compared_quantities
 from tests.twin.analysis.runs import written
 
 NAMES = ["whole", "error", "angle", "sliding", "effort", "more", "currents", "spectra", "events"]
@@ -115,9 +115,9 @@ def test_the_page_asks_no_host_for_anything(page, drawn_into):
 def test_every_series_of_every_run_is_on_the_page_to_seven_digits(files, page):
     runs = compared_runs([read(path) for path in files])
     traces = figures_of(page)["over-time"]["data"]
-    for quantity in scalar_quantities([run.table for run in runs]):
+    for quantity in compared_quantities([run.table for run in runs]):
         for place, run in enumerate(runs):
-            wanted = quantity.values(run.rows)
+            wanted = quantity.column(run.rows)
             found = [
                 trace for trace in traces
                 if trace["meta"] == f"{place}" and trace["type"] == "scatter" and trace["mode"] == "lines"
@@ -175,9 +175,9 @@ def test_one_run_alone_and_a_long_one_by_its_extremes(files, tmp_path, monkeypat
     assert "drawn by the lowest and highest value" in text
     traces = [each for each in figures_of(Sources(text))["over-time"]["data"] if each["type"] == "scatter"]
     low, high, mean = traces[:3]
-    quantity = scalar_quantities([read(files[0]).table])[0]
+    quantity = compared_quantities([read(files[0]).table])[0]
     run = compared_runs([read(files[0])])[0]
-    values = quantity.values(run.rows)
+    values = quantity.column(run.rows)
     size = -(-len(values) // (50 // 3))
     blocks = [values[first : first + size] for first in range(0, len(values), size)]
     for trace, bound in ((low, np.min), (high, np.max), (mean, np.mean)):
@@ -248,8 +248,8 @@ def test_the_page_has_the_differences_of_the_scenarios_and_the_ranges_of_settled
     assert ["controller.period_s", "0.001", "0.002"] in rows
     layout = figures_of(page)["over-time"]["layout"]
     runs = compared_runs([read(path) for path in files])
-    for place, quantity in enumerate(scalar_quantities([run.table for run in runs]), start=1):
-        values = [quantity.values(run.rows) for run in runs]
+    for place, quantity in enumerate(compared_quantities([run.table for run in runs]), start=1):
+        values = [quantity.column(run.rows) for run in runs]
         low, high = layout[f"yaxis{place if place > 1 else ''}"]["range"]
         if quantity.limits:
             assert (low, high) == quantity.limits

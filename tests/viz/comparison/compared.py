@@ -7,7 +7,7 @@ import numpy as np
 from spheretwin.models.telemetry.signals import common_signals, width
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd
-from spheretwin.viz.quantities import QuantityRows, ScalarQuantity
+from spheretwin.viz.quantities import Quantity, QuantityRows
 
 PERIOD_s = 1e-3
 T_s = PERIOD_s * np.arange(4000)
@@ -19,7 +19,7 @@ RAMP = 2.0 * T_s - 3.0
 SIGNALS = {"square": SQUARE, "spike": SPIKE, "ramp": RAMP}
 
 # Constructed signals take the column of the angle α.
-VALUE = ScalarQuantity("value", "value", "rad", "angle", ("q_rad",), lambda rows: rows.table["q_rad"][:, 0])
+VALUE = Quantity("value", "rad", "value", lambda rows: rows.table["q_rad"][:, :1], 1e-3, group="angle")
 
 
 def run_of(values, label="1 made: pd", law="pd", status=None, period_s=PERIOD_s, events=(), start_s=0.0):

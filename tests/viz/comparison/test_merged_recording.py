@@ -22,7 +22,7 @@ from spheretwin.viz.comparison.ghosts import Ghost
 from spheretwin.viz.comparison.merged_recording import EDGE
 from spheretwin.viz.layout.extents import number
 from spheretwin.viz.layout.view import TIMELINE
-from spheretwin.viz.quantities import SCALAR_QUANTITIES
+from spheretwin.viz.quantities import COMPARED_QUANTITIES
 from tests.twin.analysis.runs import written
 
 APART_mrad = 3.0
@@ -107,21 +107,27 @@ def test_a_known_difference_is_between_the_lines_of_two_runs(merged):
     apart = {
         each.name: merged.values(f"/run_2_moved/compare/{each.name}")
         - merged.values(f"/run_1_first/compare/{each.name}")
-        for each in SCALAR_QUANTITIES
+        for each in COMPARED_QUANTITIES
         if f"/run_1_first/compare/{each.name}" in merged.entities
     }
     # Rounding of angles below 1 rad, in mrad.
     np.testing.assert_allclose(apart["error_α_mrad"], APART_mrad, rtol=0, atol=1e-12)
     np.testing.assert_allclose(apart["angle_α_rad"], 1e-3 * APART_mrad, rtol=0, atol=1e-15)
-    for name in ("error_β_mrad", "error_γ_mrad", "torque_asked_Nm", "largest_current_A", "torque_margin"):
+    for name in (
+        "error_β_mrad",
+        "error_γ_mrad",
+        "torque_command_norm_Nm",
+        "largest_current_A",
+        "torque_margin",
+    ):
         assert not apart[name].any()
     assert apart["error_angle_deg"].any()
 
 
 def test_the_reference_is_recorded_once(merged):
-    leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/what_was_asked/")}
+    leading = {entity.split("/")[2] for entity in merged.entities if entity.startswith("/setpoint/")}
     assert leading == {"run_3_slow"}  # the longest of runs that were asked for the same
-    wanted = merged.values("/what_was_asked/run_3_slow/angle_α_rad")
+    wanted = merged.values("/setpoint/run_3_slow/angle_α_rad")
     assert np.array_equal(wanted, merged.values("/run_3_slow/telemetry:q_ref_rad")[:, :1])
 
 
@@ -181,19 +187,19 @@ def test_lines_have_the_colours_of_their_runs_and_the_viewer_draws_every_extreme
         assert policy == [rr.components.AggregationPolicy.MinMax.value]
         assert colours(merged, f"/run_{place}_{name}/tip/point", "Points3D:colors") == [colour]
     assert colours(merged, "/legend", "LineStrips2D:colors") == expected
-    assert colours(merged, "/what_was_asked/run_3_slow/angle_β_rad", "SeriesLines:colors") == [theme.COMMAND]
+    assert colours(merged, "/setpoint/run_3_slow/angle_β_rad", "SeriesLines:colors") == [theme.COMMAND]
 
 
 def test_every_line_has_every_row_to_the_end_of_its_run(files, merged):
     for place, (name, path) in enumerate(files.items(), start=1):
         run = read(path)
-        for quantity in SCALAR_QUANTITIES:
+        for quantity in COMPARED_QUANTITIES:
             entity = f"/run_{place}_{name}/compare/{quantity.name}"
             if entity in merged.entities:
                 assert np.array_equal(merged.t_ns(entity), np.round(run.table["t_s"] * 1e9))
         error = merged.values(f"/run_{place}_{name}/compare/error_β_mrad")[:, 0]
         assert np.array_equal(error, 1e3 * run.table["error_rad"][:, 1])
-        torque = merged.values(f"/run_{place}_{name}/compare/torque_asked_Nm")[:, 0]
+        torque = merged.values(f"/run_{place}_{name}/compare/torque_command_norm_Nm")[:, 0]
         np.testing.assert_allclose(torque, np.linalg.norm(run.table["torque_command_Nm"], axis=1))
 
 

@@ -8,7 +8,7 @@ from tests.viz.comparison.compared import RAMP, VALUE, T_s, run_of
 
 
 def range_of(*runs):
-    return settled_range(runs, [run.table["q_rad"][:, 0] for run in runs])
+    return settled_range(runs, [run.table["q_rad"][:, 0] for run in runs], 1e-3)
 
 
 def test_values_of_similar_size_are_all_within_the_range():
