@@ -83,12 +83,11 @@ def test_every_byte_of_a_file_is_checked(table, tmp_path):
     table.write_parquet(path := tmp_path / "run.parquet", {"scenario": "{}"})
     content = path.read_bytes()
     for place in [*range(0, len(content) - 600, 7), *range(len(content) - 600, len(content))]:
-        for bit in (0, 5):
-            damaged = bytearray(content)
-            damaged[place] ^= 1 << bit
-            path.write_bytes(damaged)
-            with pytest.raises(InputError, match=r"the file is damaged|expected a Parquet file of a run"):
-                read_parquet(path)
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << place % 8  # another bit of each byte
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"the file is damaged|expected a Parquet file of a run"):
+            read_parquet(path)
 
 
 def test_failed_write_leaves_nothing(table, tmp_path, monkeypatch):

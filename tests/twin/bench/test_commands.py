@@ -322,6 +322,25 @@ def test_a_snapshot_can_be_restored_again_with_the_fields_that_waited():
             assert len(made.state().pending) == 2
 
 
+def test_the_number_of_snapshots_is_bounded_and_a_name_can_be_used_again():
+    with bench() as made:
+        for place in range(16):
+            done(made, "snapshot", name=f"{place}")
+        told = "bench: expected at most 16 snapshots, received one more"
+        assert said(made, "snapshot", name="16") == told
+        done(made, "snapshot", name="15")
+        assert made.state().snapshots == tuple(f"{place}" for place in range(16))
+
+
+def test_a_note_ends_with_the_run_that_it_is_about():
+    with begun() as made:
+        assert made.state().note is None
+        done(made, "stop")
+        assert made.state().note == "STOP: zero currents until reset"
+        done(made, "reset")
+        assert made.state().note is None
+
+
 @pytest.mark.parametrize("current_A", [0.5, -1.5])
 def test_the_torque_margin_counts_currents_of_both_signs(current_A):
     with begun() as made:

@@ -4,7 +4,7 @@ import pytest
 
 from spheretwin import scenario as scenarios
 from spheretwin.bench import Bench
-from spheretwin.bench.operators import MOST_CLIENTS, GONE_s, Operators
+from spheretwin.bench.operators import MOST_CLIENTS, GONE_s, Operators, SILENCE_s
 from spheretwin.models.base.errors import InputError
 from tests.twin.bench.cases import QUIET, done
 
@@ -117,6 +117,31 @@ def test_the_number_of_clients_is_bounded(clock):
     assert not operators.check_silence()
     operators.register("one more")
     assert operators.operator == "one more"
+
+
+def test_a_silent_client_does_not_become_the_operator(clock):
+    operators = Operators(clock=clock)
+    for client in ("a", "b", "c"):
+        operators.register(client)
+    operators.ask("b")
+    clock.now = 0.9 * SILENCE_s
+    operators.register("c")
+    assert not operators.check_silence()
+    assert operators.operator == "a"
+    clock.now = 1.1 * SILENCE_s
+    assert operators.check_silence()
+    assert (operators.operator, operators.watching, operators.asking) == (None, ("c",), ())
+
+
+def test_a_silent_client_that_watches_changes_nothing_for_the_operator(clock):
+    operators = Operators(clock=clock)
+    for client in ("a", "b"):
+        operators.register(client)
+    operators.ask("b")
+    clock.now = 1.1 * SILENCE_s
+    operators.register("a")
+    assert not operators.check_silence()
+    assert (operators.operator, operators.watching, operators.asking) == ("a", (), ())
 
 
 def test_the_twin_holds_some_time_after_its_operator_has_left_unless_somebody_takes_over(shared, clock):

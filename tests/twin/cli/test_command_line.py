@@ -185,7 +185,7 @@ def test_any_arguments_before_one_that_is_invalid_are_refused_on_one_line(source
     assert stderr[:-1].isprintable()
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(st.sampled_from(shipped()), st.lists(valid, max_size=6))
 def test_help_is_given_whatever_else_is_asked(source, arguments):
     code, stdout, stderr = ended(source, *arguments, "--help")
