@@ -23,6 +23,7 @@ from spheretwin.viz.comparison.merged_recording import EDGE
 from spheretwin.viz.layout.extents import number
 from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import COMPARED_QUANTITIES
+from spheretwin.viz.scene.motion import shaft_tip
 from tests.twin.analysis.runs import written
 
 APART_mrad = 3.0
@@ -277,6 +278,59 @@ def test_a_failed_run_does_not_flatten_the_other_and_the_text_states_its_values(
     assert abs(farthest) > 2 * max(abs(low), abs(high))
     ((text,),) = merged.static["/runs", "TextDocument:text"]
     assert f"- error of α (mrad): run 2 reaches {number(farthest)} (" in text
+
+
+def paths_of(merged, entity):
+    """Ends of the segments of a path, in the order of time."""
+    segments = []
+    for chunk in RrdReader(merged.path).stream().filter(has_timeline=TIMELINE):
+        batch = chunk.to_record_batch()
+        if chunk.entity_path == entity and "LineStrips3D:strips" in batch.schema.names:
+            t_ns = np.asarray(batch.column(TIMELINE).cast(pa.int64()))
+            segments += list(zip(t_ns, batch.column("LineStrips3D:strips").to_pylist(), strict=True))
+    return {int(t_ns): strip[0][-1] for t_ns, strip in sorted(segments, key=lambda item: item[0])}
+
+
+@pytest.mark.parametrize(
+    ("entity", "signal"), [("/run_3_slow/tip/path", "q_rad"), ("/setpoint/run_3_slow/tip/path", "q_ref_rad")]
+)
+def test_paths_of_tips_are_those_of_the_run_and_of_its_reference(files, merged, actuator, entity, signal):
+    table = read(files["slow"]).table
+    ends = paths_of(merged, entity)
+    assert len(ends) > 10
+    tips = dict(zip(np.round(table["t_s"] * 1e9), shaft_tip(table[signal], actuator), strict=True))
+    for t_ns, end in ends.items():
+        np.testing.assert_allclose(end, tips[t_ns], atol=1e-7)  # single precision
+
+
+def test_every_plot_has_the_time_of_the_longest_run_and_its_range(merged):
+    reader = RrdReader(merged.path)
+    ends = [
+        cell["end"]
+        for chunk in reader.stream(store=reader.blueprints()[0])
+        if chunk.entity_path.endswith("/TimeAxis")
+        for row in chunk.to_record_batch().column("TimeAxis:view_range").to_pylist()
+        for cell in row
+    ]
+    assert len(ends) >= 11
+    longest_ns = round(merged.t_ns("/run_3_slow/compare/error_α_mrad")[-1])
+    assert all(str(longest_ns) in str(end) for end in ends)
+    for place, name in enumerate(("first", "moved", "slow", "other"), start=1):
+        low, high = limits(merged, f"/run_{place}_{name}/compare/error_angle_deg")
+        settled = merged.values(f"/run_{place}_{name}/compare/error_angle_deg")
+        assert low <= settled[len(settled) // 2 :].min() <= settled[len(settled) // 2 :].max() <= high
+
+
+def test_every_path_is_shown_over_the_last_seconds(merged):
+    reader = RrdReader(merged.path)
+    shown = {
+        chunk.entity_path.partition("/overrides")[2]
+        for chunk in reader.stream(store=reader.blueprints()[0])
+        if any("VisibleTimeRanges" in name for name in chunk.to_record_batch().schema.names)
+    }
+    tips = {entity for entity in merged.entities if entity.endswith("/tip/path")}
+    assert len(tips) == 5
+    assert tips <= {path.removesuffix("/visualizers") for path in shown}
 
 
 # --- what is refused

@@ -99,3 +99,49 @@ def test_laws_have_colours_of_their_own_or_share_the_last():
     assert len(set(colours)) == len(colours)
     assert all(to_hex(colour) == colour for colour in colours)
     assert theme.law_colour("one of the user's") == theme.OTHER_LAW not in colours
+
+
+def test_the_legend_of_lines_names_filled_and_hollow_dots_and_the_paper():
+    figure = lines()
+    (legend,) = figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts == ["measured", "true", "the paper's figure"]
+    measured, true, paper = legend.get_lines()
+    assert (measured.get_markerfacecolor(), true.get_markerfacecolor()) == (style.INK, "white")
+    assert paper.get_linestyle() == ":"
+    filled, hollow = (dot for dot in figure.axes[0].get_lines()[:4] if dot.get_marker() == "o")
+    # The first line is the measured one: its sizes are twice those of the true one.
+    assert (filled.get_xdata(), hollow.get_xdata()) == ([pytest.approx(0.2)], [pytest.approx(0.1)])
+    assert (filled.get_markerfacecolor(), hollow.get_markerfacecolor()) == (theme.law_colour("afsm"), "white")
+    printed = [
+        line
+        for line in figure.axes[0].get_lines()
+        if line.get_linestyle() == ":" and len(line.get_xdata()) == 2
+    ]
+    assert [set(line.get_xdata()) for line in printed] == [{0.12}]
+    assert figure.axes[-1].get_xlabel() == "largest |error|, degrees"
+
+
+def test_error_bands_reach_from_the_least_to_the_largest_of_the_seeds():
+    (band, _) = courses().axes[0].collections
+    points = band.get_paths()[0].vertices
+    errors = WINDOWS[:, :, 0]
+    for window in (0, 20, 39):
+        inside = points[np.isclose(points[:, 0], 0.02 * (window + 0.5)), 1]
+        assert (inside.min(), inside.max()) == pytest.approx(
+            (errors[:, window].min(), errors[:, window].max())
+        )
+
+
+def test_heat_is_blue_for_less_and_red_for_more_on_one_scale():
+    figure = heated()
+    left, right = (axes.get_images()[0] for axes in figure.axes[:2])
+    less, zero, more = left.get_cmap()(left.norm([-0.1, 0.0, 0.1]))
+    assert less[2] > less[0] + 0.25
+    assert more[0] > more[2] + 0.25
+    assert np.ptp(zero[:3]) < 0.02
+    assert left.norm is right.norm
+    np.testing.assert_allclose(left.get_array()[0], [-0.1, 0.1])  # changes beyond the scale are its ends
+    assert figure.axes[2].get_ylabel() == "change, degrees"
+    ticks = [text.get_text() for text in figure.axes[2].get_yticklabels()]
+    assert ticks == ["-0.1", "-0.03", "-0.01", "0", "+0.01", "+0.03", "+0.1"]

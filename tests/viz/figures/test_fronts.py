@@ -58,3 +58,27 @@ def test_without_a_completed_trial_there_is_still_a_figure(tmp_path, kind):
     figure = getattr(fronts, kind)({"pid": lost}, OBJECTIVES, "nothing")
     style.save(figure, tmp_path / "nothing.png")
     assert (tmp_path / "nothing.png").stat().st_size > 0
+
+
+def test_axes_of_tunings_have_the_names_of_their_objectives():
+    panel = fronts.front({"pid": TRIALS}, OBJECTIVES, "front").axes[0]
+    assert (panel.get_xlabel(), panel.get_ylabel(), panel.get_title()) == (*OBJECTIVES, "front")
+    figure = fronts.progress({"pid": TRIALS}, OBJECTIVES, "trials")
+    assert [axes.get_ylabel() for axes in figure.axes] == list(OBJECTIVES)
+    assert figure.axes[-1].get_xlabel() == "trial"
+
+
+def test_fronts_of_conditions_have_points_in_the_order_of_their_cost():
+    values = np.array([[2.0, 1.0], [1.0, 3.0]])
+    panel = fronts.FrontPanel("ideal", "error, mrad", {"pd": values}, {"best": ("pd", 1.0, 3.0)}, (0.5,))
+    axes = fronts.fronts([panel], {"pd": "PD"}, "variation, A/s").axes[0]
+    floor, front, marked = axes.get_lines()[:3]
+    assert set(floor.get_ydata()) == {0.5}
+    assert front.get_xydata().tolist() == [[1.0, 3.0], [2.0, 1.0]]
+    assert marked.get_xydata().tolist() == [[1.0, 3.0]]
+    assert [text.get_text() for text in axes.texts] == ["best"]
+    assert (axes.get_title(), axes.get_ylabel(), axes.get_xlabel()) == (
+        "ideal",
+        "error, mrad",
+        "variation, A/s",
+    )

@@ -99,3 +99,42 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path, suffix):
         found.append(path.read_bytes())
     assert found[0] == found[1]
     assert (b"<svg" in found[0]) == (suffix == "svg")
+
+
+def test_errors_over_time_are_medians_and_ranges_in_mrad():
+    seeds = (
+        np.array([0.1, 0.2, 0.4])[:, None, None] * np.array([1.0, 2.0])[:, None] * np.array([1.0, 3.0, 5.0])
+    )
+    figure = over_time.errors({"PD": over_time.ErrorBand("pd", seeds)}, 0.5, HINGES, "title")
+    panels = [axes for axes in figure.axes if axes.get_ylabel().endswith("mrad")]
+    assert [axes.get_ylabel() for axes in panels] == [f"|error| of {name}, mrad" for name in HINGES]
+    for axes, factor in zip(panels, (1.0, 3.0, 5.0), strict=True):
+        (line,) = (line for line in axes.get_lines() if line.get_label() == "PD")
+        np.testing.assert_allclose(line.get_xdata(), [0.25, 0.75])
+        np.testing.assert_allclose(line.get_ydata(), [200 * factor, 400 * factor])
+        points = axes.collections[0].get_paths()[0].vertices
+        at_first = points[np.isclose(points[:, 0], 0.25), 1]
+        assert (at_first.min(), at_first.max()) == pytest.approx((100 * factor, 400 * factor))
+
+
+def test_angles_are_drawn_with_their_references_by_law_and_hinge():
+    t_s = np.linspace(0, 1, 5)
+    q = np.stack([t_s, 2 * t_s, 3 * t_s], axis=1)
+    by_label = {
+        "PD": over_time.AngleTraces("pd", t_s[:3], q[:3], t_s, q + 0.5, False),
+        "AFSM": over_time.AngleTraces("afsm", t_s, 2 * q, t_s, q + 0.25, True),
+    }
+    figure = over_time.angles(by_label, HINGES, "title")
+    grid = np.array(figure.axes).reshape(3, 2)
+    for column, (label, motion) in enumerate(by_label.items()):
+        for hinge in range(3):
+            actual, desired = grid[hinge, column].get_lines()[:2]
+            np.testing.assert_array_equal(actual.get_xydata().T, [motion.t_s, motion.q_rad[:, hinge]])
+            np.testing.assert_array_equal(desired.get_xydata().T, [t_s, motion.desired_rad[:, hinge]])
+            assert actual.get_color() == law_colour(motion.law)
+            assert desired.get_color() == style.INK
+        assert grid[0, column].get_title() == f"({'ab'[column]}) {label}"
+    assert [axes.get_ylabel() for axes in grid[:, 0]] == ["α, rad", "β, rad", "γ, rad"]
+    (cross,) = [line for line in grid[1, 0].get_lines() if line.get_marker() == "x"]
+    assert cross.get_xydata().tolist() == [[0.5, 1.0]]
+    assert "ended early" in [text.get_text() for text in figure.legends[0].get_texts()]
