@@ -109,7 +109,7 @@ def _drive(section: DriveSection, group: CoilGroup) -> ResolvedDrive:
 def _nominal(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> ResolvedNominal:
     """Return the data sheet of the controller; default of a value: the model file, or the true value."""
     section = scenario.nominal
-    sheet = _truth(scenario, drive, actuator) if section.equals_truth else _model_sheet(actuator)
+    sheet = true_sheet(scenario, drive, actuator) if section.equals_truth else _model_sheet(actuator)
     sheet["torque_curve"] = nominal_curve(scenario)
     return _with(ResolvedNominal, section, **_given_or(section, sheet))
 
@@ -132,7 +132,7 @@ def _model_sheet(actuator: Actuator) -> dict[str, Any]:
     }
 
 
-def _truth(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> dict[str, Any]:
+def true_sheet(scenario: Scenario, drive: ResolvedDrive, actuator: Actuator) -> dict[str, Any]:
     """Return the true values as nominal values: the inertia contains modelling error and payload."""
     plant, height_m = scenario.plant, float(actuator.payload_mount_m[2])
     inertia = loaded_inertia((1 + plant.modelling_error) * actuator.inertia, plant.payload_kg, height_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import unicodedata
 from collections.abc import Iterable
 from itertools import islice
@@ -14,6 +15,9 @@ LONGEST_VALUE, LONGEST_WORD, LONGEST_LINE = 120, 300, 2000
 
 # Entries and levels of a list or a table beyond which its text is always cut.
 MOST_ENTRIES, DEEPEST = 60, 10
+
+HIDDEN = ".part"
+"""End of the name of a temporary file."""
 
 FEWEST_DIGITS, MOST_DIGITS = 6, 17  # 17 significant digits distinguish any two floats
 
@@ -38,8 +42,11 @@ def without_breaks(error: BaseException) -> str:
         case RecursionError():
             return "it is nested too deeply"
         case OSError() if error.strerror:
+            # Other libraries put paths and numbers into the text of the error.
+            text = os.strerror(error.errno) if error.errno else error.strerror
             named = error.filename if error.filename2 is None else error.filename2
-            return error.strerror if named is None else f"{error.strerror}: {named}"
+            is_hidden = f"{named}".endswith(HIDDEN)  # a temporary file, whose target the message names
+            return text if named is None or is_hidden else f"{text}: {named}"
     return " ".join(str(error).split())
 
 
@@ -121,9 +128,15 @@ def distinct_texts(*numbers: float) -> list[str]:
 
 def did_you_mean(received: str, valid: Iterable[str]) -> str:
     """Return ``"; did you mean NAME?"`` for the valid name nearest to the received one, or an empty text."""
+    near = nearest(received, valid)
+    return f"; did you mean {near}?" if near else ""
+
+
+def nearest(received: str, valid: Iterable[str]) -> str | None:
+    """Return the valid name nearest to the received one; None if none is similar."""
     # A longer text is not a name, and the comparison would take seconds.
     near = difflib.get_close_matches(received, valid, n=1) if len(received) < LONGEST_WORD else []
-    return f"; did you mean {near[0]}?" if near else ""
+    return near[0] if near else None
 
 
 class SpheretwinError(Exception):

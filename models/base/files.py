@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
+from spheretwin.models.base.errors import HIDDEN, InputError, SpheretwinError, without_breaks
 
 
 class OutputFile:
@@ -44,7 +44,7 @@ class OutputFile:
         try:
             self.path.open("xb").close()  # unlike `tempfile`, with the permissions of any new file
         except OSError as error:
-            raise InputError(f"output: expected a writable path, {without_breaks(error)}") from None
+            raise _not_writable(target, error) from None
 
     def keep(self) -> None:
         """Move the file to its target, with the permissions of the file that it replaces.
@@ -59,9 +59,7 @@ class OutputFile:
                 shutil.copymode(self._target, self.path)
             os.replace(self.path, self._target)
         except OSError as error:
-            raise SpheretwinError(
-                f"output: {self._target} could not be written, {error.strerror or error}"
-            ) from None
+            raise SpheretwinError(f"output: {self._target} could not be written, {_cause(error)}") from None
 
     def discard(self) -> None:
         """Remove the file, unless it was moved to its target."""
@@ -139,7 +137,7 @@ def check_writable(path: Path) -> None:
         if target.exists():
             target.open("ab").close()
     except OSError as error:
-        raise InputError(f"output: expected a writable path, {without_breaks(error)}") from None
+        raise _not_writable(path, error) from None
 
 
 @contextmanager
@@ -160,7 +158,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         yield output.path
         output.keep()
     except OSError as error:
-        raise SpheretwinError(f"output: {path} could not be written, {without_breaks(error)}") from None
+        raise SpheretwinError(f"output: {path} could not be written, {_cause(error)}") from None
     finally:
         output.discard()
 
@@ -181,9 +179,18 @@ def make_folder(path: Path) -> None:
         raise InputError(f"output: expected a writable folder, {without_breaks(error)}") from None
 
 
+def _not_writable(path: Path, error: OSError) -> InputError:
+    return InputError(f"output: expected a writable path, {_cause(error)}: {path}")
+
+
+def _cause(error: OSError) -> str:
+    """Return the cause of an error without the file, which has a hidden name."""
+    return os.strerror(error.errno) if error.errno else without_breaks(error)
+
+
 def _hidden(target: Path) -> Path:
     """Return a unique hidden path in the folder of a file; no other derived name is longer."""
-    return target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
+    return target.with_name(f".{target.name}.{secrets.token_hex(8)}{HIDDEN}")
 
 
 def _behind_links(path: Path) -> Path:

@@ -13,6 +13,7 @@ import numpy as np
 from spheretwin.analysis.differences import LONGEST_VALUE, common_conditions, scenario_differences
 from spheretwin.analysis.recorded_run import Reviewed, events, of_the_actuator
 from spheretwin.analysis.run_summary import amplitudes, peaks
+from spheretwin.metrics import BAND_rad
 from spheretwin.models.actuator import MJCF_PATH
 from spheretwin.models.base.errors import InputError, shortened, shown
 from spheretwin.models.telemetry.run_record import RunFacts
@@ -22,7 +23,7 @@ from spheretwin.scenario.sections import ResolvedScenario
 from spheretwin.viz.comparison.runs import ComparedRun, EarlyEnd, Spectrum, leaders
 from spheretwin.viz.pages import markdown
 from spheretwin.viz.quantities import Quantity, QuantityRows, compared_quantities
-from spheretwin.viz.terminal.runs import differences as table_rows
+from spheretwin.viz.terminal.reviews import differences as table_rows
 
 MOST_DIFFERENCES, LEGEND_LENGTH = 6, 48
 """Differences in a label, and characters of a legend's line."""
@@ -320,7 +321,7 @@ def _above(title: str, runs: Sequence[ComparedRun], most: int) -> str:
 
 def _below(runs: Sequence[Reviewed], drawn: Sequence[ComparedRun], figures: Sequence[dict[str, Any]]) -> str:
     head = ["differences from run 1" if len(runs) > 1 else "", *(_plain(run.label) for run in drawn)]
-    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures)]
+    rows = [[cell.replace("\n", "; ") for cell in row] for row in table_rows(figures, BAND_rad)]
     lines = ["## Figures", "", *markdown.table(head, rows, [False] + [True] * len(runs)), ""]
     if len(runs) > 1:
         lines += ["## Differences of the scenarios", "", *_difference_table(runs)]

@@ -178,7 +178,7 @@ def _start(recorded: Reviewed) -> ActiveConfig:
 
 
 def of_the_actuator(run: Reviewed) -> ActiveConfig:
-    """Return plant, drive and files of a run; law and trajectory, whose files may be gone, are others.
+    """Return plant, drive, sensors and files of a run; law and trajectory, whose files may be gone, differ.
 
     Raises
     ------
@@ -188,6 +188,7 @@ def of_the_actuator(run: Reviewed) -> ActiveConfig:
     shared_fields = ("name", "duration", "seed", "plant", "drive")
     fields = {
         **{name: run.record.scenario[name] for name in shared_fields},
+        "sensors": run.record.scenario.get("sensors", {}),
         "controller": {"law": "pd", "period_s": run.period_s},
         "trajectory": {"shape": "hold"},
     }

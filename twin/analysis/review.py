@@ -6,11 +6,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from spheretwin.analysis import tolerances
-from spheretwin.analysis.differences import differences
+from spheretwin.analysis.differences import differences, scenario_differences
+from spheretwin.analysis.nominal_errors import nominal_errors
 from spheretwin.analysis.recorded_run import Reviewed, read
 from spheretwin.analysis.run_summary import figures
-from spheretwin.analysis.tolerances import Exceeded, exceeded
-from spheretwin.models.base.errors import InputError
+from spheretwin.analysis.tolerances import Exceeded, compare, exceeded
+from spheretwin.models.base.errors import InputError, shortened
+from spheretwin.viz.terminal.reviews import NominalError, SignalTolerance
+
+LONGEST_VALUE = 60
+"""Characters of a field's value."""
 
 
 class Review(NamedTuple):
@@ -23,6 +28,12 @@ class Review(NamedTuple):
     """Figures of each other run less those of the first."""
     exceeded: list[list[Exceeded]]
     """Signals of each other run that leave the tolerances; empty without tolerances."""
+    tolerances: list[list[SignalTolerance]]
+    """For each other run the share of its tolerance that each signal used; empty without tolerances."""
+    differing_fields: dict[str, list[str]]
+    """Fields in which the scenarios differ, with the value in each run."""
+    nominal_errors: list[list[NominalError]]
+    """For each run the values of the controller's nominal model that differ from the truth."""
 
 
 def review(*paths: str | Path, tolerance: str | None = None) -> Review:
@@ -48,4 +59,8 @@ def review(*paths: str | Path, tolerance: str | None = None) -> Review:
     first, *others = runs = [read(Path(path)) for path in paths]
     summaries = [figures(run) for run in runs]
     over = [exceeded(first, other, allowed) for other in others] if allowed else []
-    return Review(runs, summaries, differences(summaries), over)
+    used = [compare(first, other, allowed) for other in others] if allowed else []
+    rows = scenario_differences([run.record.scenario for run in runs])
+    fields = {name: [shortened(value, LONGEST_VALUE) for value in values] for name, values in rows}
+    errors = [nominal_errors(run) for run in runs]
+    return Review(runs, summaries, differences(summaries), over, used, fields, errors)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -16,6 +17,7 @@ from spheretwin.analysis.recorded_run import Reviewed
 from spheretwin.models.base.errors import InputError, did_you_mean, shown, without_breaks
 from spheretwin.models.telemetry.signals import Signal
 from spheretwin.scenario.fields import explain
+from spheretwin.viz.terminal.reviews import SignalTolerance
 
 FOLDER = resources.files("spheretwin.analysis") / "shipped"
 
@@ -107,6 +109,22 @@ class Exceeded(NamedTuple):
     """Excess over the tolerance, in the unit of the signal; infinite if one of the two has no value."""
 
 
+def compare(reference: Reviewed, run: Reviewed, tolerances: Tolerances) -> list[SignalTolerance]:
+    """Return for each signal the largest share of its tolerance that a run used.
+
+    Where a signal exceeds its tolerance, it is the place of the largest excess.
+
+    Raises
+    ------
+    InputError
+        One of the runs lacks a signal, or they have different control periods.
+    """
+    return [
+        _largest_share(signal, *_columns_of_both(reference, run, signal.name), tolerance, run.period_s)
+        for signal, tolerance in _signals(reference, run, tolerances)
+    ]
+
+
 def exceeded(reference: Reviewed, run: Reviewed, tolerances: Tolerances) -> list[Exceeded]:
     """Return the first violation of each signal, the earliest first.
 
@@ -119,23 +137,62 @@ def exceeded(reference: Reviewed, run: Reviewed, tolerances: Tolerances) -> list
     InputError
         One of the runs lacks a signal, or they have different control periods.
     """
+    violations = []
+    for signal, tolerance in _signals(reference, run, tolerances):
+        columns = _columns_of_both(reference, run, signal.name)
+        if place := _first_violation(*columns, tolerance, reference.period_s):
+            tick, entry, by = place
+            violations.append(
+                Exceeded(str(run.path), signal.name, _axis(signal, entry), tick * run.period_s, by)
+            )
+    return sorted(violations, key=lambda violation: violation.t_s)
+
+
+def _signals(
+    reference: Reviewed, run: Reviewed, tolerances: Tolerances
+) -> Iterator[tuple[Signal, Tolerance]]:
+    """Yield each signal with its tolerance."""
     if run.period_s != reference.period_s:
         raise InputError(
             f"review {run.path}: expected a control period of {reference.period_s!r} s as the reference has,"
             f" received {run.period_s!r} s"
         )
-    violations = []
     for name, tolerance in tolerances.signals.items():
         signal, other = _find_signal(reference, name), _find_signal(run, name)
         if signal.size != other.size:
             raise InputError(
                 f"review {run.path}: expected {name} of {signal.size} numbers, received {other.size}"
             )
-        if place := _first_violation(*_columns_of_both(reference, run, name), tolerance, reference.period_s):
-            tick, entry, by = place
-            axis = signal.labels[entry] if signal.labels else ""
-            violations.append(Exceeded(str(run.path), name, axis, tick * run.period_s, by))
-    return sorted(violations, key=lambda violation: violation.t_s)
+        yield signal, tolerance
+
+
+def _axis(signal: Signal, entry: int) -> str:
+    return signal.labels[entry] if signal.labels else ""
+
+
+class _Band(NamedTuple):
+    """Allowed band of values at each tick; infinite to the wrong side where the reference has no value."""
+
+    highest: Array
+    lowest: Array
+    top: Array
+    """Highest value of the reference within the time of the tolerance."""
+    bottom: Array
+
+
+def _band(reference: Array, tolerance: Tolerance, period_s: float) -> _Band:
+    allowed = tolerance.absolute + tolerance.relative * np.abs(reference)
+    ticks = min(int(tolerance.time_s / period_s + WHOLE), len(reference))
+    none = np.isnan(reference)
+    upper = [np.where(none, -np.inf, values) for values in (reference + allowed, reference)]
+    lower = [np.where(none, np.inf, values) for values in (reference - allowed, reference)]
+    if ticks:
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d  # slow to import
+
+        window = 2 * ticks + 1
+        upper = [maximum_filter1d(values, window, axis=0, mode="nearest") for values in upper]
+        lower = [minimum_filter1d(values, window, axis=0, mode="nearest") for values in lower]
+    return _Band(upper[0], lower[0], upper[1], lower[1])
 
 
 def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: float) -> Array:
@@ -150,22 +207,47 @@ def beyond(reference: Array, values: Array, tolerance: Tolerance, period_s: floa
     period_s : float
         Time between rows, s.
     """
-    allowed = tolerance.absolute + tolerance.relative * np.abs(reference)
-    ticks = min(int(tolerance.time_s / period_s + WHOLE), len(reference))
-    none = np.isnan(reference)
-    highest, lowest = (
-        np.where(none, -np.inf, reference + allowed),
-        np.where(none, np.inf, reference - allowed),
-    )
-    if ticks:
-        from scipy.ndimage import maximum_filter1d, minimum_filter1d  # slow to import
-
-        window = 2 * ticks + 1
-        highest = maximum_filter1d(highest, window, axis=0, mode="nearest")
-        lowest = minimum_filter1d(lowest, window, axis=0, mode="nearest")
+    band = _band(reference, tolerance, period_s)
     with np.errstate(invalid="ignore"):  # infinite from infinite, where a run has diverged
-        over = np.maximum(np.maximum(values - highest, lowest - values), 0.0)
+        over = np.maximum(np.maximum(values - band.highest, band.lowest - values), 0.0)
+    none = np.isnan(reference)
     return np.where(none & np.isnan(values), 0.0, np.where(np.isnan(over), np.inf, over))
+
+
+def share_used(reference: Array, values: Array, tolerance: Tolerance, period_s: float) -> Array:
+    """Return the share of a tolerance that values use, (n, k): 0 on the reference, 1 at the limit.
+
+    The parameters are those of `beyond`. Beyond a tolerance of zero the share is infinite.
+    """
+    band = _band(reference, tolerance, period_s)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        above = (values - band.top) / (band.highest - band.top)
+        below = (band.bottom - values) / (band.bottom - band.lowest)
+        share = np.where(values > band.top, above, np.where(values < band.bottom, below, 0.0))
+    over = beyond(reference, values, tolerance, period_s)
+    return np.where(np.isfinite(over), np.where(over > 0, np.maximum(share, 1.0), share), np.inf)
+
+
+def _largest_share(
+    signal: Signal, reference: Array, values: Array, tolerance: Tolerance, period_s: float
+) -> SignalTolerance:
+    """Return the largest share of a signal, or the largest excess if it exceeds its tolerance."""
+    rows = min(len(reference), len(values))
+    over = beyond(reference[:rows], values[:rows], tolerance, period_s)
+    share = share_used(reference[:rows], values[:rows], tolerance, period_s)
+    if len(reference) != len(values):
+        return SignalTolerance(signal.name, np.inf, "", rows * period_s, np.inf)
+    if not share.size:
+        return SignalTolerance(signal.name, 0.0, "", 0.0, 0.0)
+    measure = over if over.any() else share
+    tick, entry = np.unravel_index(int(np.argmax(measure)), measure.shape)
+    return SignalTolerance(
+        signal.name,
+        float(share[tick, entry]),
+        _axis(signal, int(entry)),
+        int(tick) * period_s,
+        float(over[tick, entry]),
+    )
 
 
 def _first_violation(

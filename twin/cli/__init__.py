@@ -18,6 +18,7 @@ from spheretwin.models.base.errors import (
     InputError,
     SpheretwinError,
     is_plain,
+    nearest,
     one_line,
     shown,
     without_breaks,
@@ -49,8 +50,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         given = _plain(sys.argv[1:] if arguments is None else arguments)
         options, rest = _parser(given).parse_known_args(given)
         options.fields = rest
-        _check_flags(given, options)
-        succeeded = options.run(options)
+        if _is_help(options):
+            import_module("spheretwin.cli.help").print_help(options)
+            succeeded = True
+        else:
+            _check_flags(given, options)
+            succeeded = options.run(options)
         sys.stdout.flush()
     except InputError as error:
         return _refused(f"{error}", BAD_INPUT)
@@ -84,15 +89,21 @@ def _plain(arguments: Sequence[str]) -> Sequence[str]:
     return arguments
 
 
+def _is_help(options: argparse.Namespace) -> bool:
+    """True if help is requested of a verb that runs a scenario; argparse prints the help of the others."""
+    return getattr(options, "help", None) is not None
+
+
 def _check_flags(arguments: Sequence[str], options: argparse.Namespace) -> None:
     """Refuse an unknown argument, a flag that is given twice, unless it is a list, and an empty value."""
     if options.fields and not options.has_fields:
         *names, last = options.parser.expected
+        near = _near_flag(options.fields[0], options.parser.expected)
         raise InputError(
-            f"command line: expected {', '.join(names)} or {last}, received {' '.join(options.fields)}"
+            f"command line: expected {', '.join(names)} or {last}, received {' '.join(options.fields)}{near}"
         )
-    if getattr(options, "help", False):
-        return
+    if options.has_fields:
+        _check_options(options)
     flags = [argument.partition("=")[0].replace("_", "-") for argument in arguments if argument[:2] == "--"]
     for flag, count in Counter(flags).items():
         name = flag[2:].replace("-", "_")
@@ -100,6 +111,26 @@ def _check_flags(arguments: Sequence[str], options: argparse.Namespace) -> None:
             raise InputError(f"command line: expected {flag} once, received it {count} times")
         if hasattr(options, name) and _is_empty(arguments, flag):
             raise InputError(f"command line: expected a value after {flag}, received an empty text")
+
+
+def _check_options(options: argparse.Namespace) -> None:
+    """Refuse a flag that is no field of a scenario, but resembles an option of the verb."""
+    fields = import_module("spheretwin.scenario.sections").Scenario.model_fields
+    valid = [*options.parser.expected, *(f"--{name.replace('_', '-')}" for name in fields)]
+    for token in options.fields:
+        flag = token.partition("=")[0].replace("_", "-")
+        near = _near_flag(flag, valid) if "." not in flag else ""
+        if near and flag not in valid:
+            raise InputError(
+                f"command line: expected an option or a field of the scenario, received {flag}{near}"
+            )
+
+
+def _near_flag(received: str, valid: Sequence[str]) -> str:
+    """Return a hint at the flag nearest to a received one, or an empty text; dashes do not count."""
+    names = {name[2:]: name for name in valid if name.startswith("--")}
+    near = nearest(received[2:], names) if received.startswith("--") else None
+    return f"; did you mean {names[near]}?" if near else ""
 
 
 def _is_empty(arguments: Sequence[str], flag: str) -> bool:
@@ -118,7 +149,7 @@ def _parser(arguments: Sequence[str]) -> Parser:
     parser = Parser(prog="spheretwin", description="Digital twin of a permanent-magnet spherical actuator.")
     parser.add_argument("--version", action="version", version=f"spheretwin {version('spheretwin')}")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    # `simulate` replaces the option --help by its own.
+    # Verbs that run a scenario replace the option --help by their own.
     parsers = {
         name: verbs.add_parser(name, help=text, conflict_handler="resolve") for name, text in VERBS.items()
     }

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from spheretwin.models.base.errors import InputError
+from spheretwin.models.base.errors import InputError, did_you_mean, shown
 
 COMMON: dict[str, dict[str, Any]] = {
     "--json": {"action": "store_true"},
@@ -26,6 +26,13 @@ COMMON: dict[str, dict[str, Any]] = {
 MOST = 10**12
 
 
+class _Formatter(argparse.HelpFormatter):
+    """Help with short lines for long options."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=27)
+
+
 class Parser(argparse.ArgumentParser):
     """Parser of the command or of one verb.
 
@@ -37,7 +44,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any) -> None:
         self.expected: list[str] = []
-        super().__init__(**settings, allow_abbrev=False)
+        super().__init__(**settings, allow_abbrev=False, formatter_class=_Formatter)
 
     def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
         """Add an argument; the settings of a common option apply unless others are given."""
@@ -49,10 +56,29 @@ class Parser(argparse.ArgumentParser):
     def set_run(self, run: Callable[[argparse.Namespace], bool], *, has_fields: bool = False) -> None:
         """Set the function of a verb; with `has_fields` any field of a scenario is a flag."""
         self.set_defaults(run=run, parser=self, has_fields=has_fields)
+        if has_fields:
+            self.add_argument(
+                "-h",
+                "--help",
+                nargs="?",
+                const="",
+                metavar="SECTION",
+                help="show this help, or the fields of a section, or of all",
+            )
 
     def error(self, message: str) -> NoReturn:
         """Refuse the command line with exit code 2."""
         raise InputError(f"command line: {message}")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is not a valid choice, with the nearest valid one."""
+        if action.choices is not None and value not in action.choices:
+            valid = list(map(str, action.choices))
+            name = action.metavar or "/".join(action.option_strings)
+            raise InputError(
+                f"command line: expected {name} {', '.join(valid)},"
+                f" received {shown(value)}{did_you_mean(f'{value}', valid)}"
+            )
 
 
 def whole(last: int = MOST, *, first: int = 1, name: str = "a whole number") -> Callable[[str], int]:

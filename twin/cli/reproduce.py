@@ -20,6 +20,7 @@ from spheretwin.plant.step import ENGINES
 from spheretwin.viz.pages.markdown import prepare
 from spheretwin.viz.terminal import runs as tables
 from spheretwin.viz.terminal.progress import runs
+from spheretwin.viz.terminal.verdicts import Verdict, print_verdicts
 
 SEEDS, MOST = 20, 1000
 ALL = "all"
@@ -28,12 +29,13 @@ ALL = "all"
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
     parser.description = (
-        "Run the paper's experiments over several seeds: tables, figures, one page."
+        "Run the paper's experiments over several seeds: a verdict for each, tables, figures, one page."
         " Exit code 1 if a run ended unexpectedly."
     )
     parser.add_argument("names", metavar="NAME", nargs="+", help=f"{', '.join(EXPERIMENTS)}, or {ALL}")
     parser.add_argument("--out", help="write a page with figures into this folder")
     parser.add_argument("--json", help="print the rows as JSON, alone on stdout")
+    parser.add_argument("--verbose", help="also print every result and every table")
     parser.add_argument(
         "--seeds",
         type=whole(MOST),
@@ -76,7 +78,9 @@ def run(options: argparse.Namespace) -> bool:
         every = [row for plan_rows in rows_by_plan for row in plan_rows]
         print_json({"rows": every, "seeds": options.seeds, "wall_s": wall_s, "versions": versions()})
     else:
-        _print(chapters)
+        print_verdicts([_verdict(chapter) for chapter in chapters])
+        if options.verbose:
+            _print_tables(chapters)
         tables.print_written(written)
     bad = [
         f"{result.plan.experiment.name}: {case}"
@@ -112,8 +116,16 @@ def _command(options: argparse.Namespace) -> str:
     return f"spheretwin reproduce {' '.join(_named(options.names))} --seeds {options.seeds}{limit}{plant}"
 
 
-def _print(chapters: Sequence[Chapter]) -> None:
+def _verdict(chapter: Chapter) -> Verdict:
+    results = [(finding.reproduced, finding.text) for finding in chapter.findings]
+    return Verdict(chapter.experiment.name, chapter.experiment.title, results)
+
+
+def _print_tables(chapters: Sequence[Chapter]) -> None:
+    """Print every result and every table."""
     for chapter in chapters:
+        for finding in chapter.findings:
+            print(f"{chapter.experiment.name}: {finding.text}.")
         for section in chapter.sections:
             for table in section.tables:
                 title = f"{chapter.experiment.name}, {section.title}. {table.title}"

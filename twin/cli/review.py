@@ -13,10 +13,13 @@ from spheretwin.analysis.review import Review, review
 from spheretwin.analysis.tolerances import Exceeded
 from spheretwin.cli.common import print_json, warn
 from spheretwin.cli.options import Parser
+from spheretwin.metrics import BAND_rad
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.base.files import check_writable
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS
-from spheretwin.viz.terminal import runs as tables
+from spheretwin.viz.terminal import reviews
+from spheretwin.viz.terminal.reviews import SignalTolerance
+from spheretwin.viz.terminal.runs import print_written
 
 
 def declare(parser: Parser) -> None:
@@ -70,13 +73,14 @@ def run(options: argparse.Namespace) -> bool:
     if options.json:
         _print_json(reviewed, has_tolerances=options.tolerance is not None)
     else:
-        tables.print_runs(summaries)
-        tables.print_written([path for path in (options.export, options.merge, page) if path])
+        _print_text(reviewed)
+        print_written([path for path in (options.export, options.merge, page) if path])
     warn(f"{run.path} {NO_CHECKSUMS}" for run in runs if not run.checked)
     warn(_recovered(run) for run in runs if not run.whole)
     warn(_thinned(run) for run in runs if run.rate_Hz)
-    for places in filter(None, over):
-        print(f"spheretwin: review: {_first(places)}", file=sys.stderr)
+    for places, signals in zip(over, reviewed.tolerances, strict=True):
+        if places:
+            print(f"spheretwin: review: {_first(places, signals)}", file=sys.stderr)
     return not any(over)
 
 
@@ -97,6 +101,18 @@ def _check(options: argparse.Namespace) -> None:
         comparison.check_figures(options.figures)
 
 
+def _print_text(reviewed: Review) -> None:
+    """Print one run, or the differences of several and the use of their tolerances."""
+    if len(reviewed.runs) == 1:
+        reviews.print_run_report(reviewed.figures[0], reviewed.nominal_errors[0], BAND_rad)
+        return
+    reviews.print_comparison(reviewed.figures, reviewed.differing_fields, reviewed.nominal_errors, BAND_rad)
+    reference, *others = (run.path.name for run in reviewed.runs)
+    for name, signals in zip(others, reviewed.tolerances or [[] for _ in others], strict=True):
+        if signals:
+            reviews.print_tolerances(reference, name, signals)
+
+
 def _print_json(reviewed: Review, *, has_tolerances: bool) -> None:
     """Print the runs, their differences, and the first time at which each signal exceeds its tolerance."""
     within = not any(reviewed.exceeded) if has_tolerances else None
@@ -104,8 +120,11 @@ def _print_json(reviewed: Review, *, has_tolerances: bool) -> None:
         {
             "runs": reviewed.figures,
             "differences": reviewed.differences,
+            "differing_fields": reviewed.differing_fields,
+            "nominal_errors": reviewed.nominal_errors,
             "within_tolerance": within,
             "exceeded": [place for places in reviewed.exceeded for place in places],
+            "tolerances": reviewed.tolerances,
         }
     )
 
@@ -125,11 +144,13 @@ def _thinned(run: Reviewed) -> str:
     )
 
 
-def _first(places: Sequence[Exceeded]) -> str:
+def _first(places: Sequence[Exceeded], signals: Sequence[SignalTolerance]) -> str:
+    """Return the first violation, and the largest excess of the same signal."""
     first, others = places[0], len(places) - 1
     more = f"; {others} more signal{'s' if others > 1 else ''} later" if others else ""
     axis = f" {first.axis}" if first.axis else ""
+    largest = next(signal for signal in signals if signal.signal == first.signal)
     return (
         f"{first.path}: {first.signal}{axis} leaves its tolerance first at {first.t_s:.6g} s,"
-        f" by {first.by:.3g}{more}"
+        f" by {first.by:.3g}; its largest excess is {largest.excess:.3g} at {largest.t_s:.6g} s{more}"
     )

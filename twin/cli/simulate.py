@@ -17,13 +17,15 @@ from spheretwin import scenario as scenarios
 from spheretwin.cli.common import interruptible, print_json, warn
 from spheretwin.cli.options import Parser, number
 from spheretwin.loop import is_user_law
-from spheretwin.metrics import PlannedRun
+from spheretwin.metrics import BAND_rad, PlannedRun
 from spheretwin.models.base.errors import InputError, LawError, SpheretwinError
 from spheretwin.models.base.mujoco_library import timers_stopped
 from spheretwin.models.base.user_code import load_function
 from spheretwin.models.telemetry.checksums import NO_CHECKSUMS, has_checksums
+from spheretwin.models.telemetry.fault_log import FaultLog
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Status
-from spheretwin.models.telemetry.table import TelemetryBuffer
+from spheretwin.models.telemetry.table import Table, TelemetryBuffer
 from spheretwin.outputs import Outputs
 from spheretwin.replay import RunPlan
 from spheretwin.run import Figures, Run, UserMetric, check_names, own_value, summary
@@ -95,12 +97,34 @@ class UserMetrics:
             return None
 
 
-EXAMPLE = "nutation"
+class Faults:
+    """Sink that collects the faults of a run for its report."""
+
+    def __init__(self) -> None:
+        self._log = FaultLog()
+
+    def write(self, rows: Table) -> None:
+        """Add the rows of one chunk."""
+        self._log.add(rows)
+
+    def note(self, t_s: float, text: str) -> None:
+        """Ignore a message: the rows contain every fault."""
+
+    def finish(self, status: Status) -> None:
+        """Ignore the end of the run."""
+
+    def lines(self, session: Session) -> list[str]:
+        """Return a line for each fault: start and detection, or that the run ended before its start."""
+        late = [fault for fault in session.initial_scenario.fault if fault.start_s >= session.t_s]
+        return [fault.text() for fault in self._log.faults] + [
+            f"{fault.target} {fault.mode} from {fault.start_s:.3f} s: not started, the run ended before"
+            for fault in late
+        ]
 
 
 def declare(parser: Parser) -> None:
     """Declare the arguments of the verb."""
-    parser.description = "Run a scenario. Any field of it is a flag: --controller.law pd --disturbance.load 1"
+    parser.description = "Run a scenario. Any field of it is a flag: --controller.law pd"
     parser.usage = "spheretwin simulate SCENARIO [options] [--section.field VALUE ...]"
     parser.add_argument("scenario", help=f"{', '.join(shipped())}, or a .toml file")
     parser.add_argument("--record", help="write a Rerun recording")
@@ -108,17 +132,15 @@ def declare(parser: Parser) -> None:
         "--record-rate",
         type=number("a number of Hz above 0", lambda rate_Hz: rate_Hz > 0),
         metavar="HZ",
-        help="rows per second of the recording, in addition to the extremes of any 20 s; every row unless"
-        " given",
+        help="rows per second of the recording; every row unless given",
     )
     parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
-    parser.add_argument(
-        "--live", action="store_true", help="run at the pace of the clock, with a viewer on 127.0.0.1"
-    )
+    parser.add_argument("--live", action="store_true", help="run in real time, with a viewer on 127.0.0.1")
     parser.add_argument(
         "--view",
         choices=VIEW_NAMES,
-        help=f"the tab of the recording that is open at first; {OVERVIEW} unless given",
+        metavar="TAB",
+        help=f"first tab of the recording: {', '.join(VIEW_NAMES)}",
     )
     parser.add_argument(
         "--replay", type=Path, metavar="RUN.parquet", help="replay the run of a telemetry file"
@@ -128,22 +150,15 @@ def declare(parser: Parser) -> None:
         action="append",
         default=[],
         metavar="FILE.py:NAME",
-        help="one more figure: a function of the whole run (`spheretwin.simulation.Run`) to what JSON"
-        " holds; may be given again; the telemetry is kept in memory for it",
+        help="own metric: a function of the run (`spheretwin.run.Run`); repeatable",
     )
     parser.add_argument("--json", help="print the figures as JSON, alone on stdout")
-    parser.add_argument("-h", "--help", action="store_true", help="show this help and the scenario's fields")
     parser.set_run(run, has_fields=True)
 
 
 def run(options: argparse.Namespace) -> bool:
     """Run the verb; return True if the run completed."""
     rest: list[str] = options.fields
-    if options.help:
-        options.parser.print_help()
-        scenario = scenarios.load(options.scenario or EXAMPLE, reading.overrides(rest))
-        runs.print_fields(scenario.name, reading.field_descriptions(scenario))
-        return True
     if _is_bare(options, rest):
         runs.print_scenarios({name: scenarios.load(name).description for name in shipped()})
     plan = _planned(options, rest)
@@ -157,7 +172,8 @@ def run(options: argparse.Namespace) -> bool:
     with interruptible() as stop_requested, Session(plan.scenario) as session:
         figures = Figures(PlannedRun(session.initial_scenario, session.actuator, plan.ticks))
         progress = Progress(plan.scenario.name, plan.ticks)
-        sinks: list[Sink] = [progress, figures, *own.sinks(session, plan.ticks)]
+        faults = Faults()
+        sinks: list[Sink] = [progress, figures, faults, *own.sinks(session, plan.ticks)]
         files = Outputs(
             session,
             options.record,
@@ -180,15 +196,20 @@ def run(options: argparse.Namespace) -> bool:
             values = own.values(session, status)
             warnings = [*session.warnings(), *figures.warnings(), *own.faults]
             run_summary = summary(session, status, {**figures.values(), **values}, warnings)
-            _report(session, plan, status, run_summary, tuple(values), options.json)
+            if options.json:
+                print_json(run_summary)
+            else:
+                _print_results(session, plan, status, run_summary, tuple(values), faults)
+            if status != Status.COMPLETED:
+                print(f"spheretwin: {_ending(session, plan, status)}", file=sys.stderr, flush=True)
             if options.live and sys.stderr.isatty():
                 print("the run has ended; Ctrl-C closes the viewer", file=sys.stderr, flush=True)
                 while not stop_requested():
                     time.sleep(0.1)
         finally:
-            faults = files.close()
-            _report_files(files, faults, options.json)
-    return status == Status.COMPLETED and not faults and not own.faults
+            file_errors = files.close()
+            _report_files(files, file_errors, options.json)
+    return status == Status.COMPLETED and not file_errors and not own.faults
 
 
 def _is_bare(options: argparse.Namespace, rest: Sequence[str]) -> bool:
@@ -215,31 +236,36 @@ def _planned(options: argparse.Namespace, rest: Sequence[str]) -> RunPlan:
     return RunPlan(scenario, scenario.ticks, ())
 
 
-def _report(
+def _print_results(
     session: Session,
     plan: RunPlan,
     status: Status,
     run_summary: dict[str, Any],
     own: Sequence[str],
-    as_json: bool,
+    faults: Faults,
 ) -> None:
-    """Print the figures, and the reason if the run did not complete."""
-    scenario = session.initial_scenario
-    planned_s = plan.ticks * scenario.controller.period_s
-    if as_json:
-        print_json(run_summary)
-    else:
-        runs.print_run(scenario.controller.law, planned_s, run_summary, own)
-    if status != Status.COMPLETED:
-        print(f"spheretwin: {_ending(session, status, planned_s)}", file=sys.stderr, flush=True)
+    """Print the results of the run as tables and lines."""
+    runs.print_run(
+        session.initial_scenario.controller.law,
+        _planned_s(plan),
+        run_summary,
+        own,
+        band_rad=BAND_rad,
+        faults=faults.lines(session),
+        why=_reason(session, status),
+    )
 
 
-def _report_files(files: Outputs, faults: Sequence[SpheretwinError], as_json: bool) -> None:
+def _planned_s(plan: RunPlan) -> float:
+    return plan.ticks * plan.scenario.controller.period_s
+
+
+def _report_files(files: Outputs, errors: Sequence[SpheretwinError], as_json: bool) -> None:
     """Print the paths of the complete files and the errors of the others."""
     if not as_json:
         runs.print_files(files.record, files.telemetry)
-    for fault in faults:
-        print(f"spheretwin: {fault}", file=sys.stderr, flush=True)
+    for error in errors:
+        print(f"spheretwin: {error}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager
@@ -258,10 +284,24 @@ def _code_of_the_user(session: Session, as_json: bool) -> Iterator[None]:
         raise session.law_error
 
 
-def _ending(session: Session, status: str, planned_s: float) -> str:
+def _ending(session: Session, plan: RunPlan, status: Status) -> str:
     if session.tick == 0:
         return f"the run ended before its first tick was complete: {status}"
-    angles = np.degrees(session.q_rad)
-    pose = ", ".join(f"{name} {angle:.1f}°" for name, angle in zip("αβγ", angles, strict=True))
-    why = f", {session.reason.text}" if session.reason else ""
-    return f"the run ended at {session.t_s:.3f} s of {planned_s:g} s: {status}{why} ({pose})"
+    reason = _reason(session, status)
+    why = f", {reason}" if reason else ""
+    pose = ", ".join(
+        f"{name} {angle:.1f}°" for name, angle in zip(ANGLES, np.degrees(session.q_rad), strict=True)
+    )
+    return f"the run ended at {session.t_s:.3f} s of {_planned_s(plan):g} s: {status}{why} ({pose})"
+
+
+def _reason(session: Session, status: Status) -> str | None:
+    """Return the reason for which a run ended early; for the workspace, the hinge and its range."""
+    if status == Status.LEFT_WORKSPACE:
+        q_deg, range_deg = np.degrees(session.q_rad), np.degrees(session.actuator.hinge_range_rad)
+        return "; ".join(
+            f"{name} reached the end of its range, {low:.4g}° to {high:.4g}°"
+            for name, angle, (low, high) in zip(ANGLES, q_deg, range_deg, strict=True)
+            if not low <= angle <= high
+        )
+    return session.reason.text if session.reason else None

@@ -28,7 +28,7 @@ from spheretwin.study.tuning import report as tuning_page
 from spheretwin.study.tuning.gains import section_of
 from spheretwin.study.tuning.report import summary as tuning_summary
 from spheretwin.study.tuning.tuning import tune
-from spheretwin.viz.terminal import runs
+from spheretwin.viz.terminal import runs, studies
 from spheretwin.viz.terminal.progress import counted
 
 MOST_THREADS = 1024
@@ -113,7 +113,7 @@ def run(options: argparse.Namespace) -> bool:
     if options.json:
         print_json({**_outcome_json(outcome), "summary": printed, "versions": versions()})
     else:
-        runs.print_study(study.name, _outcome_json(outcome), printed)
+        studies.print_study(study.name, _outcome_json(outcome), printed)
         runs.print_written(written)
     if outcome.torn:
         print("spheretwin: sweep: the journal ended in a torn line, which was dropped", file=sys.stderr)
@@ -169,7 +169,7 @@ def _optimised(study: Study, options: argparse.Namespace) -> bool:
     if options.json:
         print_json({**printed, "versions": versions()})
     else:
-        runs.print_tuning(study.name, printed)
+        studies.print_tuning(study.name, printed)
         runs.print_written(written)
     if outcome.trials < outcome.of:
         print(

@@ -10,6 +10,7 @@ from spheretwin.control.supervision.watchdog import REASONS
 from spheretwin.faults.effects import Effects
 from spheretwin.faults.schedule import NEVER, FaultSchedule
 from spheretwin.models.base.state import arrays_of
+from spheretwin.models.telemetry.changes import ColumnChanges
 from spheretwin.models.telemetry.table import Table
 
 
@@ -72,7 +73,7 @@ class FaultMessages:
     """Finds faults, switched-off groups and watchdog trips in the telemetry of a run, chunk by chunk."""
 
     def __init__(self) -> None:
-        self._last: dict[str, NDArray[np.float64]] = {}
+        self._changes = ColumnChanges()
 
     def of(self, rows: Table) -> list[Line]:
         """Return the messages of one chunk, in the order of time."""
@@ -80,28 +81,16 @@ class FaultMessages:
         lines: list[Line] = []
         if len(rows) and "fault" in names:
             labels, modes = names["fault"].labels, names["fault"].states
-            for t_s, part, mode in self._changes(rows, "fault"):
+            for _, t_s, part, mode in self._changes.of(rows, "fault"):
                 lines.append(
                     (t_s, f"{labels[part]} {modes[mode]}" if mode else f"{labels[part]} works again")
                 )
             delays = rows["time_to_detection_s"]
-            for t_s, group, out in self._changes(rows, "group_out"):
-                after_s = delays[np.searchsorted(rows["t_s"], t_s), group]
+            for tick, t_s, group, out in self._changes.of(rows, "group_out"):
+                after_s = delays[tick, group]
                 after = f", {1e3 * after_s:.0f} ms after it failed" if out > REPORTED and after_s >= 0 else ""
                 lines.append((t_s, f"group {group} {STATES[out]}{after}"))
         if len(rows) and "failsafe_reason" in names:
-            for t_s, _, reason in self._changes(rows, "failsafe_reason"):
+            for _, t_s, _, reason in self._changes.of(rows, "failsafe_reason"):
                 lines.append((t_s, f"watchdog: {REASONS[reason].text}"))
         return sorted(lines, key=lambda line: line[0])
-
-    def _changes(self, rows: Table, name: str) -> list[tuple[float, int, int]]:
-        """Return time, index and new value of each change of a column; before the first row it is 0."""
-        values = rows[name].reshape(len(rows), -1)
-        last = self._last.get(name, np.zeros(values.shape[1]))
-        self._last[name] = values[-1].copy()
-        before = np.concatenate([last[None], values[:-1]])
-        ticks, places = np.nonzero(values != before)
-        return [
-            (float(rows["t_s"][tick]), int(place), int(values[tick, place]))
-            for tick, place in zip(ticks, places, strict=True)
-        ]

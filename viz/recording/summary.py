@@ -7,34 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from spheretwin.models.telemetry.fault_log import FAULT, FaultLog
 from spheretwin.models.telemetry.run_record import RunFacts
-from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.models.telemetry.status import Level, Status
 from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 
-FAULT, TIME_TO_DETECTION, FAILSAFE_REASON = "fault", "time_to_detection_s", "failsafe_reason"
-"""Signals of runs with faults and with a watchdog."""
+FAILSAFE_REASON = "failsafe_reason"
+"""Signal of runs with a watchdog."""
 
 _SYMBOLS = {Level.INFO: "✔", Level.WARN: "⚠", Level.ERROR: "✖"}
 
 _HEADLINES = {Status.COMPLETED: "COMPLETED", Status.INTERRUPTED: "INTERRUPTED", Status.FAILSAFE: "FAILSAFE"}
-
-
-class _FaultSpell:
-    """Fault of one part: its kind, when it started, and when it was detected."""
-
-    def __init__(self, part: str, kind: str, start_s: float) -> None:
-        self.part, self.kind, self.start_s = part, kind, start_s
-        self.detected_after_s: float | None = None
-
-    def text(self) -> str:
-        """Return the fault as text."""
-        found = (
-            "not detected"
-            if self.detected_after_s is None
-            else f"detected after {1e3 * self.detected_after_s:.3g} ms"
-        )
-        return f"{self.part} {self.kind} from {self.start_s:.3g} s, {found}"
 
 
 class Summary:
@@ -60,7 +44,7 @@ class Summary:
         self._squares = 0.0
         self._last_deg: NDArray[np.float64] = np.zeros(len(ANGLES))
         self._failsafe = ""
-        self._faults: dict[str, _FaultSpell] = {}
+        self._faults = FaultLog()
 
     def add(self, rows: Table, error_deg: NDArray[np.float64]) -> None:
         """Add the rows of a chunk, with the error angle of each."""
@@ -78,25 +62,7 @@ class Summary:
             reasons = rows[FAILSAFE_REASON].ravel()
             if reasons[-1]:
                 self._failsafe = signals[FAILSAFE_REASON].states[int(reasons[-1])]
-        if FAULT in signals:
-            self._add_faults(rows, signals[FAULT])
-        if TIME_TO_DETECTION in signals:
-            self._add_detections(rows[TIME_TO_DETECTION][-1])
-
-    def _add_faults(self, rows: Table, signal: Signal) -> None:
-        values = rows[FAULT].reshape(len(rows), -1)
-        for place in np.flatnonzero(values.any(axis=0)):
-            part = signal.labels[place]
-            if part not in self._faults:
-                first = int(np.flatnonzero(values[:, place])[0])
-                kind = signal.states[int(values[first, place])]
-                self._faults[part] = _FaultSpell(part, kind, float(rows["t_s"][first]))
-
-    def _add_detections(self, detected_after_s: NDArray[np.float64]) -> None:
-        for part, fault in self._faults.items():
-            kind, _, number = part.partition(".")
-            if kind in ("coil", "amplifier") and detected_after_s[int(number)] >= 0:
-                fault.detected_after_s = float(detected_after_s[int(number)])
+        self._faults.add(rows)
 
     def running(self) -> str:
         """Return the text of a run in progress."""
@@ -137,7 +103,7 @@ class Summary:
 
     def _fault_lines(self) -> list[str]:
         planned = len(self._field("run", FAULT) or ())
-        faults = sorted(self._faults.values(), key=lambda fault: (fault.start_s, fault.part))
+        faults = sorted(self._faults.faults, key=lambda fault: (fault.start_s, fault.part))
         texts = [fault.text() for fault in faults]
         if planned > len(texts):
             texts.append(f"{planned - len(texts)} of {planned} planned faults did not start")

@@ -57,7 +57,7 @@ def print_field(verdict: FieldVerdict) -> None:
             _percent(band.largest_error_of_largest_torque),
             _percent(band.quadrature_of_largest_torque),
         )
-    console.print(table)
+    tables.print_table(table)
     sources = verdict.sources
     console.print(
         "Sources of the error: the direct sum's quadrature"
@@ -69,15 +69,14 @@ def print_field(verdict: FieldVerdict) -> None:
 
 def print_workspace(verdict: WorkspaceVerdict) -> None:
     """Print the torque capability by tilt, and the weakest poses."""
-    console = tables.terminal_console()
     table = tables.new_table(
         f"torque in every direction at {verdict.current_limit_A:g} A, N·m:"
         f" worst and median of {verdict.poses} poses",
         "tilt",
         "least norm",
-        "median",
+        "median of it",
         "best currents",
-        "median",
+        "median of it",
         "least σ, N·m/A",
         "cond.",
         "copper, W/(N·m)²",
@@ -94,21 +93,20 @@ def print_workspace(verdict: WorkspaceVerdict) -> None:
                 f"{tilt.condition:.2f}",
                 f"{tilt.copper_W_per_Nm2:.0f}",
             )
-    console.print(table)
+    tables.print_table(table)
     weak = tables.new_table("weakest poses", "by", "worst", "tilt, °", "α, °", "β, °", "γ, °", "direction")
-    weak.columns[-1].no_wrap = True
     for pose in verdict.weakest:
         name, key, unit = FIGURE_NAMES[pose.figure]
         angles = (_tenths(angle) for angle in (pose.tilt_deg, *pose.q_deg))
         weak.add_row(name, f"{getattr(pose, key):.3g} {unit}", *angles, direction_text(pose.direction))
-    console.print(weak)
+    tables.print_table(weak)
 
 
 def _print_curve(title: str, rows: Sequence[tuple[str, str]]) -> None:
     table = tables.new_table(title, "figure", "value")
     for row in rows:
         table.add_row(*row)
-    tables.terminal_console().print(table)
+    tables.print_table(table)
 
 
 def _peak(peak: CurvePeak) -> str:

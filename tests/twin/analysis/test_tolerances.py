@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from spheretwin import cli
 from spheretwin.analysis import tolerances
-from spheretwin.analysis.tolerances import Tolerance, Tolerances, beyond, exceeded
+from spheretwin.analysis.tolerances import Tolerance, Tolerances, beyond, compare, exceeded, share_used
 from spheretwin.models.base.errors import InputError
 from tests.twin.analysis.runs import made_of, named, written
 
@@ -190,3 +190,39 @@ def test_the_earliest_violation_of_all_signals_comes_first():
     run.table["t_s"][50:] += 1e-4
     allowed = Tolerances(signals={"x_rad": Tolerance(absolute=0.1), "t_s": Tolerance(absolute=1e-6)})
     assert [place.signal for place in exceeded(other, run, allowed)] == ["t_s", "x_rad"]
+
+
+@given(st.lists(numbers, min_size=1, max_size=30), st.lists(numbers, min_size=1, max_size=30))
+def test_the_share_of_a_tolerance_is_that_of_its_definition(reference, values):
+    count = min(len(reference), len(values))
+    a, b = (np.array(column[:count])[:, None] for column in (reference, values))
+    tolerance = Tolerance(absolute=0.5, relative=0.1)
+    expected = np.abs(b - a) / (0.5 + 0.1 * np.abs(a))
+    share = share_used(a, b, tolerance, 1e-3)
+    # The limits are sums of numbers up to 1e6 and 1e5: their rounding over the least tolerance of 0.5.
+    assert share == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    over = beyond(a, b, tolerance, 1e-3) > 0
+    assert np.all(share[over] >= 1)
+    assert np.all(share[~over] <= 1 + 1e-9)
+
+
+def test_a_shift_within_the_time_uses_nothing_and_none_is_exceeded_at_once():
+    shifted = np.roll(WAVE, 2, axis=0)[2:-2]
+    assert not share_used(WAVE[2:-2], shifted, Tolerance(time_s=0.002, absolute=1e-3), 1e-3)[2:].any()
+    assert np.isinf(share_used(WAVE, WAVE + 1.0, Tolerance(), 1e-3)).all()
+
+
+def test_each_signal_has_its_largest_share_and_its_largest_excess():
+    other = WAVE.copy()
+    other[120, 1] += 0.003
+    other[150, 0] -= 0.005
+    (within,) = compare(
+        made_of(WAVE), made_of(other), Tolerances(signals={"x_rad": Tolerance(absolute=0.01)})
+    )
+    assert (within.signal, within.axis, within.excess) == ("x_rad", "α", 0.0)
+    assert (within.share, within.t_s) == (pytest.approx(0.5, rel=1e-9), pytest.approx(0.150, abs=1e-12))
+    (left,) = compare(made_of(WAVE), made_of(other), Tolerances(signals={"x_rad": Tolerance(absolute=0.001)}))
+    assert (left.axis, left.t_s) == ("α", pytest.approx(0.150, abs=1e-12))
+    assert (left.share, left.excess) == (pytest.approx(5.0, rel=1e-9), pytest.approx(0.004, rel=1e-9))
+    (short,) = compare(made_of(WAVE), made_of(WAVE[:50]), Tolerances(signals={"x_rad": Tolerance()}))
+    assert (short.share, short.t_s) == (np.inf, 0.05)

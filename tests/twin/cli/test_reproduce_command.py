@@ -8,6 +8,8 @@ import pytest
 
 from spheretwin import cli
 from spheretwin.cli import reproduce
+from spheretwin.paper.experiment import Finding
+from spheretwin.viz.terminal.verdicts import Verdict
 from tests.twin.paper.cases import IDEAL, LOST, experiment
 
 COMMAND = [sys.executable, "-m", "spheretwin", "reproduce"]
@@ -39,11 +41,50 @@ def test_json_stands_alone_and_the_page_is_written(tmp_path):
 
 def test_people_get_tables(capsys, monkeypatch):
     monkeypatch.setitem(reproduce.EXPERIMENTS, "short", experiment(IDEAL))
-    assert cli.main(["reproduce", "short", "--seeds", "1"]) == cli.DONE
+    assert cli.main(["reproduce", "short", "--seeds", "1", "--verbose"]) == cli.DONE
     out, err = capsys.readouterr()
     assert "short, What | was found. Errors" in out
     assert "ideal" in out
     assert err == ""
+
+
+def test_a_verdict_for_each_experiment_fits_one_screen(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    results = [
+        Finding(True, "the order holds" + " under every condition" * 9),
+        Finding(False, "the size is 0.36 of the printed one"),
+    ]
+    names = [f"figure{number}" for number in range(10)]
+    short = experiment(IDEAL, findings=lambda outcomes: results)
+    monkeypatch.setattr(reproduce, "EXPERIMENTS", {name: short._replace(name=name) for name in names})
+    assert cli.main(["reproduce", "all", "--seeds", "1"]) == cli.DONE
+    lines = capsys.readouterr().out.splitlines()
+    assert 2 * len(names) < len(lines) <= 40
+    assert max(map(len, lines)) <= 80
+    assert [line for line in lines if line.startswith("figure")] == [
+        f"{name}: 1 of 2 results reproduced. A short one" for name in names
+    ]
+    # The failed comparison comes first: it is never cut.
+    after = [lines[place + 1] for place, line in enumerate(lines) if line.startswith("figure")]
+    assert set(after) == {"  - not reproduced: the size is 0.36 of the printed one."}
+    assert "Errors" not in "\n".join(lines)
+    assert cli.main(["reproduce", "figure3", "--seeds", "1"]) == cli.DONE
+    alone = " ".join(capsys.readouterr().out.split())
+    assert f"reproduced: {results[0].text}." in alone
+
+
+@pytest.mark.parametrize(
+    ("results", "verdict"),
+    [
+        ([], "no verdict"),
+        ([(None, "a")], "not in the paper"),
+        ([(True, "a"), (None, "b")], "reproduced"),
+        ([(False, "a")], "not reproduced"),
+        ([(False, "a"), (True, "b"), (True, "c")], "2 of 3 results reproduced"),
+    ],
+)
+def test_the_verdict_counts_the_results_of_the_paper(results, verdict):
+    assert Verdict("figure6", "Figure 6", results).text().partition(":")[0] == verdict
 
 
 def test_names_are_run_once_each_and_all_is_all(capsys, monkeypatch):
@@ -73,7 +114,10 @@ def test_a_run_that_ends_early_exits_1_and_is_named(capsys, monkeypatch):
         (["figure11", "--seeds", "0"], ["--seeds", "from 1 to 1000", "0"]),
         (["figure11", "--seeds", "1001"], ["--seeds", "1001"]),
         (["figure11", "--limit", "few"], ["--limit", "few"]),
-        (["figure11", "--colour", "red"], ["--out, --json, --seeds, --limit or --plant", "--colour red"]),
+        (
+            ["figure11", "--colour", "red"],
+            ["--out, --json, --verbose, --seeds, --limit or --plant", "--colour red"],
+        ),
         (["figure11", "--plant", "water"], ["--plant", "mujoco", "lagrangian", "water"]),
         (["figure11", "--out", "taken"], ["writable folder", "taken"]),
     ],

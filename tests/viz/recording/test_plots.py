@@ -171,6 +171,7 @@ FAULT_SIGNALS = (
     Signal("q_rad", "rad", 3, "angles"),
     Signal("allocation_scale", "1", 1, "share"),
     Signal("fault", "1", 3, "faults", ("coil.00", "coil.01", "encoder.gamma"), ("none", "open", "shorted")),
+    Signal("group_out", "1", 2, "groups", ("group 0", "group 1"), ("in use", "reported", "found open")),
     Signal("time_to_detection_s", "s", 2, "time to detection", ("group 0", "group 1")),
     Signal("failsafe_reason", "1", 1, "reason", (), ("nothing", "a coil is too hot")),
 )
@@ -189,7 +190,7 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     table["t_s"][:], table["allocation_scale"][:] = TICK_s * np.arange(100), 1.0
     table["time_to_detection_s"][:] = -1.0
     table["fault"][20:, 1], table["fault"][40:60, 0] = 2, 1
-    table["time_to_detection_s"][25:, 1] = 0.005
+    table["time_to_detection_s"][25:, 1], table["group_out"][25:, 1] = 0.005, 2
     table["failsafe_reason"][90:] = 1
     summary = Summary(facts_with_faults)
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 100], strict=True):
@@ -199,6 +200,7 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     reason, _, faults = lines.split("  \n")
     assert reason == "**failsafe at 0.099 s of 3 s: a coil is too hot**"
     assert faults == (
-        "faults: coil.01 shorted from 0.02 s, detected after 5 ms; coil.00 open from 0.04 s, not detected;"
+        "faults: coil.01 shorted from 0.02 s, detected after 5 ms; coil.00 open from 0.04 s to 0.06 s,"
+        " not detected;"
         " 1 of 3 planned faults did not start"
     )

@@ -1,0 +1,73 @@
+"""Faults of a run from its telemetry: start, end and detection of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from spheretwin.models.telemetry.changes import ColumnChanges
+from spheretwin.models.telemetry.table import Table
+
+FAULT, GROUP_OUT, TIME_TO_DETECTION = "fault", "group_out", "time_to_detection_s"
+"""Columns of runs with faults: mode of each part, state of each group for the controller, and its delay."""
+
+REPORTED = 1
+"""State of a group that is out because its fault was reported."""
+
+
+@dataclass
+class FaultRecord:
+    """One fault of one part."""
+
+    part: str
+    mode: str
+    start_s: float
+    end_s: float | None = None
+    """End; None while the fault continues."""
+    detection: str = "not detected"
+    """Whether the controller knows the fault, and how long after its start."""
+
+    def text(self) -> str:
+        """Return part, mode, times and detection on one line."""
+        end = "" if self.end_s is None else f" to {self.end_s:.3g} s"
+        return f"{self.part} {self.mode} from {self.start_s:.3g} s{end}, {self.detection}"
+
+
+class FaultLog:
+    """Collector of the faults of a run.
+
+    Attributes
+    ----------
+    faults : list of FaultRecord
+        In the order of their starts.
+    """
+
+    def __init__(self) -> None:
+        self.faults: list[FaultRecord] = []
+        self._active: dict[int, FaultRecord] = {}
+        self._changes = ColumnChanges()
+
+    def add(self, rows: Table) -> None:
+        """Add the rows of one chunk."""
+        signals = {signal.name: signal for signal in rows.signals}
+        if not len(rows) or FAULT not in signals:
+            return
+        labels, modes = signals[FAULT].labels, signals[FAULT].states
+        for _, t_s, part, mode in self._changes.of(rows, FAULT):
+            if ended := self._active.pop(part, None):
+                ended.end_s = t_s
+            if mode:
+                self._active[part] = FaultRecord(labels[part], modes[mode], t_s)
+                self.faults.append(self._active[part])
+        for tick, _, group, state in self._changes.of(rows, GROUP_OUT):
+            started = [fault for fault in self.faults if _group_of(fault.part) == group]
+            if state and started:
+                delay_s = rows[TIME_TO_DETECTION][tick, group]
+                is_reported = state == REPORTED or delay_s < 0
+                found = f"detected after {1e3 * delay_s:.3g} ms"
+                started[-1].detection = "reported to the controller" if is_reported else found
+
+
+def _group_of(part: str) -> int | None:
+    """Return the group of a part such as ``coil.07``; None for a part of no group."""
+    number = part.partition(".")[2]
+    return int(number) if number.isdecimal() else None

@@ -1,0 +1,262 @@
+"""Reports of recorded runs as tables, on stdout: one run, or several with their differences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.markup import escape
+
+from spheretwin.models.telemetry.signals import ANGLES
+from spheretwin.models.telemetry.status import named
+from spheretwin.viz.terminal import tables
+from spheretwin.viz.terminal.runs import COLOURS, ERRORS, angle, settled_label
+from spheretwin.viz.terminal.tables import percent, three_digits
+
+FACTS = ("scenario", "law", "modelling_error", "load", "hardware", "seed", "status", "reason", "simulated_s")
+RESULTS = ("status", "reason", "simulated_s")
+"""Facts that are results of a run; the others are fields of its scenario."""
+
+MOST_EVENTS = 12
+
+NONE = "–"
+"""Cell without a value."""
+
+
+class NominalError(NamedTuple):
+    """Difference of the controller's nominal model from the truth."""
+
+    field: str
+    nominal: str
+    true: str
+
+
+class SignalTolerance(NamedTuple):
+    """Comparison of one signal of a run with the reference."""
+
+    signal: str
+    share: float
+    """Largest share of the tolerance that the signal used; above 1 it exceeds its tolerance."""
+    axis: str
+    """Label of the entry with that share; empty for a signal of one number."""
+    t_s: float
+    """Time of that share, s."""
+    excess: float
+    """Excess over the tolerance at that time, in the unit of the signal; 0 within it."""
+
+
+class _FigureRow(NamedTuple):
+    """A figure of every run."""
+
+    label: str
+    key: str
+    unit: str
+    each_axis: bool = False
+
+
+def _figure_rows(band_rad: float) -> tuple[_FigureRow, ...]:
+    return (
+        *(_FigureRow(label, key, "rad", True) for label, key in ERRORS.items()),
+        _FigureRow("overshoot", "overshoot_rad", "rad", True),
+        _FigureRow(settled_label(band_rad), "settling_time_s", "s", True),
+        _FigureRow("largest current", "max_abs_current_A", "A"),
+        _FigureRow("share of ticks at the limit", "saturated_fraction", "1"),
+        _FigureRow("rms torque", "rms_torque_Nm", "N·m"),
+        _FigureRow("variation of the commands", "current_variation_A_s", "A/s"),
+        _FigureRow("copper loss", "copper_loss_J", "J"),
+        _FigureRow("work on the rotor", "mechanical_work_J", "J"),
+        _FigureRow("energy", "energy_J", "J"),
+    )
+
+
+def print_run_report(run: dict[str, Any], nominal_errors: Sequence[NominalError], band_rad: float) -> None:
+    """Print the report of one run.
+
+    Parameters
+    ----------
+    run : dict
+        Report of the run.
+    nominal_errors : sequence of NominalError
+        What the controller believed where it differs from the truth.
+    band_rad : float
+        Settling band, rad.
+    """
+    console = tables.terminal_console()
+    ending = run["status"] or "not closed"
+    title = f"{run['scenario']} under {run['law']}: {ending} at {run['simulated_s']:.3f} s"
+    table = tables.new_table(title, "tracking error, mrad (degrees)", *ANGLES)
+    if run["status"]:
+        table.title_style = COLOURS[named(run["status"]).level]
+    rows = _figure_rows(band_rad)
+    for row in rows:
+        if row.each_axis:
+            table.add_row(row.label, *(_figure(value, row.unit) for value in run[row.key] or ()))
+    for place in range(max(len(run["error_peaks"][axis]) for axis in ANGLES)):
+        peaks = (run["error_peaks"][axis][place : place + 1] for axis in ANGLES)
+        label = f"{('strongest', 'second', 'third')[place]} oscillation"
+        table.add_row(label, *(_peak(*found) if found else NONE for found in peaks))
+    tables.print_table(table)
+    for row in rows:
+        if not row.each_axis:
+            console.print(f"{row.label} {_figure(run[row.key], row.unit)}")
+    facts = [f"{name} {run[name]}" for name in FACTS[2:6]]
+    console.print(escape(", ".join(facts) + (f", {run['reason']}" if run["reason"] else "")), soft_wrap=True)
+    for event in run["events"][:MOST_EVENTS]:
+        console.print(escape(f"{event['t_s']:8.3f} s  {event['text']}"), soft_wrap=True)
+    if (more := len(run["events"]) - MOST_EVENTS) > 0:
+        console.print(f"and {more} more events; --json has them all")
+    _print_nominal_errors([Path(run["path"]).name], [nominal_errors])
+
+
+def _peak(peak: dict[str, float]) -> str:
+    return f"{three_digits(peak['frequency_Hz'])} Hz: {angle(peak['amplitude_rad'])}"
+
+
+def print_comparison(
+    runs: Sequence[dict[str, Any]],
+    fields: Mapping[str, Sequence[str]],
+    nominal_errors: Sequence[Sequence[NominalError]],
+    band_rad: float,
+) -> None:
+    """Print how several runs differ: their scenarios, their nominal models, their figures.
+
+    Parameters
+    ----------
+    runs : sequence of dict
+        Report of each run.
+    fields : mapping
+        Fields in which the scenarios differ, with the value in each run.
+    nominal_errors : sequence of sequence of NominalError
+        For each run, what the controller believed where it differs from the truth.
+    band_rad : float
+        Settling band, rad.
+    """
+    console, names = tables.terminal_console(), [Path(run["path"]).name for run in runs]
+    if fields:
+        table = tables.new_table("fields in which the runs differ", "field", *names)
+        for field, values in fields.items():
+            table.add_row(escape(field), *map(escape, values))
+        tables.print_table(table)
+    else:
+        console.print("The scenarios of the runs do not differ.")
+    _print_nominal_errors(names, nominal_errors)
+    table = tables.new_table(
+        f"{len(runs)} runs, differences from the first", "angles in mrad (degrees)", *names
+    )
+    shared = []
+    for label, *cells in differences(runs, band_rad):
+        if label in FACTS and label not in RESULTS:
+            if len(set(cells)) == 1:
+                shared.append(f"{label} {cells[0]}")
+        elif set(cells) != {NONE}:
+            table.add_row(label, *map(escape, cells))
+    tables.print_table(table, labels=2)
+    if shared:
+        console.print(f"in all runs: {escape(', '.join(shared))}")
+
+
+def _print_nominal_errors(names: Sequence[str], nominal_errors: Sequence[Sequence[NominalError]]) -> None:
+    """Print a row for each nominal value that differs from the truth, once for all runs that share it."""
+    rows: dict[NominalError, list[str]] = {}
+    for name, of_run in zip(names, nominal_errors, strict=True):
+        for error in of_run:
+            rows.setdefault(error, []).append(name)
+    if not rows:
+        return
+    table = tables.new_table(
+        "what the controller believed where it differs from the truth", "field", "run", "controller", "truth"
+    )
+    for error, of_runs in rows.items():
+        label = "all" if len(of_runs) == len(names) > 1 else ", ".join(of_runs)
+        table.add_row(*map(escape, (error.field, label, error.nominal, error.true)))
+    tables.print_table(table, labels=2)
+
+
+def print_tolerances(reference: str, run: str, signals: Sequence[SignalTolerance]) -> None:
+    """Print for each signal of a run the share of its tolerance that it used, and the largest excess."""
+    within = sum(signal.share <= 1 for signal in signals)
+    title = f"{run} against {reference}: {within} of {len(signals)} signals within their tolerances"
+    table = tables.new_table(title, "signal", "tolerance used", "largest at", "largest excess")
+    for signal in signals:
+        table.add_row(
+            escape(signal.signal),
+            _share(signal.share),
+            f"{f'{signal.axis}, ' if signal.axis else ''}{signal.t_s:.6g} s" if signal.share else NONE,
+            f"{signal.excess:.3g}" if signal.share > 1 else NONE,
+            style="" if signal.share <= 1 else "bold red",
+        )
+    tables.print_table(table)
+
+
+LARGEST_SHARE = 10
+"""A larger share of a tolerance is written as a factor."""
+
+
+def _share(share: float) -> str:
+    if not math.isfinite(share):
+        return "exceeded"
+    return percent(share) if share <= LARGEST_SHARE else f"{three_digits(share)} times"
+
+
+def differences(runs: Sequence[dict[str, Any]], band_rad: float) -> Iterator[list[str]]:
+    """Yield facts and figures, one cell for each run; the others with their difference from the first."""
+    for name in FACTS:
+        yield [name, *(NONE if run[name] is None else f"{run[name]}" for run in runs)]
+    for row in _figure_rows(band_rad):
+        for place, axis in enumerate(ANGLES) if row.each_axis else ((None, ""),):
+            values = [_entry(run[row.key], place) for run in runs]
+            cells = [_figure(values[0], row.unit)]
+            cells += [_with_difference(values[0], value, row.unit) for value in values[1:]]
+            yield [f"{row.label} {axis}".strip(), *cells]
+
+
+def _entry(value: Any, place: int | None) -> float | None:
+    return value if place is None or value is None else value[place]
+
+
+def _figure(value: float | None, unit: str) -> str:
+    if value is None:
+        return NONE
+    if unit == "rad":
+        return angle(value)
+    return percent(value) if unit == "1" else f"{three_digits(value)} {unit}"
+
+
+LARGEST_PERCENT = 1000
+"""A larger change is written as a factor."""
+
+
+def _with_difference(first: float | None, value: float | None, unit: str) -> str:
+    """Return a figure, and below it the difference from the first, absolute and relative."""
+    if first is None or value is None:
+        return _figure(value, unit)
+    if (difference := value - first) == 0:
+        return "the same"
+    sign = "+" if difference > 0 else "-"
+    return f"{_figure(value, unit)}\n{sign}{_size(abs(difference), unit)}{_relative(first, value)}"
+
+
+def _size(value: float, unit: str) -> str:
+    """Return the size of a difference; also one that is negligible as a figure has its digits."""
+    if unit == "1":
+        return f"{_digits(100 * value)} %"
+    if unit == "rad":
+        return f"{_digits(1e3 * value)} ({_digits(math.degrees(value))}°)"
+    return f"{_digits(value)} {unit}"
+
+
+def _digits(value: float) -> str:
+    return three_digits(value) if value >= tables.LEAST or not math.isfinite(value) else f"{value:.2e}"
+
+
+def _relative(first: float, value: float) -> str:
+    """Return the change in percent, a large one as a factor; nothing if it has no meaning."""
+    if first == 0 or value / first < 0 or not math.isfinite(value / first):
+        return ""
+    change_percent = 100 * (value / first - 1)
+    if change_percent > LARGEST_PERCENT:
+        return f", {three_digits(value / first)} times"
+    sign = "+" if change_percent > 0 else "-"
+    return f", {sign}{_digits(abs(change_percent))} %"
