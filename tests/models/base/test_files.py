@@ -1,12 +1,13 @@
 """Output files: whole or not at all."""
 
+import errno
 import os
 import stat
 
 import numpy as np
 import pytest
 
-from spheretwin.models.base.errors import InputError, SpheretwinError
+from spheretwin.models.base.errors import InputError, SpheretwinError, without_breaks
 from spheretwin.models.base.files import OutputFile, check_writable, whole_file
 from spheretwin.models.telemetry.parquet import PART_ROWS, TelemetryFile
 from spheretwin.models.telemetry.signals import common_signals, width
@@ -115,6 +116,28 @@ def test_places_where_no_file_can_be_put(tmp_path):
             check_writable(path)
     check_writable(tmp_path / "out.txt")
     assert os.listdir(tmp_path) == ["pipe"]
+
+
+def test_messages_name_the_requested_file_and_the_cause_without_its_number(tmp_path):
+    path = tmp_path / "missing" / "run.rrd"
+    for write in (check_writable, OutputFile):
+        with pytest.raises(InputError) as refused:
+            write(path)
+        assert f"{refused.value}" == f"output: expected a writable path, No such file or directory: {path}"
+    target = tmp_path / "run.parquet"
+
+    def fill_the_disk(named):
+        with whole_file(target) as temporary:
+            text = f"[Errno 28] Error writing bytes to '{temporary}'"
+            raise OSError(errno.ENOSPC, text, str(temporary) if named else None)
+
+    for named in (True, False):
+        with pytest.raises(SpheretwinError) as failed:
+            fill_the_disk(named)
+        assert f"{failed.value}" == f"output: {target} could not be written, No space left on device"
+    hidden = OSError(errno.ENOSPC, "[Errno 28] x", str(tmp_path / ".run.parquet.0.part"))
+    assert without_breaks(hidden) == "No space left on device"
+    assert without_breaks(OSError(errno.ENOENT, "x", "a.csv")) == "No such file or directory: a.csv"
 
 
 def test_a_folder_that_came_in_between_is_told_and_the_file_stays(tmp_path):
