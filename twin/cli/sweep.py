@@ -223,7 +223,9 @@ def _one(study: Study, key: str, as_json: bool) -> bool:
     if as_json:
         print_json(printed)
     else:
+        command = printed.pop("command")
         runs.print_rows(f"row {row.number} of {study.name}", ("", "value"), _pairs(printed), 2)
+        print(f"command  {command}")
     return result.status == Status.COMPLETED and result.error is None
 
 

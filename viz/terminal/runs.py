@@ -160,4 +160,4 @@ def print_rows(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], t
         column.justify = "left"
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
-    tables.print_table(table, labels=max(1, min(texts, 2)))
+    tables.print_table(table, labels=max(1, min(texts, 2, len(head) - 1)))

@@ -10,7 +10,10 @@ from rich.text import Text
 
 from spheretwin import cli
 from spheretwin.cli import reproduce
+from spheretwin.models.design import direct_summation
 from spheretwin.paper import EXPERIMENTS
+from spheretwin.study.grid import Grid
+from spheretwin.study.study import load
 from spheretwin.viz.terminal import tables
 
 WIDTH, MOST_LINES = 80, 3
@@ -109,6 +112,10 @@ def test_sweep(checker, tmp_path, monkeypatch):
     Path("short.toml").write_text(study)
     assert cli.main(["sweep", "short.toml"]) == cli.DONE
     assert checker.tables >= 1
+    checker.tables = 0
+    key = Grid(load("short.toml"))[0].key
+    assert cli.main(["sweep", "short.toml", "--row", key]) == cli.DONE
+    assert checker.tables <= 1
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
@@ -128,6 +135,25 @@ def test_reproduce(checker, capsys, monkeypatch, name):
 def test_checks(checker, arguments):
     cli.main(arguments)
     assert checker.tables >= 1
+
+
+def test_magnetics_check(checker, monkeypatch):
+    few = direct_summation.Quadrature(direct_summation.Rule(12, 12, 48), direct_summation.Rule(6, 6, 24))
+    monkeypatch.setattr(direct_summation, "STANDARD", few)
+    assert cli.main(["magnetics", "check", "--poses", "1"]) == cli.DONE
+    assert checker.tables == 2
+
+
+def test_a_text_that_fits_no_cell_is_printed_as_a_list(checker, capsys):
+    table = tables.new_table("gains", "law", "gains")
+    gains = ", ".join(f"gain_{number} {number}" for number in range(40))
+    table.add_row("AFSM", gains)
+    tables.print_table(table)
+    lines = capsys.readouterr().out.splitlines()
+    assert checker.tables == 0
+    assert lines[:2] == ["gains", "- AFSM"]
+    assert " ".join(" ".join(lines[2:]).split()) == f"gains: {gains}"
+    assert max(map(len, lines)) <= WIDTH
 
 
 def test_a_broken_word_and_a_fourth_line_are_found(checker):
