@@ -21,6 +21,7 @@ from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import Ghost
 from spheretwin.viz.comparison.merged_recording import EDGE
 from spheretwin.viz.layout.extents import number
+from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import TIMELINE
 from spheretwin.viz.quantities import COMPARED_QUANTITIES
 from spheretwin.viz.scene.motion import shaft_tip
@@ -319,6 +320,29 @@ def test_every_plot_has_the_time_of_the_longest_run_and_its_range(merged):
         low, high = limits(merged, f"/run_{place}_{name}/compare/error_angle_deg")
         settled = merged.values(f"/run_{place}_{name}/compare/error_angle_deg")
         assert low <= settled[len(settled) // 2 :].min() <= settled[len(settled) // 2 :].max() <= high
+
+
+def test_plots_have_titles_with_units_and_a_wide_line_under_the_reference(merged):
+    reader = RrdReader(merged.path)
+    titles = {
+        name.removesuffix(", cut")
+        for chunk in reader.stream(store=reader.blueprints()[0])
+        if "ViewBlueprint:display_name" in (batch := chunk.to_record_batch()).schema.names
+        for cell in batch.column("ViewBlueprint:display_name").to_pylist()
+        for name in cell or []
+    }
+    shown = {
+        quantity.heading
+        for quantity in COMPARED_QUANTITIES
+        if f"/run_4_other/compare/{quantity.name}" in merged.entities
+    }
+    assert shown <= titles
+    for entity, width in (
+        ("/run_1_first/compare/angle_β_rad", THICK),
+        ("/setpoint/run_3_slow/angle_β_rad", THIN),
+        ("/run_1_first/compare/error_β_mrad", MIDDLE),
+    ):
+        assert merged.static[entity, "SeriesLines:widths"] == [[width]]
 
 
 def test_every_path_is_shown_over_the_last_seconds(merged):

@@ -176,7 +176,7 @@ def test_currents_are_means_of_cells_with_a_lane_of_their_variation():
     bars = [axes.get_ylabel() for axes in figure.axes[2:]]
     assert bars == ["mean current of a cell, A", "standard deviation within a cell, A"]
     assert panel.get_title(loc="left") == "1 made: pd"
-    assert lane.get_xlabel() == "time, s"
+    assert (panel.get_ylabel(), lane.get_xlabel()) == ("group", "time, s")
 
 
 def test_events_are_at_their_times_with_the_mark_of_their_level():

@@ -145,3 +145,10 @@ def test_heat_is_blue_for_less_and_red_for_more_on_one_scale():
     assert figure.axes[2].get_ylabel() == "change, degrees"
     ticks = [text.get_text() for text in figure.axes[2].get_yticklabels()]
     assert ticks == ["-0.1", "-0.03", "-0.01", "0", "+0.01", "+0.03", "+0.1"]
+
+
+def test_error_bands_name_axis_unit_and_law():
+    figure = courses()
+    assert [axes.get_ylabel() for axes in figure.axes] == ["|error| of α, degrees", "|error| of β, degrees"]
+    assert figure.axes[-1].get_xlabel() == "time, s"
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["AFSM", "PID"]

@@ -91,3 +91,17 @@ def test_what_remains_falls_at_each_time_and_ends_at_what_never_comes():
 def test_what_remains_can_be_drawn_where_nothing_comes():
     figure = faults.remaining({"open": [np.inf]}, "s", "%", "latency")
     assert len(figure.axes[0].get_lines()) == 1
+
+
+def test_axes_of_points_squares_and_shares_have_their_labels():
+    left, right, bar = clouds().axes
+    assert [axes.get_xlabel() for axes in (left, right)] == ["torque", "torque"]
+    assert (left.get_ylabel(), bar.get_ylabel()) == ("error", "groups")
+    assert [axes.get_title() for axes in (left, right)] == list(POINTS)
+    left, right, bar = triangles().axes
+    assert [left.get_xlabel(), left.get_ylabel(), right.get_xlabel()] == ["group"] * 3
+    assert bar.get_ylabel() == "ratio"
+    assert (shares().axes[0].get_xlabel(), shares().axes[0].get_ylabel()) == (
+        "open groups",
+        "runs that track, %",
+    )

@@ -1,0 +1,40 @@
+"""Torque capability against tilt: degrees, worst, median and best pose."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from spheretwin.viz.figures.torque_maps import capability_by_tilt
+
+TILT_rad = np.radians([0.0, 10.0, 20.0])
+BEST = np.arange(1.0, 13.0).reshape(3, 2, 2)
+
+
+def test_lines_are_the_worst_and_the_median_pose_over_degrees():
+    workspace = SimpleNamespace(tilt_rad=TILT_rad, reachable=np.ones((3, 2, 2), bool))
+    on_grid = SimpleNamespace(best_Nm=BEST, least_norm_Nm=BEST / 2, copper_W_per_Nm2=3 * BEST)
+    worst = {"best_Nm": BEST.min((1, 2)) - 0.5, "least_norm_Nm": BEST.min((1, 2)) / 4,
+             "copper_W_per_Nm2": np.array([20.0, 40.0, 60.0])}  # fmt: skip
+    torque, copper = capability_by_tilt(workspace, on_grid, worst, 8.0).axes
+    expected = {
+        "best currents: worst pose": worst["best_Nm"],
+        "best currents: median": np.median(BEST, (1, 2)),
+        "least-norm currents: worst pose": worst["least_norm_Nm"],
+        "least-norm currents: median": np.median(BEST, (1, 2)) / 2,
+    }
+    lines = {line.get_label(): line for line in torque.get_lines()}
+    assert set(lines) == set(expected)
+    for label, values in expected.items():
+        np.testing.assert_allclose(lines[label].get_xdata(), [0.0, 10.0, 20.0])
+        np.testing.assert_allclose(lines[label].get_ydata(), values)
+    points = torque.collections[0].get_paths()[0].vertices
+    assert points[:, 1].max() == BEST.max()
+    high, middle = copper.get_lines()
+    assert (high.get_label(), list(high.get_ydata())) == ("worst pose", [20.0, 40.0, 60.0])
+    np.testing.assert_allclose(middle.get_ydata(), 3 * np.median(BEST, (1, 2)))
+    assert (torque.get_ylabel(), copper.get_ylabel()) == (
+        "torque in every direction, N·m",
+        "copper loss, W/(N·m)²",
+    )
+    assert copper.get_xlabel() == "tilt of the shaft, degrees"
+    assert torque.get_title(loc="left") == "Torque capability at 8 A a group"
