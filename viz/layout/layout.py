@@ -13,8 +13,8 @@ from spheretwin.viz.layout.view import TIMELINE, View
 from spheretwin.viz.layout.views import VIEWS, run_line
 from spheretwin.viz.rerun_internals import EncodedLayout
 
-# The run in a line takes two lines of text.
-ROW_SHARES = (1, 10)
+# The headline and two lines.
+ROW_SHARES = (1, 9)
 
 
 def layout(view: View, extents: Extents | None = None) -> rrb.Blueprint:

@@ -100,6 +100,7 @@ class Plots:
         *lines: PlotLine,
         least: float,
         axis: int | None = None,
+        key: str = "",
     ) -> rrb.TimeSeriesView:
         """Make a plot with the range of the settled run; its title gives the extent outside.
 
@@ -113,6 +114,8 @@ class Plots:
             Half of the range at least.
         axis : int, optional
             Hinge whose entries are drawn; all unless given.
+        key : str
+            Markers of the lines, which such a plot has instead of a legend.
 
         Notes
         -----
@@ -124,9 +127,9 @@ class Plots:
             limit = extents.limit(*(PlotChannel(line.name) for line in lines), least=least)
             suffix = extents.largest(limit, *(PlotChannel(line.name, axis) for line in lines))
             reach = (1 + ROOM) * limit
-            return Fit(f"{what} ±{number(limit)} {unit}{suffix}", (-reach, reach))
+            return Fit(f"{what} ±{number(limit)} {unit}{key}{suffix}", (-reach, reach))
 
-        return self._plot(f"{what} [{unit}]", lines, axis, fit)
+        return self._plot(f"{what} [{unit}]{key}", lines, axis, fit)
 
     def above_zero(self, what: str, unit: str, line: PlotLine, *, least: float) -> rrb.TimeSeriesView:
         """Make a plot of a quantity that is never negative, with the range of the settled run."""

@@ -19,6 +19,8 @@ LINE_LOOKS = ("names", "colors", "widths", "aggregation_policy")
 
 WIDEST, THICK, MIDDLE, THIN = 5.0, 3.0, 1.5, 1.0
 
+_MARK_SIZE = 4.5
+
 MOST_MARKED = 3
 """Entries up to which the lines of a signal have markers: of many coil groups only the spread matters."""
 
@@ -57,6 +59,7 @@ def mark_style(styles: Sequence[LineStyle]) -> rr.SeriesPoints:
         names=[name for style in styles for name in style.names],
         colors=[colour for style in styles for colour in style.colours],
         markers=[marker for style in styles for marker in style.markers],
+        marker_sizes=[_MARK_SIZE] * sum(len(style.names) for style in styles),
     )
 
 

@@ -98,7 +98,7 @@ def current_bars(plots: Plots) -> rrb.BarChartView:
     return rrb.BarChartView(
         origin="/",
         contents=[f"/{scene.COILS}", f"/{CURRENT_LIMITS}"],
-        name="currents at the cursor [A], by group",
+        name=f"currents at the cursor [A], by group, ±{plots.view.current_limit_A:g} A",
         plot_legend=rrb.PlotLegend(visible=False),
     )
 
@@ -123,7 +123,7 @@ def coils(plots: Plots) -> rrb.Container:
     """Currents over time; below, those at the cursor, and the copper loss of all coils."""
     heat = plots.above_zero("heat of all coils", "W", quantity(COPPER_LOSS), least=COPPER_LOSS.floor)
     below = rrb.Horizontal(current_bars(plots), heat)
-    return rrb.Vertical(current_map(plots), below, row_shares=[3, 2], name="coils")
+    return rrb.Vertical(current_map(plots), below, row_shares=[1, 1], name="coils")
 
 
 SLIDING = "sliding_s"
@@ -137,11 +137,12 @@ def control(plots: Plots) -> rrb.Container:
     lines = [plots.signal("torque_command_Nm"), quantity(DELIVERED), plots.signal("disturbance_Nm")]
     torques = [
         plots.about_zero(
-            f"torque {name}: ● delivered, × command, + load",
+            f"torque {name}",
             "N·m",
             *lines,
             least=DELIVERED.floor,
             axis=axis,
+            key=": ● delivered, × command, + load",
         )
         for axis, name in enumerate(ANGLES)
     ]

@@ -66,7 +66,7 @@ class Summary:
 
     def running(self) -> str:
         """Return the text of a run in progress."""
-        return f"### ▶ RUNNING · {self._run_text()}"
+        return f"#### ▶ RUNNING · {self._run_text()}"
 
     def ended(self, status: Status) -> str:
         """Return the text of a run that has ended."""
@@ -78,7 +78,7 @@ class Summary:
             lines.append(self._figures())
         lines.extend(self._fault_lines())
         # Two spaces at the end of a line break it, at half of the distance between paragraphs.
-        return f"### {_SYMBOLS[status.level]} {headline} · {self._run_text()}\n\n" + "  \n".join(lines)
+        return f"#### {_SYMBOLS[status.level]} {headline} · {self._run_text()}\n\n" + "  \n".join(lines)
 
     def _reason(self, status: Status) -> str:
         if status in (Status.COMPLETED, Status.RUNNING):
