@@ -15,7 +15,7 @@ from spheretwin.models.telemetry.table import Table
 from spheretwin.provenance import facts_of, record_of
 from spheretwin.session import Session
 from spheretwin.simulation import Sink
-from spheretwin.viz.layout.view import OVERVIEW
+from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW
 
 if TYPE_CHECKING:
     from spheretwin.viz.recording.live import LiveView
@@ -72,6 +72,8 @@ class Outputs:
         Rows per second of the recording, in addition to extremes and events; default: every row.
     first_tick : int, optional
         Tick of the first row of the files; None: `begin` states it later.
+    live_window_s : float
+        Time before the present that the plots of the live view show.
 
     Attributes
     ----------
@@ -95,12 +97,13 @@ class Outputs:
         view: str = OVERVIEW,
         record_rate_Hz: float | None = None,
         first_tick: int | None = 0,
+        live_window_s: float = LIVE_WINDOW_S,
     ) -> None:
         self._session = session
         self.record, self.telemetry = record, telemetry
         check(self.paths)
         self._file: TelemetryFile | None = None
-        self._live = _live_view(session, view) if live else None
+        self._live = _live_view(session, view, live_window_s) if live else None
         # The recorder last: it would leave a file if another output were refused.
         try:
             self._recorder = _recorder_at_rate(session, record, view, record_rate_Hz) if record else None
@@ -190,10 +193,11 @@ class _FromTick:
         self._sink.finish(status)
 
 
-def _live_view(session: Session, view: str) -> LiveView:
+def _live_view(session: Session, view: str, window_s: float) -> LiveView:
     from spheretwin.viz.recording.live import LiveView  # Rerun is slow to import
 
-    live = LiveView(session.actuator, session.signals, facts_of(session.initial_scenario), shown=view)
+    facts = facts_of(session.initial_scenario)
+    live = LiveView(session.actuator, session.signals, facts, shown=view, window_s=window_s)
     print(f"watch: {live.address}", file=sys.stderr, flush=True)
     return live
 

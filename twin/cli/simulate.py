@@ -33,7 +33,7 @@ from spheretwin.scenario import reading
 from spheretwin.scenario.reading import shipped
 from spheretwin.session import Session
 from spheretwin.simulation import Sink, follow
-from spheretwin.viz.layout.view import OVERVIEW, VIEW_NAMES
+from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW, VIEW_NAMES
 from spheretwin.viz.terminal import runs
 from spheretwin.viz.terminal.progress import Progress
 
@@ -137,6 +137,13 @@ def declare(parser: Parser) -> None:
     parser.add_argument("--telemetry", type=Path, metavar="FILE.parquet", help="write the telemetry")
     parser.add_argument("--live", action="store_true", help="run in real time, with a viewer on 127.0.0.1")
     parser.add_argument(
+        "--live-window",
+        type=number("a number of s above 0", lambda window_s: window_s > 0),
+        default=LIVE_WINDOW_S,
+        metavar="S",
+        help=f"time that the plots of the live view show; the last {LIVE_WINDOW_S:g} s unless given",
+    )
+    parser.add_argument(
         "--view",
         choices=VIEW_NAMES,
         metavar="TAB",
@@ -182,6 +189,7 @@ def run(options: argparse.Namespace) -> bool:
             options.view or OVERVIEW,
             options.record_rate,
             plan.first_tick,
+            options.live_window,
         )
         try:
             with progress, timers_stopped(), _code_of_the_user(session, options.json):

@@ -247,11 +247,11 @@ class Plots:
             yield line.entity, rr.SeriesLines().visualizer(mappings=_mappings(VALUES, line.name, LINE_LOOKS))
 
     def _time_axis(self) -> rrb.TimeAxis | None:
-        """Return an axis over the planned time in a live view.
+        """Return an axis that follows the cursor in a live view.
 
         Otherwise None: the axis is as long as the data, and needs no room in the file.
         """
-        return time_axis(self.view.duration_s) if self.view.live else None
+        return _following_axis(self.view.window_s) if self.view.live else None
 
 
 def time_axis(until_s: float) -> rrb.TimeAxis:
@@ -259,6 +259,13 @@ def time_axis(until_s: float) -> rrb.TimeAxis:
     boundary = rrb.TimeRangeBoundary
     whole = rr.TimeRange(start=boundary.absolute(seconds=0), end=boundary.absolute(seconds=until_s))
     return rrb.TimeAxis(view_range=whole)
+
+
+def _following_axis(window_s: float) -> rrb.TimeAxis:
+    """Time axis over a window that ends at the cursor."""
+    boundary = rrb.TimeRangeBoundary
+    window = rr.TimeRange(start=boundary.cursor_relative(seconds=-window_s), end=boundary.cursor_relative())
+    return rrb.TimeAxis(view_range=window)
 
 
 def time_range(oldest_s: float, newest_s: float = 0.0) -> rrb.VisibleTimeRanges:

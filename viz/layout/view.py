@@ -12,8 +12,8 @@ OVERVIEW = "overview"
 VIEW_NAMES = (OVERVIEW, "control", "coils", "hardware", "compare", "scenario")
 """Tabs of a recording; apart from the views, because Rerun is slow to import."""
 
-# Time before the cursor that the plots of a live view show.
 LIVE_WINDOW_S = 10.0
+"""Time before the cursor that the plots of a live view show, unless another is chosen."""
 
 # Time after an early end that the time axes show, as a share of the time before.
 AFTER_THE_END = 0.15
@@ -38,13 +38,15 @@ class View(NamedTuple):
     """Size of the actuator relative to the shipped one; the distance of the camera is proportional to it."""
     run: str = ""
     """Identity of the recording: figures of its run stand in the layout."""
+    window_s: float = LIVE_WINDOW_S
+    """Time before the cursor that the plots of a live view show."""
     decimated: bool = False
     """True if plots show an envelope, because the recording does not have every row."""
 
     @property
     def shown_s(self) -> float:
         """Length of the time that plots show at once."""
-        return min(self.duration_s, LIVE_WINDOW_S) if self.live else self.duration_s
+        return min(self.duration_s, self.window_s) if self.live else self.duration_s
 
     @property
     def names(self) -> frozenset[str]:

@@ -8,19 +8,16 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import SpheretwinError
 from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import Signal
-from spheretwin.viz.decimation import FirstRows
+from spheretwin.viz.decimation import RowSelection
 from spheretwin.viz.layout.layout import opening_layout
-from spheretwin.viz.layout.view import OVERVIEW
+from spheretwin.viz.layout.view import LIVE_WINDOW_S, OVERVIEW
 from spheretwin.viz.recording.stream import Stream
 from spheretwin.viz.recording.viewer_server import Broadcast, ViewerServer
 from spheretwin.viz.rerun_internals import HEADER_BYTES, messages
 
-# More than the pixels of a plot; few enough for a viewer that renders in software.
-LIVE_RATE_Hz = 100.0
-
-# Recorded together: each entity costs some kilobytes each time, and a viewer that draws in software takes no
-# more than a hundred of these a second.
-_TOGETHER_S = 0.25
+# Recorded together: a viewer that draws in software on busy cores takes no more than some twenty entities a
+# second. With four times as many it was 22 s late after half a minute, with these 2 s.
+_TOGETHER_S = 1.0
 
 
 class LiveView(Stream):
@@ -31,7 +28,7 @@ class LiveView(Stream):
 
     Parameters
     ----------
-    actuator, signals, facts, shown
+    actuator, signals, facts, shown, window_s
         As for `Stream`.
 
     Raises
@@ -43,10 +40,15 @@ class LiveView(Stream):
     """
 
     def __init__(
-        self, actuator: Actuator, signals: tuple[Signal, ...], facts: RunFacts, *, shown: str = OVERVIEW
+        self,
+        actuator: Actuator,
+        signals: tuple[Signal, ...],
+        facts: RunFacts,
+        *,
+        shown: str = OVERVIEW,
+        window_s: float = LIVE_WINDOW_S,
     ) -> None:
-        selection = FirstRows(LIVE_RATE_Hz)
-        super().__init__(actuator, signals, facts, selection, live=True, shown=shown, rate_Hz=LIVE_RATE_Hz)
+        super().__init__(actuator, signals, facts, RowSelection(), live=True, shown=shown, window_s=window_s)
         self._together = max(1, round(_TOGETHER_S / facts.sections["controller"]["period_s"]))
         self._bytes = rr.binary_stream(self.recording)
         self._broadcast = Broadcast()

@@ -18,7 +18,7 @@ from spheretwin.models.telemetry.run_record import RunFacts
 from spheretwin.models.telemetry.signals import COMMON_NAMES, Signal
 from spheretwin.models.telemetry.status import Event, Status
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.view import CHECKSUM, OVERVIEW, TIMELINE, TOTAL, View
+from spheretwin.viz.layout.view import CHECKSUM, LIVE_WINDOW_S, OVERVIEW, TIMELINE, TOTAL, View
 from spheretwin.viz.rerun_internals import ArrowComponent
 from spheretwin.viz.scene.meshes import Meshes, read_meshes
 from spheretwin.viz.scene.static import size_of
@@ -48,6 +48,8 @@ class RecordingSubject:
     """The view of it that is open at first."""
     run: str = ""
     """Identity of this recording."""
+    window_s: float = LIVE_WINDOW_S
+    """Time before the cursor that the plots of a live view show."""
     rate_Hz: float | None = None
     """Rate of the rows that are kept besides the extremes; None for every row."""
 
@@ -74,7 +76,8 @@ class RecordingSubject:
             self.shown,
             size_of(self.actuator),
             self.run,
-            decimated=self.rate_Hz is not None,
+            window_s=self.window_s,
+            decimated=self.live or self.rate_Hz is not None,
         )
 
 
@@ -90,9 +93,12 @@ class RecordingPart:
     ----------
     rows : RowSet
         Set of rows that `write` receives.
+    in_live_view : bool
+        False if the part is for readers of files only.
     """
 
     rows: ClassVar[RowSet] = RowSet.ALL
+    in_live_view: ClassVar[bool] = True
 
     def __init__(self, subject: RecordingSubject) -> None:
         self.subject = subject

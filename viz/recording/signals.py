@@ -124,6 +124,7 @@ class Signals(RecordingPart):
     """All columns of the telemetry, those of a row together: a killed process leaves complete rows."""
 
     rows = RowSet.SELECTED
+    in_live_view = False
 
     def __init__(self, subject: RecordingSubject) -> None:
         super().__init__(subject)

@@ -21,7 +21,7 @@ from spheretwin.models.telemetry.signals import Signal
 from spheretwin.models.telemetry.status import Event, Level, Status, named
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz.decimation import RowSelection
-from spheretwin.viz.layout.view import application
+from spheretwin.viz.layout.view import LIVE_WINDOW_S, application
 from spheretwin.viz.recording.currents import CoilCurrents, CurrentMap
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, RowSet
 from spheretwin.viz.recording.phase_plane import PhasePlane
@@ -74,6 +74,8 @@ class Stream(ABC):
         The view that is open at first, one of `VIEWS`.
     rate_Hz : float, optional
         Rate of the rows that are kept besides the extremes; every row unless given.
+    window_s : float
+        Time before the cursor that the plots of a live view show.
 
     Attributes
     ----------
@@ -101,9 +103,10 @@ class Stream(ABC):
         *,
         live: bool,
         shown: str,
-        rate_Hz: float | None,
+        rate_Hz: float | None = None,
+        window_s: float = LIVE_WINDOW_S,
     ) -> None:
-        subject = RecordingSubject(actuator, signals, facts, live, shown, uuid4().hex, rate_Hz)
+        subject = RecordingSubject(actuator, signals, facts, live, shown, uuid4().hex, window_s, rate_Hz)
         rr.set_strict_mode(True)  # otherwise a mistake is a warning, and its data are dropped
         _ = subject.meshes  # a run needs none; a missing one is reported before there is a file
         self.view = subject.view
@@ -111,7 +114,8 @@ class Stream(ABC):
         self.recording.set_log_time_enabled(False)  # simulated time is the only one that means anything
         self.fault: str | None = None
         self.rows_handed_over = 0
-        self._parts, self._row_selection = [part(subject) for part in PARTS], row_selection
+        self._parts = [part(subject) for part in PARTS if part.in_live_view or not live]
+        self._row_selection = row_selection
         self._waiting: list[Table] = []
         self._closed = False
         self._handing_over = Lock()

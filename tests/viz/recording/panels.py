@@ -1,9 +1,11 @@
 """What the panels of a recording draw, read from its layout and its data, as a viewer reads them."""
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
+import rerun as rr
 from rerun.chunk import RrdReader
 
 from spheretwin.viz.layout.view import TIMELINE
@@ -38,7 +40,10 @@ class Panel(NamedTuple):
 def columns(path, store=None):
     """Values of every component, by entity and component, and times in ns by entity and component."""
     values, times = {}, {}
-    for chunk in RrdReader(path).stream(store=store):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rr.error_utils.RerunWarning)  # what a live view sends has no footer
+        reader = RrdReader(path)
+    for chunk in reader.stream(store=store):
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
             if name == TIMELINE or name.startswith("rerun.controls"):

@@ -1,4 +1,4 @@
-"""Live view of a run: at most 100 rows a second, unchanged telemetry, no request to other machines."""
+"""Live view of a run: envelopes of all ticks, unchanged telemetry, no request to other machines."""
 
 import os
 import signal
@@ -14,14 +14,16 @@ import numpy as np
 import pytest
 
 from spheretwin import scenario as scenarios
+from spheretwin.models.telemetry.signals import common_signals
 from spheretwin.models.telemetry.table import read_parquet
 from spheretwin.outputs import Outputs
 from spheretwin.session import Session
 from spheretwin.simulation import follow
-from spheretwin.viz.recording.live import LIVE_RATE_Hz
-from spheretwin.viz.recording.reader import read
+from spheretwin.viz.layout.plots import Plots
+from spheretwin.viz.layout.view import ENVELOPE, EVENTS, View
 from spheretwin.viz.recording.viewer_server import RECORDING
 from tests.browser import Browser, needs_a_browser
+from tests.viz.recording.panels import columns, rows
 from tests.waiting import wait_for
 
 CHANGES = {"plant.engine": "lagrangian", "duration": 1.5, "plant.modelling_error": 0.2}
@@ -83,7 +85,7 @@ def test_telemetry_is_the_same_whoever_watches(tmp_path, headless):
         viewer.close()
 
 
-def test_a_viewer_gets_a_hundred_rows_a_second_and_every_event(tmp_path, headless):
+def test_a_viewer_gets_the_envelope_of_every_tick_and_every_event(tmp_path, headless):
     (path := tmp_path / "seen.rrd").touch()
     with Session(scenarios.load("hold", CHANGES)) as session:
         files = Outputs(session, None, None, live=True)
@@ -91,11 +93,28 @@ def test_a_viewer_gets_a_hundred_rows_a_second_and_every_event(tmp_path, headles
         viewer = urllib.request.urlopen(files._live.address.rstrip("/") + RECORDING)
         assert files.close() == []
         path.write_bytes(viewer.read())
-    seen = read(path)
-    assert len(seen.table) == LIVE_RATE_Hz * CHANGES["duration"]
-    assert seen.table.values.tobytes() == headless.values[::10].tobytes()
-    assert seen.events[-1][2] == "the run is complete"
-    np.testing.assert_allclose(seen.events[-1][0], headless["t_s"][-1])
+    starts = np.arange(0, len(headless), 40)  # 25 bins a second of 1000 rows
+    for name in ("q_rad", "torque_command_Nm", "sliding_s"):
+        for kind, bound in (("low_0", np.minimum), ("high_0", np.maximum)):
+            t_ns, drawn = rows(path, ENVELOPE, kind, name)
+            bounds = bound.reduceat(headless[name], starts).astype(np.float32)
+            np.testing.assert_array_equal(t_ns // 1_000_000, [*starts, len(headless) - 1])
+            np.testing.assert_array_equal(drawn, [*bounds, bounds[-1]])
+    values, times = columns(path)
+    events = [text for column in values[f"/{EVENTS}", "TextLog:text"] for (text,) in column.to_pylist()]
+    assert events[-1] == "the run is complete"
+    assert times[f"/{EVENTS}", "TextLog:text"][-1][-1] == round(1e9 * headless["t_s"][-1])
+    assert not any(name.startswith("values") for _, name in values)  # a reader of files needs them
+
+
+def test_plots_follow_the_cursor_over_the_chosen_window():
+    common = common_signals(18)
+    plots = Plots(View(60.0, 8.0, 18, (), live=True, window_s=4.0, decimated=True))
+    axis = plots.above_zero("error", "°", plots.signal(common[1].name), least=0.1).properties["TimeAxis"]
+    encoded = axis.view_range.as_arrow_array()
+    assert encoded.to_pylist() == [{"start": -4_000_000_000, "end": 0}]
+    for end in ("start", "end"):
+        assert encoded.field(end).type_codes.to_pylist() == [1]  # relative to the cursor
 
 
 def test_a_killed_run_leaves_no_server():
