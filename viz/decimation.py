@@ -223,8 +223,8 @@ def _first_bounds(bound: Callable[..., Array], place: Callable[..., Places], val
 FIRST_CHUNK_S = 2.0
 """Time of the bins in the first chunk."""
 
-MOST_BINS = 4096
-"""Bins after which a chunk is always sent."""
+MOST_BINS = 500
+"""Bins after which a chunk is always sent: 20 s of 25 bins a second."""
 
 
 class CompletedBins(NamedTuple):

@@ -138,6 +138,10 @@ class Contents:
             raise self._damaged(f"entity {SCENARIO}, component {FACTS}")
         return facts
 
+    def signals_at_start(self) -> tuple[Signal, ...]:
+        """Return the signals of the first rows; a change of law may have brought others."""
+        return tuple(signals_of(self._described[0].text)) if 0 in self._described else ()
+
     def table(self, *, ended: bool) -> Table:
         """Return all rows by tick, NaN if a run had no such column then.
 

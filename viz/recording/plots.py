@@ -33,6 +33,7 @@ from spheretwin.viz.layout.view import (
     STYLES,
     SUMMARY,
     VALUES,
+    View,
     component,
 )
 from spheretwin.viz.quantities import ERROR_ANGLE, QuantityRows, quantities_of
@@ -101,7 +102,7 @@ class PlotData(RecordingPart):
         self._places = {name: slice(end - sizes[name], end) for name, end in zip(sizes, ends, strict=True)}
         self._extent_tracker = ExtentTracker(sizes)
         self._bins = TimeBins(ENVELOPE_RATE_Hz, immediate=subject.live)
-        self._marks = Marks(subject, self._styles, self._places)
+        self._marks = Marks(subject.view, self._styles, self._places)
         self._summary = Summary(subject.facts)
         self._before: Table | None = None
         self._begun_s: float | None = None  # clock at the first rows: all is compiled then
@@ -116,7 +117,7 @@ class PlotData(RecordingPart):
             names = [quantity.name for quantity in self._quantities]
             _log_styles(recording, DERIVED, {name: self._styles[name] for name in names})
         if self.subject.live:
-            _log_summary(recording, self._summary.running())
+            log_summary(recording, self._summary.running())
 
     def write(self, recording: rr.RecordingStream, rows: Table) -> None:
         """Record the derived quantities of the rows of a chunk, or what bins they have completed."""
@@ -143,7 +144,7 @@ class PlotData(RecordingPart):
         if binned and binned.last_s[-1] > binned.t_s[-1] and self.subject.view.decimated:
             end = CompletedBins(*(column[-1:] for column in binned))
             self._send_envelope(recording, end._replace(t_s=end.last_s))
-        _log_summary(recording, self._summary.ended(status))
+        log_summary(recording, self._summary.ended(status))
         ended_s = None if status in _AS_PLANNED else self._summary.last_s
         if ended_s is not None:
             log_end(recording, ended_s)
@@ -155,7 +156,7 @@ class PlotData(RecordingPart):
         if self._opened or self.subject.live or monotonic() - self._begun_s < OPENED_AFTER_s:
             return
         self._opened = True
-        _log_summary(recording, self._summary.running())
+        log_summary(recording, self._summary.running())
         recording.send_blueprint(opening_layout(self.subject.view))
 
     def _record(self, recording: rr.RecordingStream, binned: CompletedBins | None) -> None:
@@ -178,20 +179,19 @@ class Marks:
 
     Parameters
     ----------
-    subject : RecordingSubject
+    view : View
+        Properties of the run.
     styles : mapping of str to LineStyle
         Styles of the lines by the name of the signal or quantity.
     places : mapping of str to slice
         Columns of the lines, by the same names.
     """
 
-    def __init__(
-        self, subject: RecordingSubject, styles: Mapping[str, LineStyle], places: Mapping[str, slice]
-    ) -> None:
-        self._lines, self._styles, self._places = marked_lines(subject.view), styles, places
-        self._rate_Hz = 3 * MARKS_OF_A_LINE / subject.view.shown_s
+    def __init__(self, view: View, styles: Mapping[str, LineStyle], places: Mapping[str, slice]) -> None:
+        self._lines, self._styles, self._places = marked_lines(view), styles, places
+        self._rate_Hz = 3 * MARKS_OF_A_LINE / view.shown_s
         self._firsts = FirstRows(self._rate_Hz)
-        self._live = subject.live
+        self._live = view.live
         self._t_s: list[Array] = []
         self._values: list[Array] = []
 
@@ -252,5 +252,6 @@ def _log_styles(recording: rr.RecordingStream, entity: str, styles: Mapping[str,
     recording.log(entity, [batch], static=True)
 
 
-def _log_summary(recording: rr.RecordingStream, text: str) -> None:
+def log_summary(recording: rr.RecordingStream, text: str) -> None:
+    """Log the headline."""
     recording.log(SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)

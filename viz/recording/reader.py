@@ -18,10 +18,11 @@ from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.signals import COMMON_NAMES
 from spheretwin.models.telemetry.status import Event, Level
 from spheretwin.models.telemetry.table import Table
-from spheretwin.viz.layout.layout import layout
 from spheretwin.viz.layout.view import View, application
 from spheretwin.viz.recording.contents import Contents
 from spheretwin.viz.recording.part import total
+from spheretwin.viz.recording.recovered_plots import RecoveredPlots
+from spheretwin.viz.recording.signals import RATE
 from spheretwin.viz.rerun_internals import check_readable, whole_messages
 
 # Recordings have times in whole nanoseconds.
@@ -79,15 +80,18 @@ def rewrite(path: Path, target: Path) -> Recorded:
         It cannot be read; the file cannot be written.
     """
     recorded, contents = _read(path)
-    facts, signals = recorded.facts, recorded.table.signals
+    facts, signals = recorded.facts, contents.signals_at_start()
     own = tuple(signal for signal in signals if signal.name not in COMMON_NAMES)
     groups = next(signal.size for signal in signals if signal.name == "current_A")
-    view = View(facts["duration_s"], facts["current_limit_A"], groups, own, live=False)
+    decimated = facts.get(RATE) is not None
+    view = View(facts["duration_s"], facts["current_limit_A"], groups, own, live=False, decimated=decimated)
     with _chunks(path) as (chunks, _), whole_file(target) as temporary:
         recording = rr.RecordingStream(application(view))
         recording.set_log_time_enabled(False)
-        recording.set_sinks(rr.FileSink(temporary), default_blueprint=layout(view))
-        recording.send_chunks(chunks)
+        recording.set_sinks(rr.FileSink(temporary))
+        plots = RecoveredPlots()
+        recording.send_chunks(plots.gather(chunks))
+        plots.complete(recording, view, facts, recorded.table, signals)
         if recorded.checked:  # a closed recording states its numbers of rows and lines
             for entity, count in contents.counts.items():
                 recording.log(entity, [total(count)], static=True)

@@ -80,6 +80,13 @@ class Summary:
         # Two spaces at the end of a line break it, at half of the distance between paragraphs.
         return f"#### {_SYMBOLS[status.level]} {headline} · {self._run_text()}\n\n" + "  \n".join(lines)
 
+    def cut_off(self) -> str:
+        """Return the text of a run whose recording was not closed; figures are those of the recorded rows."""
+        until = f"the recording was not closed; its rows end at {self.last_s:.3g} s"
+        until += f" of {self._facts.duration_s:g} s"
+        lines = [f"**{until}**", self._figures(), *self._fault_lines()]
+        return f"#### {_SYMBOLS[Level.WARN]} NOT CLOSED · {self._run_text()}\n\n" + "  \n".join(lines)
+
     def _reason(self, status: Status) -> str:
         if status in (Status.COMPLETED, Status.RUNNING):
             return ""

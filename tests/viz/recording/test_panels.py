@@ -14,6 +14,7 @@ from spheretwin.viz import theme
 from spheretwin.viz.layout.view import CURRENT_LIMITS, CURRENT_MAP, CURRENT_VARIATION, TELEMETRY
 from spheretwin.viz.quantities import QuantityRows, quantities_of
 from spheretwin.viz.recording import currents, plots
+from spheretwin.viz.recording.reader import rewrite
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.scene.meshes import COILS
 from tests.viz.recording.panels import columns, panels, rows, style
@@ -299,3 +300,40 @@ def test_lines_of_a_run_that_ended_early_reach_its_end(table, tmp_path):
                 if line.visualizer == "SeriesLines":
                     t_ns, _ = rows(path, line.entity, line.component, line.name)
                     assert ticks(t_ns)[-1] == TICKS - 1
+
+
+@pytest.mark.parametrize("rate_Hz", [None, 60.0], ids=["every row", "60 Hz"])
+def test_a_recording_that_was_not_closed_is_recovered_with_its_whole_picture(table, tmp_path, rate_Hz):
+    closed, cut, recovered = (tmp_path / f"{name}.rrd" for name in ("closed", "cut", "recovered"))
+    record(closed, table, rate_Hz, Status.LEFT_WORKSPACE)
+    end = len(closed.read_bytes())
+    with Session(scenarios.load("hold", {"duration": 3.0})) as session:
+        facts, actuator = facts_of(session.initial_scenario), session.actuator
+    recorder = Recorder(actuator, table.signals, facts, path=cut, rate_Hz=rate_Hz)
+    for first in range(0, TICKS, 97):
+        recorder.write(table.rows(first, min(first + 97, TICKS)))
+    part = recorder.partial()
+    cut.write_bytes(part.path.read_bytes())
+    recorder.close()
+    assert cut.stat().st_size < end
+    recorded = rewrite(cut, recovered)
+    assert len(recorded.table) > (0.9 * TICKS if rate_Hz is None else 150)
+    last = recorded.table["t_s"][-1]
+    by_title = {panel.title.partition(",")[0].partition(" ±")[0]: panel for panel in panels(recovered)}
+    for panel in panels(closed):
+        again = by_title[panel.title.partition(",")[0].partition(" ±")[0]]
+        assert again.shown == panel.shown
+        assert [line[:4] for line in again.drawn] == [line[:4] for line in panel.drawn]
+        assert set(again.entities) == set(panel.entities)
+        if panel.band:  # of rows that end a little earlier
+            np.testing.assert_allclose(again.band, panel.band, rtol=0.15, atol=1e-9)
+    values, times = columns(recovered)
+    text = values["/summary", "TextDocument:text"][-1].to_pylist()[0][0]
+    headline, figures = text.split("\n\n")
+    assert headline.startswith("#### ⚠ NOT CLOSED · hold under afsm")
+    assert f"its rows end at {last:.3g} s of 3 s" in figures
+    assert "largest" in figures
+    marks = [entity for entity, name in values if entity.startswith("/marks/") and name == "Scalars:scalars"]
+    assert len(marks) > 5
+    ended = np.concatenate(times["/ended", "Scalars:scalars"])
+    assert abs(ended[0] * 1e-9 - last) < 1e-6
