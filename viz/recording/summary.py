@@ -16,7 +16,7 @@ from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 FAILSAFE_REASON = "failsafe_reason"
 """Signal of runs with a watchdog."""
 
-_SYMBOLS = {Level.INFO: "✔", Level.WARN: "⚠", Level.ERROR: "✖"}
+_SYMBOLS = {Level.INFO: "✔", Level.WARN: "⚠", Level.ERROR: "✗"}
 
 _HEADLINES = {Status.COMPLETED: "COMPLETED", Status.INTERRUPTED: "INTERRUPTED", Status.FAILSAFE: "FAILSAFE"}
 

@@ -155,7 +155,7 @@ def test_the_headline_says_what_was_run_how_it_ended_and_how_good_it_was(run):
     )
     summary = Summary(facts_of(session.scenario))
     assert summary.running().startswith("#### ▶ RUNNING · nutation")
-    assert summary.ended(Status.DIVERGED).startswith("#### ✖ FAILED · nutation")
+    assert summary.ended(Status.DIVERGED).startswith("#### ✗ FAILED · nutation")
     summary.add(table.rows(0, 4), np.array([1.0, 7.0, 5.0, 5.0]))
     lines = summary.ended(Status.LEFT_WORKSPACE).split("\n\n")[1].split("  \n")
     alpha, beta, gamma = np.degrees(table["q_rad"][3])
@@ -196,7 +196,7 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 100], strict=True):
         summary.add(table.rows(first, last), np.zeros(last - first))
     headline, lines = summary.ended(Status.FAILSAFE).split("\n\n")
-    assert headline.startswith("#### ✖ FAILSAFE · hold")
+    assert headline.startswith("#### ✗ FAILSAFE · hold")
     reason, _, faults = lines.split("  \n")
     assert reason == "**failsafe at 0.099 s of 3 s: a coil is too hot**"
     assert faults == (
