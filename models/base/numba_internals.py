@@ -109,10 +109,27 @@ class MachineCode(NullCache):  # type: ignore[misc]
     def _entry(self, sig: Any, codegen: Any) -> str:
         """Return the name of an entry: function, then a digest of function, signature and processor."""
         line = self._function.__code__.co_firstlineno
-        closure = dumps([cell.cell_contents for cell in self._function.__closure__ or ()])
-        key = repr((self._name, line, closure, self._kind, str(sig), codegen.magic_tuple()))
+        enclosed = _enclosed(self._function)
+        key = repr((self._name, line, enclosed, self._kind, str(sig), codegen.magic_tuple()))
         readable = re.sub(r"\W+", "-", self._name.removeprefix("spheretwin."))[:60]
         return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:24]}"
+
+
+def _enclosed(function: Callable[..., Any]) -> list[Any]:
+    """Return the values that a function encloses, the same in each process.
+
+    Pickled, a compiled function is different in each process. One of this package is defined by its name, its
+    line and what it encloses: the cache tracks its source.
+    """
+    identities: list[Any] = []
+    for cell in function.__closure__ or ():
+        plain = getattr(cell.cell_contents, "py_func", None)
+        if plain is not None and plain.__module__.startswith("spheretwin."):
+            line = plain.__code__.co_firstlineno
+            identities.append((plain.__module__, plain.__qualname__, line, _enclosed(plain)))
+        else:
+            identities.append(dumps(cell.cell_contents))
+    return identities
 
 
 def cached(dispatcher: Any, function: Callable[..., Any]) -> Any:
