@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import rerun as rr
@@ -11,19 +11,15 @@ import rerun.blueprint as rrb
 from rerun.blueprint import Visualizer
 from rerun.blueprint.archetypes import ViewBlueprint, ViewContents
 from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
-from rerun.components import AggregationPolicy
 
 from spheretwin.models.telemetry.signals import ANGLES, common_signals
 from spheretwin.viz.layout.extents import ROOM, Extents, PlotChannel, number, span_text
-from spheretwin.viz.layout.styles import LINE_LOOKS, MOST_MARKED, THIN
+from spheretwin.viz.layout.styles import LINE_LOOKS, MOST_MARKED
 from spheretwin.viz.layout.view import (
     DERIVED,
     ENDED,
     ENVELOPE,
-    HIGH,
-    LOW,
     MARKS,
-    MEAN,
     STATES,
     STYLES,
     TELEMETRY,
@@ -207,8 +203,8 @@ class Plots:
         # Drawn in this order, as entities are in that of their names.
         fields = sorted((line for line in lines if line.name), key=lambda line: line.name)
         for line in fields:
-            for entity, visualizer in self._visualizers(line):
-                overrides[f"/{entity}"].append(visualizer)
+            entity, visualizer = self._visualizer(line)
+            overrides[f"/{entity}"].append(visualizer)
         contents = list(dict.fromkeys([*overrides, *(f"/{line.entity}" for line in lines if not line.name)]))
         marked = tuple(line.name for line in fields if line.size <= MOST_MARKED)
         if len(marked) > 1 or (axis is None and any(1 < line.size <= MOST_MARKED for line in fields)):
@@ -225,7 +221,7 @@ class Plots:
             defaults=[]
             if axis is None
             else [
-                rr.SeriesLines.from_fields(visible_series=one),
+                rr.SeriesLines.from_fields(visible_series=one * (3 if self.view.decimated else 1)),
                 rr.SeriesPoints.from_fields(visible_series=one * len(marked)),
             ],
             overrides=overrides or None,
@@ -233,18 +229,12 @@ class Plots:
         self._plots.append(_Plot(view, contents, fit))
         return view
 
-    def _visualizers(self, line: PlotLine) -> Iterator[tuple[str, Visualizer]]:
-        """Entities and visualizers of lines: of every row, or of an envelope."""
+    def _visualizer(self, line: PlotLine) -> tuple[str, Visualizer]:
+        """Return entity and visualizer of lines: of every row, or of an envelope."""
+        mappings = _mappings(line.name)
         if self.view.decimated:
-            for kind, policy in ((LOW, AggregationPolicy.Min), (HIGH, AggregationPolicy.Max)):
-                bound = rr.SeriesLines(
-                    widths=[THIN] * line.size, aggregation_policy=policy, interpolation_mode="StepAfter"
-                )
-                yield ENVELOPE, bound.visualizer(mappings=_mappings(kind, line.name, LINE_LOOKS[:2]))
-            mean = rr.SeriesLines(aggregation_policy="Average", interpolation_mode="StepAfter")
-            yield ENVELOPE, mean.visualizer(mappings=_mappings(MEAN, line.name, LINE_LOOKS[:3]))
-        else:
-            yield line.entity, rr.SeriesLines().visualizer(mappings=_mappings(VALUES, line.name, LINE_LOOKS))
+            return ENVELOPE, rr.SeriesLines(interpolation_mode="StepAfter").visualizer(mappings=mappings)
+        return line.entity, rr.SeriesLines().visualizer(mappings=mappings)
 
     def _time_axis(self) -> rrb.TimeAxis | None:
         """Return an axis that follows the cursor in a live view.
@@ -276,10 +266,10 @@ def time_range(oldest_s: float, newest_s: float = 0.0) -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=end)
 
 
-def _mappings(kind: str, name: str, looks: tuple[str, ...]) -> list[VisualizerComponentMapping]:
-    """Map lines to fields of the components of their entity: values of a kind, and a style."""
-    mappings = [_mapping(kind, name, "", "Scalars:scalars")]
-    return mappings + [_mapping(STYLES, name, f".{look}", f"SeriesLines:{look}") for look in looks]
+def _mappings(name: str) -> list[VisualizerComponentMapping]:
+    """Map lines to fields of the components of their entity: values and a style."""
+    mappings = [_mapping(VALUES, name, "", "Scalars:scalars")]
+    return mappings + [_mapping(STYLES, name, f".{look}", f"SeriesLines:{look}") for look in LINE_LOOKS]
 
 
 def _mapping(kind: str, name: str, of: str, target: str) -> VisualizerComponentMapping:

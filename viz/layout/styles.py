@@ -52,6 +52,16 @@ class LineStyle(NamedTuple):
             aggregation_policy=AggregationPolicy.MinMax,
         )
 
+    def of_envelope(self) -> rr.SeriesLines:
+        """Return the style of an envelope: least values, means and greatest values, the bounds thin."""
+        count = len(self.names)
+        return rr.SeriesLines(
+            names=self.names * 3,
+            colors=self.colours * 3,
+            widths=[THIN] * count + [max(self.width, MIDDLE)] * count + [THIN] * count,
+            aggregation_policy=AggregationPolicy.MinMax,
+        )
+
 
 def mark_style(styles: Sequence[LineStyle]) -> rr.SeriesPoints:
     """Return the style of the markers on the lines of some styles."""
@@ -78,9 +88,8 @@ def quantity_style(quantity: Quantity) -> LineStyle:
     return LineStyle(names, list(quantity.colours), markers, _width(quantity.name))
 
 
-def as_struct(style: LineStyle) -> pa.Array:
+def as_struct(lines: rr.SeriesLines) -> pa.Array:
     """Return a style as lists in a struct, to which a layout can refer."""
-    lines = style.lines()
     return pa.StructArray.from_arrays([_look(getattr(lines, look)) for look in LINE_LOOKS], list(LINE_LOOKS))
 
 

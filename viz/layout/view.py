@@ -96,10 +96,8 @@ VALUES, STYLES, DESCRIBED = "values", "styles", "described"
 """Components of `TELEMETRY`: values of all signals in each row, styles of their lines, descriptions.
 
 The first two are structs with a field a signal: each component would cost some bytes more in every row.
-`DERIVED` (derived quantities of every row) and `MARKS` (markers of lines) have values and styles too."""
-
-LOW, MEAN, HIGH = "low", "mean", "high"
-"""Components of `ENVELOPE` in place of values: bounds and mean of each bin of time."""
+`DERIVED` (derived quantities of every row) and `ENVELOPE` have values and styles too; a field of an envelope
+has the least values of all entries in a bin of time, then the means, then the greatest values."""
 
 CHECKSUM, TOTAL = "checksum", "total"
 """Components of `TELEMETRY` and `EVENTS`: checksums, and how many rows or lines there are.

@@ -27,9 +27,6 @@ from spheretwin.viz.layout.view import (
     DERIVED,
     ENDED,
     ENVELOPE,
-    HIGH,
-    LOW,
-    MEAN,
     STYLES,
     SUMMARY,
     VALUES,
@@ -112,10 +109,11 @@ class PlotData(RecordingPart):
         """Log the styles of lines and markers and, in a live view, the facts of the run."""
         self._marks.begin(recording)
         if self.subject.view.decimated:
-            _log_styles(recording, ENVELOPE, self._styles)
+            envelopes = {name: style.of_envelope() for name, style in self._styles.items()}
+            _log_styles(recording, ENVELOPE, envelopes)
         else:
             names = [quantity.name for quantity in self._quantities]
-            _log_styles(recording, DERIVED, {name: self._styles[name] for name in names})
+            _log_styles(recording, DERIVED, {name: self._styles[name].lines() for name in names})
         if self.subject.live:
             log_summary(recording, self._summary.running())
 
@@ -131,7 +129,7 @@ class PlotData(RecordingPart):
         self._before = Table(rows.signals, rows.values[-1:].copy())
         self._summary.add(rows, values[ERROR_ANGLE.name][:, 0])
         if not self.subject.view.decimated:
-            _send(recording, DERIVED, rows["t_s"], {VALUES: values})
+            _send(recording, DERIVED, rows["t_s"], values)
         columns = np.concatenate([*values.values(), self._column_selector.of(rows)], axis=1)
         self._record(recording, self._bins.add(rows["t_s"], columns))
         self._marks.add(recording, rows["t_s"], columns)
@@ -167,11 +165,12 @@ class PlotData(RecordingPart):
             self._send_envelope(recording, binned)
 
     def _send_envelope(self, recording: rr.RecordingStream, binned: CompletedBins) -> None:
-        kinds = {LOW: binned.low, MEAN: binned.mean, HIGH: binned.high}
-        _send(recording, ENVELOPE, binned.t_s, {kind: self._split(block) for kind, block in kinds.items()})
-
-    def _split(self, columns: Array) -> dict[str, Array]:
-        return {name: columns[:, place] for name, place in self._places.items()}
+        blocks = binned.low, binned.mean, binned.high
+        values = {
+            name: np.concatenate([block[:, place] for block in blocks], axis=1)
+            for name, place in self._places.items()
+        }
+        _send(recording, ENVELOPE, binned.t_s, values)
 
 
 class Marks:
@@ -226,27 +225,15 @@ class Marks:
             recording.send_columns(entity, time_index(t_s), [scalars(marks, marks.shape[1])])
 
 
-def _send(
-    recording: rr.RecordingStream, entity: str, t_s: Array, kinds: Mapping[str, Mapping[str, Array]]
-) -> None:
-    """Send values as structs with a field for each name, in single precision: a plot shows no more."""
+def _send(recording: rr.RecordingStream, entity: str, t_s: Array, values: Mapping[str, Array]) -> None:
+    """Send values as a struct with a field for each name, in single precision: a plot shows no more."""
     with np.errstate(over="ignore", invalid="ignore"):  # a run that diverged has larger numbers
-        columns = [
-            rr.ComponentColumn(
-                component(kind, 0),
-                struct_component(
-                    {
-                        name: vectors(values.astype(np.float32), values.shape[1])
-                        for name, values in fields.items()
-                    }
-                ),
-            )
-            for kind, fields in kinds.items()
-        ]
-    recording.send_columns(entity, time_index(t_s), columns)
+        fields = {name: vectors(block.astype(np.float32), block.shape[1]) for name, block in values.items()}
+    column = rr.ComponentColumn(component(VALUES, 0), struct_component(fields))
+    recording.send_columns(entity, time_index(t_s), [column])
 
 
-def _log_styles(recording: rr.RecordingStream, entity: str, styles: Mapping[str, LineStyle]) -> None:
+def _log_styles(recording: rr.RecordingStream, entity: str, styles: Mapping[str, rr.SeriesLines]) -> None:
     structs = struct_component({name: as_struct(style) for name, style in styles.items()})
     batch = rr.DescribedComponentBatch(structs, rr.ComponentDescriptor(component(STYLES, 0)))
     recording.log(entity, [batch], static=True)

@@ -20,39 +20,38 @@ from spheretwin.viz.decimation import TimeBins
 from spheretwin.viz.layout.extents import ExtentTracker, plotted_signals
 from spheretwin.viz.layout.layout import layout
 from spheretwin.viz.layout.styles import quantity_style, signal_style
-from spheretwin.viz.layout.view import DERIVED, ENVELOPE, HIGH, LOW, MEAN, TIMELINE, VALUES, View, component
+from spheretwin.viz.layout.view import DERIVED, ENVELOPE, TIMELINE, VALUES, View, component
 from spheretwin.viz.quantities import angle_between, quantities_of
 from spheretwin.viz.recording.plots import ENVELOPE_RATE_Hz, Marks, log_end, log_summary
 from spheretwin.viz.recording.summary import Summary
 
 Array = NDArray[np.float64]
 
-_KINDS = {component(kind, 0): kind for kind in (VALUES, LOW, MEAN, HIGH)}
+_VALUES = component(VALUES, 0)
 
 
 class RecoveredPlots:
     """Plotted data of a recording, from which its missing end is made."""
 
     def __init__(self) -> None:
-        self._t_ns: dict[str, list[NDArray[np.int64]]] = defaultdict(list)
-        self._values: dict[tuple[str, str], list[Array]] = defaultdict(list)
+        self._t_ns: list[NDArray[np.int64]] = []
+        self._values: dict[str, list[Array]] = defaultdict(list)
 
     def gather(self, chunks: Iterable[Chunk]) -> Iterator[Chunk]:
         """Yield chunks, and keep the derived quantities or envelopes among them."""
         for chunk in chunks:
             if chunk.entity_path in (f"/{DERIVED}", f"/{ENVELOPE}"):
-                self._take(chunk.entity_path[1:], chunk.to_record_batch())
+                self._take(chunk.to_record_batch())
             yield chunk
 
-    def _take(self, entity: str, batch: pa.RecordBatch) -> None:
-        kinds = [name for name in batch.schema.names if name in _KINDS]
-        for name in kinds:
-            structs = batch.column(name).flatten()
-            for field, column in zip(structs.type, structs.flatten(), strict=True):
-                values = np.asarray(column.flatten(), dtype=np.float64).reshape(len(column), -1)
-                self._values[_KINDS[name], field.name].append(values)
-        if kinds:
-            self._t_ns[entity].append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
+    def _take(self, batch: pa.RecordBatch) -> None:
+        if _VALUES not in batch.schema.names:  # styles
+            return
+        structs = batch.column(_VALUES).flatten()
+        for field, column in zip(structs.type, structs.flatten(), strict=True):
+            values = np.asarray(column.flatten(), dtype=np.float64).reshape(len(column), -1)
+            self._values[field.name].append(values)
+        self._t_ns.append(np.asarray(batch.column(TIMELINE).cast(pa.int64())))
 
     def complete(
         self,
@@ -87,8 +86,9 @@ class RecoveredPlots:
         tracker, marks = ExtentTracker(sizes), Marks(view, styles, places)
         if self._t_ns:
             if view.decimated:
-                t_s = np.concatenate(self._t_ns[ENVELOPE]).astype(np.float64) * 1e-9
-                low, mean, high = (self._columns(kind, sizes) for kind in (LOW, MEAN, HIGH))
+                t_s = np.concatenate(self._t_ns).astype(np.float64) * 1e-9
+                parts = [np.split(np.concatenate(self._values[name]), 3, axis=1) for name in sizes]
+                low, mean, high = (np.concatenate(blocks, axis=1) for blocks in zip(*parts, strict=True))
                 tracker.add(t_s, low, high)
                 marks.add(recording, t_s, mean)
             else:
@@ -106,16 +106,13 @@ class RecoveredPlots:
         log_end(recording, summary.last_s)
         recording.send_blueprint(layout(view, tracker.extents(summary.last_s)))
 
-    def _columns(self, kind: str, sizes: Mapping[str, int]) -> Array:
-        return np.concatenate([np.concatenate(self._values[kind, name]) for name in sizes], axis=1)
-
     def _rows(self, sizes: Mapping[str, int], table: Table) -> tuple[Array, Array]:
         """Return times and columns of the rows that have derived quantities."""
-        t_ns = np.concatenate(self._t_ns[DERIVED])
+        t_ns = np.concatenate(self._t_ns)
         rows = np.searchsorted(np.round(table["t_s"] * 1e9).astype(np.int64), t_ns)
         columns = [
-            np.concatenate(self._values[VALUES, name])
-            if (VALUES, name) in self._values
+            np.concatenate(self._values[name])
+            if name in self._values
             else table[name].reshape(len(table), -1)[rows]
             for name in sizes
         ]

@@ -181,7 +181,7 @@ class Signals(RecordingPart):
 def _description(arrival: int, signals: tuple[Signal, ...]) -> list[rr.DescribedComponentBatch]:
     """Return what readers and viewers need to know of signals that arrived together."""
     styles = struct_component(
-        {signal.name: as_struct(signal_style(signal)) for signal in signals if signal.name != TIME}
+        {signal.name: as_struct(signal_style(signal).lines()) for signal in signals if signal.name != TIME}
     )
     style_batch = rr.DescribedComponentBatch(styles, rr.ComponentDescriptor(component(STYLES, arrival)))
     return [*signals_as_json(arrival, signals), style_batch]

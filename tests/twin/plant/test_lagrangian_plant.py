@@ -295,6 +295,7 @@ for function in (loop.loop, channels.write_channels):
 
 def test_compiled_and_plain_loops_are_kept_between_processes():
     """A law in plain Python runs in the plain loop, which calls compiled functions."""
+
     def hits_and_misses():
         command = [sys.executable, "-c", SECOND_PROCESS]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()

@@ -11,9 +11,6 @@ from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz.layout.view import (
     AFTER_THE_END,
-    HIGH,
-    LOW,
-    MEAN,
     STYLES,
     VALUES,
     VIEW_NAMES,
@@ -128,7 +125,7 @@ def fields(path):
     for chunk in RrdReader(path).stream():
         batch = chunk.to_record_batch()
         for name in batch.schema.names:
-            if name.startswith((VALUES, STYLES, LOW, MEAN, HIGH)):
+            if name.startswith((VALUES, STYLES)):
                 for field in batch.schema.field(name).type.value_type:
                     looks = field.type if name.startswith(STYLES) else []
                     there = found.setdefault((chunk.entity_path, name), set())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rerun.components import MarkerShape
+from rerun.components import AggregationPolicy, InterpolationMode, MarkerShape
 
 from spheretwin import scenario as scenarios
 from spheretwin.models.telemetry.signals import ANGLES, Signal, common_signals, width
@@ -27,7 +27,7 @@ OWN = (
     Signal("q_measured_rad", "rad", 3, "measured angles", ANGLES),
     Signal("qdot_estimated_rad_s", "rad/s", 3, "estimated rates", ANGLES),
     Signal("sliding_s", "rad/s", 3, "sliding variables", ANGLES),
-    Signal("voltage_limited", "1", 18, "share of the time"),
+    Signal("voltage_limited", "1", 18, "share of the time", tuple(f"group {i}" for i in range(18))),
 )
 
 
@@ -88,7 +88,6 @@ def ticks(t_ns):
 def test_every_line_is_the_signal_at_each_tick_or_its_bounds_in_each_bin(recording):
     path, rate_Hz, plotted = recording
     bins = bins_of(plots.ENVELOPE_RATE_Hz)
-    reductions = {"low_0": np.min, "high_0": np.max, "mean_0": np.mean}
     lines = {
         (line.entity, line.component, line.name)
         for panel in panels(path)
@@ -112,29 +111,33 @@ def test_every_line_is_the_signal_at_each_tick_or_its_bounds_in_each_bin(recordi
         # The last bin is drawn twice: from its first row to the end of the run.
         starts = [part[0] for part in bins] + [TICKS - 1]
         np.testing.assert_array_equal(ticks(t_ns), starts)
-        expected = np.array([reductions[component](whole[part], axis=0) for part in [*bins, bins[-1]]])
-        if component == "mean_0":  # summed in another order, in single precision at last
-            np.testing.assert_allclose(drawn, expected, rtol=1e-6, atol=1e-9)
-        else:
-            np.testing.assert_array_equal(drawn, expected.astype(np.float32))
+        low, mean, high = np.split(drawn, 3, axis=1)
+        parts = [*bins, bins[-1]]
+        np.testing.assert_array_equal(low, np.array([whole[part].min(axis=0) for part in parts], np.float32))
+        np.testing.assert_array_equal(high, np.array([whole[part].max(axis=0) for part in parts], np.float32))
+        # Summed in another order, and in single precision at last.
+        means = [whole[part].mean(axis=0) for part in parts]
+        np.testing.assert_allclose(mean, means, rtol=1e-6, atol=1e-9)
 
 
-def test_lines_of_one_panel_share_one_reduction(recording):
-    path, rate_Hz, _ = recording
+def test_all_lines_share_one_reduction(recording):
+    path, rate_Hz, plotted = recording
     for panel in panels(path):
-        kinds = {}
         for line in panel.drawn:
-            if line.visualizer == "SeriesLines":
-                policy = line.look.get("SeriesLines:aggregation_policy")
-                if policy is None:
-                    policy = style(path, line.entity, line.name)["aggregation_policy"]
-                kinds.setdefault(line.name, set()).add((line.component, policy[0]))
-        assert len({frozenset(reductions) for reductions in kinds.values()}) <= 1
-        for reductions in kinds.values():
-            # All values of a pixel; in an envelope the bounds of the bounds.
-            assert reductions == (
-                {("values_0", 5)} if rate_Hz is None else {("low_0", 4), ("high_0", 3), ("mean_0", 2)}
-            )
+            look = style(path, line.entity, line.name)
+            assert look["aggregation_policy"] == [AggregationPolicy.MinMax.value]  # all values of a pixel
+            mode = line.look.get("SeriesLines:interpolation_mode")
+            size = plotted[line.name].shape[1]
+            if rate_Hz is None:
+                assert mode is None
+                assert len(look["names"]) == size
+                continue
+            assert mode == [InterpolationMode.StepAfter.value]  # to the end of the bin
+            assert len(look["names"]) == 3 * size
+            low, mean, high = np.split(np.array(look["widths"]), 3)
+            assert np.all(low < mean)
+            assert np.all(high < mean)
+            assert panel.shown is None or panel.shown == panel.shown[:3] * 3
 
 
 MARKERS = {"●": MarkerShape.Circle, "×": MarkerShape.Cross, "+": MarkerShape.Plus}
@@ -175,7 +178,7 @@ def test_lines_that_share_a_panel_have_a_legend_or_a_key_and_markers_on_the_sign
         if panel.shown is None:
             continue
         # The title says which line has which marker; no two of them have one at the same time.
-        shown = np.array(panel.shown * len(few))
+        shown = np.array(panel.shown[:3] * len(few))
         assert panel.marked == shown.tolist()
         assert there[:, shown].sum(axis=1).max() == 1
         stated = {marker for glyph, marker in MARKERS.items() if f"{glyph} " in panel.title}
@@ -201,7 +204,7 @@ def test_each_panel_of_a_hinge_shows_its_own_entries(recording):
     assert len(shown) == 6
     for title, entries in shown.items():
         (hinge,) = (name for name in ANGLES if name in title)
-        assert entries == [name == hinge for name in ANGLES], title
+        assert entries[:3] == [name == hinge for name in ANGLES], title
 
 
 def test_ranges_and_titles_hold_the_largest_values(recording):
