@@ -123,6 +123,13 @@ class Bench:
         """
         return (self._bench_state.player or self._bench_state).history.read()
 
+    def bounds(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
+        """Return the least and the greatest values of all ticks in each 20 ms of the last 10 s, as `history`.
+
+        Rows at 50 Hz do not show what a current does between them.
+        """
+        return (self._bench_state.player or self._bench_state).history.read_bounds()
+
     def scenario_toml(self) -> str:
         """Return the present settings as a scenario file."""
         return as_toml(self._bench_state.driver.settings)

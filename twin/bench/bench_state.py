@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,17 @@ RATE_Hz = 50.0
 LENGTH_s = 10.0
 
 
+class _Bin(NamedTuple):
+    """Rows within 1/50 s: the first of them, and the bounds of all."""
+
+    number: int
+    row: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
 class History:
-    """Newest rows of the signals that every run has; a reader never delays the writer.
+    """Newest rows of the signals of every run, and bounds of all rows; a reader never delays the writer.
 
     Parameters
     ----------
@@ -40,20 +50,40 @@ class History:
         self._signals = common_signals(groups)
         self._width = width(self._signals)
         self._stride = max(1, round(1 / (RATE_Hz * period_s)))
-        self._rows: deque[NDArray[np.float64]] = deque(maxlen=round(LENGTH_s * RATE_Hz))
+        self._bins: deque[_Bin] = deque(maxlen=round(LENGTH_s * RATE_Hz))
 
     def write(self, first_tick: int, rows: Table) -> None:
-        """Add the rows that are due, for any chunks; they must not change any more."""
-        due = rows.values[-first_tick % self._stride :: self._stride]
+        """Add rows, in any chunks."""
+        if not len(rows):
+            return
+        values = rows.values[:, : self._width]
         # A run begins its rows with these signals; a recording may have them in another order.
         if rows.signals[: len(self._signals)] != self._signals:
             parts = [rows[signal.name].reshape(len(rows), -1) for signal in self._signals]
-            due = np.concatenate(parts, axis=1)[-first_tick % self._stride :: self._stride]
-        self._rows.extend(due[-(self._rows.maxlen or 0) :, : self._width].copy())
+            values = np.concatenate(parts, axis=1)
+        numbers = (first_tick + np.arange(len(values))) // self._stride
+        starts = np.flatnonzero(np.diff(numbers, prepend=numbers[0] - 1))[-(self._bins.maxlen or 0) :]
+        values, starts, numbers = values[starts[0] :], starts - starts[0], numbers[starts]
+        low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+        for place, number in enumerate(numbers.tolist()):
+            latest = self._bins[-1] if self._bins else None
+            new = _Bin(number, values[starts[place]].copy(), low[place], high[place])
+            if latest and latest.number == number:
+                bounds = np.minimum(latest.low, new.low), np.maximum(latest.high, new.high)
+                self._bins[-1] = _Bin(number, latest.row, *bounds)
+            else:
+                self._bins.append(new)
 
     def read(self) -> dict[str, NDArray[np.float64]]:
-        """The rows by signal, oldest first; a copy."""
-        rows = list(self._rows)  # in one step: another thread may write
+        """Return the first row of each bin by signal, oldest first; a copy."""
+        return self._by_signal([of.row for of in list(self._bins)])
+
+    def read_bounds(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
+        """Return the least and the greatest values of all rows in each bin by signal, oldest first."""
+        bins = list(self._bins)  # in one step: another thread may write
+        return self._by_signal([of.low for of in bins]), self._by_signal([of.high for of in bins])
+
+    def _by_signal(self, rows: list[NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
         table = Table(self._signals, np.array(rows).reshape(len(rows), self._width))
         return {signal.name: table[signal.name] for signal in self._signals}
 

@@ -192,7 +192,7 @@ class Page:
         if state.t_s != self._shown_s:
             self._shown_s = state.t_s
             self._scene.trail(np.array(state.q_rad))
-            self._plots.show(self._bench.history())
+            self._plots.show(*self._bench.bounds())
             self._plots.warm(state.t_s, state.temperature_C)
         self._modes_tab.show(state)
         self._faults_tab.show(state)

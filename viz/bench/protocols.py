@@ -35,8 +35,8 @@ class BenchProtocol(Protocol):
     def state(self) -> Any:
         """The latest picture."""
 
-    def history(self) -> dict[str, NDArray[np.float64]]:
-        """Rows of the last seconds, by signal."""
+    def bounds(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
+        """Least and greatest values in short parts of the last seconds, by signal."""
 
     def command_line(self) -> str:
         """The present settings as a command line."""

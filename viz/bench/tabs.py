@@ -11,6 +11,7 @@ import viser
 from numpy.typing import NDArray
 
 from spheretwin.models.base.errors import InputError
+from spheretwin.models.telemetry.signals import ANGLES
 from spheretwin.viz import theme
 from spheretwin.viz.bench.event_handlers import Event, EventHandlers, Note, on_press
 from spheretwin.viz.bench.protocols import BenchProtocol, Choices
@@ -152,6 +153,8 @@ class FilesTab:
             self._snapshots.visible = bool(state.snapshots)
 
 
+Array = NDArray[np.float64]
+
 # A group of buttons needs at least one button.
 NONE_YET = ("",)
 
@@ -174,8 +177,8 @@ class CurvesPanel:
     """
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        self._error = _plot(gui, "error, mrad", ("α", "β", "γ"))
-        self._torque = _plot(gui, "commanded torque, N·m", ("α", "β", "γ"))
+        self._error = _plot(gui, "error, mrad: bounds of all ticks", ANGLES, bounds=True)
+        self._torque = _plot(gui, "commanded torque, N·m: bounds of all ticks", ANGLES, bounds=True)
         self._temperature = _plot(gui, "warmest winding, °C", ("T",))
         self._temperature.visible = False
         self._warmest: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)
@@ -192,25 +195,33 @@ class CurvesPanel:
             self._temperature.data = tuple(np.array(self._warmest).T.copy())
             self._temperature.visible = True
 
-    def show(self, rows: dict[str, NDArray[np.float64]]) -> None:
-        """Draw rows, as a bench's history has them."""
-        if not rows or len(rows["t_s"]) < 2:
+    def show(self, low: dict[str, Array], high: dict[str, Array]) -> None:
+        """Draw the bounds of all ticks, as a bench has them: a band for each axis."""
+        count = len(low["t_s"]) if low else 0
+        if count < 2:
             return
-        stride = -(-len(rows["t_s"]) // MOST_POINTS)
-        t_s = rows["t_s"][::-stride][::-1]
-        for plot, values in (
-            (self._error, 1e3 * rows["error_rad"]),
-            (self._torque, rows["torque_command_Nm"]),
-        ):
-            plot.data = (t_s, *(np.ascontiguousarray(column[::-stride][::-1]) for column in values.T))
+        starts = np.arange(0, count, -(-count // MOST_POINTS))
+        for plot, name, factor in ((self._error, "error_rad", 1e3), (self._torque, "torque_command_Nm", 1.0)):
+            least = factor * np.minimum.reduceat(low[name], starts)
+            most = factor * np.maximum.reduceat(high[name], starts)
+            columns = (column for pair in zip(least.T, most.T, strict=True) for column in pair)
+            plot.data = (low["t_s"][starts], *map(np.ascontiguousarray, columns))
 
 
-def _plot(gui: viser.GuiApi, title: str, names: tuple[str, ...]) -> viser.GuiUplotHandle:
+def _plot(
+    gui: viser.GuiApi, title: str, names: tuple[str, ...], *, bounds: bool = False
+) -> viser.GuiUplotHandle:
+    """Return a plot with a line for each name, or with two and the band between them."""
     nothing = np.array([0.0, 1.0])
     colours = ["rgb({},{},{})".format(*colour) for colour in theme.AXIS_COLOURS[: len(names)]]
     curves: Any = tuple(
-        {"label": name, "stroke": colour, "width": 1.5, "points": {"show": False}}
+        {"label": f"{name}{end}", "stroke": colour, "width": 1.0 if end else 1.5, "points": {"show": False}}
         for name, colour in zip(names, colours, strict=True)
+        for end in ((" min", " max") if bounds else ("",))
+    )
+    bands: Any = tuple(
+        {"series": (2 * place + 2, 2 * place + 1), "fill": "rgba({},{},{},0.5)".format(*colour)}
+        for place, colour in enumerate(theme.AXIS_COLOURS[: len(names)])
     )
     axis = {
         "stroke": _INK,
@@ -220,8 +231,9 @@ def _plot(gui: viser.GuiApi, title: str, names: tuple[str, ...]) -> viser.GuiUpl
     }
     axes: Any = tuple({**axis, "size": size} for size in (32, 44))
     return gui.add_uplot(
-        data=(nothing, *(np.zeros(2) for _ in names)),
+        data=(nothing, *(np.zeros(2) for _ in curves)),
         series=({"label": "s"}, *curves),
+        bands=bands if bounds else None,
         title=title,
         scales={"x": {"time": False}},
         axes=axes,

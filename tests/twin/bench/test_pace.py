@@ -2,8 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from spheretwin.bench.bench_state import History
 from spheretwin.bench.pace import MOST_TICKS, CHUNK_s, LATE_s, Pace
+from spheretwin.models.telemetry.signals import common_signals, width
+from spheretwin.models.telemetry.table import Table
 from tests.twin.bench.cases import MODES, begun, bench, done, kept_rows, said
 from tests.twin.bench.test_operators import Clock
 
@@ -158,6 +163,28 @@ def test_the_history_is_decimated_bounded_and_independent_of_chunks():
         assert history["q_rad"].shape == (500, 3)
         assert history["current_A"].shape == (500, 18)
         np.testing.assert_allclose(history["t_s"][[0, -1]], [5.0, 14.98], rtol=1e-12)
+
+
+@given(st.sets(st.integers(1, 299)))
+def test_bounds_of_the_history_are_those_of_all_ticks_in_any_chunks(cuts):
+    """A 250 Hz square wave, which rows at 50 Hz show as a constant, and a spike of one tick."""
+    signals = common_signals(18)
+    table = Table(signals, np.zeros((300, width(signals))))
+    tick = np.arange(300)
+    table["t_s"][:] = 1e-3 * tick
+    table["current_A"][:, 3] = np.where(tick // 2 % 2, 4.0, -4.0)
+    table["error_rad"][137, 1] = 0.2
+    history = History(18, 1e-3)
+    for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 300], strict=True):
+        history.write(first, table.rows(first, last))
+    low, high = history.read_bounds()
+    for name in ("t_s", "current_A", "error_rad"):
+        blocks = table[name].reshape(15, 20, -1)
+        np.testing.assert_array_equal(low[name].reshape(15, -1), blocks.min(axis=1))
+        np.testing.assert_array_equal(high[name].reshape(15, -1), blocks.max(axis=1))
+        np.testing.assert_array_equal(history.read()[name].reshape(15, -1), blocks[:, 0])
+    assert high["current_A"][0, 3] - low["current_A"][0, 3] == 8.0
+    assert high["error_rad"][137 // 20, 1] == 0.2
 
 
 def test_the_realtime_factor_restarts_when_time_goes_back():

@@ -79,10 +79,11 @@ class Bench:
     def state(self):
         return self.now
 
-    def history(self):
+    def bounds(self):
         t_s = np.linspace(0.0, 1.0, 50)
         angles = np.stack([np.sin(t_s), np.cos(t_s), t_s], axis=1)
-        return {"t_s": t_s, "error_rad": 1e-3 * angles, "torque_command_Nm": angles}
+        low = {"t_s": t_s, "error_rad": 1e-3 * angles, "torque_command_Nm": angles}
+        return low, {name: values + 0.5 for name, values in low.items()}
 
     def command_line(self):
         return "spheretwin simulate hold"
