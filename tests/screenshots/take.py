@@ -1,5 +1,7 @@
 """Take the pictures that the READMEs show: ``python -m tests.screenshots.take [--out DIR] [NAME ...]``.
 
+``--inspect DIR`` takes them at five sizes instead, each also as a reader with deuteranopia sees it.
+
 Each is a run made anew, recorded, and drawn by Rerun's viewer without a screen; or a bench that is driven in
 Chromium, where the machine has it.
 """
@@ -11,6 +13,7 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from PIL import Image
 
 from tests.browser import CHROMIUM
@@ -22,6 +25,14 @@ WIDTH, HEIGHT = 1280, 800
 
 # A picture of an interface has few colours: these are enough for its shaded coils, in a fifth of the bytes.
 COLOURS = 256
+
+
+SIZES = (800, 600), (1024, 768), (1280, 800), (1920, 1080), (2560, 1440)
+
+# Machado, Oliveira and Fernandes (2009), severity 1, on linear light.
+DEUTERANOPIA = np.array(
+    [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+)
 
 
 class Recorded(NamedTuple):
@@ -70,25 +81,50 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(TABLE)}; all unless given")
     parser.add_argument("--out", type=Path, default=PICTURES, metavar="DIR")
     parser.add_argument("--size", default=f"{WIDTH}x{HEIGHT}", metavar="WIDTHxHEIGHT")
+    parser.add_argument(
+        "--inspect", type=Path, metavar="DIR", help="take all sizes and a simulation of colours"
+    )
     options = parser.parse_args()
     for name in options.names:
         if name not in TABLE:
             parser.error(f"expected one of {', '.join(TABLE)}, received {name}")
-    options.out.mkdir(parents=True, exist_ok=True)
-    width, height = map(int, options.size.split("x"))
-    with tempfile.TemporaryDirectory() as folder:
+    size = tuple(map(int, options.size.split("x")))
+    for width, height in SIZES if options.inspect else [size]:
+        folder = options.inspect / f"{width}x{height}" if options.inspect else options.out
         for name in options.names or TABLE:
-            row = TABLE[name]
-            if isinstance(row, Recorded):
-                picture = seen(name, row, Path(folder) / name, (width, height))
-            elif CHROMIUM:
-                picture = drawn(row.run.split(), row.poses_deg, (width, height), Path(folder))
-            else:
-                print(f"{name}: not taken: no Chromium on this machine", file=sys.stderr)
+            with tempfile.TemporaryDirectory() as work:
+                picture = taken(name, (width, height), Path(work))
+            if not picture:
                 continue
-            path = options.out / f"{name}.png"
-            picture.quantize(COLOURS).save(path, optimize=True)
-            print(path)
+            save(picture, folder / f"{name}.png")
+            if options.inspect:
+                save(as_deuteranope(picture), folder / f"{name}_deuteranopia.png")
+
+
+def taken(name: str, size: tuple[int, int], folder: Path) -> Image.Image | None:
+    """A picture of the table, or None where this machine cannot take it."""
+    row = TABLE[name]
+    if isinstance(row, Recorded):
+        return seen(name, row, folder / name, size)
+    if CHROMIUM:
+        return drawn(row.run.split(), row.poses_deg, size, folder)
+    print(f"{name}: not taken: no Chromium on this machine", file=sys.stderr)
+    return None
+
+
+def save(picture: Image.Image, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    picture.quantize(COLOURS).save(path, optimize=True)
+    print(path)
+
+
+def as_deuteranope(picture: Image.Image) -> Image.Image:
+    """The picture as a reader with deuteranopia sees it."""
+    encoded = np.asarray(picture.convert("RGB")) / 255
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    seen_light = np.clip(linear @ DEUTERANOPIA.T, 0, 1)
+    shown = np.where(seen_light <= 0.0031308, 12.92 * seen_light, 1.055 * seen_light ** (1 / 2.4) - 0.055)
+    return Image.fromarray(np.round(255 * shown).astype(np.uint8))
 
 
 def seen(name: str, picture: Recorded, folder: Path, size: tuple[int, int]) -> Image.Image:

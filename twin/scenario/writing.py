@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from spheretwin.scenario.changes import fields_with
 from spheretwin.scenario.hardware import hardware_defaults
 from spheretwin.scenario.reading import override, read, shipped, validated
-from spheretwin.scenario.sections import Scenario
+from spheretwin.scenario.sections import Scenario, UserController, UserPath
 
 # A shipped scenario with few fields: other scenarios are written as differences from it.
 PLAIN = "tilt"
@@ -63,11 +63,25 @@ def changed_fields(scenario: Scenario) -> dict[str, Any]:
     """
     fields = scenario.model_dump(mode="json")
     chosen = _chosen(scenario, fields)
-    defaults = _defaults(chosen)
+    defaults = _defaults(_without_objects(scenario, chosen))
     changed = {
         dotted: value for dotted, value in _flat(fields).items() if defaults.get(dotted) not in (None, value)
     }
     return {dotted: value for dotted, value in {**chosen, **changed}.items() if dotted not in _HEADINGS}
+
+
+def _without_objects(scenario: Scenario, chosen: dict[str, Any]) -> dict[str, Any]:
+    """Return the chosen fields, with shipped members in place of a law or trajectory given as an object."""
+    if isinstance(scenario.controller, UserController):
+        chosen = _with_section(chosen, "controller", {"law": "afsm"})
+    if isinstance(scenario.trajectory, UserPath):
+        chosen = _with_section(chosen, "trajectory", read(PLAIN)["trajectory"])
+    return chosen
+
+
+def _with_section(chosen: Mapping[str, Any], section: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+    others = {dotted: value for dotted, value in chosen.items() if not dotted.startswith(f"{section}.")}
+    return {**others, **{f"{section}.{name}": value for name, value in fields.items()}}
 
 
 def _chosen(scenario: Scenario, fields: Mapping[str, Any]) -> dict[str, Any]:
