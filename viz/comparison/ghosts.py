@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
+from spheretwin.viz.recording.currents import CoilCurrents
 from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, strips, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.scene3d import Frames, MovingActuator
@@ -153,6 +154,6 @@ class Tip(RecordingPart):
             self._last = tips[-1:]
 
 
-def body(subject: RecordingSubject, colour: theme.Colour, *, ghost: bool) -> RecordingPart:
-    """Return the bodies of a run: the whole actuator, or its rotor as a ghost."""
-    return Ghost(subject, colour) if ghost else MovingActuator(subject)
+def bodies(subject: RecordingSubject, colour: theme.Colour, *, ghost: bool) -> list[RecordingPart]:
+    """Return the bodies of a run: the whole actuator with its currents, or its rotor as a ghost."""
+    return [Ghost(subject, colour)] if ghost else [MovingActuator(subject), CoilCurrents(subject)]

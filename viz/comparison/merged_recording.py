@@ -16,7 +16,7 @@ from rerun.chunk import Chunk
 from spheretwin.models.base.files import whole_file
 from spheretwin.models.telemetry.table import Table
 from spheretwin.viz import theme
-from spheretwin.viz.comparison.ghosts import Array, Tip, body, send_line
+from spheretwin.viz.comparison.ghosts import Array, Tip, bodies, send_line
 from spheretwin.viz.comparison.layout import (
     COMPARE,
     END,
@@ -165,7 +165,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
             below = cast(rr.RecordingStream, SubtreeStream(recording, run.name))
             parts = [
                 Signals(subject),
-                body(subject, colour, ghost=place > 0),
+                *bodies(subject, colour, ghost=place > 0),
                 Tip(subject, TIP, "q_rad", f"{place + 1}", colour),
                 StateLanes(subject),
             ]

@@ -209,6 +209,7 @@ class Plots:
         marked = tuple(line.name for line in fields if line.size <= MOST_MARKED)
         if len(marked) > 1 or (axis is None and any(1 < line.size <= MOST_MARKED for line in fields)):
             contents.append(f"/{self.marked.setdefault(marked, f'{MARKS}/{len(self.marked)}')}")
+        has_legend = axis is None and bool(fields) and len(marked) == len(fields)
         one = [place == axis for place in range(len(ANGLES))]
         view = rrb.TimeSeriesView(
             origin="/",
@@ -216,8 +217,8 @@ class Plots:
             name=title,
             axis_x=self._time_axis(),
             axis_y=axis_y,
-            # A legend would list what is invisible too, and each row of a map.
-            plot_legend=None if fields and axis is None else rrb.PlotLegend(visible=False),
+            # A legend would list what is invisible too, each row of a map, and each of many groups.
+            plot_legend=None if has_legend else rrb.PlotLegend(visible=False),
             defaults=[]
             if axis is None
             else [

@@ -166,6 +166,19 @@ def test_every_run_has_a_body_and_one_alone_has_the_whole_actuator(merged):
         assert (f"/run_{place}_{name}/world/coils" in merged.entities) == (place == 1)
 
 
+def test_the_coils_have_the_colours_of_the_first_run_s_currents(files, merged):
+    table = read(files["first"]).table
+    rows = [
+        np.frombuffer(bytes(texel), np.uint8)
+        for chunk in RrdReader(merged.path).stream().filter(content="/run_1_first/world/coils")
+        if "Mesh3D:albedo_texture_buffer" in (batch := chunk.to_record_batch()).schema.names
+        for (texel,) in batch.column("Mesh3D:albedo_texture_buffer").to_pylist()
+    ]
+    limit_A = read(files["first"]).record.scenario["drive"]["current_limit_A"]
+    expected = theme.current_colours(table["current_A"], limit_A)
+    np.testing.assert_array_equal(rows, expected.reshape(len(table), -1))
+
+
 def test_nothing_but_the_file_is_left(merged):
     assert os.listdir(merged.path.parent) == ["all.rrd"]
 

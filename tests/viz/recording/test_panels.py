@@ -151,7 +151,7 @@ def test_lines_that_share_a_panel_have_a_legend_or_a_key_and_markers_on_the_sign
         names = sorted({line.name for line in panel.drawn})
         few = [name for name in names if plotted[name].shape[1] <= 3]
         (entity,) = [entity for entity in panel.entities if entity.startswith("/marks/")] or [None]
-        assert panel.legend == (bool(names) and panel.shown is None), panel.title
+        assert panel.legend == (bool(names) and names == few and panel.shown is None), panel.title
         if not (len(few) > 1 or any(plotted[name].shape[1] == 3 for name in few)):
             assert entity is None, panel.title
             continue
