@@ -27,9 +27,9 @@ class Recorder(Stream):
     """Takes a run's telemetry chunk by chunk and writes it to a recording.
 
     Every signal is recorded at the rate of the control ticks, or at a lower one with all extremes
-    (`decimation.FirstAndExtremeRows`), bit for bit; poses, coil colours and traces at 60 Hz; events and
-    states from all rows. The file gets its name when the recording closes; until then it is hidden, under a
-    temporary name that ends in ``.part``.
+    (`decimation.FirstAndExtremeRows`), bit for bit; currents of the coils as the signals, or at 60 Hz if
+    these have a lower rate; poses and traces at 60 Hz; events and states from all rows. The file gets its
+    name when the recording closes; until then it is hidden, under a temporary name that ends in ``.part``.
 
     Parameters
     ----------

@@ -10,14 +10,14 @@ TIP = np.array([[1.0, 2.0, 30.0], [4.0, -5.0, 31.0], [7.0, 8.0, 32.0]])
 DESIRED = TIP + [0.5, 0.25, 0.125]
 
 
-def drawn():
+def figure_of_paths():
     return paths(
         {"PD": TipPath("pd", TIP, DESIRED, False), "AFSM": TipPath("afsm", TIP, DESIRED, True)}, "title"
     )
 
 
 def test_paths_are_drawn_in_space_and_from_above():
-    figure = drawn()
+    figure = figure_of_paths()
     for place, law in enumerate(("pd", "afsm")):
         space, plan = figure.axes[2 * place : 2 * place + 2]
         for axes, size in ((space, 3), (plan, 2)):
@@ -37,7 +37,7 @@ def test_paths_are_drawn_in_space_and_from_above():
 
 
 def test_an_early_end_is_a_cross_at_the_last_tip():
-    figure = drawn()
+    figure = figure_of_paths()
     crosses = [
         line for line in figure.axes[1].get_lines() if line.get_marker() == "x" and len(line.get_xdata())
     ]

@@ -11,7 +11,7 @@ from rerun.chunk import RrdReader
 from spheretwin.viz.layout.view import TIMELINE
 
 
-class Drawn(NamedTuple):
+class PanelLine(NamedTuple):
     """One visualizer of a panel."""
 
     entity: str
@@ -34,7 +34,7 @@ class Panel(NamedTuple):
     """Which entries of the markers are visible; None for all."""
     legend: bool
     entities: list
-    drawn: list
+    lines: list
 
 
 def columns(path, store=None):
@@ -87,8 +87,8 @@ def panels(path):
         if name != "ViewBlueprint:class_identifier" or values[-1] != ["TimeSeries"]:
             continue
         entities = (layout.get((f"{view}/ViewContents", "ViewContents:query")) or [[]])[-1]
-        drawn = [
-            _drawn(
+        lines = [
+            _panel_line(
                 entity.partition("/overrides/")[2].partition("/visualizers")[0], values[-1], layout, entity
             )
             for (entity, component), values in layout.items()
@@ -103,18 +103,18 @@ def panels(path):
                 (layout.get((f"{view}/defaults", "SeriesPoints:visible_series")) or [None])[-1],
                 (layout.get((f"{view}/PlotLegend", "PlotLegend:visible")) or [[True]])[-1][0],
                 entities,
-                drawn,
+                lines,
             )
         )
     return found
 
 
-def _drawn(entity, mappings, layout, path):
+def _panel_line(entity, mappings, layout, path):
     by_target = {mapping["target"]: mapping for mapping in mappings}
     scalars = by_target["Scalars:scalars"]
     kind = (layout.get((path, "VisualizerInstruction:visualizer_type")) or [[""]])[-1][0]
     look = {name: values[-1] for (place, name), values in layout.items() if place == path and ":" in name}
-    return Drawn(
+    return PanelLine(
         entity,
         scalars["source_component"],
         scalars["selector"].removeprefix(".").removesuffix("[]"),

@@ -91,7 +91,7 @@ def test_every_line_is_the_signal_at_each_tick_or_its_bounds_in_each_bin(recordi
     lines = {
         (line.entity, line.component, line.name)
         for panel in panels(path)
-        for line in panel.drawn
+        for line in panel.lines
         if line.visualizer == "SeriesLines"
     }
     assert {name for _, _, name in lines} >= {
@@ -123,7 +123,7 @@ def test_every_line_is_the_signal_at_each_tick_or_its_bounds_in_each_bin(recordi
 def test_all_lines_share_one_reduction(recording):
     path, rate_Hz, plotted = recording
     for panel in panels(path):
-        for line in panel.drawn:
+        for line in panel.lines:
             look = style(path, line.entity, line.name)
             assert look["aggregation_policy"] == [AggregationPolicy.MinMax.value]  # all values of a pixel
             mode = line.look.get("SeriesLines:interpolation_mode")
@@ -148,7 +148,7 @@ def test_lines_that_share_a_panel_have_a_legend_or_a_key_and_markers_on_the_sign
     values, times = columns(path)
     several = 0
     for panel in panels(path):
-        names = sorted({line.name for line in panel.drawn})
+        names = sorted({line.name for line in panel.lines})
         few = [name for name in names if plotted[name].shape[1] <= 3]
         (entity,) = [entity for entity in panel.entities if entity.startswith("/marks/")] or [None]
         assert panel.legend == (bool(names) and names == few and panel.shown is None), panel.title
@@ -161,7 +161,7 @@ def test_lines_that_share_a_panel_have_a_legend_or_a_key_and_markers_on_the_sign
             for name in ("names", "colors", "markers")
         }
         styles = [
-            style(path, line.entity, line.name) for name in few for line in panel.drawn if line.name == name
+            style(path, line.entity, line.name) for name in few for line in panel.lines if line.name == name
         ]
         by_name = {
             name: colour for of in styles for name, colour in zip(of["names"], of["colors"], strict=True)
@@ -299,7 +299,7 @@ def test_lines_of_a_run_that_ended_early_reach_its_end(table, tmp_path):
         record(path, table, rate_Hz, Status.LEFT_WORKSPACE)
         for panel in panels(path):
             assert "/ended" in panel.entities
-            for line in panel.drawn:
+            for line in panel.lines:
                 if line.visualizer == "SeriesLines":
                     t_ns, _ = rows(path, line.entity, line.component, line.name)
                     assert ticks(t_ns)[-1] == TICKS - 1
@@ -326,7 +326,7 @@ def test_a_recording_that_was_not_closed_is_recovered_with_its_whole_picture(tab
     for panel in panels(closed):
         again = by_title[panel.title.partition(",")[0].partition(" ±")[0]]
         assert again.shown == panel.shown
-        assert [line[:4] for line in again.drawn] == [line[:4] for line in panel.drawn]
+        assert [line[:4] for line in again.lines] == [line[:4] for line in panel.lines]
         assert set(again.entities) == set(panel.entities)
         if panel.band:  # of rows that end a little earlier
             np.testing.assert_allclose(again.band, panel.band, rtol=0.15, atol=1e-9)

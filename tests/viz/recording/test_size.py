@@ -8,7 +8,9 @@ from spheretwin.models.telemetry.signals import width
 from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
-from spheretwin.viz.recording import plots
+from spheretwin.viz.recording import plots, stream
+from spheretwin.viz.recording.currents import CoilCurrents
+from spheretwin.viz.recording.plots import PlotData
 from spheretwin.viz.recording.recorder import Recorder
 
 
@@ -32,3 +34,13 @@ def test_pictures_take_a_bounded_share_of_the_numbers(tmp_path, monkeypatch, rat
     brief, long = (size_and_raw(tmp_path / f"{each:g}.rrd", each, rate_Hz) for each in (10.0, 20.0))
     grown, raw = long - brief
     assert grown <= share * raw
+
+
+def test_all_but_what_every_tick_draws_grows_no_faster_than_the_numbers(tmp_path, monkeypatch):
+    """Telemetry, poses, traces, map and states fit into what the compression of the numbers saves."""
+    monkeypatch.setattr(
+        stream, "PARTS", [part for part in stream.PARTS if part not in (CoilCurrents, PlotData)]
+    )
+    brief, long = (size_and_raw(tmp_path / f"{each:g}.rrd", each, None) for each in (10.0, 20.0))
+    grown, raw = long - brief
+    assert grown <= raw
