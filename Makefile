@@ -43,7 +43,7 @@ tune-rivals: setup ## search the gains of the compared laws again, and freeze th
 		$(BIN)/spheretwin sweep $$study --optimise && cp $${study}_study/gains.json twin/paper/$$study.json || exit 1; \
 	done
 
-screenshots: setup ## take the READMEs' pictures; with INSPECT=DIR at five sizes and as a colour-blind reader sees them
+screenshots: setup ## take the READMEs' pictures; with INSPECT=DIR these and more, at five sizes, in both themes, and as a colour-blind reader sees them
 	$(BIN)/python -m tests.screenshots.take $(if $(INSPECT),--inspect $(INSPECT))
 
 format: .venv-wheel/installed

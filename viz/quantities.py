@@ -313,7 +313,7 @@ COMPARED_QUANTITIES: tuple[Quantity, ...] = (
                group="angle", desired=_desired(i)) for i, axis in enumerate(ANGLES)),
     *(Quantity(f"sliding_{axis}_rad_s", "rad/s", f"sliding of {axis}", _entry(_signal("sliding_s"), i), 0.01,
                needs=("sliding_s",), group="sliding") for i, axis in enumerate(ANGLES)),
-    Quantity("torque_command_norm_Nm", "N·m", "commanded torque", _norm(_signal("torque_command_Nm")),
+    Quantity("torque_command_norm_Nm", "N·m", "command", _norm(_signal("torque_command_Nm")),
              DELIVERED.floor, group="effort"),
     Quantity("largest_current_A", "A", "top current", _largest_current, 0.05, group="effort"),
     MARGIN._replace(title="torque margin", group="effort", limits=(-0.05 * MOST, 1.05 * MOST)),

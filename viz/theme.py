@@ -1,6 +1,6 @@
 """Colours: one for each axis, each law and each role, and a scale for signed currents.
 
-Lines are drawn on the grounds of the viewer's dark and light theme, on pages, and on the ground of 3D views.
+Lines are drawn on the grounds of the viewer's dark and light theme, and on pages.
 Their colours have a contrast of at least 3:1 to each of these (WCAG 2), and differ for colour-blind readers.
 """
 
@@ -19,7 +19,6 @@ AXIS_COLOURS: tuple[Colour, ...] = ((208, 16, 8), (0, 166, 132), (112, 60, 240))
 The CIE76 difference of any two is at least 40 under deuteranopia, protanopia and tritanopia.
 """
 
-BACKGROUND: Colour = (20, 22, 26)
 TRACE: Colour = (230, 112, 20)
 NORTH: Colour = (150, 155, 163)
 SOUTH: Colour = (44, 47, 54)

@@ -1,31 +1,40 @@
-"""Take the pictures that the READMEs show: ``python -m tests.screenshots.take [--out DIR] [NAME ...]``.
+"""Take the pictures of the READMEs: ``python -m tests.screenshots.take [--out DIR] [NAME ...]``.
 
-``--inspect DIR`` takes them at five sizes instead, each also as a reader with deuteranopia sees it.
+``--inspect DIR`` takes these and more at five sizes instead, in both themes of the viewer, each also as a
+reader with deuteranopia sees it.
 
-Each is a run made anew, recorded, and drawn by Rerun's viewer without a screen; or a bench that is driven in
-Chromium, where the machine has it.
+A picture shows a new run, recorded and drawn by Rerun's viewer without a screen; or a bench in Chromium, if
+the machine has it.
 """
 
 import argparse
 import subprocess
 import sys
 import tempfile
+import urllib.request
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from PIL import Image
 
+from spheretwin import scenario as scenarios
+from spheretwin.outputs import Outputs
+from spheretwin.scenario import reading
+from spheretwin.session import Session
+from spheretwin.simulation import follow
+from spheretwin.viz.recording.viewer_server import RECORDING
 from tests.browser import CHROMIUM
 from tests.screenshots.bench import drawn
-from tests.screenshots.viewer import HeadlessViewer
+from tests.screenshots.viewer import DARK, THEMES, HeadlessViewer
 
 PICTURES = Path(__file__).parents[2] / "viz" / "pictures"
 WIDTH, HEIGHT = 1280, 800
 
-# A picture of an interface has few colours: these are enough for its shaded coils, in a fifth of the bytes.
+# A picture of an interface has few colours: these are enough for its shaded coils, in a fourth of the bytes,
+# and no colour changes by more than 25 of 255.
 COLOURS = 256
-
 
 SIZES = (800, 600), (1024, 768), (1280, 800), (1920, 1080), (2560, 1440)
 
@@ -42,6 +51,8 @@ class Recorded(NamedTuple):
     """Scenario and flags of each by the name of its file; two or more are merged."""
     view: str
     t_s: float
+    live: bool = False
+    """True for what a live view receives, which has one view."""
 
 
 class Driven(NamedTuple):
@@ -76,45 +87,67 @@ TABLE: dict[str, Recorded | Driven] = {
 }
 
 
+MORE: dict[str, Recorded | Driven] = {
+    "scenario": Recorded({"nutation": "nutation"}, "scenario", 3.4),
+    "open_overview": Recorded({"open": f"tilt --hardware prototype {OPEN}"}, "overview", 4.4),
+    "open_control": Recorded({"open": f"tilt --hardware prototype {OPEN}"}, "control", 4.4),
+    "failed_control": Recorded({"failing": FAILING}, "control", 1.222),
+    "compare_failed": Recorded({"afsm": "sinusoid --disturbance.load 2", "pd": FAILING}, "compare", 1.0),
+    "live": Recorded({"nutation": "nutation"}, "overview", 3.4, live=True),
+}
+"""Pictures for an inspection only."""
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(TABLE)}; all unless given")
+    known = TABLE | MORE
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(known)}")
     parser.add_argument("--out", type=Path, default=PICTURES, metavar="DIR")
     parser.add_argument("--size", default=f"{WIDTH}x{HEIGHT}", metavar="WIDTHxHEIGHT")
     parser.add_argument(
-        "--inspect", type=Path, metavar="DIR", help="take all sizes and a simulation of colours"
+        "--inspect", type=Path, metavar="DIR", help="all sizes, both themes and a simulation of colours"
     )
     options = parser.parse_args()
     for name in options.names:
-        if name not in TABLE:
-            parser.error(f"expected one of {', '.join(TABLE)}, received {name}")
-    size = tuple(map(int, options.size.split("x")))
-    for width, height in SIZES if options.inspect else [size]:
-        folder = options.inspect / f"{width}x{height}" if options.inspect else options.out
+        if name not in known:
+            parser.error(f"expected one of {', '.join(known)}, received {name}")
+    if not options.inspect:
+        size = tuple(map(int, options.size.split("x")))
         for name in options.names or TABLE:
-            with tempfile.TemporaryDirectory() as work:
-                picture = taken(name, (width, height), Path(work))
-            if not picture:
-                continue
-            save(picture, folder / f"{name}.png")
-            if options.inspect:
-                save(as_deuteranope(picture), folder / f"{name}_deuteranopia.png")
+            for _, _, picture in pictures_of(name, known[name], [size], [DARK]):
+                save(picture, options.out / f"{name}.png")
+        return
+    for name in options.names or known:
+        for (width, height), theme, picture in pictures_of(name, known[name], SIZES, THEMES):
+            folder = options.inspect / f"{width}x{height}"
+            save(picture, folder / f"{name}_{theme}.png")
+            save(as_deuteranope(picture), folder / f"{name}_{theme}_deuteranopia.png")
 
 
-def taken(name: str, size: tuple[int, int], folder: Path) -> Image.Image | None:
-    """A picture of the table, or None where this machine cannot take it."""
-    row = TABLE[name]
-    if isinstance(row, Recorded):
-        return seen(name, row, folder / name, size)
-    if CHROMIUM:
-        return drawn(row.run.split(), row.poses_deg, size, folder)
-    print(f"{name}: not taken: no Chromium on this machine", file=sys.stderr)
-    return None
+Size = tuple[int, int]
+
+
+def pictures_of(
+    name: str, row: Recorded | Driven, sizes: Sequence[Size], themes: Sequence[str]
+) -> Iterator[tuple[Size, str, Image.Image]]:
+    """Yield the pictures of a row, each with size and theme; none if this machine cannot take them."""
+    with tempfile.TemporaryDirectory() as work:
+        if isinstance(row, Recorded):
+            recording = recorded(row, Path(work))
+            for size in sizes:
+                for theme in themes:
+                    yield size, theme, viewer_picture(name, recording, row.t_s, size, theme)
+        elif CHROMIUM:
+            for size in sizes:  # a bench has one theme
+                yield size, DARK, drawn(row.run.split(), row.poses_deg, size, Path(work))
+        else:
+            print(f"{name}: not taken: no Chromium on this machine", file=sys.stderr)
 
 
 def save(picture: Image.Image, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    picture.quantize(COLOURS).save(path, optimize=True)
+    few = picture.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=3, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
     print(path)
 
 
@@ -127,12 +160,11 @@ def as_deuteranope(picture: Image.Image) -> Image.Image:
     return Image.fromarray(np.round(255 * shown).astype(np.uint8))
 
 
-def seen(name: str, picture: Recorded, folder: Path, size: tuple[int, int]) -> Image.Image:
-    """The picture's moment, as a viewer draws it; what the viewer cannot draw is said."""
-    recording = recorded(picture, folder)
-    with HeadlessViewer(*size) as viewer:  # each anew: a viewer keeps what it was shown last
+def viewer_picture(name: str, recording: Path, t_s: float, size: Size, theme: str) -> Image.Image:
+    """Return a moment of a recording, as a viewer draws it; report what the viewer cannot draw."""
+    with HeadlessViewer(*size, theme) as viewer:  # a new one: a viewer keeps the former layout
         viewer.open(recording)
-        image = viewer.at(picture.t_s)
+        image = viewer.at(t_s)
         for fault in viewer.faults():
             print(f"{name}: {fault}", file=sys.stderr)
     return image
@@ -140,15 +172,27 @@ def seen(name: str, picture: Recorded, folder: Path, size: tuple[int, int]) -> I
 
 def recorded(picture: Recorded, folder: Path) -> Path:
     """Recording of the picture's run, or of all its runs side by side."""
-    folder.mkdir()
     paths = [folder / f"{name}.rrd" for name in picture.runs]
     for flags, path in zip(picture.runs.values(), paths, strict=True):
+        if picture.live:
+            return live_recording(flags.split(), path)
         view = [] if len(paths) > 1 else ["--view", picture.view]
         spheretwin("simulate", *flags.split(), *view, "--record", path)
     if len(paths) == 1:
         return paths[0]
     spheretwin("review", *paths, "--merge", folder / "merged.rrd")
     return folder / "merged.rrd"
+
+
+def live_recording(run: list[str], path: Path) -> Path:
+    """Save what a live view of a run receives."""
+    with Session(scenarios.load(run[0], reading.overrides(run[1:]))) as session:
+        outputs = Outputs(session, None, None, live=True)
+        follow(session, session.scenario.ticks, outputs.sinks)
+        stream = urllib.request.urlopen(outputs._live.address.rstrip("/") + RECORDING)
+        outputs.close()
+        path.write_bytes(stream.read())
+    return path
 
 
 def spheretwin(*arguments: str | Path) -> None:

@@ -110,7 +110,7 @@ def test_compared_quantities_have_units_titles_and_limits():
     assert by_name["sliding_α_rad_s"].heading == "sliding of α [rad/s]"
     assert by_name["error_angle_deg"].heading == "error as one angle [°]"
     assert by_name["largest_current_A"].heading == "top current [A]"
-    assert by_name["torque_command_norm_Nm"].heading == "commanded torque [N·m]"
+    assert by_name["torque_command_norm_Nm"].heading == "command [N·m]"
     assert by_name["torque_margin"].limits == pytest.approx((-0.15, 3.15))  # 5 % of the largest, 3
     groups = [quantity.group for quantity in COMPARED_QUANTITIES]
     assert list(dict.fromkeys(groups)) == ["whole", "error", "angle", "sliding", "effort", "more"]

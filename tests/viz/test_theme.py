@@ -16,7 +16,6 @@ GROUNDS = {
     "viewer, dark": (13, 13, 13),
     "viewer, light": (255, 255, 255),
     "page, dark": (0x15, 0x18, 0x1C),
-    "3D view": theme.BACKGROUND,
 }
 
 # Machado, Oliveira and Fernandes (2009), severity 1.0, on linear red, green and blue.
@@ -39,7 +38,7 @@ VISION = {
     ],
 }
 
-BODIES = ("BACKGROUND", "NORTH", "SOUTH")
+BODIES = ("NORTH", "SOUTH")
 """Surfaces of 3D views, which lights shade."""
 
 

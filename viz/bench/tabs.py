@@ -178,7 +178,7 @@ class CurvesPanel:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._error = _plot(gui, "error, mrad: bounds of all ticks", ANGLES, bounds=True)
-        self._torque = _plot(gui, "commanded torque, N·m: bounds of all ticks", ANGLES, bounds=True)
+        self._torque = _plot(gui, "command, N·m: bounds of all ticks", ANGLES, bounds=True)
         self._temperature = _plot(gui, "warmest winding, °C", ("T",))
         self._temperature.visible = False
         self._warmest: deque[tuple[float, float]] = deque(maxlen=MOST_POINTS)

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import rerun.blueprint as rrb
 
-from spheretwin.viz import theme
 from spheretwin.viz.comparison.ghosts import ROTOR
 from spheretwin.viz.layout.layout import blueprint
 from spheretwin.viz.layout.plots import time_axis, time_range
@@ -75,7 +74,7 @@ def layout(view: ComparisonView) -> rrb.Blueprint:
     )
     return blueprint(
         rrb.Horizontal(
-            rrb.Vertical(_bodies(view), _legend(view), texts, row_shares=[5, 0.5 + 0.45 * len(view.runs), 3]),
+            rrb.Vertical(_bodies(view), _legend(view), texts, row_shares=[5, 0.5 + 0.6 * len(view.runs), 3]),
             rrb.Vertical(*rows, row_shares=[4 if group == LARGE else 3 for group in groups]),
             column_shares=[2, 3],
             name="compare",
@@ -111,8 +110,7 @@ def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
         contents=[*bodies, *(f"{tip}/**" for tip in tips)],
-        name="run 1 in the actuator, the others as ghosts",
-        background=list(theme.BACKGROUND),
+        name="run 1; the others as ghosts",
         line_grid=False,
         eye_controls=eye(view.size),
         overrides={f"{tip}/path": time_range(TRAIL_S) for tip in tips},
@@ -122,9 +120,7 @@ def _bodies(view: ComparisonView) -> rrb.Spatial3DView:
 def _legend(view: ComparisonView) -> rrb.Spatial2DView:
     """View of the colours and labels of the runs: a legend within a plot would cover lines."""
     bounds = rrb.VisualBounds2D(x_range=[-0.1, 1.1], y_range=[-0.5, len(view.runs) - 0.1])
-    return rrb.Spatial2DView(
-        origin=f"/{LEGEND}", name="runs", visual_bounds=bounds, background=list(theme.BACKGROUND)
-    )
+    return rrb.Spatial2DView(origin=f"/{LEGEND}", name="runs", visual_bounds=bounds)
 
 
 def _states(view: ComparisonView) -> rrb.StateTimelineView:

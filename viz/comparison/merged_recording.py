@@ -36,7 +36,7 @@ from spheretwin.viz.layout.styles import MIDDLE, THICK, THIN
 from spheretwin.viz.layout.view import SCENARIO
 from spheretwin.viz.quantities import Quantity, compared_quantities
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
-from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, scalars, time_index
+from spheretwin.viz.recording.part import RecordingPart, RecordingSubject, drawable, scalars, time_index
 from spheretwin.viz.recording.recorder import MOST_ROWS
 from spheretwin.viz.recording.signals import Signals
 from spheretwin.viz.recording.status import StateChanges, StateLanes, log_lines
@@ -158,7 +158,7 @@ def write(path: Path, runs: Sequence[ComparedRun], subjects: Sequence[RecordingS
     colours = [theme.rgb(colour) for colour in theme.run_colours([run.law for run in runs])]
     with recorded(path, application(view), layout(view)) as recording:
         recording.send_recording_name(f"{len(runs)} runs")
-        text = "\n".join([text, *_outside(quantities, ranges)])
+        text = drawable("\n".join([text, *_outside(quantities, ranges)]))
         recording.log(RUNS, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
         _log_legend(recording, runs, colours)
         for place, (run, subject, colour) in enumerate(zip(runs, subjects, colours, strict=True)):
@@ -244,7 +244,7 @@ def _log_legend(
     lines = rr.LineStrips2D(
         ends,
         colors=list(colours),
-        labels=[run.legend for run in runs],
+        labels=[drawable(run.legend) for run in runs],
         show_labels=True,
         radii=rr.Radius.ui_points(2.0),
     )

@@ -100,7 +100,6 @@ def _layout(trajectories: Mapping[str, LawTrajectory]) -> rrb.Blueprint:
     tips = rrb.Spatial3DView(
         origin=f"/{WORLD}",
         name="the shaft's tip under each law",
-        background=list(theme.BACKGROUND),
         overrides={f"/{WORLD}/{_part(label)}/path": trail for label in (DESIRED, *trajectories)},
     )
     plots = [

@@ -209,7 +209,8 @@ class Plots:
         marked = tuple(line.name for line in fields if line.size <= MOST_MARKED)
         if len(marked) > 1 or (axis is None and any(1 < line.size <= MOST_MARKED for line in fields)):
             contents.append(f"/{self.marked.setdefault(marked, f'{MARKS}/{len(self.marked)}')}")
-        has_legend = axis is None and bool(fields) and len(marked) == len(fields)
+        # A legend of one line would repeat the title, and cover a part of a small plot.
+        has_legend = axis is None and len(marked) == len(fields) and sum(line.size for line in fields) > 1
         one = [place == axis for place in range(len(ANGLES))]
         view = rrb.TimeSeriesView(
             origin="/",

@@ -85,10 +85,7 @@ def run_line() -> rrb.TextDocumentView:
 def current_map(plots: Plots) -> rrb.TimeSeriesView:
     """Currents as colours: a row for each group, time along it."""
     limit, groups = plots.view.current_limit_A, plots.view.groups
-    title = (
-        f"mean currents of groups 0 (lowest) to {groups - 1}, -{limit:g} A blue to +{limit:g} A red;"
-        " top: how much they vary"
-    )
+    title = f"mean currents, -{limit:g} A blue, +{limit:g} A red; top: variation"
     lines = PlotLine(CURRENT_MAP, ""), PlotLine(CURRENT_VARIATION, "")
     return plots.fixed(title, *lines, low=-0.7, high=groups + VARIATION_LANE)
 
@@ -142,7 +139,7 @@ def control(plots: Plots) -> rrb.Container:
             *lines,
             least=DELIVERED.floor,
             axis=axis,
-            key=": ● delivered, × command, + load",
+            key=": ●coils ×command +load",
         )
         for axis, name in enumerate(ANGLES)
     ]
@@ -209,13 +206,13 @@ def hardware(plots: Plots) -> rrb.Container:
     shown = []
     if "coil_temperature_degC" in names:
         line = plots.signal("coil_temperature_degC")
-        shown.append(plots.whole("temperature of the coils", "°C", line, least=LEAST_degC))
+        shown.append(plots.whole("coil temperature", "°C", line, least=LEAST_degC))
     if "voltage_limited" in names:
-        title = "share of time with the voltage at its limit"
+        title = "time at voltage limit [1]"
         shown.append(plots.fixed(title, plots.signal("voltage_limited"), low=-0.02, high=1.05))
     if "supply_power_W" in names:
         line = plots.signal("supply_power_W")
-        shown.append(plots.whole("power of the supply", "W", line, least=LEAST_W))
+        shown.append(plots.whole("supply power", "W", line, least=LEAST_W))
     if "q_measured_rad" in names:
         title = "measured - true"
         shown.append(plots.about_zero(title, "mrad", quantity(MEASURED_ANGLE), least=MEASURED_ANGLE.floor))
@@ -233,7 +230,7 @@ def hardware(plots: Plots) -> rrb.Container:
     )
 
 
-EYE_m, LOOKED_AT_m = (0.16, -0.16, 0.22), (0.0, 0.0, 0.02)
+EYE_m, LOOKED_AT_m = (0.16, -0.16, 0.22), (0.0, 0.0, 0.012)
 
 
 def eye(size: float) -> rrb.EyeControls3D:
@@ -264,7 +261,7 @@ def overview(plots: Plots) -> rrb.Container:
         plots.above_zero("error as one angle", "°", quantity(ERROR_ANGLE), least=ERROR_ANGLE.floor),
         error_of_each_axis(plots),
         plots.fixed(
-            f"torque margin [times the commanded], 0 is saturated, {MOST:g} or more is {MOST:g}",
+            f"torque margin [× command], 0 saturated, to {MOST:g}",
             quantity(MARGIN),
             low=-0.05 * MOST,
             high=1.05 * MOST,

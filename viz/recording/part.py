@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -138,6 +139,18 @@ def scalars(values: NDArray[np.float64], size: int) -> rr.ComponentColumn:
     """Return the result of `rr.Scalars.columns` for (n, size) values, at half of its cost."""
     batch = rr.components.ScalarBatch(values.ravel())
     return rr.ComponentColumn(_SCALARS, batch, offsets=size * np.arange(len(values) + 1, dtype=np.int32))
+
+
+# The viewer has Inter for Latin, Greek and Cyrillic, and few symbols.
+_NOT_IN_FONT = re.compile("[^\n -~\u00a0-\u0377\u0384-\u03e1\u0400-\u04ff\u2010-\u2027\u2212✔⚠✗▶]")
+
+
+def drawable(text: str) -> str:
+    r"""Return a text with an escape such as ``\u6f22`` for each character that the viewer's font lacks.
+
+    A viewer without a screen ends at such a character; other viewers draw the same mark for all of them.
+    """
+    return _NOT_IN_FONT.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 def struct_component(fields: Mapping[str, pa.Array]) -> ArrowComponent:

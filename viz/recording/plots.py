@@ -37,6 +37,7 @@ from spheretwin.viz.quantities import ERROR_ANGLE, QuantityRows, quantities_of
 from spheretwin.viz.recording.part import (
     RecordingPart,
     RecordingSubject,
+    drawable,
     scalars,
     struct_component,
     time_index,
@@ -241,4 +242,4 @@ def _log_styles(recording: rr.RecordingStream, entity: str, styles: Mapping[str,
 
 def log_summary(recording: rr.RecordingStream, text: str) -> None:
     """Log the headline."""
-    recording.log(SUMMARY, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+    recording.log(SUMMARY, rr.TextDocument(drawable(text), media_type=rr.MediaType.MARKDOWN), static=True)

@@ -22,6 +22,7 @@ from spheretwin.viz.recording.part import (
     RecordingPart,
     RecordingSubject,
     RowSet,
+    drawable,
     no_vectors,
     range_checksum,
     struct_component,
@@ -74,8 +75,8 @@ class ScenarioText(RecordingPart):
     def begin(self, recording: rr.RecordingStream) -> None:
         """Log text and facts."""
         facts = self.subject.facts
-        recording.send_recording_name(f"{facts.name}, {facts.law}")
-        text = rr.TextDocument(_as_markdown(facts), media_type=rr.MediaType.MARKDOWN)
+        recording.send_recording_name(drawable(f"{facts.name}, {facts.law}"))
+        text = rr.TextDocument(drawable(_as_markdown(facts)), media_type=rr.MediaType.MARKDOWN)
         recording.log(SCENARIO, text, static=True)
         recording.log(SCENARIO, facts_as_json(facts, self.subject.rate_Hz), static=True)
 

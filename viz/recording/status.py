@@ -18,6 +18,7 @@ from spheretwin.viz.recording.part import (
     RecordingPart,
     RecordingSubject,
     checksums,
+    drawable,
     nanoseconds,
     time_index,
     total,
@@ -124,7 +125,7 @@ def log_lines(recording: rr.RecordingStream, events: list[Event], first: int = 0
         Number of the first of them.
     """
     if events:
-        t_s, level, text = zip(*events, strict=True)
+        t_s, level, text = zip(*((t_s, level, drawable(text)) for t_s, level, text in events), strict=True)
         lines = rr.TextLog.columns(text=list(text), level=list(level))
         t_ns = nanoseconds(np.array(t_s)).tolist()
         sums = line_checksums(list(zip(t_ns, level, text, strict=True)), first)

@@ -16,6 +16,10 @@ from spheretwin.models.telemetry.table import Table, rank_lost, saturated
 FAILSAFE_REASON = "failsafe_reason"
 """Signal of runs with a watchdog."""
 
+# Two spaces at the end of a line break it, at half of the distance between paragraphs. Headings would take
+# two lines each, and a small window has room for three lines.
+_LINE_BREAK = "  \n"
+
 _SYMBOLS = {Level.INFO: "✔", Level.WARN: "⚠", Level.ERROR: "✗"}
 
 _HEADLINES = {Status.COMPLETED: "COMPLETED", Status.INTERRUPTED: "INTERRUPTED", Status.FAILSAFE: "FAILSAFE"}
@@ -66,7 +70,7 @@ class Summary:
 
     def running(self) -> str:
         """Return the text of a run in progress."""
-        return f"#### ▶ RUNNING · {self._run_text()}"
+        return f"**▶ RUNNING · {self._run_text()}**"
 
     def ended(self, status: Status) -> str:
         """Return the text of a run that has ended."""
@@ -77,15 +81,14 @@ class Summary:
                 lines.append(f"**{reason}**")
             lines.append(self._figures())
         lines.extend(self._fault_lines())
-        # Two spaces at the end of a line break it, at half of the distance between paragraphs.
-        return f"#### {_SYMBOLS[status.level]} {headline} · {self._run_text()}\n\n" + "  \n".join(lines)
+        return _LINE_BREAK.join([f"**{_SYMBOLS[status.level]} {headline} · {self._run_text()}**", *lines])
 
     def cut_off(self) -> str:
         """Return the text of a run whose recording was not closed; figures are those of the recorded rows."""
         until = f"the recording was not closed; its rows end at {self.last_s:.3g} s"
         until += f" of {self._facts.duration_s:g} s"
-        lines = [f"**{until}**", self._figures(), *self._fault_lines()]
-        return f"#### {_SYMBOLS[Level.WARN]} NOT CLOSED · {self._run_text()}\n\n" + "  \n".join(lines)
+        headline = f"**{_SYMBOLS[Level.WARN]} NOT CLOSED · {self._run_text()}**"
+        return _LINE_BREAK.join([headline, f"**{until}**", self._figures(), *self._fault_lines()])
 
     def _reason(self, status: Status) -> str:
         if status in (Status.COMPLETED, Status.RUNNING):

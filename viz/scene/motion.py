@@ -77,7 +77,7 @@ TORQUE_STYLES = {
 METRES_PER_Nm = 0.1
 """Length of an arrow for an actuator of the shipped size; like the axes, it grows with the actuator."""
 
-SCALE = f"torque arrows: the length of x, y, z is {AXES_LENGTH_m / METRES_PER_Nm:g} N·m"
+SCALE = f"axes are {AXES_LENGTH_m / METRES_PER_Nm:g} N·m long"
 """Scale of the arrows, for the name of the view."""
 
 LONGEST_m = 1e3

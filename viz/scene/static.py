@@ -29,7 +29,7 @@ ALONG = np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
 UP = np.array([-0.4, 0.4, 0.82])
 LENGTH_m, HEIGHT_m = 0.14, 0.008
 STRIPES = 32
-TICKS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+TICKS = (-1.0, 0.0, 1.0)
 
 
 def size_of(actuator: Actuator) -> float:
@@ -76,7 +76,7 @@ def current_scale_labels(limit_A: float, size: float) -> rr.Points3D:
     return rr.Points3D(
         size * (MIDDLE_m + LENGTH_m / 2 * at[:, None] * ALONG - 0.3 * HEIGHT_m * UP),
         labels=[f"{share * limit_A:+g} A" if share else "0" for share in at.tolist()],
-        colors=[theme.DESIRED_TRACE],
+        colors=theme.current_colours(at, 1.0),
         radii=rr.Radius.ui_points(1.0),
         show_labels=True,
     )

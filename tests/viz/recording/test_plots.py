@@ -142,10 +142,10 @@ def test_the_headline_says_what_was_run_how_it_ended_and_how_good_it_was(run):
     for chunk in RrdReader(path).stream().filter(content=f"/{SUMMARY}"):
         batch = chunk.to_record_batch()
         text = batch.column("TextDocument:text").to_pylist()[-1][0]
-    headline, figures = text.split("\n\n")
+    headline, figures = text.split("  \n")
     assert (
         headline
-        == "#### ✔ COMPLETED · nutation under afsm · modelling error m = 0.2 · load L = 2 · ideal hardware"
+        == "**✔ COMPLETED · nutation under afsm · modelling error m = 0.2 · load L = 2 · ideal hardware**"
     )
     error_deg = np.degrees(angle_between(table["q_rad"], table["q_ref_rad"]))
     saturated = np.mean((table["allocation_scale"] > 0) & (table["allocation_scale"] < 1))
@@ -154,10 +154,10 @@ def test_the_headline_says_what_was_run_how_it_ended_and_how_good_it_was(run):
         f"error: largest **{largest:.3g}°**, RMS **{rms:.3g}°** · saturated {share:.1f} % of the time"
     )
     summary = Summary(facts_of(session.scenario))
-    assert summary.running().startswith("#### ▶ RUNNING · nutation")
-    assert summary.ended(Status.DIVERGED).startswith("#### ✗ FAILED · nutation")
+    assert summary.running().startswith("**▶ RUNNING · nutation")
+    assert summary.ended(Status.DIVERGED).startswith("**✗ FAILED · nutation")
     summary.add(table.rows(0, 4), np.array([1.0, 7.0, 5.0, 5.0]))
-    lines = summary.ended(Status.LEFT_WORKSPACE).split("\n\n")[1].split("  \n")
+    lines = summary.ended(Status.LEFT_WORKSPACE).split("  \n")[1:]
     alpha, beta, gamma = np.degrees(table["q_rad"][3])
     assert lines[0] == (
         "**left workspace at 0.003 s of 2.6 s: a hinge reached the end of its range,"
@@ -195,9 +195,8 @@ def test_the_headline_names_each_fault_its_start_and_its_detection(facts_with_fa
     summary = Summary(facts_with_faults)
     for first, last in zip([0, *sorted(cuts)], [*sorted(cuts), 100], strict=True):
         summary.add(table.rows(first, last), np.zeros(last - first))
-    headline, lines = summary.ended(Status.FAILSAFE).split("\n\n")
-    assert headline.startswith("#### ✗ FAILSAFE · hold")
-    reason, _, faults = lines.split("  \n")
+    headline, reason, _, faults = summary.ended(Status.FAILSAFE).split("  \n")
+    assert headline.startswith("**✗ FAILSAFE · hold")
     assert reason == "**failsafe at 0.099 s of 3 s: a coil is too hot**"
     assert faults == (
         "faults: coil.01 shorted from 0.02 s, detected after 5 ms; coil.00 open from 0.04 s to 0.06 s,"

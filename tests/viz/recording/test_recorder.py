@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from spheretwin.provenance import facts_of
 from spheretwin.session import Session
 from spheretwin.simulation import follow
 from spheretwin.viz import theme
-from spheretwin.viz.layout.view import EVENTS, SCENARIO, TELEMETRY
+from spheretwin.viz.layout.view import EVENTS, SCENARIO, SUMMARY, TELEMETRY
 from spheretwin.viz.recording.reader import read
 from spheretwin.viz.recording.recorder import Recorder
 from spheretwin.viz.recording.stream import PENDING_CHUNKS
@@ -254,3 +255,19 @@ def test_every_recording_is_an_application_of_its_own(tmp_path):
     ]
     assert len(set(found)) == 3
     assert all(set(each) <= set("abcdefghijklmnopqrstuvwxyz0123456789-") for each in found)
+
+
+def test_texts_have_escapes_for_characters_that_the_viewer_cannot_draw(tmp_path):
+    session, facts = hold_facts()
+    facts = replace(facts, name="漢 α Ж ß", description="😀 ±1 N·m – ok")
+    with Recorder(session.actuator, session.signals, facts, path=(path := tmp_path / "run.rrd")) as recorder:
+        recorder.write(session.advance(10))
+        recorder.note(0.005, "law 漢.py:Ä")
+        recorder.finish(session.status)
+    name = "\\u6f22 α Ж ß"
+    (headline,) = static_text(path, SUMMARY, "TextDocument:text")
+    assert f"{name} under afsm" in headline
+    (text,) = static_text(path, SCENARIO, "TextDocument:text")
+    assert text.startswith(f"# {name}\n\n\\U0001f600 ±1 N·m – ok\n")
+    assert "law \\u6f22.py:Ä" in texts(path)
+    assert read(path).facts["name"] == "漢 α Ж ß"  # for readers of the data

@@ -170,7 +170,7 @@ def test_without_load_and_payload_there_is_one_arrow(tmp_path):
 
 
 def test_the_axes_give_the_scale_of_the_arrows(loaded):
-    assert SCALE.endswith("the length of x, y, z is 0.5 N·m")
+    assert SCALE.endswith("axes are 0.5 N·m long")
     np.testing.assert_allclose(0.5 * METRES_PER_Nm, AXES_LENGTH_m, rtol=1e-15)
 
 
