@@ -25,6 +25,8 @@ from spheretwin.models.base.errors import InputError, SpheretwinError, exception
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
+from spheretwin.plant.bristle_friction import BristleFriction, bristle_friction
+from spheretwin.plant.cable import cable
 from spheretwin.plant.friction import Friction, friction
 from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.plant.step import ENGINES, Plant
@@ -170,6 +172,8 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers
         scratch=scratch_of(magnetics),
         drive=drive_of(scenario, groups, buffers),
         friction=_friction(section, actuator),
+        bristles=_bristles(section, actuator),
+        cable=cable(section.cable),
         group_gain=np.array(section.group_gain),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
         hinge_range=actuator.hinge_range_rad,
@@ -194,14 +198,23 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers
 
 
 def _friction(section: ResolvedPlant, actuator: Actuator) -> Friction:
-    height = float(actuator.payload_mount_m[2])
     return friction(
-        np.array(section.coulomb_Nm),
+        np.zeros(3) if section.stiction.on else np.array(section.coulomb_Nm),
         np.array(section.viscous_Nm_s),
         section.friction_smoothing_rad_s,
-        loaded_inertia((1 + section.modelling_error) * actuator.inertia, section.payload_kg, height),
+        _inertia(section, actuator),
         section.step_s,
     )
+
+
+def _bristles(section: ResolvedPlant, actuator: Actuator) -> BristleFriction:
+    inertia = _inertia(section, actuator)
+    return bristle_friction(section.stiction, section.coulomb_Nm, section.cable, inertia, section.step_s)
+
+
+def _inertia(section: ResolvedPlant, actuator: Actuator) -> Array:
+    height = float(actuator.payload_mount_m[2])
+    return loaded_inertia((1 + section.modelling_error) * actuator.inertia, section.payload_kg, height)
 
 
 def rotor_of(scenario: ResolvedScenario, files: Files) -> Rotor:

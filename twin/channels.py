@@ -15,6 +15,8 @@ from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.base.compiled import part_of_its_caller
 from spheretwin.models.telemetry.signals import ANGLES, Signal
+from spheretwin.plant.bristle_friction import LAST
+from spheretwin.plant.cable import acts
 from spheretwin.scenario.sections import Scenario
 
 
@@ -153,6 +155,50 @@ def _logs_friction(scenario: Scenario) -> bool:
 FRICTION = Channel(lambda groups: FRICTION_SIGNALS, _logs_friction, write_friction)
 
 
+PRESLIDING_SIGNALS = (
+    Signal(
+        "presliding_rad",
+        "rad",
+        3,
+        "elastic rotation of the hinges within static friction, at the end of the control period",
+        ANGLES,
+    ),
+)
+
+
+@part_of_its_caller
+def write_presliding(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    for i in range(3):
+        row[i] = plant.bristles.deflection_rad[LAST, i]
+
+
+def _logs_presliding(scenario: Scenario) -> bool:
+    return scenario.plant.stiction.on
+
+
+PRESLIDING = Channel(lambda groups: PRESLIDING_SIGNALS, _logs_presliding, write_presliding)
+
+
+CABLE_SIGNALS = (
+    Signal("cable_Nm", "N·m", 3, "cable on the hinges, over the physics step that begins now", ANGLES),
+)
+
+
+@part_of_its_caller
+def write_cable(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    for i in range(3):
+        row[i] = plant.cable.first_torque_q[i]
+
+
+def _logs_cable(scenario: Scenario) -> bool:
+    return acts(scenario.plant.cable)
+
+
+CABLE = Channel(lambda groups: CABLE_SIGNALS, _logs_cable, write_cable)
+
+
 REFERENCE_GOVERNOR_SIGNALS = (
     Signal("q_governed_rad", "rad", 3, "desired hinge angles as the governor has them", ANGLES),
     Signal("qdot_governed_rad_s", "rad/s", 3, "desired hinge rates as the governor has them", ANGLES),
@@ -248,6 +294,8 @@ CHANNELS: tuple[Channel, ...] = (
     PREDICTION,
     FEED_FORWARD,
     FRICTION,
+    PRESLIDING,
+    CABLE,
     DRIVE,
     FAULTS,
     WATCHDOG,

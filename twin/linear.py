@@ -38,7 +38,9 @@ class LinearisationData(NamedTuple):
     viscous_Nm_s: Array
     """Viscous friction of each hinge, (3,)."""
     unmodelled_torque_Nm: Array
-    """Constant torque against the coils, (3,)."""
+    """Torque against the coils at angles of 0, (3,): constant, and of the cable."""
+    spring_Nm_rad: Array
+    """Stiffness of the cable about each hinge, (3,)."""
     magnetics: Magnetics
     """Magnetics from currents to torque."""
     nominal_magnetics: Magnetics
@@ -66,17 +68,22 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
             weight_moment=0.0,
             viscous_Nm_s=np.array(sheet.viscous_Nm_s),
             unmodelled_torque_Nm=np.zeros(3),
+            spring_Nm_rad=np.zeros(3),
             magnetics=nominal_magnetics,
             nominal_magnetics=nominal_magnetics,
             lag_s=sheet.time_constant_s,
             current_limit_A=sheet.current_limit_A,
         )
-    rotor = _lagrangian_rotor(scenario, files)
+    rotor, cable = _lagrangian_rotor(scenario, files), section.cable
+    spring = np.array(cable.stiffness_Nm_rad)
     return LinearisationData(
         inertia=rotor.inertia,
         weight_moment=rotor.weight_moment,
         viscous_Nm_s=np.array(section.viscous_Nm_s),
-        unmodelled_torque_Nm=np.array(section.modelling_torque_Nm),
+        unmodelled_torque_Nm=np.array(section.modelling_torque_Nm)
+        - np.array(cable.torque_Nm)
+        - spring * np.array(cable.neutral_rad),
+        spring_Nm_rad=spring,
         magnetics=Magnetics(files.actuator, np.array(section.group_gain)),
         nominal_magnetics=nominal_magnetics,
         lag_s=drive.lag_s,
@@ -255,10 +262,12 @@ def linearise(
         A pose beyond the workspace (where the joint locks), or one that the coils cannot hold within the
         current limit; a model that the Lagrangian does not support; a missing library.
 
-    Notes ----- Effects without a linear part at rest are omitted: Coulomb friction, limits of current and
-    voltage. Delays and sampling, which belong to the discretisation, and disturbances, sensors and faults are
-    also omitted. Mass, gravity and friction are differentiated in closed form, the torque of currents by
-    differences.
+    Notes
+    -----
+    Effects without a linear part at rest are omitted: Coulomb and static friction, hysteresis, limits of
+    current and voltage. Delays and sampling, which belong to the discretisation, and disturbances, sensors
+    and faults are also omitted. Mass, gravity, cable and friction are differentiated in closed form, the
+    torque of currents by differences.
     """
     _check_choice("inputs", inputs, ("torque", "currents"))
     _check_choice("kind", kind, ("scipy", "control"))
@@ -324,7 +333,7 @@ def _rotor_matrices(data: LinearisationData, q: Array, pull: Array) -> tuple[Arr
     them. The derivative of M is multiplied by accelerations that are 0.
     """
     per_torque: Array = np.linalg.inv(inertia_matrix(q, data.inertia)).astype(np.float64)
-    stiffness = gravity_stiffness(q, data.weight_moment) - pull
+    stiffness = gravity_stiffness(q, data.weight_moment) + np.diag(data.spring_Nm_rad) - pull
     A = np.zeros((6, 6))
     A[:3, 3:] = np.eye(3)
     A[3:, :3], A[3:, 3:] = -per_torque @ stiffness, -per_torque * data.viscous_Nm_s
@@ -339,9 +348,10 @@ def _behind_lag(A: Array, per_input: Array, follows: Array, lag_s: float) -> Arr
 
 
 def _holding_actuation(data: LinearisationData, pose: Array) -> Actuation:
-    """Return the actuation about a pose at which the coils balance gravity and unmodelled torque."""
+    """Return the actuation about a pose at which the coils balance gravity, cable and unmodelled torque."""
     try:
-        coils = actuation(data, pose, gravity_torque(pose, data.weight_moment) + data.unmodelled_torque_Nm)
+        load = gravity_torque(pose, data.weight_moment) + data.spring_Nm_rad * pose
+        coils = actuation(data, pose, load + data.unmodelled_torque_Nm)
     except np.linalg.LinAlgError:
         raise InputError(
             "linear model: expected coils that give torque, received coils without torque"

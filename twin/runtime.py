@@ -232,6 +232,7 @@ class Runtime:
             "currents": self._plant.current,
             "the last rates": self._plant.last_qdot,
             "the drive's state": self._plant.drive,
+            "the presliding state": self._plant.bristles,
             LAW_PARAMETERS: controller.parameters,
             LAW_MEMORY: controller.memory,
             "the applied torque": controller.applied_torque,

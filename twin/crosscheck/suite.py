@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, trajectories
+from spheretwin.crosscheck import coil_driven, dynamics, friction, identities, stiction, trajectories
 from spheretwin.crosscheck import identities as free_rotor
 from spheretwin.crosscheck import trajectories as closed_loop
 from spheretwin.crosscheck.friction import HingeFriction, VISCOUS_Nm_s
@@ -27,6 +27,7 @@ PARTS = (
     trajectories.TRAJECTORIES,
     free_rotor.FREE_ROTOR,
     friction.PART,
+    stiction.PART,
     coil_driven.PART,
     closed_loop.CLOSED_LOOP,
 )

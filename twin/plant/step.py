@@ -14,6 +14,8 @@ from spheretwin.models.base.compiled import copy_into, implements, part_of_its_c
 from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
+from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles
+from spheretwin.plant.cable import Cable, pull
 from spheretwin.plant.friction import Friction, slow_down
 from spheretwin.plant.rotor import EngineKind
 
@@ -64,6 +66,8 @@ class Plant(NamedTuple):
     scratch: NDArray[np.float64]  # of `fill_torque_matrix`
     drive: DriveModel
     friction: Friction
+    bristles: BristleFriction
+    cable: Cable
     group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
     hinge_range: NDArray[np.float64]  # (3, 2) rad
@@ -98,9 +102,10 @@ def plant_tick(
 ) -> int:
     """Advance the plant by one control period.
 
-    Each physics step: half of the friction, coil currents and torque, rotor, other half of the friction.
-    The torque matrix and the back-EMF are those of the predicted pose and rates in the middle of the step.
-    With friction split symmetrically around the rotor's step, the whole step is of second order.
+    Each physics step: half of the friction, coil currents and torque, rotor with static friction and cable,
+    other half of the friction. The torque matrix, the back-EMF and the spring of the cable are those of the
+    predicted pose and rates in the middle of the step. With friction split symmetrically around the rotor's
+    step, the whole step is of second order.
 
     Parameters
     ----------
@@ -130,7 +135,7 @@ def plant_tick(
         plant.friction,
         plant.friction_q,
     )
-    drive = plant.drive
+    drive, bristles, cable = plant.drive, plant.bristles, plant.cable
     begin(drive, command)
     for substep in range(plant.substeps):
         for i in range(3):
@@ -149,13 +154,23 @@ def plant_tick(
         generalised_torque(middle_q, torque_S, torque_q)
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
+        if cable.on:
+            pull(cable, middle_q, torque_q)
+        if bristles.on:
+            begin_bristles(bristles, q, qdot, torque_q)
         step(rotor)
+        if bristles.on:
+            apply_bristles(bristles, middle_q, middle_qdot, last_qdot, q, qdot)
+            for i in range(3):
+                friction_q[i] -= bristles.torque_q[0, i]
+                cable.torque_q[i] -= bristles.torque_q[1, i]
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
         if substep == 0:
             copy_into(output.current, 0, mean_current, mean_current.shape[0])
             copy_into(output.torque_S, 0, torque_S, 3)
             copy_into(plant.first_friction_q, 0, friction_q, 3)
+            copy_into(cable.first_torque_q, 0, cable.torque_q, 3)
         for i in range(3):
             if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also if it is NaN
                 return DIVERGED

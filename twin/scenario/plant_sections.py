@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from spheretwin.control.law import NonNegative, Positive
+from spheretwin.plant.bristle_friction import StictionSection
+from spheretwin.plant.cable import CableSection
 from spheretwin.plant.step import ENGINES
 from spheretwin.scenario.fields import SHIPPED
 from spheretwin.trajectories.rounding import Bounded, Triple
@@ -54,8 +56,11 @@ class PlantSection(Section):
         (0.0, 0.0, 0.0), description="viscous friction of each hinge, N·m·s, in addition to that of the model"
     )
     friction_smoothing_rad_s: Annotated[float, Field(ge=1e-9, le=1e3)] = Field(
-        0.01, description="rate over which Coulomb friction changes sign, rad/s"
+        0.01,
+        description="rate over which Coulomb friction changes sign, rad/s; not used with plant.stiction.on",
     )
+    stiction: StictionSection = StictionSection()
+    cable: CableSection = CableSection()
     group_gain: tuple[Bounded, ...] | None = Field(
         None, description="torque per ampere of each group over that of the torque curve; 1 unless given"
     )

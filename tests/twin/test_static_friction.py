@@ -1,0 +1,202 @@
+"""Static friction and cable in the loop: telemetry, energy, state, events, replay, both engines."""
+
+import numpy as np
+import pytest
+
+from spheretwin import scenario as scenarios
+from spheretwin.cli import main
+from spheretwin.linear import linearise
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.lagrangian import inertia_matrix
+from spheretwin.models.telemetry.table import Table
+from spheretwin.session import Session
+from tests.twin.passive_cases import ENGINES, FREE, STILL, session, table
+
+COULOMB_Nm, BREAK_AWAY = np.array([2e-3, 3e-3, 4e-3]), 1.5
+STICTION = {"plant.stiction.on": True, "plant.coulomb_Nm": COULOMB_Nm.tolist()}
+STIFFNESS_Nm_rad = BREAK_AWAY * COULOMB_Nm / 0.75e-3
+SPRING_Nm_rad, NEUTRAL_rad, CONSTANT_Nm = (
+    np.array([0.05, 0.03, 0.02]),
+    np.array([0.1, -0.1, 0.3]),
+    np.array([1e-3, 0, -2e-3]),
+)
+CABLE = {
+    "plant.cable.stiffness_Nm_rad": SPRING_Nm_rad.tolist(),
+    "plant.cable.neutral_rad": NEUTRAL_rad.tolist(),
+    "plant.cable.torque_Nm": CONSTANT_Nm.tolist(),
+}
+HYSTERESIS = {"plant.cable.hysteresis_Nm": [1e-3, 1e-3, 1e-3], "plant.cable.hysteresis_rad": 0.02}
+BOTH = STICTION | CABLE | HYSTERESIS | {"plant.viscous_Nm_s": [1e-4, 1e-4, 1e-4]}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_rotor_under_less_than_the_break_away_torque_rests(engine):
+    # 0.4 of break-away, at once: with an overshoot of 0.37 it remains in the elastic range.
+    load = 0.4 * BREAK_AWAY * COULOMB_Nm
+    changes = STILL | STICTION | {"plant.modelling_torque_Nm": (-load).tolist(), "plant.engine": engine}
+    run = table(3000, "hold", changes, FREE)
+    deflection = load / STIFFNESS_Nm_rad
+    # The elastic motion decays with 0.08 s: by exp(-37) within 3 s.
+    np.testing.assert_allclose(run["q_rad"][-1], deflection, rtol=1e-9)
+    np.testing.assert_allclose(run["presliding_rad"][-1], deflection, rtol=1e-9)
+    np.testing.assert_allclose(run["friction_Nm"][-1], -load, rtol=1e-9)
+    np.testing.assert_allclose(run["qdot_rad_s"][-1], 0, atol=1e-11)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_cable_swings_the_rotor_about_its_neutral_pose(engine, actuator):
+    """Hinge γ of the upright rotor: a harmonic oscillation about the equilibrium."""
+    changes = STILL | {"plant.engine": engine, "controller.period_s": 5e-4}
+    changes |= {"plant.cable.stiffness_Nm_rad": [0.0, 0.0, 0.05], "plant.cable.neutral_rad": [0.0, 0.0, 0.2]}
+    run = table(8000, "hold", changes | {"plant.cable.torque_Nm": [0.0, 0.0, 5e-3]}, FREE)
+    natural, rest = np.sqrt(0.05 / actuator.inertia[2]), 0.2 + 5e-3 / 0.05
+    exact = rest * (1 - np.cos(natural * run["t_s"]))
+    # The explicit midpoint is early by (natural h)²/24 of the phase of 19 rad in 4 s, times the amplitude.
+    bound = 2 * rest * (natural * 5e-4) ** 2 / 24 * natural * 4
+    assert np.abs(run["q_rad"][:, 2] - exact).max() < bound
+    # No energy is lost or gained: the last swings are as wide as the first.
+    assert run["q_rad"][-3000:, 2].max() == pytest.approx(run["q_rad"][:3000, 2].max(), rel=1e-5)
+    middle = run["q_rad"][:, 2] + 0.5 * 5e-4 * run["qdot_rad_s"][:, 2]
+    np.testing.assert_allclose(run["cable_Nm"][:, 2], 5e-3 - 0.05 * (middle - 0.2), rtol=0, atol=1e-16)
+    assert not run["cable_Nm"][:, :2].any()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_rows_account_for_the_energy_of_friction_and_cable(engine, actuator):
+    """A row each physics step: kinetic energy, and the works of all torques over the path."""
+    rates = [1.0, -0.8, 2.0]
+
+    def unbalanced_J(step_s):
+        changes = STILL | BOTH | {"plant.engine": engine, "plant.initial_rad_s": rates}
+        changes |= {"plant.step_s": step_s, "controller.period_s": step_s}
+        run = table(round(0.4 / step_s) + 1, "hold", changes, FREE)
+        kinetic = [
+            0.5 * v @ inertia_matrix(q, actuator.inertia) @ v
+            for q, v in zip(run["q_rad"][[0, -1]], run["qdot_rad_s"][[0, -1]], strict=True)
+        ]
+        moved = np.diff(run["q_rad"], axis=0)
+        works = [np.sum(run[name][:-1] * moved) for name in ("friction_Nm", "cable_Nm")]
+        return kinetic[1] - kinetic[0] - sum(works), works, kinetic[0]
+
+    left_J, works, first_J = unbalanced_J(5e-4)
+    assert max(works) < -0.02 * first_J  # each takes energy here
+    assert abs(left_J) < 1e-4 * first_J
+    # Torques are held over each step, so that the works are nearly exact: at least second order.
+    assert abs(left_J) < 0.3 * abs(unbalanced_J(1e-3)[0])
+
+
+def test_both_engines_agree_on_a_loop_with_static_friction_and_a_cable():
+    one, other = (
+        table(1500, "tilt", BOTH | {"plant.engine": engine, "controller.law": "afsm_eso"})
+        for engine in ENGINES
+    )
+    for name, bound in (
+        ("q_rad", 1e-9),
+        ("presliding_rad", 1e-9),
+        ("friction_Nm", 1e-8),
+        ("cable_Nm", 1e-10),
+    ):
+        np.testing.assert_allclose(one[name], other[name], rtol=0, atol=bound)
+    assert np.abs(one["presliding_rad"]).max() > 0.6e-3
+    level = BREAK_AWAY * COULOMB_Nm + 1e-4 * np.abs(one["qdot_rad_s"]).max(axis=0)
+    assert np.all(np.abs(one["friction_Nm"]) <= level)
+    assert np.abs(one["friction_Nm"]).max() > 0.95 * BREAK_AWAY * COULOMB_Nm[0]
+
+
+def test_fields_without_effect_change_no_bit_and_add_no_column():
+    plain = table(300, "nutation", {"plant.coulomb_Nm": COULOMB_Nm.tolist()})
+    idle = {"plant.stiction.presliding_rad": 0.1, "plant.cable.neutral_rad": [1.0, 1.0, 1.0]}
+    other = table(300, "nutation", {"plant.coulomb_Nm": COULOMB_Nm.tolist()} | idle)
+    assert [signal.name for signal in plain.signals] == [signal.name for signal in other.signals]
+    np.testing.assert_array_equal(plain.values, other.values)
+
+
+def test_the_controller_does_not_know_of_them():
+    with session("tilt", BOTH) as stuck, session("tilt") as free:
+        assert stuck.scenario.nominal == free.scenario.nominal
+
+
+def test_snapshots_and_chunks_continue_bit_for_bit():
+    whole = table(400, "tilt", BOTH)
+    with session("tilt", BOTH) as first:
+        start = first.advance(150)
+        snapshot = first.snapshot()
+        first.advance(100)
+        first.restore(snapshot)
+        rest = first.advance(250)
+    np.testing.assert_array_equal(np.vstack([start.values, rest.values]), whole.values)
+
+
+def test_another_level_keeps_the_deflections_and_switching_off_drops_them():
+    # 0.4 of break-away, at once: with an overshoot of 0.37 it remains in the elastic range.
+    load = 0.4 * BREAK_AWAY * COULOMB_Nm
+    changes = STILL | STICTION | {"plant.modelling_torque_Nm": (-load).tolist()}
+    with Session(scenarios.load("hold", changes), FREE) as run:
+        before = run.advance(2000)["presliding_rad"][-1]
+        run.set("plant.coulomb_Nm", (2 * COULOMB_Nm).tolist())
+        after = run.advance(2000)["presliding_rad"]
+        # Twice as stiff: half of the deflection remains, without a jump.
+        np.testing.assert_allclose(after[0], before, rtol=0, atol=2e-6)
+        np.testing.assert_allclose(after[-1], 0.5 * before, rtol=1e-6)
+        run.set("plant.stiction.on", False)
+        assert "presliding_rad" not in {signal.name for signal in run.advance(10).signals}
+        run.set("plant.stiction.on", True)
+        assert np.abs(run.advance(1)["presliding_rad"]).max() < 1e-5
+
+
+def test_a_run_with_both_is_replayed_to_the_same_bytes(tmp_path, capsys):
+    fields = [
+        "--plant.stiction.on", "true", "--plant.coulomb-Nm", "2e-3", "2e-3", "2e-3",
+        "--plant.cable.stiffness-Nm-rad", "0.01", "0.01", "0",
+        "--plant.cable.hysteresis-Nm", "0", "1e-3", "0",
+    ]  # fmt: skip
+    first, second = tmp_path / "first.parquet", tmp_path / "second.parquet"
+    assert main(["simulate", "tilt", "--duration", "0.2", *fields, "--telemetry", str(first)]) == 0
+    assert main(["simulate", "--replay", str(first), "--telemetry", str(second)]) == 0
+    capsys.readouterr()
+    assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("plant.stiction.break_away", 0.9, r"plant\.stiction\.break_away.*greater than or equal to 1"),
+        ("plant.stiction.presliding_rad", 0.0, r"plant\.stiction\.presliding_rad"),
+        ("plant.stiction.damping_ratio", -0.1, r"plant\.stiction\.damping_ratio"),
+        ("plant.stiction.stribeck_rad_s", 0.0, r"plant\.stiction\.stribeck_rad_s"),
+        ("plant.stiction.level", 1.0, r"plant\.stiction, received level"),
+        ("plant.cable.stiffness_Nm_rad", [-1.0, 0.0, 0.0], r"plant\.cable\.stiffness_Nm_rad"),
+        ("plant.cable.hysteresis_rad", 0.0, r"plant\.cable\.hysteresis_rad"),
+        ("plant.cable.hysteresis_Nm", [0.0, 0.0], r"plant\.cable\.hysteresis_Nm"),
+    ],
+)
+def test_bad_values_are_refused_in_one_line(name, value, message):
+    with pytest.raises(InputError, match=message) as refused:
+        scenarios.load("hold", {name: value})
+    assert "\n" not in str(refused.value)
+
+
+def test_the_linear_model_has_the_spring_and_the_torque_of_the_cable(actuator):
+    scenario, pose = scenarios.load("hold", STILL | CABLE), np.array([0.2, -0.1, 0.4])
+    bare = linearise(scenarios.load("hold", STILL), pose)
+    model = linearise(scenario, pose)
+    M = inertia_matrix(pose, actuator.inertia)
+    # Currents are commanded for a torque: the nominal model is the true one, so a command has no stiffness.
+    np.testing.assert_allclose(
+        M @ (model.system.A - bare.system.A)[3:, :3], -np.diag(SPRING_Nm_rad), rtol=0, atol=1e-12
+    )
+    held = SPRING_Nm_rad * (pose - NEUTRAL_rad) - CONSTANT_Nm
+    np.testing.assert_allclose(model.input_at_rest - bare.input_at_rest, held, rtol=0, atol=1e-12)
+    nominal, other = (
+        linearise(scenarios.load("hold", changes), pose, nominal=True).system.A
+        for changes in (STILL, STILL | CABLE)
+    )
+    np.testing.assert_array_equal(nominal, other)
+
+
+def test_table_columns_have_labels_and_units():
+    run = table(5, "tilt", BOTH)
+    assert isinstance(run, Table)
+    units = {signal.name: (signal.unit, signal.size) for signal in run.signals}
+    assert units["presliding_rad"] == ("rad", 3)
+    assert units["cable_Nm"] == ("N·m", 3)
