@@ -161,3 +161,11 @@ def angular_velocity(q: NDArray[np.float64], qdot: NDArray[np.float64], rate_S: 
     rate_S[0] = qdot[0] + sb * qdot[2]
     rate_S[1] = ca * qdot[1] - sa * cb * qdot[2]
     rate_S[2] = sa * qdot[1] + ca * cb * qdot[2]
+
+
+def frame_of_axis(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a rotation matrix (3, 3) whose third column is the axis."""
+    least = np.eye(3)[np.argmin(np.abs(axis))]
+    first = np.cross(least, axis)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(axis, first), axis])

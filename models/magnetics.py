@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from functools import lru_cache
+from math import copysign
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from spheretwin.models.torque_curve import TorqueCurve
 KNEE = 0.95
 WIDE_PER_UNIT = 200
 NARROW_PER_UNIT = 4000
+CENTRE = KNEE * WIDE_PER_UNIT + (1 - KNEE) * NARROW_PER_UNIT  # row of the cosine 0
 
 # Numbers that older curve files do not name: before poles could be ground they were flat.
 UNSAID = {"magnet front_radius_m": 0.0}
@@ -27,6 +29,9 @@ UNSAID = {"magnet front_radius_m": 0.0}
 # The model's lengths come from sums and rotations, with errors of 1e-15; the torque is a low power of them.
 # This tolerance means equality; a difference of a millionth of a percent is reported.
 SAME = 1e-9
+
+# Of the coordinates of opposite axes, which come from rotations of degrees.
+OPPOSITE_TOLERANCE = 1e-12
 
 
 class TorqueModel(NamedTuple):
@@ -36,12 +41,17 @@ class TorqueModel(NamedTuple):
     ``h(r.s) r x s`` with the odd function ``h(c) = g(c) - g(-c)``, ``g = f_t / sin``. Because h is
     odd, the poles at r and -r add: the shipped 16 poles are 8 *pole lines*, each with the sum of the two
     polarities as its weight. 144 look-ups replace 576 pairs of coil and pole.
+
+    A machine with scatter (`models.scatter`) has a gain and a stretch for each pair of line and group: row 0
+    plus row 1 if the angle between line and group axis is acute, row 0 minus row 1 if it is obtuse.
     """
 
     line_axes: NDArray[np.float64]  # (n_lines, 3), rotor frame
     line_weights: NDArray[np.float64]  # (n_lines,)
     group_axes: NDArray[np.float64]  # (3, n), stator frame
     table: NDArray[np.float64]  # (781, 4), cubic coefficients of h, N·m/A
+    pair_gain: NDArray[np.float64]  # (2, lines × n) factor of h; (2, 0) without scatter
+    pair_stretch: NDArray[np.float64]  # (2, lines × n) share of 1 - |c| that is added to |c|
 
 
 def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.float64]:
@@ -75,13 +85,23 @@ def torque_matrix(q: NDArray[np.float64], actuator: Actuator) -> NDArray[np.floa
 @lru_cache(maxsize=8)
 def torque_model(actuator: Actuator) -> TorqueModel:
     """Return the data of an actuator for compiled code, cached for the actuators used last."""
-    axes, weights = _pole_lines(actuator)
+    lines = pole_lines(actuator.pole_axes)
+    opposite = np.where(lines[:, 1] < 0, 0.0, actuator.pole_polarity[lines[:, 1]])
     return TorqueModel(
-        line_axes=axes,
-        line_weights=weights,
+        line_axes=np.ascontiguousarray(actuator.pole_axes[lines[:, 0]]),
+        line_weights=actuator.pole_polarity[lines[:, 0]] + opposite,
         group_axes=np.ascontiguousarray(actuator.group_axes.T),
         table=_cached_table(actuator.torque_curve),
+        pair_gain=np.empty((2, 0)),
+        pair_stretch=np.empty((2, 0)),
     )
+
+
+def pole_lines(axes: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the poles of each pole line, (lines, 2): one pole and its opposite, or -1 if there is none."""
+    opposite = np.all(np.abs(axes[:, None] + axes) <= OPPOSITE_TOLERANCE, axis=2)
+    partner = np.where(opposite.any(axis=1), np.argmax(opposite, axis=1), -1)
+    return np.array([[pole, other] for pole, other in enumerate(partner) if not 0 <= other < pole])
 
 
 def lookup_table(curve: TorqueCurve) -> NDArray[np.float64]:
@@ -111,8 +131,7 @@ def lookup_table(curve: TorqueCurve) -> NDArray[np.float64]:
 def place(cosine: float) -> float:
     """Return the row of a cosine in the look-up table, with fraction t: two slopes, joined at the knee."""
     beyond = cosine - min(max(cosine, -KNEE), KNEE)
-    centre = KNEE * WIDE_PER_UNIT + (1 - KNEE) * NARROW_PER_UNIT
-    return centre + WIDE_PER_UNIT * cosine + (NARROW_PER_UNIT - WIDE_PER_UNIT) * beyond
+    return CENTRE + WIDE_PER_UNIT * cosine + (NARROW_PER_UNIT - WIDE_PER_UNIT) * beyond
 
 
 def scratch_of(model: TorqueModel) -> NDArray[np.float64]:
@@ -154,11 +173,13 @@ def fill_torque_matrix(
     scattered reads of the table over several groups.
     """
     R_x, R_y, R_z = rotation_rows(q)
-    table, row, h = model.table, scratch[0], scratch[1]
+    table, row, cosine, h = model.table, scratch[0], scratch[1], scratch[1]
     pull_x, pull_y, pull_z = scratch[2], scratch[3], scratch[4]
     s_x, s_y, s_z = model.group_axes[0], model.group_axes[1], model.group_axes[2]
     G_x, G_y, G_z = G[0], G[1], G[2]
     lines, groups = model.line_axes.shape[0], s_x.shape[0]
+    scattered, gain, gain_step = model.pair_gain.shape[1] > 0, model.pair_gain[0], model.pair_gain[1]
+    stretch, stretch_step = model.pair_stretch[0], model.pair_stretch[1]
     for line in range(lines):
         r, weight, first = model.line_axes[line], model.line_weights[line], line * groups
         x = R_x[0] * r[0] + R_x[1] * r[1] + R_x[2] * r[2]
@@ -166,11 +187,20 @@ def fill_torque_matrix(
         z = R_z[0] * r[0] + R_z[1] * r[1] + R_z[2] * r[2]
         pull_x[line], pull_y[line], pull_z[line] = weight * x, weight * y, weight * z
         for j in range(groups):
-            row[first + j] = place(x * s_x[j] + y * s_y[j] + z * s_z[j])
+            cosine[first + j] = x * s_x[j] + y * s_y[j] + z * s_z[j]
+    if scattered:
+        for pair in range(lines * groups):
+            side = copysign(1.0, cosine[pair])
+            cosine[pair] += (stretch[pair] + side * stretch_step[pair]) * (side - cosine[pair])
+    for pair in range(lines * groups):
+        row[pair] = place(cosine[pair])
     for pair in range(lines * groups):
         i = np.uint64(np.int64(row[pair]))  # unsigned: no check for an index below 0 is compiled in
         t = row[pair] - np.floor(row[pair])
         h[pair] = table[i, 0] + t * (table[i, 1] + t * (table[i, 2] + t * table[i, 3]))
+    if scattered:
+        for pair in range(lines * groups):
+            h[pair] *= gain[pair] + copysign(1.0, row[pair] - CENTRE) * gain_step[pair]
     for j in range(groups):
         G_x[j] = G_y[j] = G_z[j] = 0.0
     for line in range(lines):
@@ -241,21 +271,6 @@ def _cached_table(curve: TorqueCurve) -> NDArray[np.float64]:
     """Return the look-up table, from the cache if possible: the spline is slow to import."""
     samples = curve.phi_rad.tobytes() + curve.torque_Nm_per_A.tobytes()
     return cached_array(samples, lambda: lookup_table(curve))
-
-
-def _pole_lines(actuator: Actuator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Merge opposite poles; the sum of their polarities is the line's weight."""
-    axes: list[NDArray[np.float64]] = []
-    weights: list[float] = []
-    for axis, polarity in zip(actuator.pole_axes, actuator.pole_polarity, strict=True):
-        for known, other in enumerate(axes):
-            if np.allclose(axis, -other, rtol=0.0, atol=1e-12):
-                weights[known] += polarity
-                break
-        else:
-            axes.append(axis)
-            weights.append(polarity)
-    return np.ascontiguousarray(axes), np.array(weights)
 
 
 def computed_from(magnet: Magnet, coil: CoilGeometry) -> dict[str, float]:

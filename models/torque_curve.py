@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 COLUMNS = ("phi_deg", "torque_Nm_per_A")
 FEWEST_ROWS = 8
 
-# Start of a comment that names a number of the geometry.
+# Starts of comments that name a number: of the geometry, and a sensitivity to the distance of a part in 1/m.
 COMPUTED_FOR = "Computed for"
-HEAD_LINE = re.compile(rf"^# *{COMPUTED_FOR} ((?:magnet|coil) \w+):[ \t]*(.*?)[ \t]*\r?$", re.MULTILINE)
+SENSITIVITY = "Per metre of distance,"
+HEAD_LINE = r"^# *{start} ((?:magnet|coil) \w+):[ \t]*(.*?)[ \t]*\r?$"
 
 # Angles closer than this are duplicates; peaks beyond these are mistakes of the unit.
 CLOSEST_DEG = 1e-6
@@ -48,6 +49,9 @@ class TorqueCurve:
     computed_for : mapping of str to float, optional
         Numbers of the geometry that it was computed for, such as ``coil turns``; None if unknown, as for
         measured data.
+    distance_sensitivity : mapping of str to float, optional
+        Change by a larger distance of the magnet or of the coil from the joint centre, 1/m: ``magnet gain``,
+        ``magnet stretch``, ``coil gain``, ``coil stretch`` (`models.scatter`); None if unknown.
     name : str
         Name in warnings.
     """
@@ -55,6 +59,7 @@ class TorqueCurve:
     phi_rad: NDArray[np.float64]
     torque_Nm_per_A: NDArray[np.float64]
     computed_for: Mapping[str, float] | None = None
+    distance_sensitivity: Mapping[str, float] | None = None
     name: str = "torque curve"
 
     @cached_property
@@ -148,8 +153,13 @@ def parse(path: Path, content: bytes) -> TorqueCurve:
         where = "a column twice" if uneven is None else f"another number of them in row {uneven + 1}"
         raise InputError(f"torque curve {path}: expected each column once in every row, received {where}")
     _check(path, samples)
-    computed_for = _computed_for(path, text)
-    return TorqueCurve(np.radians(samples[:, 0]), samples[:, 1], computed_for, f"torque curve {path.name}")
+    return TorqueCurve(
+        np.radians(samples[:, 0]),
+        samples[:, 1],
+        _named_numbers(path, text, COMPUTED_FOR),
+        _named_numbers(path, text, SENSITIVITY),
+        f"torque curve {path.name}",
+    )
 
 
 def _number(path: Path, text: Any) -> float:
@@ -159,10 +169,11 @@ def _number(path: Path, text: Any) -> float:
         raise InputError(f"torque curve {path}: expected numbers only, received {shown(text)}") from None
 
 
-def head(computed_for: Mapping[str, float]) -> list[str]:
-    """Return the lines of provenance with the geometry of a curve, for readers and for `read`."""
+def head(computed_for: Mapping[str, float], sensitivity: Mapping[str, float]) -> list[str]:
+    """Return the lines of provenance with the numbers of a curve, for readers and for `read`."""
     # 12 digits hide the rounding of a length that was a sum, but no difference that `disagreements` reports.
-    return [f"{COMPUTED_FOR} {name}: {value:.12g}" for name, value in computed_for.items()]
+    geometry = [f"{COMPUTED_FOR} {name}: {value:.12g}" for name, value in computed_for.items()]
+    return geometry + [f"{SENSITIVITY} {name}: {value:.4g}" for name, value in sensitivity.items()]
 
 
 def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
@@ -177,17 +188,17 @@ def to_csv(curve: TorqueCurve, provenance: list[str]) -> str:
     return text.getvalue()
 
 
-def _computed_for(path: Path, text: str) -> dict[str, float] | None:
-    """Return the numbers in the lines written by `head`."""
+def _named_numbers(path: Path, text: str, start: str) -> dict[str, float] | None:
+    """Return the numbers in the lines written by `head` that begin with `start`."""
     numbers = {}
-    for name, number in HEAD_LINE.findall(text):
+    for name, number in re.findall(HEAD_LINE.format(start=start), text, re.MULTILINE):
         try:
             numbers[name] = float(number)
         except ValueError:
             numbers[name] = np.nan
         if not np.isfinite(numbers[name]):
             raise InputError(
-                f"torque curve {path}: expected a finite number after {COMPUTED_FOR} {name}:,"
+                f"torque curve {path}: expected a finite number after {start} {name}:,"
                 f" received {number or 'none'}"
             )
     return numbers or None

@@ -24,10 +24,12 @@ from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, SpheretwinError, exception_text, shown
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
+from spheretwin.models.scatter import scattered_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
 from spheretwin.plant.bristle_friction import BristleFriction, bristle_friction
 from spheretwin.plant.cable import cable
 from spheretwin.plant.friction import Friction, friction
+from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.rotor import Rotor, RotorSettings
 from spheretwin.plant.step import ENGINES, Plant
 from spheretwin.scenario.files import Files
@@ -164,7 +166,9 @@ def _compensators_of(scenario: ResolvedScenario, magnetics: TorqueModel) -> Comp
 
 def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers: SharedBuffers) -> Plant:
     """Return the plant of a resolved scenario with a started rotor and zero currents."""
-    section, groups, magnetics = scenario.plant, len(actuator.groups), torque_model(actuator)
+    section, groups = scenario.plant, len(actuator.groups)
+    scatter = scatter_of(section, scenario.seed, actuator)
+    magnetics = scattered_model(actuator, scatter) if scatter else torque_model(actuator)
     return Plant(
         rotor=rotor,
         magnetics=magnetics,

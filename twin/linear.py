@@ -13,10 +13,12 @@ from spheretwin import assembly
 from spheretwin.active_config import initial_config
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.errors import InputError, distinct_texts, shown
-from spheretwin.models.kinematics import rate_jacobian, rotation
+from spheretwin.models.kinematics import rate_jacobian
 from spheretwin.models.lagrangian import gravity_stiffness, gravity_torque, inertia_matrix
 from spheretwin.models.mjcf_reader import HINGES
+from spheretwin.models.scatter import Scatter, summed_torque_matrix
 from spheretwin.plant.lagrangian_rotor import LagrangianRotor
+from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.scenario.files import Files
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
 
@@ -26,6 +28,7 @@ class Magnetics(NamedTuple):
 
     actuator: Actuator
     gain: Array  # (n,)
+    scatter: Scatter | None = None
 
 
 class LinearisationData(NamedTuple):
@@ -84,7 +87,11 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
         - np.array(cable.torque_Nm)
         - spring * np.array(cable.neutral_rad),
         spring_Nm_rad=spring,
-        magnetics=Magnetics(files.actuator, np.array(section.group_gain)),
+        magnetics=Magnetics(
+            files.actuator,
+            np.array(section.group_gain),
+            scatter_of(section, scenario.seed, files.actuator),
+        ),
         nominal_magnetics=nominal_magnetics,
         lag_s=drive.lag_s,
         current_limit_A=min(sheet.current_limit_A, drive.current_limit_A),
@@ -156,8 +163,8 @@ def hinge_matrix(q: Array, magnetics: Magnetics) -> Array:
     It uses the torque curve itself: the table of the compiled torque matrix agrees with it within 2e-7 of its
     peak, but its slopes are not accurate.
     """
-    actuator = magnetics.actuator
-    return rate_jacobian(q).T @ _torque_matrix(q, actuator) * magnetics.gain
+    matrix = summed_torque_matrix(q, magnetics.actuator, magnetics.scatter)
+    return rate_jacobian(q).T @ matrix * magnetics.gain
 
 
 def slopes(q: Array, magnetics: Magnetics) -> Array:
@@ -174,16 +181,6 @@ def slopes(q: Array, magnetics: Magnetics) -> Array:
     )
 
 
-def _torque_matrix(q: Array, actuator: Actuator) -> Array:
-    """Return G_t(q) (15) as a sum over every pole and the two coils of every group."""
-    poles, axes = actuator.pole_axes @ rotation(q).T, actuator.group_axes  # (p, 3), (n, 3)
-    cosine = poles @ axes.T
-    curve = actuator.torque_curve
-    pull = curve.over_sine(cosine) - curve.over_sine(-cosine)  # of both coils, along r x s
-    crossed = np.cross(poles[:, None], axes[None])  # (p, n, 3)
-    return np.einsum("p,pn,pnk->kn", actuator.pole_polarity, pull, crossed)
-
-
 def _inverse_slope(matrix: Array, inverse: Array, slope: Array) -> Array:
     """Return the derivative of the least-norm inverse of a matrix with independent rows."""
     across = np.eye(matrix.shape[1]) - inverse @ matrix
@@ -191,7 +188,8 @@ def _inverse_slope(matrix: Array, inverse: Array, slope: Array) -> Array:
 
 
 def _same(first: Magnetics, second: Magnetics) -> bool:
-    return first.actuator is second.actuator and bool(np.all(first.gain == second.gain))
+    scattered = first.scatter or second.scatter
+    return first.actuator is second.actuator and not scattered and bool(np.all(first.gain == second.gain))
 
 
 Inputs = Literal["torque", "currents"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -180,11 +181,12 @@ def compute(mjcf: Path = MJCF_PATH, track: Callable[[range], Iterable[int]] = it
     """
     magnet, coil = read_magnet_and_coil(mjcf)
     curve = pole_torque.compute_curve(magnet, coil, track=track)
+    curve = replace(curve, distance_sensitivity=pole_torque.distance_sensitivity(curve, magnet, coil))
     measured = pole_torque.convergence(curve, magnet, coil, track=track)
     lookup_error = largest_lookup_error(curve)
     return ComputedCurve(
         curve=curve,
-        csv=torque_curve.to_csv(curve, pole_torque.provenance(magnet, coil, measured)),
+        csv=torque_curve.to_csv(curve, pole_torque.provenance(curve, magnet, coil, measured)),
         peak=_peak(curve),
         doubled_mesh=measured,
         lookup_error=lookup_error,

@@ -14,6 +14,7 @@ behind the poles: that is a question to finite elements or to a bench.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -23,8 +24,9 @@ from numpy.typing import NDArray
 from spheretwin.models.actuator import Actuator, CoilGeometry, Magnet
 from spheretwin.models.base.errors import InputError
 from spheretwin.models.design.workspace import pose
-from spheretwin.models.kinematics import rotation
-from spheretwin.models.magnetics import torque_matrix
+from spheretwin.models.kinematics import frame_of_axis, rotation
+from spheretwin.models.magnetics import fill_torque_matrix, scratch_of, torque_model
+from spheretwin.models.scatter import Scatter, no_scatter, scattered_model
 
 Array = NDArray[np.float64]
 
@@ -90,7 +92,12 @@ class Errors(NamedTuple):
     quadrature_Nm: Array  # (n, m), distance to the coarser sum's
 
 
-def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | None = None) -> Array:
+def direct_torque_matrix(
+    q: Array,
+    actuator: Actuator,
+    quadrature: Quadrature | None = None,
+    scatter: Scatter | None = None,
+) -> Array:
     """Return the torque matrix G_t(q) by direct summation over all poles and all conductors.
 
     Parameters
@@ -101,6 +108,8 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
         Its geometry; its torque curve is not used.
     quadrature : Quadrature
         Points in the windings; the default depends on whether the magnets are flat or ground.
+    scatter : Scatter
+        None unless given.
 
     Returns
     -------
@@ -113,14 +122,20 @@ def direct_torque_matrix(q: Array, actuator: Actuator, quadrature: Quadrature | 
         magpylib is not installed.
     """
     quadrature = quadrature or _standard(actuator.magnet)
+    poles, coils = scatter or no_scatter(actuator)
     near_angle = _rim_reaches_winding(actuator)
-    poles = actuator.pole_axes @ rotation(np.asarray(q, dtype=np.float64)).T  # (p, 3), stator frame
-    torque = np.zeros((len(actuator.coil_axes), 3))
-    for pole, polarity in zip(poles, actuator.pole_polarity, strict=True):
-        near = np.arccos(np.clip(actuator.coil_axes @ pole, -1.0, 1.0)) < near_angle
-        for coils, rule in ((near, quadrature.near), (~near, quadrature.far)):
-            magnet = pole_magnet(actuator.magnet, pole, float(polarity), rule.stacked)
-            torque[coils] -= _torque_on_coils(magnet, actuator.coil_axes[coils], actuator.coil, rule)
+    pole_axes = poles.axes(actuator.pole_axes) @ rotation(np.asarray(q, dtype=np.float64)).T  # stator frame
+    coil_axes = coils.axes(actuator.coil_axes)
+    torque = np.zeros((len(coil_axes), 3))
+    for axis, polarity, gain, distance_m in zip(
+        pole_axes, actuator.pole_polarity, poles.gain, poles.distance_m, strict=True
+    ):
+        pole = replace(actuator.magnet, distance_m=actuator.magnet.distance_m + distance_m)
+        near = np.arccos(np.clip(coil_axes @ axis, -1.0, 1.0)) < near_angle
+        for here, rule in ((near, quadrature.near), (~near, quadrature.far)):
+            magnet = pole_magnet(pole, axis, float(polarity * (1 + gain)), rule.stacked)
+            on_coils = _torque_on_coils(magnet, coil_axes[here], coils.distance_m[here], actuator.coil, rule)
+            torque[here] -= (1 + coils.gain[here, None]) * on_coils
     return torque[actuator.groups].sum(axis=1).T
 
 
@@ -130,6 +145,7 @@ def compare(
     seed: int = 0,
     quadrature: Quadrature | None = None,
     track: Callable[[range], Iterable[int]] = iter,
+    scatter: Scatter | None = None,
 ) -> Comparison:
     """Compute the torque matrix by the curve and by direct summation, in random poses.
 
@@ -145,17 +161,20 @@ def compare(
         The finer of the two sums.
     track : callable
         Iterates over the numbers of the poses, and may show progress.
+    scatter : Scatter
+        None unless given.
     """
     quadrature = quadrature or _standard(actuator.magnet)
     azimuth, spin = np.random.default_rng(seed).uniform(-np.pi, np.pi, (2, len(tilt_rad)))
     q = pose(tilt_rad, azimuth, spin)
-    direct, coarse = np.empty((2, len(q), 3, len(actuator.groups)))
+    model, direct, coarse = np.empty((3, len(q), 3, len(actuator.groups)))
+    data = scattered_model(actuator, scatter) if scatter else torque_model(actuator)
+    scratch = scratch_of(data)
     for i in track(range(len(q))):
-        direct[i] = direct_torque_matrix(q[i], actuator, quadrature)
-        coarse[i] = direct_torque_matrix(q[i], actuator, quadrature.halved())
-    return Comparison(
-        tilt_rad, q, np.array([torque_matrix(pose_q, actuator) for pose_q in q]), direct, coarse
-    )
+        fill_torque_matrix(q[i], data, model[i], scratch)
+        direct[i] = direct_torque_matrix(q[i], actuator, quadrature, scatter)
+        coarse[i] = direct_torque_matrix(q[i], actuator, quadrature.halved(), scatter)
+    return Comparison(tilt_rad, q, model, direct, coarse)
 
 
 def errors(compared: Comparison, limit_A: float, currents: int = 200, seed: int = 0) -> Errors:
@@ -223,7 +242,7 @@ def pole_magnet(magnet: Magnet, axis: Array, polarity: float, stacked: int) -> A
             polarization=(0.0, 0.0, polarity * magnet.remanence_T),
             dimension=(2 * radius, top - bottom),
             position=0.5 * (top + bottom) * axis,
-            orientation=Rotation.from_matrix(_frame(axis)),
+            orientation=Rotation.from_matrix(frame_of_axis(axis)),
         )
         for radius, bottom, top in _cylinders(magnet, stacked)
     ]
@@ -261,10 +280,11 @@ def lorentz_force(magnet: Any, position: Array, element: Array) -> Array:
     return np.asarray(np.cross(element, magnet.getB(position)))
 
 
-def _torque_on_coils(magnet: Any, axes: Array, coil: CoilGeometry, rule: Rule) -> Array:
+def _torque_on_coils(magnet: Any, axes: Array, farther_m: Array, coil: CoilGeometry, rule: Rule) -> Array:
     """Return the torque of a magnet on one ampere in each of k coils, about the joint centre: (k, 3), N·m."""
-    turned = np.array([_frame(axis).T for axis in axes]).reshape(-1, 3, 3)
+    turned = np.array([frame_of_axis(axis).T for axis in axes]).reshape(-1, 3, 3)
     position, element = ((vectors @ turned).reshape(-1, 3) for vectors in conductors(coil, rule))
+    position += np.repeat(farther_m[:, None] * axes, len(conductors(coil, rule)[0]), axis=0)
     torque = np.empty_like(position)
     for start in range(0, len(position), BLOCK):
         block = slice(start, start + BLOCK)
@@ -311,11 +331,3 @@ def _rim_reaches_winding(actuator: Actuator) -> float:
     rim = np.arctan2(magnet.radius_m, magnet.rim_m)
     edge = np.arctan2(coil.outer_radius_m, coil.distance_m - coil.length_m / 2)
     return float(rim + edge + RIM_MARGIN)
-
-
-def _frame(axis: Array) -> Array:
-    """Return a rotation matrix (3, 3) whose third column is the axis."""
-    least = np.eye(3)[np.argmin(np.abs(axis))]
-    first = np.cross(least, axis)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(axis, first), axis])

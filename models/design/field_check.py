@@ -13,11 +13,16 @@ from spheretwin.models.base.checks import Check
 from spheretwin.models.design import curve_check, direct_summation, geometry_check, published_values
 from spheretwin.models.design.direct_summation import Comparison, Errors
 from spheretwin.models.design.pole_torque import compute_curve
+from spheretwin.models.scatter import Scatter, part_errors
 
 # The last is the largest tilt of the paper's nutation.
 BANDS_DEG = (0.0, 12.0, 24.0, 36.0, 48.0, 57.0)
 
 TORQUE_BOUND = 0.01
+
+# Largest errors of the scatter that is checked: gain, two angles in rad, distance in m.
+SCATTER_BOUNDS = (0.05, 0.01, 0.01, 3e-4)
+SCATTER_POSES = 3
 QUADRATURE_BOUND = 5e-3
 
 # Halfway between samples of the shipped curve, where its spline is least accurate, and where f_t is large.
@@ -99,9 +104,37 @@ def judge(
             curve_between_samples_of_peak=_curve_error(actuator),
             lookup_of_peak=curve_check.largest_lookup_error(actuator.torque_curve),
         ),
-        checks=[torque, quadrature, *published_values.checks(actuator)],
+        checks=[torque, quadrature, *_scatter(actuator, seed), *published_values.checks(actuator)],
         warnings=geometry_check.of_geometry(actuator),
     )
+
+
+def _scatter(actuator: Actuator, seed: int) -> list[Check]:
+    """Compare the torque matrix of a machine with scatter with direct sums over its displaced parts."""
+    if actuator.torque_curve.distance_sensitivity is None:
+        return []
+    rng = np.random.default_rng([seed, 3])
+    scatter = Scatter(
+        *(
+            part_errors(rng.uniform(-1, 1, (len(axes), 4)) * SCATTER_BOUNDS)
+            for axes in (actuator.pole_axes, actuator.coil_axes)
+        )
+    )
+    compared = direct_summation.compare(
+        actuator, np.radians(_tilts_deg(SCATTER_POSES, seed)), seed, scatter=scatter
+    )
+    errors = direct_summation.errors(compared, actuator.group.current_limit_A, seed=seed)
+    return [
+        Check(
+            name="scatter",
+            compares="torque of a machine with scatter against the direct sum, over the largest torque",
+            states=errors.torque_Nm.size,
+            value=_of_largest(errors.model_Nm, errors),
+            bound=TORQUE_BOUND,
+            why="mean axes and sensitivities to distance are exact to first order; the second-order rest must"
+            " stay below the percent to which a machine is known",
+        )
+    ]
 
 
 def _tilts_deg(poses: int, seed: int) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ rim, which passes half a millimetre from the winding, or, where the front is fla
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -31,6 +32,10 @@ STEP_DEG = 0.25
 
 # Samples between two that `convergence` computes again: 2 degrees apart.
 CONVERGENCE_STRIDE = 8
+
+# Step and angles of `distance_sensitivity`, and its mesh: four digits are sufficient.
+DISTANCE_STEP_m = 2e-4
+SENSITIVITY_RAD = np.radians(np.arange(0.5, 90.0))
 
 # Points of the sheet evaluated at once: with their layers they stay in the cache of the processor (1.5 times
 # as fast as 2048 points).
@@ -169,21 +174,61 @@ def convergence(
     return MeshConvergence(peak=float(change[-1]), worst=float(np.max(change)))
 
 
+def distance_sensitivity(curve: TorqueCurve, magnet: Magnet, coil: CoilGeometry) -> dict[str, float]:
+    """Return the change of a curve with the distance of magnet and coil from the joint centre, 1/m.
+
+    With ``f_t = g(c) sin phi`` and ``c = cos phi``, the derivative of g is fitted by
+    ``gain g + stretch (1 - c) g'(c)``: least squares of f_t over acute angles.
+
+    Parameters
+    ----------
+    curve : TorqueCurve
+        Result of `compute_curve` for the same magnet and coil.
+    magnet, coil
+        As in `compute_curve`.
+
+    Returns
+    -------
+    dict
+        ``magnet gain``, ``magnet stretch``, ``coil gain``, ``coil stretch``.
+    """
+    phi, mesh = SENSITIVITY_RAD, Mesh(12, 64, 6, 12)
+    cosine, sine = np.cos(phi), np.sin(phi)
+    f, slope = curve.spline(phi), curve.spline(phi, 1)
+    basis = np.column_stack([f, (1 - cosine) * (f * cosine / sine - slope) / sine])  # dc = -sin phi dphi
+    sensitivity: dict[str, float] = {}
+    for name in ("magnet", "coil"):
+        farther, closer = (
+            compute_curve(
+                replace(magnet, distance_m=magnet.distance_m + (name == "magnet") * step_m),
+                replace(coil, distance_m=coil.distance_m + (name == "coil") * step_m),
+                phi,
+                mesh,
+            ).torque_Nm_per_A
+            for step_m in (DISTANCE_STEP_m, -DISTANCE_STEP_m)
+        )
+        fit = np.linalg.lstsq(basis, (farther - closer) / (2 * DISTANCE_STEP_m), rcond=None)[0]
+        sensitivity |= {f"{name} gain": float(fit[0]), f"{name} stretch": float(fit[1])}
+    return sensitivity
+
+
 def provenance(
-    magnet: Magnet, coil: CoilGeometry, measured: MeshConvergence, mesh: Mesh | None = None
+    curve: TorqueCurve, magnet: Magnet, coil: CoilGeometry, measured: MeshConvergence
 ) -> list[str]:
     """Return lines with the provenance of a torque curve, for the head of its file.
 
     Parameters
     ----------
-    magnet, coil, mesh
+    curve : TorqueCurve
+        Result of `compute_curve`, with its sensitivities to distance.
+    magnet, coil
         Input of the curve.
     measured : Convergence
         Change by a doubled mesh.
     """
     import magpylib
 
-    mesh = mesh or Mesh()
+    mesh = Mesh()
     return [
         "Torque curve f_t(phi): torque on one pole of polarity +1, of one ampere in one coil, about the",
         "joint centre, against the angle between their axes; positive where it pulls the pole to the coil.",
@@ -191,7 +236,7 @@ def provenance(
         f" length {_mm(magnet.length_m)}, centre at {_mm(magnet.distance_m)}, {_front(magnet)}.",
         f"Coil: {coil.turns:g} turns in air, radii {_mm(coil.inner_radius_m)} to {_mm(coil.outer_radius_m)},"
         f" length {_mm(coil.length_m)}, centre at {_mm(coil.distance_m)}.",
-        *head(computed_from(magnet, coil)),
+        *head(computed_from(magnet, coil), curve.distance_sensitivity or {}),
         "Method: torque on the magnet's equivalent current sheet in the exact field of solenoids (magpylib"
         f" {magpylib.__version__}).",
         f"Quadrature: {mesh.along} points along the side, {_over_front(magnet, mesh)}{mesh.around} on half a"

@@ -31,9 +31,12 @@ def test_head_is_read_back(tmp_path, actuator, shipped):
     geometry = computed_from(
         replace(actuator.magnet, remanence_T=1.25), replace(actuator.coil, turns=123456.5)
     )
+    sensitivity = {"magnet gain": 123.4, "coil stretch": -5.6}
     path = tmp_path / "curve.csv"
-    path.write_text(torque_curve.to_csv(shipped, ["Before", *torque_curve.head(geometry), "after"]))
+    head = torque_curve.head(geometry, sensitivity)
+    path.write_text(torque_curve.to_csv(shipped, ["Before", *head, "after"]))
     again = torque_curve.read(path)
+    assert again.distance_sensitivity == sensitivity
     assert again.computed_for == pytest.approx(geometry, rel=1e-11)  # written with 12 digits
     assert again.name == "torque curve curve.csv"
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from spheretwin.control.law import NonNegative, Positive
 from spheretwin.plant.bristle_friction import StictionSection
 from spheretwin.plant.cable import CableSection
+from spheretwin.plant.part_scatter import PartScatter
 from spheretwin.plant.step import ENGINES
 from spheretwin.scenario.fields import SHIPPED
 from spheretwin.trajectories.rounding import Bounded, Triple
@@ -64,6 +65,8 @@ class PlantSection(Section):
     group_gain: tuple[Bounded, ...] | None = Field(
         None, description="torque per ampere of each group over that of the torque curve; 1 unless given"
     )
+    poles: PartScatter = PartScatter()
+    coils: PartScatter = PartScatter()
     payload_kg: NonNegative = Field(0.0, description="point mass on the shaft's payload mount, kg")
     initial_rad: Triple | None = Field(
         None, description="pose at the start, rad; the trajectory's first unless given"

@@ -26,7 +26,7 @@ def compared(actuator):
 
 def torque_on_coils(actuator, pole, axes, rule):
     magnet = direct_summation.pole_magnet(actuator.magnet, pole, 1.0, rule.stacked)
-    return direct_summation._torque_on_coils(magnet, axes, actuator.coil, rule)
+    return direct_summation._torque_on_coils(magnet, axes, np.zeros(len(axes)), actuator.coil, rule)
 
 
 def flat(actuator):

@@ -25,10 +25,11 @@ def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
     for band in verdict.by_tilt:
         assert band.median_relative_error <= band.largest_relative_error
         assert band.median_relative_error < 5e-4  # measured: 1.7e-4
-    torque, quadrature, *published = verdict.checks
+    torque, quadrature, scatter, *published = verdict.checks
     assert len(published) == 5
     assert torque.value == max(band.largest_error_of_largest_torque for band in verdict.by_tilt)
     assert torque.value < 1e-3  # measured: 2e-4
+    assert 1e-3 < scatter.value < scatter.bound  # of second order; measured: 4e-3
     assert quadrature.value == verdict.sources.quadrature_of_largest_torque
     assert broken(verdict.checks) == verdict.warnings == []
     assert verdict.sources.curve_between_samples_of_peak < 1e-4
@@ -38,10 +39,15 @@ def test_the_shipped_actuator_passes_and_is_told_by_tilt(actuator):
 
 @pytest.mark.usefixtures("coarse")
 def test_a_wrong_matrix_is_not_attributed_to_the_curve(actuator, monkeypatch):
-    right = direct_summation.torque_matrix
-    monkeypatch.setattr(direct_summation, "torque_matrix", lambda q, actuator: -right(q, actuator))
+    right = direct_summation.fill_torque_matrix
+
+    def negative(q, model, G, scratch):
+        right(q, model, G, scratch)
+        G *= -1
+
+    monkeypatch.setattr(direct_summation, "fill_torque_matrix", negative)
     verdict = field_verdict.judge(actuator, poses=1)
-    assert broken(verdict.checks) == ["torque"]
+    assert broken(verdict.checks) == ["torque", "scatter"]
     assert verdict.checks[0].value == pytest.approx(2, abs=0.01)  # as far off as the torque is large, twice
     assert not verdict.curve_is_of_another_geometry
 

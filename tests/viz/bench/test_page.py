@@ -12,7 +12,7 @@ from spheretwin.viz.bench.page import FRAMES_A_SETTING
 from tests.browser import Browser, needs_a_browser
 from tests.viz.bench import fake
 from tests.viz.bench.on_page import STATUS, at_rest, errors, on_screen, opened, write
-from tests.waiting import wait_for
+from tests.waiting import PATIENCE_S, wait_for
 
 # Of two colours, as directions: light and shade change their length. Told as they are, they come out pale:
 # copper 0.982, blue 0.91, red 0.87.
@@ -179,7 +179,8 @@ def test_without_an_operator_the_pages_explain_how_to_take_over(browser):
         third.close()
 
 
-def test_a_reloaded_single_page_operates(browser):
+def test_a_reloaded_single_page_operates(browser, monkeypatch):
+    monkeypatch.setattr("spheretwin.viz.bench.page.FRESH_S", PATIENCE_S)  # a busy machine opens it slowly
     bench = fake.Bench(operator="page 7", watching=("page 0",))
     with fake.shown(bench) as page:
         tab = opened(browser, page)
@@ -244,6 +245,7 @@ def test_a_page_reconnects(browser):
 def test_the_path_of_the_tip_restarts_with_another_run():
     bench = fake.Bench()
     with fake.shown(bench) as page:
+        wait_for(lambda: len(page._scene._trail) == 1)  # before the time changes
         for points, t_s in enumerate((1.3, 1.4, 1.5), 1):
             bench.now.t_s = t_s
             wait_for(lambda points=points: len(page._scene._trail) > points)

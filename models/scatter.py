@@ -1,0 +1,155 @@
+"""Scatter of a real machine: each pole and each coil with its own strength and placement.
+
+A pair of poles and a pair of coils on common axes enter the torque matrix as one look-up (`TorqueModel`).
+With scatter their axes are no longer opposite. Their mean axis cancels the placement errors to first order;
+what is left grows with the square of the angles. The strengths are exact: the two combinations of pole and
+coil that are next to each other have other weights than the two that are far apart.
+
+A larger distance from the joint centre changes the gap between pole and coil. To first order, f_t is then
+multiplied by ``1 + gain delta``, and its angle is stretched: ``1 - |cos phi|`` is multiplied by
+``1 - stretch delta``. Both sensitivities are those of the torque curve (`pole_torque.distance_sensitivity`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.kinematics import frame_of_axis, rotation
+from spheretwin.models.magnetics import TorqueModel, pole_lines, torque_model
+
+Array = NDArray[np.float64]
+
+
+class PartErrors(NamedTuple):
+    """Errors of k poles or of k coils."""
+
+    gain: Array  # (k,) relative error of the remanence, or of the torque per ampere
+    angle_rad: Array  # (k, 2) placement in two directions normal to the nominal axis
+    distance_m: Array  # (k,) placement along the axis
+
+    def axes(self, nominal: Array) -> Array:
+        """Return the axes, (k, 3), for nominal axes of the same shape."""
+        offsets = [
+            frame_of_axis(axis)[:, :2] @ angle for axis, angle in zip(nominal, self.angle_rad, strict=True)
+        ]
+        axes = nominal + np.reshape(offsets, nominal.shape)
+        return np.asarray(axes / np.linalg.norm(axes, axis=1, keepdims=True))
+
+
+def part_errors(table: Array) -> PartErrors:
+    """Return the errors of a table (k, 4): gain, two angles in rad, distance in m."""
+    return PartErrors(table[:, 0], table[:, 1:3], table[:, 3])
+
+
+class Scatter(NamedTuple):
+    """Errors of all poles and of all coils of a machine."""
+
+    poles: PartErrors
+    coils: PartErrors
+
+
+def no_scatter(actuator: Actuator) -> Scatter:
+    """Return the scatter of a machine that equals its drawing."""
+    return Scatter(
+        *(part_errors(np.zeros((len(axes), 4))) for axes in (actuator.pole_axes, actuator.coil_axes))
+    )
+
+
+def summed_torque_matrix(q: Array, actuator: Actuator, scatter: Scatter | None = None) -> Array:
+    """Return the torque matrix G_t(q) as a sum over every pole and every coil, with the torque curve itself.
+
+    Parameters
+    ----------
+    q : (3,) array, rad
+        Pose.
+    actuator : Actuator
+        Nominal machine.
+    scatter : Scatter
+        None unless given.
+
+    Returns
+    -------
+    (3, n) array, N·m/A
+        Column j is the stator-frame torque of one ampere in group j.
+    """
+    poles, coils = scatter = scatter or no_scatter(actuator)
+    pole_axes = poles.axes(actuator.pole_axes) @ rotation(q).T  # (p, 3)
+    coil_axes = coils.axes(actuator.coil_axes)  # (c, 3)
+    pole_change, coil_change = _distance_changes(actuator, scatter)
+    gain, stretch = pole_change[:, :, None] + coil_change[:, None]  # (p, c)
+    cosine = pole_axes @ coil_axes.T
+    pull = (1 + gain) * actuator.torque_curve.over_sine(cosine + stretch * (np.sign(cosine) - cosine))
+    pull *= np.outer(actuator.pole_polarity * (1 + poles.gain), 1 + coils.gain)
+    torque = np.einsum("pc,pck->ck", pull, np.cross(pole_axes[:, None], coil_axes))  # (c, 3)
+    return np.asarray(torque[actuator.groups].sum(axis=1).T)
+
+
+def scattered_model(actuator: Actuator, scatter: Scatter) -> TorqueModel:
+    """Return the data of the torque matrix of a machine with scatter.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Nominal machine.
+    scatter : Scatter
+        Errors of each pole and of each coil.
+
+    Raises
+    ------
+    InputError
+        A distance has an error, and the torque curve lacks its sensitivities to distance.
+    """
+    poles, coils = scatter
+    pole_axes, coil_axes = poles.axes(actuator.pole_axes), coils.axes(actuator.coil_axes)
+    lines, pairs = pole_lines(actuator.pole_axes), actuator.groups
+    strength = actuator.pole_polarity * (1 + poles.gain)
+    pole_change, coil_change = _distance_changes(actuator, scatter)
+    gain, stretched = np.zeros((2, 2, len(lines), len(pairs)))  # of the pairs at acute, at obtuse angles
+    for first, second in np.ndindex(2, 2):
+        pole, coil = lines[:, first], pairs[:, second]
+        change, stretch = pole_change[:, pole, None] + coil_change[:, None, coil]
+        weight = strength[pole, None] * (1 + coils.gain[coil]) * (1 + change)
+        weight[pole < 0] = 0.0
+        gain[first ^ second] += weight
+        stretched[first ^ second] += weight * stretch
+    cancelled = np.abs(gain) < 0.5  # poles whose effects cancel have no common stretch
+    stretch = np.where(cancelled, 0.0, stretched / np.where(cancelled, 1.0, gain))
+    return torque_model(actuator)._replace(
+        line_axes=_mean_axes(pole_axes, lines),
+        line_weights=np.ones(len(lines)),
+        group_axes=np.ascontiguousarray(_mean_axes(coil_axes, pairs).T),
+        pair_gain=_mean_and_step(gain.reshape(2, -1)),
+        pair_stretch=_mean_and_step(stretch.reshape(2, -1)),
+    )
+
+
+def _mean_and_step(pairs: Array) -> Array:
+    """Return mean and half difference of rows (acute, obtuse)."""
+    return 0.5 * np.array([pairs[0] + pairs[1], pairs[0] - pairs[1]])
+
+
+def _mean_axes(axes: Array, opposite: NDArray[np.int64]) -> Array:
+    """Return the mean axis of each pair of opposite parts, unit vectors; a part alone has its own axis."""
+    first, second = opposite.T
+    total = axes[first] - np.where(second[:, None] < 0, 0.0, axes[second])
+    return np.asarray(total / np.linalg.norm(total, axis=1, keepdims=True))
+
+
+def _distance_changes(actuator: Actuator, scatter: Scatter) -> tuple[Array, Array]:
+    """Return the relative change of f_t and the stretch of its angle of each pole and of each coil."""
+    known, distances_m = actuator.torque_curve.distance_sensitivity, [part.distance_m for part in scatter]
+    if known is None and any(map(np.any, distances_m)):
+        raise InputError(
+            f"{actuator.torque_curve.name}: expected its sensitivities to distance, as `spheretwin magnetics"
+            " curve` writes them, for errors of the distance; received a file without them"
+        )
+    magnet, coil = (
+        np.outer([known[f"{name} gain"], known[f"{name} stretch"]] if known else [0.0, 0.0], distance_m)
+        for name, distance_m in zip(("magnet", "coil"), distances_m, strict=True)
+    )
+    return magnet, coil

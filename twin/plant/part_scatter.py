@@ -1,0 +1,95 @@
+"""Sections of the scatter of poles and coils, and the errors drawn for a machine."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from spheretwin.electronics.random_streams import errors
+from spheretwin.models.actuator import Actuator
+from spheretwin.models.base.errors import InputError
+from spheretwin.models.scatter import PartErrors, Scatter, part_errors
+
+# Within these bounds the torque matrix is within 1 % of the exact field (`magnetics check`).
+LARGEST_GAIN_ERROR, LARGEST_ANGLE_rad, LARGEST_DISTANCE_m = 0.2, 0.01, 3e-4
+
+Gain = Annotated[float, Field(ge=-LARGEST_GAIN_ERROR, le=LARGEST_GAIN_ERROR)]
+Angle = Annotated[float, Field(ge=-LARGEST_ANGLE_rad, le=LARGEST_ANGLE_rad)]
+Distance = Annotated[float, Field(ge=-LARGEST_DISTANCE_m, le=LARGEST_DISTANCE_m)]
+
+
+class PartScatter(BaseModel):
+    """Scatter of the poles, or of the coils: bounds of uniform errors, drawn from the seed for each part."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    gain_error: Annotated[float, Field(ge=0, le=LARGEST_GAIN_ERROR)] = Field(
+        0.0, description="largest relative error of a pole's remanence, or of a coil's torque per ampere"
+    )
+    angle_error_rad: Annotated[float, Field(ge=0, le=LARGEST_ANGLE_rad)] = Field(
+        0.0, description="largest placement error in each of two directions normal to the axis, rad"
+    )
+    distance_error_m: Annotated[float, Field(ge=0, le=LARGEST_DISTANCE_m)] = Field(
+        0.0, description="largest error of the distance from the joint centre, m"
+    )
+    errors: tuple[tuple[Gain, Angle, Angle, Distance], ...] | None = Field(
+        None,
+        description="error of each part: relative gain, two angles in rad, distance in m; drawn unless given",
+    )
+
+    @property
+    def acts(self) -> bool:
+        """True if a part has an error."""
+        return bool(self.errors or self.gain_error or self.angle_error_rad or self.distance_error_m)
+
+    def part_errors(self, seed: int, name: str, parts: int) -> PartErrors:
+        """Return the errors of the parts of a machine.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the run.
+        name : str
+            Name of the section, which keys the random stream.
+        parts : int
+            Number of poles or coils.
+
+        Raises
+        ------
+        InputError
+            Errors are given for another number of parts.
+        """
+        if self.errors is None:
+            bounds = [self.gain_error, self.angle_error_rad, self.angle_error_rad, self.distance_error_m]
+            return part_errors(errors(seed, name, parts, len(bounds)) * bounds)
+        if len(self.errors) != parts:
+            raise InputError(
+                f"scenario: expected {name}.errors of {parts} parts, received {len(self.errors)}"
+            )
+        return part_errors(np.array(self.errors))
+
+
+def scatter_of(plant: Any, seed: int, actuator: Actuator) -> Scatter | None:
+    """Return the scatter of a plant section; None if it has none.
+
+    Parameters
+    ----------
+    plant : PlantSection
+        Its sections `poles` and `coils`.
+    seed : int
+        Seed of the run.
+    actuator : Actuator
+        Nominal machine.
+
+    Raises
+    ------
+    InputError
+        The given errors do not fit the machine.
+    """
+    if not (plant.poles.acts or plant.coils.acts):
+        return None
+    poles = plant.poles.part_errors(seed, "plant.poles", len(actuator.pole_axes))
+    coils = plant.coils.part_errors(seed, "plant.coils", len(actuator.coil_axes))
+    return Scatter(poles, coils)
