@@ -147,12 +147,17 @@ def test_check_prints_a_table(capsys, coarse):
     assert (code, err) == (0, "")
     assert "0° to 12°" in out
     assert "Sources of the error" in out
-    assert "7 of 7 checks hold" in out
+    assert "8 of 8 checks hold" in out
 
 
 def test_check_finds_a_wrong_polarity(capsys, coarse, monkeypatch):
-    right = direct_summation.torque_matrix
-    monkeypatch.setattr(direct_summation, "torque_matrix", lambda q, actuator: -right(q, actuator))
+    right = direct_summation.fill_torque_matrix
+
+    def negative(q, model, G, scratch):
+        right(q, model, G, scratch)
+        G *= -1
+
+    monkeypatch.setattr(direct_summation, "fill_torque_matrix", negative)
     code, out, err = here(capsys, "check", "--poses", 1, "--json")
     assert code == 1
     assert "broken: torque" in one_line(err)
