@@ -183,9 +183,12 @@ def current_colours(current: NDArray[np.float64], limit: float) -> NDArray[np.ui
     (..., 3) uint8 array
         Red, green, blue.
     """
-    share = np.clip(np.abs(current) / limit, 0, 1)[..., None]
-    full = np.where(current[..., None] < 0, _NEGATIVE, _POSITIVE)
-    return np.round((1 - share) * np.array(_ZERO) + share * full).astype(np.uint8)
+    share = np.clip(current / limit, -1, 1)
+    negative, positive = np.minimum(share, 0), np.maximum(share, 0)
+    colours = np.empty((*share.shape, 3), np.uint8)
+    for channel, (low, zero, high) in enumerate(zip(_NEGATIVE, _ZERO, _POSITIVE, strict=True)):
+        colours[..., channel] = np.rint(zero + (zero - low) * negative + (high - zero) * positive)
+    return colours
 
 
 def variation_colours(deviation: NDArray[np.float64], limit: float) -> NDArray[np.uint8]:

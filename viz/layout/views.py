@@ -143,8 +143,8 @@ def control(plots: Plots) -> rrb.Container:
         )
         for axis, name in enumerate(ANGLES)
     ]
-    below = rrb.Grid(*torques, *_law_plots(plots), grid_columns=3)
-    return rrb.Vertical(error_of_each_axis(plots), below, row_shares=[1, 2], name="control")
+    rows = rrb.Horizontal(*torques), rrb.Horizontal(*_law_plots(plots))
+    return rrb.Vertical(error_of_each_axis(plots), *rows, name="control")
 
 
 def error_of_each_axis(plots: Plots) -> rrb.TimeSeriesView:

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 BAR_WIDTH = 0.8
 
 _VALUES = next(iter(rr.BarChart.columns(values=np.zeros((1, 1))))).component_descriptor()
+_TEXTURE = next(
+    iter(rr.Mesh3D.columns(albedo_texture_buffer=np.zeros((1, 1), np.uint8)))
+).component_descriptor()
 
 
 class CoilCurrents(RecordingPart):
@@ -51,13 +54,20 @@ class CoilCurrents(RecordingPart):
             return
         colours = theme.current_colours(current_A, self.subject.facts.current_limit_A)  # (n, groups, 3)
         columns = [
-            *rr.Mesh3D.columns(albedo_texture_buffer=colours.reshape(len(colours), -1)),
+            rr.ComponentColumn(_TEXTURE, ArrowComponent(_lists(colours.reshape(len(colours), -1)))),
             rr.ComponentColumn(_VALUES, ArrowComponent(_tensors(current_A))),
         ]
         recording.send_columns(COILS, time_index(t_s), columns)
 
 
+_TEXTURES = rr.components.ImageBufferBatch([np.zeros(1, np.uint8)]).as_arrow_array().type
 _TENSOR = rr.components.TensorDataBatch(np.zeros(1, np.float16)).as_arrow_array().type
+
+
+def _lists(values: NDArray[np.uint8]) -> pa.Array:
+    """Arrow form of one list of bytes a row of (n, size) values; Rerun's own conversion is slow."""
+    starts = values.shape[1] * np.arange(len(values) + 1, dtype=np.int32)
+    return pa.ListArray.from_arrays(pa.array(starts), pa.array(values.ravel()), type=_TEXTURES)
 
 
 def _tensors(values: Array) -> pa.Array:

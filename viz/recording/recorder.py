@@ -16,8 +16,8 @@ from spheretwin.viz.layout.view import OVERVIEW
 from spheretwin.viz.recording.file_pipe import PIPE_PATHS, FilePipe
 from spheretwin.viz.recording.stream import Stream
 
-# Rerun keeps some bytes of each chunk until the end of a recording. Chunks therefore grow, up to this.
-MOST_ROWS = 12_288
+# Each chunk of each entity costs some time and bytes, whatever its length. Chunks therefore grow.
+FEWEST_ROWS, MOST_ROWS = 1_500, 12_288
 
 # Time that an ending process waits for each step of the recording.
 PATIENCE_s = 2.0
@@ -78,7 +78,7 @@ class Recorder(Stream):
 
     def due(self) -> int:
         """Rows that are recorded together: more as the recording grows."""
-        return min(self.rows_handed_over // 4, MOST_ROWS)
+        return min(max(FEWEST_ROWS, self.rows_handed_over // 4), MOST_ROWS)
 
     def send(self) -> None:
         """Leave the recorded data to Rerun's threads, which encode them meanwhile."""
