@@ -14,6 +14,7 @@ from spheretwin import assembly
 from spheretwin.control.law import Law
 from spheretwin.control.law_components.parameters import COMPENSATORS
 from spheretwin.control.laws import LAWS
+from spheretwin.electronics.coil_coupling import check_coupling
 from spheretwin.electronics.drive_section import DriveSection, ResolvedDrive, drive_sheet
 from spheretwin.electronics.sensor_chain import SensorsSection, sensor_sheet
 from spheretwin.faults.fault import Fault
@@ -21,6 +22,7 @@ from spheretwin.models import mjcf
 from spheretwin.models.actuator import Actuator, CoilGroup
 from spheretwin.models.base.errors import InputError, distinct_texts
 from spheretwin.models.base.user_code import is_reference
+from spheretwin.models.inductance import mutual_inductance
 from spheretwin.models.lagrangian import loaded_inertia
 from spheretwin.models.magnetics import disagreements
 from spheretwin.models.mjcf import Mjcf
@@ -57,6 +59,8 @@ def fill_defaults(
     actuator, section = files.actuator, scenario.plant
     _check_groups(scenario, actuator)
     drive = _drive(scenario.drive, actuator.group)
+    if drive.coil_coupling:
+        check_coupling(drive, mutual_inductance(actuator))
     plant = _with(
         ResolvedPlant,
         section,

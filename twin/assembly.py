@@ -174,7 +174,7 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers
         magnetics=magnetics,
         G=np.empty((3, groups)),
         scratch=scratch_of(magnetics),
-        drive=drive_of(scenario, groups, buffers),
+        drive=drive_of(scenario, actuator, buffers),
         friction=_friction(section, actuator),
         bristles=_bristles(section, actuator),
         cable=cable(section.cable),

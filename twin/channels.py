@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from spheretwin.control.supervision.enabled_groups import IN_USE, STATES
 from spheretwin.control.supervision.watchdog import REASONS
-from spheretwin.electronics.drive import write_telemetry
+from spheretwin.electronics.drive import write_telemetry as write_drive_telemetry
+from spheretwin.electronics.sensors import write_telemetry as write_sensor_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
 from spheretwin.models.base.compiled import part_of_its_caller
@@ -67,7 +68,7 @@ def drive_signals(groups: int) -> tuple[Signal, ...]:
 @part_of_its_caller
 def write_drive(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    write_telemetry(plant.drive, row)
+    write_drive_telemetry(plant.drive, row)
 
 
 DRIVE = Channel(drive_signals, lambda scenario: scenario.drive.supply_V is not None, write_drive)
@@ -246,6 +247,31 @@ def _logs_sensors(scenario: Scenario) -> bool:
 SENSORS = Channel(lambda groups: SENSOR_SIGNALS, _logs_sensors, write_sensors)
 
 
+SENSOR_STATE_SIGNALS = (
+    Signal(
+        "sensor_state_error_rad",
+        "rad",
+        3,
+        "error of each angle by the state of its sensor: play of the wiper (α, β), count not referenced (γ)",
+        ANGLES,
+    ),
+)
+
+
+@part_of_its_caller
+def write_sensor_states(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
+    """Write the columns of one tick."""
+    write_sensor_telemetry(sensors, row)
+
+
+def _logs_sensor_states(scenario: Scenario) -> bool:
+    sensors = scenario.sensors
+    return sensors.potentiometer.hysteresis_rad > 0 or sensors.encoder.start_error_rad > 0
+
+
+SENSOR_STATES = Channel(lambda groups: SENSOR_STATE_SIGNALS, _logs_sensor_states, write_sensor_states)
+
+
 PREDICTION_SIGNALS = (
     Signal("q_predicted_rad", "rad", 3, "hinge angles predicted over the known delay", ANGLES),
     Signal("qdot_predicted_rad_s", "rad/s", 3, "hinge rates predicted over the known delay", ANGLES),
@@ -289,6 +315,7 @@ WATCHDOG = Channel(lambda groups: WATCHDOG_SIGNALS, lambda scenario: scenario.wa
 
 CHANNELS: tuple[Channel, ...] = (
     SENSORS,
+    SENSOR_STATES,
     MEASURED_CURRENTS,
     REFERENCE_GOVERNOR,
     PREDICTION,

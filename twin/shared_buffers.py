@@ -22,6 +22,7 @@ from spheretwin.faults.effects import Effects
 from spheretwin.faults.fault_injector import FaultInjector
 from spheretwin.faults.schedule import FaultSchedule, noise_streams
 from spheretwin.models.actuator import Actuator
+from spheretwin.models.inductance import mutual_inductance
 from spheretwin.plant.step import Plant
 from spheretwin.scenario.plant_sections import ResolvedNominal
 from spheretwin.scenario.sections import ResolvedScenario, Scenario
@@ -70,16 +71,17 @@ def _delays_s(scenario: Scenario, target: str) -> list[float]:
     ]
 
 
-def drive_of(scenario: ResolvedScenario, groups: int, buffers: SharedBuffers) -> DriveModel:
+def drive_of(scenario: ResolvedScenario, actuator: Actuator, buffers: SharedBuffers) -> DriveModel:
     """Return the drive of a resolved scenario, at rest; with fault inputs if faults are scheduled.
 
     A watchdog acts on the drive itself, so that it does not wait for delayed commands.
     """
-    step_s, faults = scenario.plant.step_s, None
+    step_s, faults, groups = scenario.plant.step_s, None, len(actuator.groups)
     if scenario.fault or scenario.watchdog.on:
         longest_delay = round(sum(_delays_s(scenario, "controller")) / step_s)
         faults = DriveFaults(bool(scenario.fault), longest_delay, buffers.halt, buffers.draws)
-    return build_drive(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults)
+    mutual_H = mutual_inductance(actuator) if scenario.drive.coil_coupling else None
+    return build_drive(scenario.drive, step_s, scenario.substeps, groups, scenario.seed, faults, mutual_H)
 
 
 def supervision_of(scenario: ResolvedScenario, actuator: Actuator, buffers: SharedBuffers) -> Supervision:

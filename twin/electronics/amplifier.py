@@ -145,6 +145,23 @@ def amplifier(
     )
 
 
+@part_of_its_caller
+def with_supply(amplifier: Amplifier, more_V: float) -> Amplifier:
+    """Return amplifiers with a supply that is higher by `more_V`; without a swing below their drops."""
+    if more_V == 0.0:
+        return amplifier
+    return Amplifier(
+        amplifier.supplied,
+        max(amplifier.highest_V + more_V, 0.0),
+        min(amplifier.lowest_V - more_V, 0.0),
+        amplifier.bandwidth_rad_s,
+        amplifier.current_limit_A,
+        amplifier.step_s,
+        amplifier.following,
+        amplifier.offset_A,
+    )
+
+
 def zero_flow(groups: int) -> Flow:
     """Return a flow with all sums at 0."""
     return Flow(*np.zeros((len(Flow._fields), groups)))

@@ -91,6 +91,11 @@ class CoilSection(BaseModel):
     inductance_H: Annotated[float, Field(ge=1e-9, le=1e3)] | None = Field(
         None, description="inductance of a group, H; the model file's unless given (assumed: 0.9e-3)"
     )
+    coil_coupling: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0,
+        description="share of the mutual inductance of the groups, which is computed from the model's coils;"
+        " 0 for none, 1 for all; needs supply_V",
+    )
     resistance_per_K: Annotated[float, Field(ge=0, le=0.01)] = Field(
         0.0,
         description="relative rise of the resistance, 1/K, from 20 °C (property of copper: 0.0039)",

@@ -190,10 +190,10 @@ MOST_CONVERSIONS = 250
 
 
 class AdcSection(SensorStage):
-    """Parameters of the converter of α and β; ideal if bits, offset, gain error and noise are 0.
+    """Parameters of the converter of α and β; ideal if bits, offset, gain error, noise and skew are 0.
 
-    All channels and the count of the encoder are sampled at the control tick; the samples are converted once
-    or several times within the period.
+    All channels and the count of the encoder are sampled at the control tick, unless there is a skew; the
+    samples are converted once or several times within the period.
     """
 
     bits: Annotated[int, Field(ge=0, le=32)] = Field(
@@ -216,11 +216,17 @@ class AdcSection(SensorStage):
         description="conversions averaged in a control period, each with separate noise, of the held sample"
         " (4 µs each by ADS8364's sheet)",
     )
+    skew_s: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0,
+        description="time between the samples of two channels, α at the tick and β this time later, s; below"
+        " controller.period_s (0 for converters with a sample-and-hold for each channel, as the ADS8364)",
+    )
 
     @property
     def ideal(self) -> bool:
         """True if the converter does not change the voltage."""
-        return self.bits == 0 and self.offset_V == 0 and self.gain_error == 0 and self.noise_V == 0
+        errors = (self.bits, self.offset_V, self.gain_error, self.noise_V, self.skew_s)
+        return not any(errors)
 
     def build(self, setup: SensorSetup) -> Adcs:
         """Return the channels with errors from the seed; they also convert if the tracks have errors."""

@@ -60,17 +60,18 @@ def build_drive(
     groups: int,
     seed: int,
     faults: DriveFaults | None = None,
+    mutual_H: NDArray | None = None,
 ) -> DriveModel:
     """Return the drive of a resolved section, at rest.
 
     Parameters
     ----------
-    section, step_s, substeps, groups, seed, faults
+    section, step_s, substeps, groups, seed, faults, mutual_H
         As in `drive_chain.drive_chain`.
     """
     if section.supply_V is None and not section.converts and faults is None:
         return LagDrive(current_lag(section.lag_s, step_s, section.current_limit_A))
-    return drive_chain(section, step_s, substeps, groups, seed, faults)
+    return drive_chain(section, step_s, substeps, groups, seed, faults, mutual_H)
 
 
 def transfer_drive(before: DriveModel, after: DriveModel, command: NDArray) -> None:

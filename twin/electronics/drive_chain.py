@@ -21,6 +21,7 @@ from spheretwin.electronics.amplifier import (
     amplifier,
     drive_coils,
     reset_sums,
+    with_supply,
     zero_flow,
 )
 from spheretwin.electronics.coil import (
@@ -37,10 +38,18 @@ from spheretwin.electronics.coil import (
     is_overheated,
     update_resistance,
 )
+from spheretwin.electronics.coil_coupling import (
+    MOST_SWEEPS,
+    Coupling,
+    coupling,
+    induce_voltages,
+    predict_changes,
+    update_changes,
+)
 from spheretwin.electronics.delay import Delay, delay, due, latch
 from spheretwin.electronics.drive_section import STAGES, ResolvedDrive
 from spheretwin.electronics.stages import DriveSetup, FaultLine, chained, fault_line, through
-from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.models.base.state import transfer_state
 from spheretwin.models.kinematics import angular_velocity
 
@@ -82,6 +91,7 @@ class DriveChain(NamedTuple):
     supply: FaultLine  # of the supply voltage
     amplifier: Amplifier
     coil: GroupCoils
+    coupling: Coupling
     flow: Flow
     draws: Array  # standard normal numbers of this tick, of faults
     setpoint: Array  # (n,) A, command at the input of the amplifiers
@@ -90,7 +100,7 @@ class DriveChain(NamedTuple):
     period: (
         Array  # (3,) of this control period: charge drawn in As, supply in V, 1 for an open or shorted group
     )
-    before: Array  # (5, n) current and sums of open and shorted groups at step start
+    before: Array  # (5, n) current and sums of the groups at step start
 
     def stage(self, name: str) -> Any:
         """Return the stage of a name."""
@@ -121,6 +131,7 @@ def drive_chain(
     groups: int,
     seed: int,
     faults: DriveFaults | None = None,
+    mutual_H: Array | None = None,
 ) -> DriveChain:
     """Return the drive chain at rest, with errors drawn from the seed.
 
@@ -136,6 +147,8 @@ def drive_chain(
         Seed of the run: the same seed gives the same prototype.
     faults : DriveFaults, optional
         None if nothing can fail.
+    mutual_H : (n, n) array, H, optional
+        Mutual inductance of the groups by the geometry; None without coupling.
 
     Raises
     ------
@@ -147,6 +160,7 @@ def drive_chain(
     if faults:
         more = -(-faults.longest_delay_steps // substeps)
         command_delay = command_delay._replace(history=np.zeros((len(command_delay.history) + more, groups)))
+    amplifiers = amplifier(section, section.current_limit_A, step_s, groups, seed)
     chain = DriveChain(
         converts=section.converts or faults is not None,
         supplied=section.supply_V is not None,
@@ -158,8 +172,9 @@ def drive_chain(
         stages=tuple(kind.build(section, setup) for kind in STAGES.values()),
         delay=command_delay,
         supply=fault_line(1),
-        amplifier=amplifier(section, section.current_limit_A, step_s, groups, seed),
+        amplifier=amplifiers,
         coil=group_coils(section, section.resistance_ohm, section.inductance_H, substeps * step_s, groups),
+        coupling=coupling(section, mutual_H, amplifiers),
         flow=zero_flow(groups),
         draws=faults.draws if faults else np.empty(0),
         setpoint=np.zeros(groups),
@@ -233,18 +248,60 @@ def advance(
     if chain.supplied or any_open_short:
         angular_velocity(q, qdot, chain.rate_S)
         back_emf(G, gain, chain.rate_S, chain.emf)
-    if any_open_short:
-        _save_open_short_groups(chain, current)
+    if chain.coupling.on:
+        _advance_coupled_groups(chain, setpoint, any_open_short, current, mean)
+    else:
+        amplifier = with_supply(chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V)
+        _advance_groups(chain, amplifier, setpoint, any_open_short, current, mean)
     if chain.supplied:
-        drive_coils(_amplifier_on_supply(chain), chain.coil, setpoint, chain.emf, current, chain.flow)
+        _add_supply_charge(chain, setpoint, mean)
+
+
+@part_of_its_caller
+def _advance_groups(
+    chain: DriveChain,
+    amplifier: Amplifier,
+    setpoint: Array,
+    any_open_short: bool,
+    current: Array,
+    mean: Array,
+) -> None:
+    """Advance the currents by the step of the amplifiers, with the present EMF."""
+    if any_open_short:
+        _save_groups(chain, current)
+    if chain.supplied:
+        drive_coils(amplifier, chain.coil, setpoint, chain.emf, current, chain.flow)
         for j in range(mean.shape[0]):
             mean[j] = chain.flow.mean_current_A[j]
     else:
         advance_lag(chain.lag, setpoint, current, mean)
     if any_open_short:
-        _advance_open_short_groups(chain, current, mean)
-    if chain.supplied:
-        _add_supply_charge(chain, setpoint, mean)
+        _advance_open_short_groups(chain, amplifier.step_s, current, mean)
+
+
+@allocation_free
+def _advance_coupled_groups(
+    chain: DriveChain, setpoint: Array, any_open_short: bool, current: Array, mean: Array
+) -> None:
+    """Advance the currents of coupled groups by one physics step, in two parts."""
+    coupling, groups = chain.coupling, current.shape[0]
+    for j in range(groups):
+        coupling.own_emf[j], coupling.charge_As[j] = chain.emf[j], 0.0
+    for part in range(len(coupling.amplifiers)):
+        amplifier = with_supply(coupling.amplifiers[part], chain.period[SUPPLY_V] - chain.supply_V)
+        _save_groups(chain, current)
+        predict_changes(coupling, amplifier, chain.coil, setpoint, current)
+        for _ in range(MOST_SWEEPS):
+            induce_voltages(coupling, amplifier.step_s, chain.emf)
+            for j in range(groups):
+                _restore_group(chain, j, current)
+            _advance_groups(chain, amplifier, setpoint, any_open_short, current, mean)
+            if update_changes(coupling, chain.before[0], current):
+                break
+        for j in range(groups):
+            coupling.charge_As[j] += amplifier.step_s * mean[j]
+    for j in range(groups):
+        mean[j] = coupling.charge_As[j] / chain.amplifier.step_s
 
 
 @part_of_its_caller
@@ -263,24 +320,6 @@ def update_setpoint(chain: DriveChain, substep: int) -> None:
 
 
 @part_of_its_caller
-def _amplifier_on_supply(chain: DriveChain) -> Amplifier:
-    """Return the amplifiers with the supply of this period; their swing is 0 if the drops exceed it."""
-    amplifier, more_V = chain.amplifier, chain.period[SUPPLY_V] - chain.supply_V
-    if more_V == 0.0:
-        return amplifier
-    return Amplifier(
-        amplifier.supplied,
-        max(amplifier.highest_V + more_V, 0.0),
-        min(amplifier.lowest_V - more_V, 0.0),
-        amplifier.bandwidth_rad_s,
-        amplifier.current_limit_A,
-        amplifier.step_s,
-        amplifier.following,
-        amplifier.offset_A,
-    )
-
-
-@part_of_its_caller
 def _add_supply_charge(chain: DriveChain, setpoint: Array, mean: Array) -> None:
     """Add the charge that the amplifiers draw from the supply in a physics step."""
     amplifier, period = chain.amplifier, chain.period
@@ -294,27 +333,30 @@ def _add_supply_charge(chain: DriveChain, setpoint: Array, mean: Array) -> None:
 
 
 @part_of_its_caller
-def _save_open_short_groups(chain: DriveChain, current: Array) -> None:
-    """Save currents and sums of the open and shorted groups, before all groups are driven."""
+def _save_groups(chain: DriveChain, current: Array) -> None:
+    """Save currents and sums of all groups at the start of the step."""
     flow, before = chain.flow, chain.before
     for j in range(current.shape[0]):
-        if _contact(chain, j) != DRIVEN:
-            before[0, j], before[1, j], before[2, j] = current[j], flow.copper_J[j], flow.work_J[j]
-            before[3, j], before[4, j] = flow.voltage_limited_s[j], flow.current_limited_s[j]
+        before[0, j], before[1, j], before[2, j] = current[j], flow.copper_J[j], flow.work_J[j]
+        before[3, j], before[4, j] = flow.voltage_limited_s[j], flow.current_limited_s[j]
 
 
 @part_of_its_caller
-def _advance_open_short_groups(chain: DriveChain, current: Array, mean: Array) -> None:
-    """Restore the open and shorted groups to the start of the step, and advance them without amplifiers."""
+def _restore_group(chain: DriveChain, j: int, current: Array) -> None:
+    """Restore current and sums of a group to the start of the step."""
     flow, before = chain.flow, chain.before
+    current[j], flow.copper_J[j], flow.work_J[j] = before[0, j], before[1, j], before[2, j]
+    flow.voltage_limited_s[j], flow.current_limited_s[j] = before[3, j], before[4, j]
+
+
+@part_of_its_caller
+def _advance_open_short_groups(chain: DriveChain, step_s: float, current: Array, mean: Array) -> None:
+    """Restore the open and shorted groups to the start of the step, and advance them without amplifiers."""
     for j in range(current.shape[0]):
         contact = _contact(chain, j)
         if contact != DRIVEN:
-            current[j], flow.copper_J[j], flow.work_J[j] = before[0, j], before[1, j], before[2, j]
-            flow.voltage_limited_s[j], flow.current_limited_s[j] = before[3, j], before[4, j]
-            advance_open_short(
-                contact, chain.coil, j, chain.amplifier.step_s, chain.emf[j], current, mean, flow
-            )
+            _restore_group(chain, j, current)
+            advance_open_short(contact, chain.coil, j, step_s, chain.emf[j], current, mean, chain.flow)
 
 
 @part_of_its_caller

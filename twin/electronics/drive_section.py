@@ -26,11 +26,15 @@ class DriveSection(DelaySection, DacSection, AmplifierSection, CoilSection):
     current_limit_A: Positive | None = Field(None, description="largest group current of the amplifiers, A")
 
     @model_validator(mode="after")
-    def _one_lag(self) -> DriveSection:
+    def _supply_fits(self) -> DriveSection:
         if self.supply_V is not None and self.time_constant_s is not None:
             raise ValueError(
                 "expected either a supply_V, whose amplifiers have a bandwidth, or a time_constant_s,"
                 f" received {self.supply_V!r} V and {self.time_constant_s!r} s"
+            )
+        if self.coil_coupling and self.supply_V is None:
+            raise ValueError(
+                f"expected a supply_V with a coil_coupling of {self.coil_coupling!r}, received none"
             )
         return self
 

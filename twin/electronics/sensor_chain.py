@@ -17,8 +17,13 @@ from pydantic import BaseModel, Field
 from spheretwin.electronics.converters import AdcSection
 from spheretwin.electronics.random_streams import Streams
 from spheretwin.electronics.stages import SensorSetup, SensorStage, TickNoise, chained
-from spheretwin.electronics.transducers import CurrentSection, EncoderSection, PotentiometerSection
-from spheretwin.models.base.compiled import allocation_free
+from spheretwin.electronics.transducers import (
+    LAG,
+    CurrentSection,
+    EncoderSection,
+    PotentiometerSection,
+)
+from spheretwin.models.base.compiled import allocation_free, part_of_its_caller
 from spheretwin.trajectories.rounding import CONFIG, Triple
 
 
@@ -56,6 +61,7 @@ STAGES: dict[str, type[SensorStage]] = {
 Array = NDArray[np.float64]
 
 _NAMES = tuple(STAGES)
+_POTENTIOMETER, _ENCODER = _NAMES.index("potentiometer"), _NAMES.index("encoder")
 _pass_stages = chained([kind.function() for kind in STAGES.values()])
 
 
@@ -63,7 +69,8 @@ class SensorChain(NamedTuple):
     """All angle sensors, for compiled code."""
 
     offset_rad: Array  # (3,)
-    shifts: bool  # true if any offset is not 0
+    skew_s: Array  # (3,) time of the sample after the tick
+    shifts: bool  # true if any offset or skew is not 0
     stages: tuple[Any, ...]  # in the order of `STAGES`
     silent: NDArray[np.bool_]  # (3,) true if a fault suppresses new angles
     fresh: Array  # (3,) result: 1 for a new angle, 0 for a repeated one
@@ -115,7 +122,8 @@ def sensor_chain(section: SensorsSection, seed: int, faults: SensorFaults | None
         first_draw += parameters.draws(section)
     return SensorChain(
         np.array(section.angle_offset_rad, dtype=np.float64),
-        any(section.angle_offset_rad),
+        section.adc.skew_s * np.array([0.0, 1.0, 0.0]),
+        any(section.angle_offset_rad) or section.adc.skew_s > 0,
         tuple(stages),
         np.zeros(3, dtype=np.bool_),
         faults.fresh if faults else np.ones(3),
@@ -158,12 +166,23 @@ def sensor_sheet(sensors: SensorsSection) -> dict[str, Any]:
     }
 
 
+@part_of_its_caller
+def write_telemetry(chain: SensorChain, row: Array) -> None:
+    """Write the errors of the angles that are states of the sensors into the beginning of `row`, rad."""
+    tracks, encoder = chain.stages[_POTENTIOMETER], chain.stages[_ENCODER]
+    for channel in range(tracks.play.shape[0]):
+        row[channel] = tracks.play[channel, LAG]
+    row[2] = encoder.count[0] * (2 * np.pi / encoder.counts_per_turn) if encoder.starts_with_error else 0.0
+
+
 @allocation_free
 def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: Array) -> bool:
     """Write measured angles (rad) and true rates (rad/s) into the first rows of `measurement` (3, 3).
 
-    The measured pose is that at the tick, also for all conversions of an oversampling converter. The
-    controller converts voltages to angles with the nominal volts per radian. No sensor measures a rate.
+    The measured pose is that at the tick, also for all conversions of an oversampling converter. With a skew
+    s of the converter, β is that a time s later, to first order from angle and rate: the error is at most
+    ``s**2 / 2`` times the largest acceleration in that time. The controller converts voltages to angles with
+    the nominal volts per radian. No sensor measures a rate.
 
     Parameters
     ----------
@@ -184,7 +203,7 @@ def sense(chain: SensorChain, q: Array, qdot: Array, noise: Array, measurement: 
     for i in range(3):
         measurement[0, i], measurement[1, i] = q[i], qdot[i]
         if chain.shifts:
-            measurement[0, i] += chain.offset_rad[i]
+            measurement[0, i] += chain.offset_rad[i] + chain.skew_s[i] * qdot[i]
     _pass_stages(chain.stages, measurement, TickNoise(noise, chain.draws))
     finite = True
     for i in range(3):

@@ -74,6 +74,29 @@ def sense(sensors: Sensors, q: NDArray, qdot: NDArray, noise: NDArray, measureme
     return bool(_SENSE[type(sensors)](sensors, q, qdot, noise, measurement))
 
 
+@part_of_its_caller
+def _write_nothing(sensors: Any, row: Any) -> None:
+    pass
+
+
+_WRITE_TELEMETRY: dict[type, Any] = {IdealSensors: _write_nothing, SensorChain: chain.write_telemetry}
+
+
+def write_telemetry(sensors: Sensors, row: NDArray) -> None:
+    """Write the states of the sensors (3,), rad; ideal sensors have none."""
+    _WRITE_TELEMETRY[type(sensors)](sensors, row)
+
+
+@implements(write_telemetry, inline=True)
+def _compiled_write_telemetry(sensors: Any, row: Any) -> Callable[..., Any] | None:
+    implementation: Any = _WRITE_TELEMETRY.get(getattr(sensors, "instance_class", object))
+
+    def call(sensors: Any, row: Any) -> None:
+        implementation(sensors, row)
+
+    return call if implementation else None
+
+
 @implements(sense, inline=True)
 def _compiled_sense(
     sensors: Any, q: Any, qdot: Any, noise: Any, measurement: Any

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import cos, floor, isnan, nan, pi, sin
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, model_validator
 
-from spheretwin.electronics.random_streams import uniforms
+from spheretwin.electronics.random_streams import errors, uniforms
 from spheretwin.electronics.stages import FaultLine, SensorSetup, SensorStage, TickNoise, fault_line, through
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.trajectories.rounding import CONFIG
@@ -26,7 +26,12 @@ LARGEST_SHARE = 0.06
 
 
 class PotentiometerSection(SensorStage):
-    """Parameters of the potentiometers of α and β; ideal if residual and noise are 0."""
+    """Parameters of the potentiometers of α and β; ideal if residual, noise and hysteresis are 0.
+
+    The wiper has play: it rests until the joint has moved by the hysteresis after a reversal. Repeatability
+    is the spread of readings at one angle that is approached from one side again and again: the play on each
+    side changes at each reversal. The voltage is continuous, as the wiper never jumps.
+    """
 
     electrical_angle_rad: Annotated[float, Field(ge=1e-2, le=100)] = Field(
         5 * pi / 3,
@@ -43,6 +48,16 @@ class PotentiometerSection(SensorStage):
     noise_rad: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0, description="noise of the wiper, white from conversion to conversion, rad rms (assumed: 0.02°)"
     )
+    hysteresis_rad: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0,
+        description="difference between the readings of one angle, approached from below and from above: play"
+        " of the wiper, rad",
+    )
+    repeatability_rad: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.0,
+        description="largest deviation of a reading from the mean of approaches from the same side, new at"
+        " each reversal (normal, 3 standard deviations), rad; at most half of hysteresis_rad",
+    )
 
     @model_validator(mode="after")
     def _rises(self) -> PotentiometerSection:
@@ -53,24 +68,39 @@ class PotentiometerSection(SensorStage):
                 " electrical_angle_rad, so that the voltage rises with the angle,"
                 f" received {self.nonlinearity_rad:.10g}"
             )
+        if self.repeatability_rad > self.hysteresis_rad / 2:
+            raise ValueError(
+                "expected repeatability_rad of at most half of hysteresis_rad,"
+                f" received {self.repeatability_rad:.10g} and {self.hysteresis_rad:.10g}"
+            )
         return self
 
     @property
     def ideal(self) -> bool:
         """True if the stage does not change the angle."""
-        return self.nonlinearity_rad == 0 and self.noise_rad == 0
+        return self.nonlinearity_rad == 0 and self.noise_rad == 0 and self.hysteresis_rad == 0
 
     def build(self, setup: SensorSetup) -> Potentiometers:
         """Return the potentiometers with residuals from the seed; with ends if the converter is not ideal."""
         converts = not (self.ideal and setup.sensors.adc.ideal)
         phases = uniforms(setup.seed, setup.name, CHANNELS, HARMONICS)
+        play = np.zeros((CHANNELS, PLAY_COLUMNS))
+        play[:, WIPER] = nan
         return Potentiometers(
             converts or setup.faults,
             converts,
             self.volts_per_rad,
             (potentiometer(self, phases[0]), potentiometer(self, phases[1])),
             fault_line(CHANNELS),
+            self.hysteresis_rad / 2,
+            self.repeatability_rad,
+            setup.first_draw,
+            play,
         )
+
+    def draws(self, sensors: Any) -> int:
+        """Return one number for each channel, used at a reversal; 0 if the play is constant."""
+        return CHANNELS if self.repeatability_rad else 0
 
     @classmethod
     def function(cls) -> Any:
@@ -83,6 +113,11 @@ class PotentiometerSection(SensorStage):
         return self.supply_V / self.electrical_angle_rad
 
 
+WIPER, LAG, DIRECTION, UP, DOWN, PLAY_COLUMNS = range(6)
+"""Columns of the play: angle of the wiper (NaN before the first tick), its lead over the joint, its last
+direction, and the deviation of the play on each side as a share of the repeatability."""
+
+
 class Potentiometers(NamedTuple):
     """Both potentiometers, for compiled code."""
 
@@ -91,6 +126,14 @@ class Potentiometers(NamedTuple):
     volts_per_rad: float
     channels: tuple[Potentiometer, Potentiometer]
     line: FaultLine  # of the wipers, in rad of the nominal slope
+    half_play_rad: float
+    repeatability_rad: float
+    first_draw: int
+    play: NDArray[np.float64]  # (2, PLAY_COLUMNS)
+
+    def state_arrays(self) -> tuple[Any, ...]:
+        """Return the arrays with the state."""
+        return self.line, self.play
 
 
 @allocation_free
@@ -99,8 +142,33 @@ def pass_potentiometers(stage: Potentiometers, measurement: NDArray[np.float64],
     for channel in range(CHANNELS):
         angle = measurement[0, channel]
         if stage.converts:
+            if stage.half_play_rad > 0.0:
+                angle = wiper_angle(stage, channel, angle, noise.stages)
             angle = wiper_voltage(stage.channels[channel], angle) / stage.volts_per_rad
         measurement[0, channel] = through(stage.line, channel, angle, noise.faults)
+
+
+@allocation_free
+def wiper_angle(stage: Potentiometers, channel: int, angle_rad: float, draws: NDArray[np.float64]) -> float:
+    """Return the angle of a wiper (rad) at an angle of its joint (rad), and store it; NaN stays NaN.
+
+    At the first tick the wiper is in the middle of its play.
+    """
+    play, spread = stage.play, stage.repeatability_rad
+    if isnan(angle_rad) or isnan(play[channel, WIPER]):
+        play[channel, WIPER] = angle_rad
+        return angle_rad
+    lowest = angle_rad - (stage.half_play_rad + spread * play[channel, UP])
+    highest = angle_rad + (stage.half_play_rad + spread * play[channel, DOWN])
+    wiper = min(max(play[channel, WIPER], lowest), highest)
+    moved = wiper - play[channel, WIPER]
+    if moved * play[channel, DIRECTION] < 0.0 or (moved != 0.0 and play[channel, DIRECTION] == 0.0):
+        play[channel, DIRECTION] = 1.0 if moved > 0.0 else -1.0
+        if spread > 0.0:  # the play of the next reversal
+            deviation = min(max(draws[stage.first_draw + channel] / 3.0, -1.0), 1.0)
+            play[channel, DOWN if moved > 0.0 else UP] = deviation
+    play[channel, WIPER], play[channel, LAG] = wiper, wiper - angle_rad
+    return wiper
 
 
 class Potentiometer(NamedTuple):
@@ -177,12 +245,11 @@ def _peak(shape: NDArray[np.complex128]) -> float:
 
 
 class EncoderSection(SensorStage):
-    """Parameters of the incremental encoder of γ; ideal if it has no counts.
+    """Parameters of the incremental encoder of γ; ideal if it has neither counts nor eccentricity.
 
-    The counter starts from the initial pose, rounded to the grid of the disc, and no count is lost: its value
-    is the angle to the nearest line of the grid, over any number of turns. The index, once per turn where γ
-    is a multiple of 2π, lies on that grid. In reality it reveals lost counts and the angle within a turn of a
-    rotor of unknown pose; neither occurs here. It could not reveal the number of missed turns.
+    No count is lost: the counter has the angle to the nearest line of the grid, over any number of turns,
+    plus the error that it starts with. The index, once per turn, is one line of the grid. When it passes, the
+    counter is set to the angle of the index in this turn, and the error of the start is gone.
     """
 
     counts: Annotated[int, Field(ge=0, le=2**31)] = Field(
@@ -190,15 +257,47 @@ class EncoderSection(SensorStage):
         description="counts per turn, rounded to the nearest; 0 for none"
         " (assumed: OME-500-2MCA read as 500 pulses × 4 = 2000, 0.18°)",
     )
+    eccentricity_rad: Annotated[float, Field(ge=0, le=0.5)] = Field(
+        0.0,
+        description="amplitude of the error once per turn, of a disc off its axis; its phase is drawn from"
+        " the seed, rad (2 × offset / diameter of the grating)",
+    )
+    start_error_rad: Annotated[float, Field(ge=0, le=pi)] = Field(
+        0.0,
+        description="largest error of the count until the index passes, drawn from the seed, rad; 0 if the"
+        " counter was referenced before the run",
+    )
+    index_rad: Annotated[float, Field(ge=-pi, le=pi)] = Field(
+        0.0, description="angle of the index, rounded to a count, rad"
+    )
+
+    @model_validator(mode="after")
+    def _has_counts(self) -> EncoderSection:
+        if self.start_error_rad and not self.counts:
+            raise ValueError(
+                f"expected counts for a start_error_rad of {self.start_error_rad:.10g}, received 0"
+            )
+        return self
 
     @property
     def ideal(self) -> bool:
         """True if the stage does not change the angle."""
-        return self.counts == 0
+        return self.counts == 0 and self.eccentricity_rad == 0
 
     def build(self, setup: SensorSetup) -> Encoder:
-        """Return the encoder; its lines have no position errors."""
-        return Encoder(not self.ideal or setup.faults, float(self.counts), fault_line(1))
+        """Return the encoder, with a phase of the eccentricity and an error of the start from the seed."""
+        phase, start = errors(setup.seed, setup.name, 1, 2)[0].tolist()
+        start_counts = np.rint(start * self.start_error_rad * self.counts / (2 * pi))
+        return Encoder(
+            not self.ideal or setup.faults,
+            float(self.counts),
+            fault_line(1),
+            self.eccentricity_rad,
+            pi * phase,
+            self.start_error_rad > 0,
+            np.rint(self.index_rad * self.counts / (2 * pi)),
+            np.array([start_counts, nan]),
+        )
 
     @classmethod
     def function(cls) -> Any:
@@ -212,13 +311,37 @@ class Encoder(NamedTuple):
     on: bool
     counts_per_turn: float  # 0 for none
     line: FaultLine  # of the angle, rad, before it is counted
+    eccentricity_rad: float
+    phase_rad: float
+    starts_with_error: bool
+    index_count: float
+    count: NDArray[np.float64]  # (2,) error in counts, and turns from the index at the last tick or NaN
+
+    def state_arrays(self) -> tuple[Any, ...]:
+        """Return the arrays with the state."""
+        return self.line, self.count
 
 
 @allocation_free
 def pass_encoder(encoder: Encoder, measurement: NDArray[np.float64], noise: TickNoise) -> None:
-    """Count γ, rad, after its fault line."""
-    angle_rad = through(encoder.line, 0, measurement[0, 2], noise.faults)
-    measurement[0, 2] = counted(encoder, angle_rad)
+    """Count γ, rad, after eccentricity and fault line."""
+    angle_rad = measurement[0, 2]
+    if encoder.eccentricity_rad > 0.0:
+        angle_rad += encoder.eccentricity_rad * sin(angle_rad + encoder.phase_rad)
+    measurement[0, 2] = counted(encoder, through(encoder.line, 0, angle_rad, noise.faults))
+    if encoder.starts_with_error:
+        line_rad = 2 * pi / encoder.counts_per_turn
+        update_reference(encoder, np.rint(measurement[0, 2] / line_rad))
+        measurement[0, 2] += encoder.count[0] * line_rad
+
+
+@allocation_free
+def update_reference(encoder: Encoder, count: float) -> None:
+    """Remove the error of the start if the count is at the index or has passed it since the last tick."""
+    turns = (count - encoder.index_count) / encoder.counts_per_turn
+    if turns == floor(turns) or abs(floor(turns) - encoder.count[1]) > 0.0:
+        encoder.count[0] = 0.0
+    encoder.count[1] = floor(turns)
 
 
 @allocation_free

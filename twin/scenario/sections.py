@@ -127,6 +127,12 @@ class Scenario(Section):
             raise ValueError(
                 f"expected nominal.delay_s of at most {MOST_DELAY} control periods, received {delay_s!r} s"
             )
+        skew_s, period_s = self.sensors.adc.skew_s, self.controller.period_s
+        if not skew_s < period_s:
+            raise ValueError(
+                f"expected sensors.adc.skew_s below controller.period_s of {period_s!r} s,"
+                f" received {skew_s!r} s"
+            )
         delay(self.drive, self.plant.step_s, self.substeps, 1)  # a whole number of physics steps
         if self.ticks < 1:
             raise ValueError(

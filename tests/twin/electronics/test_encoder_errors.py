@@ -1,0 +1,139 @@
+"""Eccentricity and index of the encoder, and the skew between the channels of the converter."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from spheretwin import scenario as scenarios
+from spheretwin.electronics.sensor_chain import SensorsSection, sense, sensor_chain
+from spheretwin.models.base.errors import InputError
+from spheretwin.session import Session
+
+LINE = 2 * np.pi / 2000
+
+
+def measured(q, seed=0, rates=None, **section):
+    """Measured angles (n, 3) at poses (n, 3)."""
+    chain, row, angles = sensor_chain(SensorsSection(**section), seed), np.empty((3, 3)), []
+    for pose, rate in zip(q, np.zeros_like(q) if rates is None else rates, strict=True):
+        sense(chain, pose, rate, np.zeros(8), row)
+        angles.append(row[0].copy())
+    return np.array(angles)
+
+
+def spun(angles):
+    return np.stack([0 * angles, 0 * angles, angles], axis=1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_eccentricity_is_one_harmonic_of_the_turn(seed):
+    turn = 2 * np.pi * np.arange(256) / 256
+    error = measured(spun(turn), seed, encoder={"eccentricity_rad": 2e-3})[:, 2] - turn
+    spectrum = np.fft.fft(error) / 256
+    assert 2 * abs(spectrum[1]) == pytest.approx(2e-3, rel=1e-12)
+    assert np.abs(np.delete(spectrum, [1, 255])).max() < 1e-15  # rounding of angles of 6 rad
+    over = measured(spun(turn + 6 * np.pi), seed, encoder={"eccentricity_rad": 2e-3})[:, 2] - turn - 6 * np.pi
+    np.testing.assert_allclose(over, error, rtol=0, atol=1e-14)
+
+
+def test_phase_of_the_eccentricity_belongs_to_the_seed_and_counts_round_after_it():
+    turn = np.linspace(0, 7, 1000)
+    phases = []
+    for seed in range(50):
+        error = measured(spun(turn), seed, encoder={"eccentricity_rad": 0.01})[:, 2] - turn
+        phases.append(np.angle(np.exp(-1j * turn) @ error))
+        lines = measured(spun(turn), seed, encoder={"eccentricity_rad": 0.01, "counts": 2000})[:, 2]
+        np.testing.assert_allclose(lines, np.rint((turn + error) / LINE) * LINE, rtol=0, atol=1e-12)
+    # 50 phases leave a quarter of the turn empty with a probability of 50 * 0.75**49, 4e-5.
+    assert np.diff(np.sort(phases)).max() < np.pi / 2
+
+
+def slow_count(angles, start, index, counts=2000):
+    """Counter that is set right at the index: at its line, or between two ticks on either side of it."""
+    lines, error, readings = np.rint(angles * counts / (2 * np.pi)).astype(int), start, []
+    index_line = round(index * counts / (2 * np.pi))
+    for place, line in enumerate(lines):
+        first = line if place == 0 else lines[place - 1]
+        passed = range(min(first, line), max(first, line) + 1)
+        if any((position - index_line) % counts == 0 for position in passed):
+            error = 0
+        readings.append(line + error)
+    return np.array(readings) * 2 * np.pi / counts
+
+
+@given(
+    st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=40), st.floats(-np.pi, np.pi), st.integers(0, 1000)
+)
+def test_count_is_wrong_by_a_constant_until_the_index_passes(steps, index, seed):
+    angles = 0.37 + np.cumsum(steps)
+    section = {"counts": 2000, "start_error_rad": 0.2, "index_rad": index}
+    start = measured(spun(np.array([index + 1.0])), seed, encoder=section)[0, 2] - index - 1.0
+    got = measured(spun(angles), seed, encoder=section)[:, 2]
+    expected = slow_count(angles, round(start / LINE), index)
+    np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12)
+
+
+def test_error_of_the_start_fills_its_bound_and_counters_differ():
+    section = {"counts": 2000, "start_error_rad": 0.5}
+    errors = [measured(spun(np.array([1.0])), seed, encoder=section)[0, 2] - 1.0 for seed in range(200)]
+    assert np.abs(errors).max() <= 0.5 + LINE  # half a line each of the error and of the count
+    # Uniform: 200 numbers all miss the outer tenth on one side with a probability of 0.95**200, 4e-5.
+    assert max(errors) > 0.45
+    assert min(errors) < -0.45
+
+
+def test_start_error_without_counts_is_refused():
+    with pytest.raises(ValidationError, match=r"expected counts for a start_error_rad of 0\.1, received 0"):
+        SensorsSection(encoder={"start_error_rad": 0.1})
+
+
+def test_telemetry_shows_the_error_until_the_index_and_snapshots_hold_it():
+    fields = {
+        "hardware": "prototype",
+        "sensors.encoder.start_error_rad": 0.05,
+        "sensors.encoder.index_rad": 0.1,
+        "seed": 3,
+        "duration": 2.0,
+        "plant.engine": "lagrangian",
+    }
+    with Session(scenarios.load("sinusoid", fields)) as session:
+        session.advance(20)
+        state = session.snapshot()
+        table = session.advance(1500)
+        session.restore(state)
+        assert session.advance(1500).values.tobytes() == table.values.tobytes()
+    error, gamma = table["sensor_state_error_rad"][:, 2], table["q_rad"][:, 2]
+    passed = int(np.argmax(gamma > 0.1 - LINE / 2))
+    assert passed > 0
+    assert abs(error[0]) > LINE
+    np.testing.assert_array_equal(error[:passed], error[0])
+    np.testing.assert_array_equal(error[passed + 1 :], 0)
+    # The reading is the count next to the angle, plus the error.
+    off = table["q_measured_rad"][:, 2] - gamma - error
+    assert np.abs(off).max() <= LINE / 2 * (1 + 1e-9)
+
+
+def test_skew_samples_beta_later_to_first_order():
+    skew, size, w = 2e-4, 0.3, 20.0
+    t = np.arange(0, 1, 1e-3)
+
+    def motion(times):
+        return size * np.sin(w * times + 0.4)
+
+    q = np.stack([motion(t)] * 3, axis=1)
+    rates = np.stack([size * w * np.cos(w * t + 0.4)] * 3, axis=1)
+    got = measured(q, rates=rates, adc={"skew_s": skew})
+    bound = size * w**2 * skew**2 / 2
+    error = np.abs(got[:, 1] - motion(t + skew))
+    assert 0.99 * bound < error.max() <= bound + 1e-15
+    assert np.abs(got[:, 1] - q[:, 1]).max() == pytest.approx(size * w * skew, rel=1e-3)
+    np.testing.assert_allclose(got[:, 0], q[:, 0], rtol=0, atol=1e-15)  # to volts and back
+    np.testing.assert_array_equal(got[:, 2], q[:, 2])
+
+
+def test_skew_of_a_period_is_refused():
+    message = r"expected sensors\.adc\.skew_s below controller\.period_s of 0\.001 s, received 0\.001 s"
+    with pytest.raises(InputError, match=message):
+        scenarios.load("hold", {"sensors.adc.skew_s": 1e-3})

@@ -1,0 +1,137 @@
+"""Play of the wiper: hysteresis and repeatability by their definitions, and against a slow copy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from spheretwin import scenario as scenarios
+from spheretwin.electronics.random_streams import noise_rows, noise_table
+from spheretwin.electronics.sensor_chain import SensorsSection, noise_streams, sense, sensor_chain
+from spheretwin.electronics.stages import SensorSetup
+from spheretwin.electronics.transducers import LAG, PotentiometerSection, wiper_angle
+from spheretwin.session import Session
+
+WIDTH, SPREAD = 4e-3, 1e-3
+
+
+def made(hysteresis=WIDTH, repeatability=SPREAD):
+    section = PotentiometerSection(hysteresis_rad=hysteresis, repeatability_rad=repeatability)
+    setup = SensorSetup(
+        SensorsSection(), 0, "potentiometer", first_draw=0, faults=False, longest_delay_ticks=0
+    )
+    return section.build(setup)
+
+
+def followed(stage, angles, draws):
+    return np.array([wiper_angle(stage, 0, angle, draw) for angle, draw in zip(angles, draws, strict=True)])
+
+
+def approaches(count, side):
+    """Angles that go to 0 again and again from one side, by way of 0.1 rad on this side."""
+    away = side * np.linspace(0, 0.1, 7)
+    return np.tile(np.concatenate([away, away[::-1]]), count)
+
+
+def slow_wiper(angles, numbers, half, spread):
+    """Wiper that two stops of the joint push; a stop moves when the wiper begins to move the other way."""
+    wiper, direction, stops, path = angles[0], 0, {1: half, -1: half}, []
+    for angle, number in zip(angles, numbers, strict=True):
+        for way in (1, -1):
+            if way * (angle - wiper) > stops[way]:
+                wiper = angle - way * stops[way]
+                if direction != way:
+                    direction = way
+                    stops[-way] = half + spread * np.clip(number / 3, -1, 1)
+        path.append(wiper)
+    return np.array(path)
+
+
+@given(st.lists(st.floats(-0.02, 0.02), min_size=2, max_size=60), st.integers(0, 99))
+def test_wiper_is_its_slow_copy_and_never_jumps(steps, seed):
+    angles = np.cumsum(steps)
+    numbers = np.random.default_rng(seed).normal(size=(len(angles), 2))
+    wiper = followed(made(), angles, numbers)
+    # Sums of angles of 1 rad.
+    np.testing.assert_allclose(
+        wiper, slow_wiper(angles, numbers[:, 0], WIDTH / 2, SPREAD), rtol=0, atol=1e-15
+    )
+    assert np.all(np.abs(np.diff(wiper)) <= np.abs(np.diff(angles)) + 1e-15)
+
+
+def test_hysteresis_is_the_difference_of_readings_from_both_sides():
+    stage, none = made(repeatability=0.0), np.zeros((42, 0))
+    below, above = (followed(stage, approaches(3, side), none)[-1] for side in (-1, 1))
+    assert above - below == pytest.approx(WIDTH, rel=1e-12)
+    assert above == pytest.approx(WIDTH / 2, rel=1e-12)
+    assert stage.play[0, LAG] == above  # the joint is at 0
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_repeatability_is_the_spread_of_readings_from_one_side(side):
+    count, angles = 3000, approaches(3000, side)
+    draws = noise_rows(4, 0, len(angles), 2, "sensors.potentiometer noise")
+    reading = followed(made(), angles, draws)[len(angles) // count - 1 :: len(angles) // count]
+    deviation = reading - side * WIDTH / 2
+    assert 0.9 * SPREAD < np.abs(deviation).max() <= SPREAD * (1 + 1e-12)
+    # The standard deviation of 3000 numbers strays by 1 / sqrt(6000) of itself; four of these.
+    assert deviation.std() == pytest.approx(SPREAD / 3, rel=4 / np.sqrt(6000) + 0.01)  # 0.3 % are cut off
+    assert abs(deviation.mean()) < 4 * SPREAD / 3 / np.sqrt(count)
+
+
+def test_spread_larger_than_the_play_is_refused():
+    message = "expected repeatability_rad of at most half of hysteresis_rad, received 0.003 and 0.004"
+    with pytest.raises(ValidationError, match=message):
+        PotentiometerSection(hysteresis_rad=0.004, repeatability_rad=0.003)
+
+
+def test_wiper_starts_at_the_joint_and_nan_stays_nan():
+    stage, none = made(repeatability=0.0), np.zeros(0)
+    assert wiper_angle(stage, 0, 0.3, none) == 0.3
+    assert np.isnan(wiper_angle(stage, 0, np.nan, none))
+
+
+def test_play_changes_no_other_number_and_is_the_channel_s_own():
+    """The converter's noise is the same numbers with and without play; α and β have their own spread."""
+    tracks = {"hysteresis_rad": WIDTH, "repeatability_rad": SPREAD}
+    section = SensorsSection(potentiometer=tracks, adc={"noise_V": 1e-3})
+    plain = SensorsSection(adc={"noise_V": 1e-3})
+    angles = np.concatenate([approaches(20, 1), approaches(20, -1)])
+    measured = {}
+    for name, parameters in (("play", section), ("plain", plain)):
+        chain, row = sensor_chain(parameters, 3), np.empty((3, 3))
+        noise = noise_table(3, 0, len(angles), noise_streams(parameters))
+        measured[name] = []
+        for angle, numbers in zip(angles, noise, strict=True):
+            sense(chain, np.array([angle, angle, 0.0]), np.zeros(3), numbers, row)
+            measured[name].append(row[0, :2].copy())
+    play = np.array(measured["play"]) - np.array(measured["plain"])
+    numbers = noise_rows(3, 0, len(angles), 2, "sensors.potentiometer noise")
+    for channel in range(2):
+        expected = slow_wiper(angles, numbers[:, channel], WIDTH / 2, SPREAD) - angles
+        # Sums of volts, in rad of 1 V/rad.
+        np.testing.assert_allclose(play[:, channel], expected, rtol=0, atol=1e-14)
+    assert np.abs(play[:, 0] - play[:, 1]).max() > SPREAD / 10
+
+
+def test_telemetry_has_the_lead_of_the_wiper_and_snapshots_hold_it():
+    fields = {
+        "sensors.potentiometer.hysteresis_rad": WIDTH,
+        "sensors.potentiometer.repeatability_rad": SPREAD,
+        "plant.engine": "lagrangian",
+        "duration": 1.0,
+    }
+    with Session(scenarios.load("nutation", {"hardware": "prototype", **fields})) as session:
+        first = session.advance(150)
+        state = session.snapshot()
+        second = session.advance(150).values.tobytes()
+        session.restore(state)
+        assert session.advance(150).values.tobytes() == second
+    numbers = noise_rows(0, 0, 150, 2, "sensors.potentiometer noise")
+    for channel in range(2):
+        q = first["q_rad"][:, channel]
+        expected = slow_wiper(q, numbers[:, channel], WIDTH / 2, SPREAD) - q
+        np.testing.assert_allclose(first["sensor_state_error_rad"][:, channel], expected, rtol=0, atol=1e-15)
+    assert np.abs(first["sensor_state_error_rad"][:, 0]).max() > WIDTH / 4
+    np.testing.assert_array_equal(first["sensor_state_error_rad"][:, 2], 0)
