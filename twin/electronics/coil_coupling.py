@@ -38,8 +38,8 @@ Array = NDArray[np.float64]
 # fifth of their change by the coupling at the step of the plant, with one part three fifths.
 FIRST_PART = 1.6
 
-# The error of the currents is below a tenth of this: a few thousandths of a code of the converter.
-TOLERANCE_A = 1e-5
+# The error of the currents is below a tenth of this: a few ten-thousandths of a code of the converter.
+TOLERANCE_A = 1e-6
 
 # A sweep gains a digit; the bound is reached only by groups that are coupled almost completely.
 MOST_SWEEPS = 30
