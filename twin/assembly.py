@@ -27,7 +27,6 @@ from spheretwin.models.magnetics import TorqueModel, scratch_of, torque_model
 from spheretwin.models.scatter import scattered_model
 from spheretwin.models.telemetry.signals import Signal, common_signals, offsets, width
 from spheretwin.plant.bristle_friction import BristleFriction, bristle_friction
-from spheretwin.plant.cable import cable
 from spheretwin.plant.friction import Friction, friction
 from spheretwin.plant.part_scatter import scatter_of
 from spheretwin.plant.rotor import Rotor, RotorSettings
@@ -177,7 +176,6 @@ def plant_of(scenario: ResolvedScenario, actuator: Actuator, rotor: Any, buffers
         drive=drive_of(scenario, actuator, buffers),
         friction=_friction(section, actuator),
         bristles=_bristles(section, actuator),
-        cable=cable(section.cable),
         group_gain=np.array(section.group_gain),
         unmodelled_torque=np.array(section.modelling_torque_Nm),
         hinge_range=actuator.hinge_range_rad,

@@ -14,7 +14,7 @@ from spheretwin.electronics.drive import write_telemetry as write_drive_telemetr
 from spheretwin.electronics.sensors import write_telemetry as write_sensor_telemetry
 from spheretwin.faults.fault import MODES
 from spheretwin.faults.schedule import part_names
-from spheretwin.models.base.compiled import part_of_its_caller
+from spheretwin.models.base.compiled import copy_into, part_of_its_caller
 from spheretwin.models.telemetry.signals import ANGLES, Signal
 from spheretwin.plant.bristle_friction import LAST
 from spheretwin.plant.cable import acts
@@ -157,28 +157,19 @@ FRICTION = Channel(lambda groups: FRICTION_SIGNALS, _logs_friction, write_fricti
 
 
 PRESLIDING_SIGNALS = (
-    Signal(
-        "presliding_rad",
-        "rad",
-        3,
-        "elastic rotation of the hinges within static friction, at the end of the control period",
-        ANGLES,
-    ),
+    Signal("presliding_rad", "rad", 3, "elastic rotation within static friction, after the tick", ANGLES),
 )
 
 
 @part_of_its_caller
 def write_presliding(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    for i in range(3):
-        row[i] = plant.bristles.deflection_rad[LAST, i]
+    copy_into(row, 0, plant.bristles.deflection_rad[LAST], 3)
 
 
-def _logs_presliding(scenario: Scenario) -> bool:
-    return scenario.plant.stiction.on
-
-
-PRESLIDING = Channel(lambda groups: PRESLIDING_SIGNALS, _logs_presliding, write_presliding)
+PRESLIDING = Channel(
+    lambda groups: PRESLIDING_SIGNALS, lambda scenario: scenario.plant.stiction.on, write_presliding
+)
 
 
 CABLE_SIGNALS = (
@@ -189,15 +180,10 @@ CABLE_SIGNALS = (
 @part_of_its_caller
 def write_cable(row: NDArray, controller: Any, sensors: Any, plant: Any) -> None:
     """Write the columns of one tick."""
-    for i in range(3):
-        row[i] = plant.cable.first_torque_q[i]
+    copy_into(row, 0, plant.bristles.first_cable_q, 3)
 
 
-def _logs_cable(scenario: Scenario) -> bool:
-    return acts(scenario.plant.cable)
-
-
-CABLE = Channel(lambda groups: CABLE_SIGNALS, _logs_cable, write_cable)
+CABLE = Channel(lambda groups: CABLE_SIGNALS, lambda scenario: acts(scenario.plant.cable), write_cable)
 
 
 REFERENCE_GOVERNOR_SIGNALS = (

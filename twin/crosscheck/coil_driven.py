@@ -8,7 +8,7 @@ step of the same plant is the reference. Both engines answer both.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -146,13 +146,13 @@ def integrate(actuator: Actuator) -> Array:
 def by_plant(mjcf: Path, engine: str, step_s: float) -> Array:
     """States at the samples by the plant, its currents the means of the prescribed ones over each step."""
     fields = {"plant.engine": engine, "plant.step_s": step_s, "drive.time_constant_s": 0.0}
-    return _driven(mjcf, fields, step_s, AMPLITUDE_A, np.zeros(3))
+    return _driven(mjcf, fields, step_s, AMPLITUDE_A, (0.0, 0.0, 0.0))
 
 
 def by_complete_plant(mjcf: Path, engine: str, step_s: float) -> Array:
     """States at the samples by the plant with all that acts in it, under commands held over each period."""
     fields = {**COMPLETE, "plant.engine": engine, "plant.step_s": step_s}
-    return _driven(mjcf, fields, PERIOD_s, COMPLETE_AMPLITUDE_A, np.array(DISTURBANCE_Nm))
+    return _driven(mjcf, fields, PERIOD_s, COMPLETE_AMPLITUDE_A, DISTURBANCE_Nm)
 
 
 def _samples_s() -> Array:
@@ -160,33 +160,51 @@ def _samples_s() -> Array:
 
 
 def _driven(
-    mjcf: Path, fields: Mapping[str, Any], period_s: float, amplitude_A: float, disturbance: Array
+    mjcf: Path, fields: Mapping[str, Any], period_s: float, amplitude_A: float, disturbance: tuple[float, ...]
 ) -> Array:
-    """States at the samples; no numbers from where the rotor left its workspace."""
+    """States at the samples."""
     own = {
-        "plant.mjcf": str(mjcf),
         "plant.initial_rad": START_rad,
         "plant.initial_rad_s": START_rad_s,
         "controller.period_s": period_s,
     }
-    begun = initial_config(scenarios.load("hold", {**own, **fields}), None, None)
-    scenario, actuator = begun.scenario, begun.files.actuator
-    groups = len(actuator.groups)
-    rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
-    stepped = rotor.start(np.array(START_rad), np.array(START_rad_s))
-    plant = assembly.plant_of(scenario, actuator, stepped, shared_buffers(scenario, groups))
     every = round(SAMPLE_s / period_s)
-    states = np.full((len(_samples_s()), 6), np.nan)
-    states[0] = np.concatenate([START_rad, START_rad_s])
-    commands = amplitude_A * mean_shares(period_s, groups)
-    _drive(
-        plant,
-        commands,
-        disturbance,
-        PlantOutput(np.empty(groups), np.empty(groups), np.empty(3)),
-        every,
-        states,
-    )
+    torque = np.tile(disturbance, (round(DURATION_s / period_s), 1))
+
+    def commands(groups: int) -> Array:
+        return amplitude_A * mean_shares(period_s, groups)
+
+    return drive_plant(mjcf, {**own, **fields}, commands, torque, every)
+
+
+def drive_plant(
+    mjcf: Path, fields: Mapping[str, Any], commands: Callable[[int], Array], disturbance: Array, every: int
+) -> Array:
+    """Return the states of the plant at every so many ticks; no numbers after it left its workspace.
+
+    Parameters
+    ----------
+    mjcf : Path
+        Model file that the engine reads.
+    fields : mapping
+        Fields of the scenario.
+    commands : callable
+        Returns the commanded currents (n, groups) of each tick, A.
+    disturbance : (n, 3) array, N·m
+        Against the motion, of each tick.
+    every : int
+        Ticks from one state to the next.
+    """
+    begun = initial_config(scenarios.load("hold", {"plant.mjcf": str(mjcf), **fields}), None, None)
+    scenario, actuator = begun.scenario, begun.files.actuator
+    groups, section = len(actuator.groups), scenario.plant
+    rotor = assembly.rotor_of(scenario, begun.files)  # keep it: the stepped plant has addresses within it
+    stepped = rotor.start(np.array(section.initial_rad), np.array(section.initial_rad_s))
+    plant = assembly.plant_of(scenario, actuator, stepped, shared_buffers(scenario, groups))
+    states = np.full((len(disturbance) // every + 1, 6), np.nan)
+    states[0] = [*section.initial_rad, *section.initial_rad_s]
+    output = PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
+    _drive(plant, commands(groups), disturbance, output, every, states)
     return states
 
 
@@ -195,7 +213,7 @@ def _drive(
     plant: Any, commands: Array, disturbance: Array, delivered: Any, every: int, states: Array
 ) -> None:
     for tick in range(commands.shape[0]):
-        if plant_tick(plant, commands[tick], disturbance, delivered) != GOING:
+        if plant_tick(plant, commands[tick], disturbance[tick], delivered) != GOING:
             return
         if (tick + 1) % every == 0:
             row = states[(tick + 1) // every]

@@ -1,4 +1,4 @@
-"""Static friction: both engines against an event-driven integration of the same model, and at rest.
+"""Static friction: both engines against an event-driven integration of the same model.
 
 The reference knows neither the step nor the implicit method of `plant.bristle_friction`: DOP853 integrates
 the Lagrangian between the instants at which a slider begins to slip or sticks again.
@@ -14,19 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from spheretwin import assembly
-from spheretwin import scenario as scenarios
-from spheretwin.active_config import initial_config
+from spheretwin.crosscheck.coil_driven import drive_plant
 from spheretwin.crosscheck.part import Part
 from spheretwin.crosscheck.trajectories import ENGINES
 from spheretwin.models.actuator import Actuator
 from spheretwin.models.base.checks import Check
-from spheretwin.models.base.compiled import compiled
 from spheretwin.models.base.errors import EngineError
 from spheretwin.models.lagrangian import acceleration
 from spheretwin.plant.bristle_friction import LAST, SLIP_SHARES, StictionSection
-from spheretwin.plant.step import GOING, PlantOutput, plant_tick
-from spheretwin.shared_buffers import shared_buffers
 
 Array = NDArray[np.float64]
 
@@ -38,11 +33,6 @@ STICTION = StictionSection(on=True)
 # 1.3 to 1.7 times the break-away torques.
 AMPLITUDE_Nm, FREQUENCY_rad_s = np.array([5e-3, 6e-3, 4e-3]), 2 * np.pi * np.array([1.0, 1.3, 0.7])
 
-REST_s = 20.0
-LOAD = 0.5  # of the break-away torque
-DRIFT_rad = 1e-9
-
-
 TIGHT: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-13, "max_step": SAMPLE_s, "dense_output": True}
 
 
@@ -53,7 +43,7 @@ class Stiction(NamedTuple):
 
 
 def compare(mjcf: Path, actuator: Actuator) -> Stiction:
-    """Compare both engines with the reference, and load them at rest.
+    """Compare both engines with the reference.
 
     Parameters
     ----------
@@ -62,13 +52,12 @@ def compare(mjcf: Path, actuator: Actuator) -> Stiction:
     actuator : Actuator
         Its inertia is that of the Lagrangian.
     """
-    reference = Reference(actuator, STICTION, COULOMB_Nm)
-    expected, break_aways = reference.integrate(START_rad, DURATION_s)
-    checks = [
-        _motion(name, by_plant(mjcf, engine), expected, break_aways, actuator)
-        for name, engine in ENGINES.items()
-    ]
-    return Stiction([*checks, *(_rest(name, at_rest(mjcf, engine)) for name, engine in ENGINES.items())])
+    expected, break_aways = Reference(actuator, STICTION, COULOMB_Nm).integrate(START_rad, DURATION_s)
+    drop = max(COULOMB_Nm) * (STICTION.break_away - 1) / float(min(actuator.inertia))
+    bound = 1.5 * STEP_s * drop * break_aways
+    return Stiction(
+        [_motion(name, np.abs(by_plant(mjcf, engine) - expected), bound) for name, engine in ENGINES.items()]
+    )
 
 
 def torque_Nm(t_s: float) -> Array:
@@ -156,79 +145,32 @@ class Reference:
 
 
 def by_plant(mjcf: Path, engine: str) -> Array:
-    """Return the states (n + 1, 6) at the samples by the plant."""
-    middle_s = STEP_s * (np.arange(round(DURATION_s / STEP_s)) + 0.5)
-    return _driven(mjcf, engine, np.array([torque_Nm(t) for t in middle_s]), round(SAMPLE_s / STEP_s))
-
-
-def at_rest(mjcf: Path, engine: str) -> Array:
-    """Return the states (n + 1, 6) at whole seconds by the plant under `LOAD`."""
-    load = LOAD * STICTION.break_away * np.array(COULOMB_Nm)
-    return _driven(mjcf, engine, np.tile(load, (round(REST_s / STEP_s), 1)), round(1 / STEP_s))
-
-
-def _driven(mjcf: Path, engine: str, torque: Array, every: int) -> Array:
-    """Return the states at every so many steps under torques (n, 3) without currents."""
+    """Return the states (n + 1, 6) at the samples by the plant without currents."""
+    count = round(DURATION_s / STEP_s)
+    torque = np.array([torque_Nm(STEP_s * (step + 0.5)) for step in range(count)])
     fields: dict[str, Any] = {
-        "plant.mjcf": str(mjcf),
         "plant.engine": engine,
         "plant.initial_rad": START_rad,
         "plant.coulomb_Nm": COULOMB_Nm,
         "controller.period_s": STEP_s,
         **{f"plant.stiction.{name}": value for name, value in STICTION.model_dump().items()},
     }
-    config = initial_config(scenarios.load("hold", fields), None, None)
-    scenario, actuator = config.scenario, config.files.actuator
-    groups = len(actuator.groups)
-    rotor = assembly.rotor_of(scenario, config.files)  # keep it: the plant has addresses within it
-    plant = assembly.plant_of(
-        scenario, actuator, rotor.start(np.array(START_rad), np.zeros(3)), shared_buffers(scenario, groups)
-    )
-    states = np.full((len(torque) // every + 1, 6), np.nan)
-    states[0] = [*START_rad, 0, 0, 0]
-    output = PlantOutput(np.empty(groups), np.empty(groups), np.empty(3))
-    _drive(plant, np.zeros(groups), -torque, output, every, states)
-    return states
+    every = round(SAMPLE_s / STEP_s)
+    return drive_plant(mjcf, fields, lambda groups: np.zeros((count, groups)), -torque, every)
 
 
-@compiled
-def _drive(plant: Any, command: Array, disturbance: Array, output: Any, every: int, states: Array) -> None:
-    for tick in range(disturbance.shape[0]):
-        if plant_tick(plant, command, disturbance[tick], output) != GOING:
-            return
-        if (tick + 1) % every == 0:
-            for i in range(3):
-                states[(tick + 1) // every, i] = plant.rotor.q[i]
-                states[(tick + 1) // every, 3 + i] = plant.rotor.qdot[i]
-
-
-def _motion(name: str, states: Array, expected: Array, break_aways: int, actuator: Actuator) -> Check:
-    drop = max(COULOMB_Nm) * (STICTION.break_away - 1) / float(min(actuator.inertia))
-    difference = np.abs(states - expected)
+def _motion(name: str, difference: Array, bound: float) -> Check:
     return Check(
         name=f"static friction: motion, {name}",
         compares=f"all hinges under torques of 1.3 to 1.7 of break-away for {DURATION_s:g} s: rates, with"
         " DOP853 between the instants at which a slider slips or sticks",
-        states=len(expected),
+        states=len(difference),
         value=float(difference[:, 3:].max()),
-        bound=1.5 * STEP_s * drop * break_aways,
+        bound=bound,
         why="after each break-away the Stribeck effect begins a step and a half late at most; it takes the"
-        f" difference of both levels at most; {break_aways} break-aways",
+        " difference of both levels at most",
         unit="rad/s",
         detail={"largest difference of an angle, rad": float(difference[:, :3].max())},
-    )
-
-
-def _rest(name: str, states: Array) -> Check:
-    settled = states[2:, :3]
-    return Check(
-        name=f"static friction: rest, {name}",
-        compares=f"all hinges at rest under {LOAD:g} of break-away: drift from 2 to {REST_s:g} s",
-        states=len(settled),
-        value=float(np.ptp(settled, axis=0).max()),
-        bound=DRIFT_rad,
-        why="deflection does not creep; the elastic motion decays with 0.08 s, by a factor of 1e-11 in 2 s",
-        unit="rad",
     )
 
 

@@ -37,20 +37,23 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from spheretwin.models.base.compiled import allocation_free
 from spheretwin.models.lagrangian import InertiaEntries, inertia_entries, solve_inertia, triple, turns
-from spheretwin.plant.cable import CableSection
+from spheretwin.plant.cable import CableSection, acts
+from spheretwin.plant.friction import momentum
 
 Array = NDArray[np.float64]
 
-# Slip of the sliders of the bearing over `presliding_rad`.
 SLIP_SHARES = 0.5, 1.0
-LAST, CABLE = 1, 2
-"""Elements: the slider of the bearing that slips last, and the cable."""
-ELEMENTS = 3
+"""Slip of the sliders of the bearing over `presliding_rad`."""
+LAST, CABLE, ELEMENTS = 1, 2, 3
+"""Elements: the slider of the bearing that slips last, and the cable; their number."""
+
+# Rows of `BristleFriction.trial`: pose and rates at the start of the rotor's step; Stribeck factors, rates
+# and rotation at its end.
+START, START_RATE, FACTOR, RATE, TRAVEL = range(5)
 
 # Newton's method ends after one or two steps; where it cycles between two branches, steps with secants, which
 # cannot cycle, replace it.
-NEWTON_STEPS, MOST_STEPS = 10, 60
-TOLERANCE = 1e-13
+NEWTON_STEPS, MOST_STEPS, TOLERANCE = 10, 60, 1e-13
 
 # A slider slips if its deflection equals the limit of the last step, up to rounding.
 _SLIPS = 1.0 - 1e-9
@@ -70,40 +73,35 @@ class StictionSection(BaseModel):
         1.5, description="break-away torque of each hinge over plant.coulomb_Nm"
     )
     presliding_rad: Annotated[float, Field(ge=1e-9, le=1)] = Field(
-        1e-3,
-        description="rotation from the unloaded hinge to break-away, rad; elastic up to half of it, at 2/3 of"
-        " the break-away torque",
+        1e-3, description="rotation from the unloaded hinge to break-away, rad; elastic up to half of it"
     )
     damping_ratio: Annotated[float, Field(ge=0, le=10)] = Field(
-        0.3,
-        description="damping of the elastic motion of the rotor about a hinge at rest, over critical damping",
+        0.3, description="damping of the elastic motion about a hinge at rest, over critical damping"
     )
     stribeck_rad_s: Annotated[float, Field(ge=1e-6, le=1e3)] = Field(
-        0.05,
-        description="rate of slip, rad/s, at which 1/e of the difference between break-away and Coulomb"
-        " torque is left",
+        0.05, description="rate of slip with 1/e of the excess of break-away over Coulomb torque, rad/s"
     )
 
 
 class BristleFriction(NamedTuple):
     """Elements of a run with their state, for compiled code; the first index is the element."""
 
-    on: bool  # false if there is neither static friction nor a cable with hysteresis: no cost
+    on: bool  # false if there is neither static friction nor a cable: no cost
     stiffness_Nm_rad: Array  # (3, 3) by hinge
     damping_Nm_s: Array  # (3, 3) by hinge, only as long as an element does not slip
     slip_rad: Array  # (3,) largest deflection
     coulomb_share: float  # Coulomb level over break-away torque
     stribeck_rad_s: float
+    spring: Array  # (3, 3) stiffness of the cable, its neutral pose, its constant torque, by hinge
     implicitness: float  # 1/2 to 1
     inertia: Array  # (3,) kg·m² about the joint centre, modelling error and payload included
     step_s: float
     deflection_rad: Array  # (3, 3) state: by hinge
     stribeck_factor: Array  # (3,) state: of each hinge at the end of the last step
-    start_q: Array  # (3,) pose at the start of the step
-    start_qdot: Array  # (3,)
-    torque_q: (
-        Array  # (2, 3) N·m state: torque of bearing and cable, against the motion, mean over the last step
-    )
+    torque_q: Array  # (2, 3) N·m state: against bearing and cable, mean over the last step
+    spring_q: Array  # (3,) N·m on the hinges: spring and constant torque of the cable
+    first_cable_q: Array  # (3,) N·m on the hinges: cable, in the first step of the control period
+    trial: Array  # (5, 3) of the present step: rows below
 
     def state_arrays(self) -> tuple[Array, ...]:
         """Return the arrays that hold the state."""
@@ -130,42 +128,52 @@ def bristle_friction(
     step_s : float, s
         Physics step.
     """
-    break_away = stiction.break_away * np.array(coulomb_Nm) * stiction.on
     slip = np.array([*SLIP_SHARES, 0.0]) * stiction.presliding_rad
     slip[CABLE] = cable.hysteresis_rad
-    stiffness = np.zeros((ELEMENTS, 3))
-    stiffness[:CABLE] = break_away / slip[:CABLE].sum()
+    stiffness, damping = np.zeros((2, ELEMENTS, 3))
+    if stiction.on:
+        stiffness[:CABLE] = stiction.break_away * np.array(coulomb_Nm) / slip[:CABLE].sum()
+        # Critical damping is 2 sqrt(k J); each element has its share.
+        damping[:CABLE] = stiction.damping_ratio * np.sqrt(2.0 * stiffness[:CABLE] * inertia)
     stiffness[CABLE] = np.array(cable.hysteresis_Nm) / cable.hysteresis_rad
-    damping = np.zeros((ELEMENTS, 3))
-    # Critical damping is 2 sqrt(k J); each element has its share.
-    damping[:CABLE] = stiction.damping_ratio * np.sqrt(2.0 * stiffness[:CABLE] * inertia)
     # Squares of step times natural frequency, and of step times decay, at most.
     stiff = step_s**2 * stiffness.sum(axis=0).max() / inertia.min()
     stiff += (step_s * damping.sum(axis=0).max() / inertia.min()) ** 2
     return BristleFriction(
-        on=bool(stiffness.any()),
+        on=bool(stiffness.any()) or acts(cable),
         stiffness_Nm_rad=stiffness,
         damping_Nm_s=damping,
         slip_rad=slip,
         coulomb_share=1.0 / stiction.break_away,
         stribeck_rad_s=stiction.stribeck_rad_s,
+        spring=np.array([cable.stiffness_Nm_rad, cable.neutral_rad, cable.torque_Nm]),
         implicitness=0.5 + 0.5 * stiff / (stiff + 4.0),
         inertia=np.array(inertia, dtype=np.float64),
         step_s=float(step_s),
         deflection_rad=np.zeros((ELEMENTS, 3)),
         stribeck_factor=np.ones(3),
-        start_q=np.zeros(3),
-        start_qdot=np.zeros(3),
         torque_q=np.zeros((2, 3)),
+        spring_q=np.zeros(3),
+        first_cable_q=np.zeros(3),
+        trial=np.zeros((5, 3)),
     )
 
 
 @allocation_free
-def begin_bristles(bristles: BristleFriction, q: Array, qdot: Array, torque_q: Array) -> None:
-    """Store pose and rates (3,) at the start of the rotor's step, and apply the last torque in it."""
+def begin_bristles(
+    bristles: BristleFriction, middle_q: Array, q: Array, qdot: Array, torque_q: Array
+) -> None:
+    """Store pose and rates (3,) at the start of the rotor's step; add the cable and the last torque.
+
+    With the pose that is predicted for the middle of the step, q + h qdot / 2, and the torque held over the
+    step, the spring of the cable is of second order and preserves phase volume: it gains and loses no energy
+    on average. It is stable for a step below 2 sqrt(J / stiffness).
+    """
     for i in range(3):
-        bristles.start_q[i], bristles.start_qdot[i] = q[i], qdot[i]
-        torque_q[i] -= bristles.torque_q[0, i] + bristles.torque_q[1, i]
+        bristles.trial[START, i], bristles.trial[START_RATE, i] = q[i], qdot[i]
+        stretch = middle_q[i] - bristles.spring[1, i]
+        bristles.spring_q[i] = bristles.spring[2, i] - bristles.spring[0, i] * stretch
+        torque_q[i] += bristles.spring_q[i] - bristles.torque_q[0, i] - bristles.torque_q[1, i]
 
 
 @allocation_free
@@ -198,70 +206,50 @@ def apply_bristles(
     F is the mean torque over the path from 0 to d, which is integrated in closed form. For g = 1/2 this is
     the mean-value discrete gradient: exact work and second order. For large stiffness g rises to 1, as for
     implicit Euler (L-stable): g - 1/2 is of second order in the step. F rises with d, so that the solution is
-    unique.
-    Deflections follow the pose itself: at rest ``v = 0, d = 0`` is an exact solution, and nothing drifts.
+    unique. Deflections follow the pose itself: at rest ``v = 0, d = 0`` is an exact solution, without drift.
 
     Without other torques the sum of kinetic energy and energy of the springs never rises. Its change is
     ``-F.d + (energy of the springs) - (g - 1/2) h**2 F.M**-1 F``, and the work F.d is at least what the
     springs store: an implicit spring, damping and slip take energy, and a smaller slip deflection releases it
     as heat.
     """
-    h, g = bristles.step_s, bristles.implicitness
-    trial, before = triple(qdot), triple(bristles.start_qdot)
+    h, g, trial, former = bristles.step_s, bristles.implicitness, bristles.trial, bristles.torque_q
     M = inertia_entries(turns(triple(middle_q)), triple(bristles.inertia))
-    factors = (
-        _stribeck_factor(bristles, 0, 2.0 * middle_qdot[0] - last_qdot[0]),
-        _stribeck_factor(bristles, 1, 2.0 * middle_qdot[1] - last_qdot[1]),
-        _stribeck_factor(bristles, 2, 2.0 * middle_qdot[2] - last_qdot[2]),
-    )
-    first = (
-        q[0] - bristles.start_q[0] - h * (0.5 * trial[0] + (g - 0.5) * before[0]),
-        q[1] - bristles.start_q[1] - h * (0.5 * trial[1] + (g - 0.5) * before[1]),
-        q[2] - bristles.start_q[2] - h * (0.5 * trial[2] + (g - 0.5) * before[2]),
-    )
-    former = (
-        bristles.torque_q[0, 0] + bristles.torque_q[1, 0],
-        bristles.torque_q[0, 1] + bristles.torque_q[1, 1],
-        bristles.torque_q[0, 2] + bristles.torque_q[1, 2],
-    )
-    v0, v1, v2 = trial
+    for i in range(3):
+        trial[FACTOR, i] = _stribeck_factor(bristles, i, 2.0 * middle_qdot[i] - last_qdot[i])
+        trial[RATE, i] = qdot[i]
     for iteration in range(MOST_STEPS):
-        secant = iteration >= NEWTON_STEPS
-        F0, k0 = _hinge_torque(bristles, 0, first[0] + g * h * v0, factors[0], secant)
-        F1, k1 = _hinge_torque(bristles, 1, first[1] + g * h * v1, factors[1], secant)
-        F2, k2 = _hinge_torque(bristles, 2, first[2] + g * h * v2, factors[2], secant)
-        e0, e1, e2 = trial[0] - v0, trial[1] - v1, trial[2] - v2
+        for i in range(3):
+            implicit = (g - 0.5) * (trial[RATE, i] - trial[START_RATE, i])
+            correction = 0.5 * (trial[RATE, i] - qdot[i]) + implicit
+            trial[TRAVEL, i] = q[i] - trial[START, i] + h * correction
+        F0, k0 = _hinge_torque(bristles, 0, iteration >= NEWTON_STEPS)
+        F1, k1 = _hinge_torque(bristles, 1, iteration >= NEWTON_STEPS)
+        F2, k2 = _hinge_torque(bristles, 2, iteration >= NEWTON_STEPS)
+        p = momentum(M, (qdot[0] - trial[RATE, 0], qdot[1] - trial[RATE, 1], qdot[2] - trial[RATE, 2]))
         residual = (
-            M.alpha * e0 + M.alpha_beta * e1 + M.alpha_gamma * e2 - h * (F0 - former[0]),
-            M.alpha_beta * e0 + M.beta * e1 - h * (F1 - former[1]),
-            M.alpha_gamma * e0 + M.gamma * e2 - h * (F2 - former[2]),
+            p[0] - h * (F0 - former[0, 0] - former[1, 0]),
+            p[1] - h * (F1 - former[0, 1] - former[1, 1]),
+            p[2] - h * (F2 - former[0, 2] - former[1, 2]),
         )
-        hh = g * h * h
-        slopes = InertiaEntries(
-            M.alpha + hh * k0, M.beta + hh * k1, M.gamma + hh * k2, M.alpha_beta, M.alpha_gamma
-        )
-        s0, s1, s2 = solve_inertia(slopes, residual)
-        v0, v1, v2 = v0 + s0, v1 + s1, v2 + s2
-        size = max(abs(v0), abs(v1), abs(v2), abs(trial[0]), abs(trial[1]), abs(trial[2]))
-        if max(abs(s0), abs(s1), abs(s2)) <= TOLERANCE * size:
+        a, b, c = M.alpha + g * h * h * k0, M.beta + g * h * h * k1, M.gamma + g * h * h * k2
+        change = solve_inertia(InertiaEntries(a, b, c, M.alpha_beta, M.alpha_gamma), residual)
+        largest, size = 0.0, 0.0
+        for i in range(3):
+            trial[RATE, i] += change[i]
+            largest = max(largest, abs(change[i]))
+            size = max(size, abs(trial[RATE, i]), abs(qdot[i]))
+        if largest <= TOLERANCE * size:
             break
-    _advance(bristles, 0, first[0] + g * h * v0, v0, factors[0], q, qdot)
-    _advance(bristles, 1, first[1] + g * h * v1, v1, factors[1], q, qdot)
-    _advance(bristles, 2, first[2] + g * h * v2, v2, factors[2], q, qdot)
-
-
-@allocation_free
-def _advance(
-    bristles: BristleFriction, hinge: int, travel: float, rate: float, factor: float, q: Array, qdot: Array
-) -> None:
-    """Write the state of a hinge and of its elements at the end of the step."""
-    bristles.torque_q[0, hinge] = bristles.torque_q[1, hinge] = 0.0
-    for element in range(ELEMENTS):
-        torque, _, deflection = _element(bristles, element, hinge, travel, factor)
-        bristles.torque_q[element // CABLE, hinge] += torque
-        bristles.deflection_rad[element, hinge] = deflection
-    bristles.stribeck_factor[hinge] = factor
-    q[hinge], qdot[hinge] = bristles.start_q[hinge] + travel, rate
+    for i in range(3):
+        factor, travel = trial[FACTOR, i], trial[TRAVEL, i]
+        bristles.torque_q[0, i] = bristles.torque_q[1, i] = 0.0
+        for element in range(ELEMENTS):
+            torque, _, deflection = _element(bristles, element, i, travel, factor)
+            bristles.torque_q[element // CABLE, i] += torque
+            bristles.deflection_rad[element, i] = deflection
+        bristles.stribeck_factor[i] = factor
+        q[i], qdot[i] = trial[START, i] + travel, trial[RATE, i]
 
 
 @allocation_free
@@ -276,11 +264,10 @@ def _stribeck_factor(bristles: BristleFriction, hinge: int, rate: float) -> floa
 
 
 @allocation_free
-def _hinge_torque(
-    bristles: BristleFriction, hinge: int, travel: float, factor: float, secant: bool
-) -> tuple[float, float]:
-    """Return the mean torque against a rotation, N·m, and its slope or secant, N·m/rad."""
+def _hinge_torque(bristles: BristleFriction, hinge: int, secant: bool) -> tuple[float, float]:
+    """Return the mean torque against the trial rotation, N·m, and its slope or secant, N·m/rad."""
     torque, slope = 0.0, 0.0
+    factor, travel = bristles.trial[FACTOR, hinge], bristles.trial[TRAVEL, hinge]
     for element in range(ELEMENTS):
         own, own_slope, _ = _element(bristles, element, hinge, travel, factor)
         if secant and travel != 0.0:

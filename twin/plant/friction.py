@@ -115,18 +115,18 @@ def slow_down(
     t = 0.5 * friction.step_s
     v = triple(qdot)
     M = inertia_entries(turns(triple(q)), triple(friction.inertia))
-    momentum = _momentum(M, v)
-    middle = solve_inertia(_damped(friction, M, v, 0.5 * t), momentum)
-    slowed = solve_inertia(_damped(friction, M, middle, _POLE * t), momentum)
+    before = momentum(M, v)
+    middle = solve_inertia(_damped(friction, M, v, 0.5 * t), before)
+    slowed = solve_inertia(_damped(friction, M, middle, _POLE * t), before)
     for i in range(3):
         qdot[i] = (_RESIDUE * slowed[i]).real
-    gained = _momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]))
+    gained = momentum(M, (qdot[0] - v[0], qdot[1] - v[1], qdot[2] - v[2]))
     for i in range(3):
         mean_torque_q[i] += gained[i] / friction.step_s
 
 
 @allocation_free
-def _momentum(M: InertiaEntries, v: Triple) -> Triple:
+def momentum(M: InertiaEntries, v: Triple) -> Triple:
     """Return ``M v``."""
     return (
         M.alpha * v[0] + M.alpha_beta * v[1] + M.alpha_gamma * v[2],

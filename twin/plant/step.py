@@ -15,7 +15,6 @@ from spheretwin.models.kinematics import generalised_torque
 from spheretwin.models.magnetics import TorqueModel, fill_torque_matrix, rotor_torque
 from spheretwin.plant import lagrangian_rotor, mujoco_rotor
 from spheretwin.plant.bristle_friction import BristleFriction, apply_bristles, begin_bristles
-from spheretwin.plant.cable import Cable, pull
 from spheretwin.plant.friction import Friction, slow_down
 from spheretwin.plant.rotor import EngineKind
 
@@ -67,7 +66,6 @@ class Plant(NamedTuple):
     drive: DriveModel
     friction: Friction
     bristles: BristleFriction
-    cable: Cable
     group_gain: NDArray[np.float64]  # (n,) torque per ampere over that of the torque matrix
     unmodelled_torque: NDArray[np.float64]  # (3,) N·m on the hinges (paper: ΔG)
     hinge_range: NDArray[np.float64]  # (3, 2) rad
@@ -135,7 +133,7 @@ def plant_tick(
         plant.friction,
         plant.friction_q,
     )
-    drive, bristles, cable = plant.drive, plant.bristles, plant.cable
+    drive, bristles = plant.drive, plant.bristles
     begin(drive, command)
     for substep in range(plant.substeps):
         for i in range(3):
@@ -154,23 +152,21 @@ def plant_tick(
         generalised_torque(middle_q, torque_S, torque_q)
         for i in range(3):
             torque_q[i] -= disturbance[i] + unmodelled[i]
-        if cable.on:
-            pull(cable, middle_q, torque_q)
         if bristles.on:
-            begin_bristles(bristles, q, qdot, torque_q)
+            begin_bristles(bristles, middle_q, q, qdot, torque_q)
         step(rotor)
         if bristles.on:
             apply_bristles(bristles, middle_q, middle_qdot, last_qdot, q, qdot)
             for i in range(3):
                 friction_q[i] -= bristles.torque_q[0, i]
-                cable.torque_q[i] -= bristles.torque_q[1, i]
+                if substep == 0:
+                    bristles.first_cable_q[i] = bristles.spring_q[i] - bristles.torque_q[1, i]
         if friction.acts:
             slow_down(friction, q, qdot, friction_q)
         if substep == 0:
             copy_into(output.current, 0, mean_current, mean_current.shape[0])
             copy_into(output.torque_S, 0, torque_S, 3)
             copy_into(plant.first_friction_q, 0, friction_q, 3)
-            copy_into(cable.first_torque_q, 0, cable.torque_q, 3)
         for i in range(3):
             if not abs(qdot[i]) < FASTEST_RATE_rad_s:  # also if it is NaN
                 return DIVERGED
