@@ -83,9 +83,8 @@ def linearisation_data(scenario: ResolvedScenario, files: Files, *, nominal: boo
         inertia=rotor.inertia,
         weight_moment=rotor.weight_moment,
         viscous_Nm_s=np.array(section.viscous_Nm_s),
-        unmodelled_torque_Nm=np.array(section.modelling_torque_Nm)
-        - np.array(cable.torque_Nm)
-        - spring * np.array(cable.neutral_rad),
+        unmodelled_torque_Nm=np.subtract(section.modelling_torque_Nm, cable.torque_Nm)
+        - spring * cable.neutral_rad,
         spring_Nm_rad=spring,
         magnetics=Magnetics(
             files.actuator,
