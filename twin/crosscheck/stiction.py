@@ -98,7 +98,8 @@ class Reference:
         events = [partial(self._margin, *place) for place in np.ndindex(2, 3)]
         for event in events:
             event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
-        state, now, states, break_aways = np.concatenate([start_rad, np.zeros(3)]), 0.0, [], 0
+        states: list[Array] = []
+        state, now, break_aways = np.concatenate([start_rad, np.zeros(3)]), 0.0, 0
         while len(states) < len(t_s):
             solved = solve_ivp(self._flow, (now, t_s[-1]), state, "DOP853", events=events, **TIGHT)
             if not solved.success:
